@@ -1,0 +1,180 @@
+"""box2d-py 2.3.8 (Box2D 2.3), float32: collide at the old position, then one velocity solve, then push-out."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from typing import Any
+
+import Box2D
+import numpy as np
+
+from adapters.engine import Hit
+from adapters.float32 import must_fit, rounding
+from scenarios.model import Array, Scene, State
+
+VELOCITY_ITERATIONS, POSITION_ITERATIONS = 8, 3  # as the manual recommends; `Step` has no defaults
+
+
+class Box2DEngine:
+    """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
+
+    `matched`: the scene in other units. Box2D treats hits below 1 unit of length per unit of time as
+    inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The length unit
+    is the smallest radius, so that the slop (0.005) is 0.5 % of it; or the way of the fastest disk in a
+    step where that is longer, because nothing moves by more than 2 units a step. No friction, sleep,
+    continuous collision or wall skin; at e = 1 no push-out, because it adds energy.
+    """
+
+    def __init__(self, profile: str) -> None:
+        self.matched = profile == "matched"
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Build a new world in the profile's units."""
+        self.scene, self.dt, self.steps = scene, dt, 0
+        self.time = 1000.0 if self.matched else 1.0  # s in one unit of the engine's time
+        self.length = 1.0 / max(scene.radius.min(), fastest(scene) * dt) if self.matched else 1.0  # units in one m
+        self.speed = self.time * self.length
+        must_fit(
+            position=scene.position * self.length,
+            velocity=scene.velocity * self.speed,
+            radius=scene.radius * self.length,
+            mass=scene.mass,
+            inertia=scene.inertia * self.length**2,
+            angle=scene.angle,
+            angular_velocity=scene.angular_velocity * self.time,
+            walls=scene.walls * self.length,
+            gravity=scene.gravity * self.speed * self.time,
+        )
+        self.listener = Listener(self)
+        gravity = scene.gravity * self.speed * self.time
+        self.world = Box2D.b2World(gravity=vector(gravity), contactListener=self.listener)
+        if self.matched:
+            self.world.continuousPhysics = False
+            self.world.SetAllowSleeping(False)  # `doSleep` only sets a Python attribute that the engine never sees
+        self.position_iterations = 0 if self.matched and scene.restitution == 1 else POSITION_ITERATIONS
+        self.bodies = [self._disk(i) for i in range(scene.n)]
+        for w in range(len(scene.walls)):
+            self._wall(w)
+
+    def _surface(self) -> dict[str, float]:
+        return {"restitution": float(self.scene.restitution), **({"friction": 0.0} if self.matched else {})}
+
+    def _disk(self, i: int) -> Any:
+        scene, length = self.scene, self.length
+        shape = Box2D.b2CircleShape(radius=float(scene.radius[i]) * length)
+        fixture = Box2D.b2FixtureDef(shape=shape, density=1.0, **self._surface())
+        place = {"position": vector(scene.position[i] * length), "angle": float(scene.angle[i]), "userData": i}
+        if scene.static[i]:
+            return self.world.CreateStaticBody(**place, fixtures=fixture)
+        body = self.world.CreateDynamicBody(
+            **place,
+            linearVelocity=vector(scene.velocity[i] * self.speed),
+            angularVelocity=float(scene.angular_velocity[i]) * self.time,
+            **({"allowSleep": False} if self.matched else {}),
+        )
+        body.CreateFixture(fixture)
+        # After the fixture: adding one computes mass and inertia from its density.
+        inertia = float(scene.inertia[i]) * length**2
+        body.massData = Box2D.b2MassData(mass=float(scene.mass[i]), center=(0, 0), I=inertia)
+        return body
+
+    def _wall(self, w: int) -> None:
+        start, end = (vector(point * self.length) for point in self.scene.walls[w])
+        shape = Box2D.b2EdgeShape(vertices=[start, end])
+        if self.matched:
+            shape.radius = 0.0
+        body = self.world.CreateStaticBody(userData=-1 - w)
+        body.CreateFixture(Box2D.b2FixtureDef(shape=shape, **self._surface()))
+
+    def push(self, disk: int, force: Array, torque: float) -> None:
+        """Apply force and torque; `Step` clears both."""
+        per_time2 = self.time**2
+        self.bodies[disk].ApplyForceToCenter(vector(force * self.length * per_time2), True)
+        self.bodies[disk].ApplyTorque(float(torque * self.length**2 * per_time2), True)
+
+    def step(self, count: int = 1) -> None:
+        """`count` calls of `Step`; where the scene wraps, leavers are set over after each."""
+        dt = self.dt / self.time
+        for _ in range(count):
+            self.world.Step(dt, VELOCITY_ITERATIONS, self.position_iterations)
+            self.steps += 1
+            if self.scene.wrap is not None:
+                self._wrap()
+
+    def _wrap(self) -> None:
+        assert self.scene.wrap is not None
+        (x0, y0), (x1, y1) = (self.scene.wrap * self.length).tolist()
+        for body in self.bodies:
+            x, y = body.position
+            if not (x0 <= x <= x1 and y0 <= y <= y1):
+                over = (x1 if x < x0 else x0 if x > x1 else x, y1 if y < y0 else y0 if y > y1 else y)
+                body.transform = (over, body.angle)
+
+    def read(self) -> State:
+        """Attribute by attribute: box2d-py has no bulk read."""
+        n, bodies = self.scene.n, self.bodies
+        position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2) / self.length
+        velocity = np.array([tuple(b.linearVelocity) for b in bodies], float).reshape(n, 2) / self.speed
+        angle = np.array([b.angle for b in bodies], float)
+        angular_velocity = np.array([b.angularVelocity for b in bodies], float) / self.time
+        return State(position, velocity, angle, angular_velocity)
+
+    def hits(self) -> list[Hit]:
+        """From `PostSolve`, impulses back in N s."""
+        return [Hit(step, i, j, impulse / self.speed) for step, i, j, impulse in self.listener.log]
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """Resolved values are read back from the world and a fixture."""
+        matched, world = self.matched, self.world
+        fixture = self.bodies[0].fixtures[0]
+        iterations = f"{VELOCITY_ITERATIONS}, {self.position_iterations}"
+        return {
+            "unit of time in s": (self.time if matched else None, self.time),
+            "unit of length in m": (1 / self.length if matched else None, 1 / self.length),
+            "restitution threshold in m/s": (None, Box2D.b2_velocityThreshold / self.speed),
+            "linear slop in m": (None, Box2D.b2_linearSlop / self.length),
+            "speed cap in m per step": (None, Box2D.b2_maxTranslation / self.length),
+            "wall skin in m": (0.0 if matched else None, 0.0 if matched else Box2D.b2_polygonRadius / 2),
+            "friction": (0.0 if matched else None, fixture.friction),
+            "restitution": (self.scene.restitution, fixture.restitution),
+            "sleeping": (False if matched else None, world.GetAllowSleeping()),
+            "continuous collision": (False if matched else None, world.continuousPhysics),
+            "velocity, position iterations": (iterations, iterations),
+            "float32 rounding of the start in m": (None, rounding(self.scene)),
+        }
+
+    def versions(self) -> dict[str, str]:
+        """The package; it carries its own copy of Box2D 2.3."""
+        return {"box2d-py": version("box2d-py")}
+
+    def close(self) -> None:
+        """Drop the world; Box2D frees it with the last reference."""
+        self.world = self.bodies = self.listener = None  # type: ignore[assignment]
+
+
+def fastest(scene: Scene) -> float:
+    """m/s, of the fastest disk if it falls through the whole height of the scene."""
+    points = np.concatenate([scene.position, scene.walls.reshape(-1, 2)])
+    fall = np.ptp(points @ scene.gravity)
+    return float(np.sqrt((scene.velocity**2).sum(axis=1).max() + 2 * fall))
+
+
+class Listener(Box2D.b2ContactListener):
+    """Logs (step, i, j, impulse in the engine's units) of every contact that pushed."""
+
+    def __init__(self, engine: Box2DEngine) -> None:
+        super().__init__()
+        self.engine = engine
+        self.log: list[tuple[int, int, int, float]] = []
+
+    def PostSolve(self, contact: Any, impulse: Any) -> None:
+        """Called once a step for every touching pair, whether it pushed or not."""
+        J = impulse.normalImpulses[0]
+        if J > 0.0:
+            i, j = contact.fixtureA.body.userData, contact.fixtureB.body.userData
+            self.log.append((self.engine.steps, i, j, J))
+
+
+def vector(array: Array) -> tuple[float, float]:
+    """A pair of Python floats: the binding takes no numpy scalars."""
+    return float(array[0]), float(array[1])

@@ -1,0 +1,172 @@
+"""pyb2d3 0.11 (Box2D v3.1), float32: soft substeps with speculative contacts, then one restitution sweep."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from math import atan2, cos, pi, sin
+from typing import Any
+
+import numpy as np
+import pyb2d3
+
+from adapters.engine import Hit
+from adapters.float32 import must_fit, rounding
+from scenarios.model import Array, Scene, State
+
+SUBSTEPS = 4  # as the manual recommends; `step` has no default
+HERTZ, DAMPING_RATIO, PUSH_SPEED = 30.0, 10.0, 3.0  # the engine's contact tuning
+
+
+class Box2DV3:
+    """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
+
+    `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap; the length
+    unit is 2 % of the smallest radius, which shrinks slop and speculative margin with it.
+    """
+
+    def __init__(self, profile: str) -> None:
+        self.matched = profile == "matched"
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Build a new world; the length unit is global to the process, so each profile sets its own."""
+        must_fit(
+            position=scene.position, velocity=scene.velocity, radius=scene.radius, mass=scene.mass,
+            inertia=scene.inertia, angle=scene.angle, angular_velocity=scene.angular_velocity,
+            walls=scene.walls, gravity=scene.gravity,
+        )  # fmt: skip
+        self.scene, self.dt, self.steps = scene, dt, 0
+        self.log: list[Hit] = []
+        self.unit = float(0.02 * scene.radius.min()) if self.matched else 1.0
+        pyb2d3.set_length_units_per_meter(self.unit)
+        self.options = self._options()
+        self.world = pyb2d3.World(gravity=vector(scene.gravity), **self.options)
+        if self.matched:
+            self.world.continuous_enabled = False
+            self.world.sleeping_enabled = False
+            self.world.set_contact_tuning(HERTZ, DAMPING_RATIO, PUSH_SPEED)
+        self.world.hit_event_threshold = 0.0  # listening only: report every hit
+        self.bodies = [self._disk(i) for i in range(scene.n)]
+        for w in range(len(scene.walls)):
+            self._wall(w)
+        self.angle, self.spin, self.seen = np.array(scene.angle), np.array(scene.angular_velocity), 0
+
+    def _options(self) -> dict[str, float]:
+        return {"restitution_threshold": 0.0, "maximum_linear_speed": 1e9} if self.matched else {}
+
+    def _shape(self) -> Any:
+        friction = {"friction": 0.0} if self.matched else {}
+        material = pyb2d3.surface_material(restitution=float(self.scene.restitution), **friction)
+        return pyb2d3.shape_def(density=1.0, material=material, enable_hit_events=True)
+
+    def _disk(self, i: int) -> Any:
+        scene = self.scene
+        turn = pyb2d3.make_rot(0.0)  # make_rot(angle) is a polynomial, off by up to 1.7e-3 rad
+        turn.c, turn.s = cos(scene.angle[i]), sin(scene.angle[i])
+        if scene.static[i]:
+            body = self.world.create_static_body(position=vector(scene.position[i]), rotation=turn)
+        else:
+            body = self.world.create_dynamic_body(
+                position=vector(scene.position[i]),
+                rotation=turn,
+                linear_velocity=vector(scene.velocity[i]),
+                angular_velocity=float(scene.angular_velocity[i]),
+                **({"enable_sleep": False} if self.matched else {}),
+            )
+        body.user_data = i
+        body.create_circle_shape(self._shape(), pyb2d3.circle(radius=float(scene.radius[i])))
+        if not scene.static[i]:
+            mass = pyb2d3.MassData()
+            mass.mass, mass.rotational_inertia = float(scene.mass[i]), float(scene.inertia[i])
+            mass.center = (0.0, 0.0)
+            body.mass_data = mass
+        return body
+
+    def _wall(self, w: int) -> None:
+        body = self.world.create_static_body()
+        body.user_data = self.scene.n + w
+        start, end = self.scene.walls[w]
+        body.create_segment_shape(self._shape(), pyb2d3.segment(vector(start), vector(end)))
+
+    def push(self, disk: int, force: Array, torque: float) -> None:
+        """Apply force and torque; `step` clears both."""
+        self.bodies[disk].apply_force_to_center(vector(force))
+        self.bodies[disk].apply_torque(float(torque))
+
+    def step(self, count: int = 1) -> None:
+        """`count` calls of `step`; hit events live for one step, so they are collected after each."""
+        pyb2d3.set_length_units_per_meter(self.unit)  # another world may have set its own since
+        for _ in range(count):
+            self.world.step(self.dt, SUBSTEPS)
+            for hit in self.world.get_contact_events().hit_events():
+                i, j = hit.shape_a.body.user_data, hit.shape_b.body.user_data
+                self.log.append(Hit(self.steps, self._index(i), self._index(j), np.nan))
+            self.steps += 1
+            if self.scene.wrap is not None:
+                self._wrap()
+
+    def _index(self, user_data: int) -> int:
+        return user_data if user_data < self.scene.n else self.scene.n - 1 - user_data
+
+    def _wrap(self) -> None:
+        assert self.scene.wrap is not None
+        (x0, y0), (x1, y1) = self.scene.wrap.tolist()
+        for body in self.bodies:
+            x, y = body.position
+            if not (x0 <= x <= x1 and y0 <= y <= y1):
+                over = (x1 if x < x0 else x0 if x > x1 else x, y1 if y < y0 else y0 if y > y1 else y)
+                body.set_transform(over, body.rotation)
+
+    def read(self) -> State:
+        """Attribute by attribute; the engine keeps (cos, sin), so the angle is unwound from read to read."""
+        n, bodies = self.scene.n, self.bodies
+        position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2)
+        velocity = np.array([tuple(b.linear_velocity) for b in bodies], float).reshape(n, 2)
+        angular_velocity = np.array([b.angular_velocity for b in bodies], float)
+        return State(position, velocity, self._unwound(angular_velocity), angular_velocity)
+
+    def _unwound(self, spin: Array) -> Array:
+        """The angles nearest to where the mean spin since the last read would have brought them."""
+        raw = np.array([atan2(body.rotation.s, body.rotation.c) for body in self.bodies])
+        expected = self.angle + (self.spin + spin) / 2 * (self.steps - self.seen) * self.dt
+        self.angle = raw + 2 * pi * np.round((expected - raw) / (2 * pi))
+        self.spin, self.seen = spin, self.steps
+        return self.angle.copy()
+
+    def hits(self) -> list[Hit]:
+        """From the hit events, which tell the approach speed but no impulse."""
+        return self.log
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """Resolved values are read back where the binding lets one read them."""
+        matched, world, options = self.matched, self.world, self.options
+        return {
+            "length unit in m": (self.unit if matched else None, self.unit),
+            "restitution threshold in m/s": (options.get("restitution_threshold"), world.restitution_threshold),
+            "speed cap in m/s": (options.get("maximum_linear_speed"), 1e9 if matched else 400.0),
+            "linear slop in m": (None, 0.005 * self.unit),
+            "speculative margin in m": (None, 0.02 * self.unit),
+            "contact tuning (hertz, damping ratio, push speed in m/s)": (
+                "30, 10, 3" if matched else None,
+                "30, 10, 3",
+            ),
+            "friction": (0.0 if matched else None, self.bodies[0].shapes[0].friction),
+            "restitution": (self.scene.restitution, self.bodies[0].shapes[0].restitution),
+            "sleeping": (False if matched else None, world.sleeping_enabled),
+            "continuous collision": (False if matched else None, world.continuous_enabled),
+            "substeps": (SUBSTEPS, SUBSTEPS),
+            "float32 rounding of the start in m": (None, rounding(self.scene)),
+        }
+
+    def versions(self) -> dict[str, str]:
+        """The package; it carries its own copy of Box2D 3.1."""
+        return {"pyb2d3": version("pyb2d3")}
+
+    def close(self) -> None:
+        """Bodies before the world: using one afterwards is a segmentation fault."""
+        self.bodies = []
+        self.world = None
+
+
+def vector(array: Array) -> tuple[float, float]:
+    """A pair of Python floats."""
+    return float(array[0]), float(array[1])

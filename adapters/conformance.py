@@ -1,0 +1,82 @@
+"""The conformance suite: what is asked of every engine before a number of it is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
+
+import pandas as pd
+
+from adapters.engine import Unsupported
+from adapters.engines import ENGINES, Row
+from adapters.probe import Probe, Reading
+from adapters.probes_contract import CONTRACT
+from adapters.probes_physics import PHYSICS
+
+PROBES: dict[str, Probe] = CONTRACT | PHYSICS
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one probe found in one engine.
+
+    Attributes:
+        engine, profile: the row of `ENGINES`, `engine:profile`.
+        probe: a key of `PROBES`, or "make" for an engine that cannot be made.
+        asked: the question, one plain sentence.
+        got: the answer, a number in the unit of the question, or words.
+        expected: the answer of an engine that keeps to protocol and scene.
+        bound: how far a number may be from it.
+        verdict: "keeps"; "departs": plays by the protocol, but other physics than the scene states;
+            "breaks": no number of this engine may be trusted.
+        note: what was raised or refused, or what limits the reading.
+    """
+
+    engine: str
+    profile: str
+    probe: str
+    asked: str
+    got: float | str
+    expected: float | str
+    bound: float
+    verdict: str
+    note: str = ""
+
+
+def conform(name: str, row: Row) -> list[Finding]:
+    """One finding a probe, in the order of `PROBES`; only the finding "make" if the engine cannot be made.
+
+    Whatever an engine raises becomes a finding: a refusal (`Unsupported`) departs, all else breaks.
+    """
+    engine, profile = name.split(":")
+    try:
+        row.make().close()
+    except Exception as error:  # a missing library, or one that fails as it starts
+        reason = f"{type(error).__name__}: {error}"
+        return [Finding(engine, profile, "make", "Can the engine be made?", "no", "yes", 0.0, "breaks", reason)]
+    return [ask(engine, profile, probe, row) for probe in PROBES]
+
+
+def ask(engine: str, profile: str, name: str, row: Row) -> Finding:
+    """The finding of one probe."""
+    probe = PROBES[name]
+    try:
+        reading = probe.read(row)
+        verdict = "keeps" if reading.kept else probe.failure
+    except Unsupported as refusal:
+        reading, verdict = Reading("refused", "an answer", note=str(refusal)), "departs"
+    except Exception as error:  # an engine may raise anything; the finding says what
+        reading, verdict = Reading("raised", "an answer", note=f"{type(error).__name__}: {error}"), "breaks"
+    return Finding(
+        engine, profile, name, probe.asked, reading.got, reading.expected, reading.bound, verdict, reading.note
+    )
+
+
+def conform_all(names: Iterable[str]) -> list[Finding]:
+    """The findings of these rows of `ENGINES`, in their order."""
+    return [finding for name in names for finding in conform(name, ENGINES[name])]
+
+
+def to_table(findings: Iterable[Finding]) -> pd.DataFrame:
+    """A row a finding, a column a field of `Finding`."""
+    return pd.DataFrame([asdict(finding) for finding in findings], columns=[field.name for field in fields(Finding)])

@@ -1,0 +1,51 @@
+"""What an engine must be able to do to take part: a few verbs, no base class."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+from scenarios.model import Array, Scene, State
+
+
+class Unsupported(Exception):
+    """An engine cannot model this scene, and says why rather than approximate it."""
+
+
+class Hit(NamedTuple):
+    """One contact that pushed during step `step` (from 0): i and j in either order, wall w as -1 - w; N s.
+
+    A contact that lasts gives a hit in every step; `play` keeps where each one begins.
+    """
+
+    step: int
+    i: int
+    j: int
+    impulse: float
+
+
+class Engine(Protocol):
+    """The protocol. `read` gives all four arrays at the same instant, in the scene's order, static disks included."""
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Forget everything and build the scene for steps of `dt` s; raise `Unsupported` rather than approximate."""
+
+    def push(self, disk: int, force: Array, torque: float) -> None:
+        """Act on one disk during the next step only; N (world frame), N m; pushes add up."""
+
+    def step(self, count: int = 1) -> None:
+        """Advance `count` steps; the only call that is timed."""
+
+    def read(self) -> State:
+        """The present state, as float64 copies."""
+
+    def hits(self) -> list[Hit]:
+        """Every push of a contact since `load`, in order of steps."""
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """Setting -> (asked for, resolved by the engine), after `load`; asked None: the engine's own default."""
+
+    def versions(self) -> dict[str, str]:
+        """Library -> version, of all that decides the numbers."""
+
+    def close(self) -> None:
+        """Give everything back."""

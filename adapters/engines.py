@@ -1,0 +1,92 @@
+"""The table of players: a row an engine and profile. To add one, write its file and its row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from adapters.engine import Engine
+
+
+@dataclass(frozen=True)
+class Row:
+    """How to make an engine and what is known of it.
+
+    Attributes:
+        make: a new engine; imports its library only now.
+        summary: one line for `crosscheck list`.
+        alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t is
+            (alpha - 1/2) a dt t. A property of the order of updates, not an error of the adapter.
+        digits: relative precision of the numbers the engine keeps.
+    """
+
+    make: Callable[[], Engine]
+    summary: str
+    alpha: float
+    digits: float
+
+
+def _exercise() -> Engine:
+    from adapters.reference import Reference
+    from reference_impl import exercise
+
+    return Reference(exercise)
+
+
+def _lesson() -> Engine:
+    from adapters.reference import Reference
+    from reference_impl import lesson
+
+    return Reference(lesson)
+
+
+def _pymunk(profile: str) -> Engine:
+    from adapters.pymunk import Pymunk
+
+    return Pymunk(profile)
+
+
+def _box2d(profile: str) -> Engine:
+    from adapters.box2d import Box2DEngine
+
+    return Box2DEngine(profile)
+
+
+def _box2d_v3(profile: str) -> Engine:
+    from adapters.box2d_v3 import Box2DV3
+
+    return Box2DV3(profile)
+
+
+FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
+
+ENGINES: dict[str, Row] = {
+    "reference:exercise": Row(
+        _exercise, "hand-written solver of exercise 11: symplectic Euler, project, impulse", 1.0, FLOAT64
+    ),
+    "reference:lesson": Row(
+        _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
+    ),
+    "pymunk:shipped": Row(
+        partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64
+    ),
+    "pymunk:matched": Row(
+        partial(_pymunk, "matched"), "pymunk, matched: elasticity sqrt(e), 50 iterations, small slop", 0.0, FLOAT64
+    ),
+    "box2d:shipped": Row(
+        partial(_box2d, "shipped"), "box2d-py 2.3.8 as it comes: friction, sleep, threshold 1 m/s", 1.0, FLOAT32
+    ),
+    "box2d:matched": Row(
+        partial(_box2d, "matched"),
+        "box2d-py, matched: units that lift its thresholds; no friction, CCD, sleep", 1.0, FLOAT32
+    ),
+    "box2d_v3:shipped": Row(
+        partial(_box2d_v3, "shipped"),
+        "Box2D 3.1 (pyb2d3) as it comes: friction, sleep, threshold 1 m/s", 0.625, FLOAT32
+    ),
+    "box2d_v3:matched": Row(
+        partial(_box2d_v3, "matched"),
+        "Box2D 3.1, matched: no thresholds, small length unit, no friction", 0.625, FLOAT32
+    ),
+}  # fmt: skip

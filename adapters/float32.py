@@ -1,0 +1,24 @@
+"""What the two Box2Ds need because they compute in float32."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.engine import Unsupported
+from scenarios.model import Array, Scene
+
+
+def must_fit(**quantities: Array) -> None:
+    """Raise `Unsupported` if a number, in the engine's units, overflows in float32, or a size or mass underflows."""
+    largest, smallest = float(np.finfo(np.float32).max), float(np.finfo(np.float32).tiny)
+    for name, given in quantities.items():
+        values = np.abs(given)
+        too_small = values < smallest if name in ("radius", "mass", "inertia") else np.zeros_like(values, bool)
+        for bad in values[too_small | (np.isfinite(values) & (values > largest))]:
+            raise Unsupported(f"{name} {bad:g} does not fit into float32")
+
+
+def rounding(scene: Scene) -> float:
+    """Largest change of a start position by rounding to float32, in m."""
+    nearest: Array = scene.position.astype(np.float32).astype(np.float64)
+    return float(np.abs(nearest - scene.position).max())

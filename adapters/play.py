@@ -1,0 +1,171 @@
+"""The one loop that plays a scenario on an engine, and the `Run` it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from math import cos, sin
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Engine, Hit, Unsupported
+from scenarios.model import Array, Collisions, Scenario, State, Thrust, Trajectory, frozen
+
+STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
+RUNAWAY = 1e9  # m; no scene is this large, so a disk beyond it has been thrown
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What one engine made of one scenario at one dt.
+
+    Attributes:
+        engine, profile: the row of `ENGINES`, `engine:profile`.
+        scenario: its name.
+        dt: s.
+        status: one of `STATUSES`.
+        reason: why the status is not "ok", else "".
+        trajectory: the samples, up to where a diverged run left off; None if nothing was played.
+        seconds: wall time inside `step`, with the collision log on; no benchmark.
+        settings: setting -> (asked for, resolved).
+        versions: library -> version.
+    """
+
+    engine: str
+    profile: str
+    scenario: str
+    dt: float
+    status: str = "ok"
+    reason: str = ""
+    trajectory: Trajectory | None = None
+    seconds: float = 0.0
+    settings: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """`engine:profile`, the key in `ENGINES`."""
+        return f"{self.engine}:{self.profile}"
+
+
+def play(engine: Engine, name: str, scenario: Scenario, dt: float) -> Run:
+    """Play `scenario` in steps of `dt` s, which must divide its sample interval; `name` is `engine:profile`.
+
+    Refusals, exceptions and runaways become the run's status; only a dt that does not fit raises `ValueError`.
+    """
+    engine_name, profile = name.split(":")
+    substeps = round(scenario.sample_interval / dt)
+    if substeps < 1 or abs(substeps * dt - scenario.sample_interval) > 1e-9 * scenario.sample_interval:
+        raise ValueError(f"dt {dt:g} s does not divide the sample interval {scenario.sample_interval:g} s")
+    states: list[State] = []
+    hits: list[Hit] = []
+    settings: dict[str, tuple[Any, Any]] = {}
+    versions: dict[str, str] = {}
+    seconds = 0.0
+    status, reason = "ok", ""
+    try:
+        engine.load(scenario.scene, dt)
+        settings, versions = engine.settings(), engine.versions()
+        states.append(engine.read())
+        for k in range(scenario.samples):
+            seconds += advance(engine, scenario, k * substeps, substeps, dt)
+            states.append(engine.read())
+            if fault := fault_of(states[-1]):
+                status, reason = "diverged", f"{fault} at {(k + 1) * scenario.sample_interval:g} s"
+                break
+        hits = engine.hits()
+    except Unsupported as refusal:
+        status, reason = "unsupported", str(refusal)
+    except Exception as error:  # an engine may raise anything; the run says what
+        status, reason = "error", f"{type(error).__name__}: {error}"
+    trajectory = gather(scenario, states, first_hits(hits, dt)) if states else None
+    return Run(engine_name, profile, scenario.name, dt, status, reason, trajectory, seconds, settings, versions)
+
+
+def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: float) -> float:
+    """Advance `count` steps from step number `first`, pushing where a thrust is on; the seconds inside `step`."""
+    seconds = 0.0
+    for step, pushes in pushed_steps(scenario.thrusts, first, count, dt):
+        for thrust, share in pushes:
+            engine.push(thrust.disk, world_force(thrust, engine) * share, thrust.torque * share)
+        started = perf_counter()
+        engine.step(step)
+        seconds += perf_counter() - started
+    return seconds
+
+
+def pushed_steps(
+    thrusts: Sequence[Thrust], first: int, count: int, dt: float
+) -> Iterator[tuple[int, list[tuple[Thrust, float]]]]:
+    """Cut steps first .. first + count into (how many, pushes): one by one where a thrust is on, else in one go.
+
+    A push carries the share of the step during which its thrust is on, so that its impulse is exact.
+    """
+    if not thrusts:
+        yield count, []
+        return
+    free = 0
+    for step in range(first, first + count):
+        shares = [(t, min(t.stop / dt, step + 1) - max(t.start / dt, step)) for t in thrusts]
+        if pushes := [(t, share) for t, share in shares if share > 1e-9]:  # less is rounding of start / dt
+            if free:
+                yield free, []
+            yield 1, pushes
+            free = 0
+        else:
+            free += 1
+    if free:
+        yield free, []
+
+
+def world_force(thrust: Thrust, engine: Engine) -> Array:
+    """(2,) N in the world frame; a body-frame force is turned by the disk's angle at the start of the step."""
+    if thrust.frame == "world":
+        return thrust.force
+    angle = engine.read().angle[thrust.disk]
+    x, y = thrust.force
+    return np.array([cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y])
+
+
+def fault_of(state: State) -> str:
+    """What is wrong with a state that cannot be gone on from, or ""."""
+    for name in ("position", "velocity", "angle", "angular_velocity"):
+        values = getattr(state, name)
+        if not np.isfinite(values).all():
+            return f"{name} of disk {int(np.argwhere(~np.isfinite(values))[0][0])} is not finite"
+    if len(state.position) and (far := np.abs(state.position).max()) > RUNAWAY:
+        return f"a disk is {far:.3g} m away"
+    return ""
+
+
+def first_hits(hits: Sequence[Hit], dt: float) -> Collisions:
+    """One collision where a pair begins to push: pushes in consecutive steps are one. Its time is the step's end."""
+    if not hits:
+        return Collisions.of([])
+    step, i, j = (np.array(column) for column in list(zip(*hits))[:3])
+    impulse = np.array([hit.impulse for hit in hits])
+    low, high = np.minimum(i, j), np.maximum(i, j)
+    disk, other = np.where(low < 0, high, low), np.where(low < 0, low, high)
+    order = np.lexsort((step, other, disk))
+    step, disk, other, impulse = step[order], disk[order], other[order], impulse[order]
+    same_pair = (np.diff(disk, prepend=-1) == 0) & (np.diff(other, prepend=disk[0]) == 0)
+    begins = ~(same_pair & (np.diff(step, prepend=-9) <= 1))
+    order = np.flatnonzero(begins)[np.lexsort((other[begins], disk[begins], step[begins]))]
+    return Collisions(
+        frozen((step[order] + 1) * dt), frozen(disk[order], np.int64), frozen(other[order], np.int64),
+        frozen(impulse[order]),
+    )  # fmt: skip
+
+
+def gather(scenario: Scenario, states: Sequence[State], collisions: Collisions) -> Trajectory:
+    """States at the first samples of a scenario as a `Trajectory`."""
+    return Trajectory(
+        t=frozen(scenario.times[: len(states)]),
+        position=frozen([state.position for state in states]),
+        velocity=frozen([state.velocity for state in states]),
+        angle=frozen([state.angle for state in states]),
+        angular_velocity=frozen([state.angular_velocity for state in states]),
+        collisions=collisions,
+    )

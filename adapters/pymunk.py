@@ -1,0 +1,146 @@
+"""pymunk 7 (Munk2D, a fork of Chipmunk), float64: collide at the new position, then one velocity solve."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pymunk
+from pymunk import batch
+
+from adapters.engine import Hit
+from scenarios.model import Array, Scene, State
+
+FIELDS = (
+    batch.BodyFields.POSITION | batch.BodyFields.ANGLE | batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+)
+
+
+class Pymunk:
+    """`shipped`: restitution goes into every shape's elasticity, all else is pymunk's default.
+
+    `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; 50 iterations, because 10
+    lose energy in a dense gas; slop 1 % of the smallest radius, because the default 0.1 is a length in
+    the scene's units; at e = 1 no push-out, because it adds energy.
+    """
+
+    def __init__(self, profile: str) -> None:
+        self.matched = profile == "matched"
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Build a new space; static disks and walls are shapes on its static body."""
+        self.scene, self.dt, self.steps = scene, dt, 0
+        self.log: list[Hit] = []
+        self.space = pymunk.Space()
+        self.space.gravity = tuple(scene.gravity)
+        self.asked = self._asked()
+        for name, value in self.asked.items():
+            if name != "elasticity":
+                setattr(self.space, name, value)
+        self.bodies: list[pymunk.Body | None] = []
+        self.index: dict[pymunk.Shape, int] = {}
+        for i in range(scene.n):
+            self._add_disk(i)
+        for w, (start, end) in enumerate(scene.walls):
+            self._add_shape(pymunk.Segment(self.space.static_body, tuple(start), tuple(end), 0.0), -1 - w)
+        self.moving = np.flatnonzero(~scene.static)
+        self.space.on_collision(None, None, post_solve=self._record)
+        self.buffer = batch.Buffer()
+
+    def _asked(self) -> dict[str, Any]:
+        scene = self.scene
+        if not self.matched:
+            return {"elasticity": float(scene.restitution)}
+        asked: dict[str, Any] = {
+            "elasticity": float(np.sqrt(scene.restitution)),
+            "iterations": 50,
+            "collision_slop": float(0.01 * scene.radius.min()),
+        }
+        return asked | ({"collision_bias": 1.0} if scene.restitution == 1 else {})
+
+    def _add_disk(self, i: int) -> None:
+        scene = self.scene
+        if scene.static[i]:
+            self.bodies.append(None)
+            shape = pymunk.Circle(self.space.static_body, scene.radius[i], tuple(scene.position[i]))
+        else:
+            body = pymunk.Body(scene.mass[i], scene.inertia[i])
+            body.position, body.velocity = tuple(scene.position[i]), tuple(scene.velocity[i])
+            body.angle, body.angular_velocity = scene.angle[i], scene.angular_velocity[i]
+            self.space.add(body)
+            self.bodies.append(body)
+            shape = pymunk.Circle(body, scene.radius[i])
+        self._add_shape(shape, i)
+
+    def _add_shape(self, shape: pymunk.Shape, index: int) -> None:
+        shape.elasticity = self.asked["elasticity"]
+        self.space.add(shape)
+        self.index[shape] = index
+
+    def _record(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        impulse = arbiter.total_impulse.length
+        if impulse > 0.0:
+            a, b = arbiter.shapes
+            self.log.append(Hit(self.steps, self.index[a], self.index[b], impulse))
+
+    def push(self, disk: int, force: Array, torque: float) -> None:
+        """Add to the body's force and torque; pymunk clears both after a step."""
+        if (body := self.bodies[disk]) is not None:
+            body.force += tuple(force)
+            body.torque += torque
+
+    def step(self, count: int = 1) -> None:
+        """`count` calls of `space.step`; where the scene wraps, leavers are set over after each."""
+        for _ in range(count):
+            self.space.step(self.dt)
+            self.steps += 1
+            if self.scene.wrap is not None:
+                self._wrap()
+
+    def _wrap(self) -> None:
+        assert self.scene.wrap is not None
+        low, high = self.scene.wrap
+        position = self._rows()[:, :2]
+        for row in np.flatnonzero(((position < low) | (position > high)).any(axis=1)):
+            x = np.where(position[row] < low, high, np.where(position[row] > high, low, position[row]))
+            self.bodies[self.moving[row]].position = tuple(x)
+
+    def _rows(self) -> Array:
+        """(moving, 6): x, y, angle, vx, vy, angular velocity; static bodies follow in the buffer and are cut off."""
+        self.buffer.clear()
+        batch.get_space_bodies(self.space, FIELDS, self.buffer)
+        return np.frombuffer(self.buffer.float_buf()).reshape(-1, 6)[: len(self.moving)]
+
+    def read(self) -> State:
+        """One bulk read; the buffer is copied."""
+        scene, rows = self.scene, self._rows()
+        state = State(*(np.array(a) for a in (scene.position, scene.velocity, scene.angle, scene.angular_velocity)))
+        state.position[self.moving], state.angle[self.moving] = rows[:, :2], rows[:, 2]
+        state.velocity[self.moving], state.angular_velocity[self.moving] = rows[:, 3:5], rows[:, 5]
+        return state
+
+    def hits(self) -> list[Hit]:
+        """From `post_solve`."""
+        return self.log
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """Resolved values are read back from the space."""
+        shape = next(iter(self.index))
+        resolved = {
+            "elasticity": shape.elasticity,
+            "restitution of a pair": shape.elasticity**2,
+            "friction": shape.friction,
+            **{
+                name: getattr(self.space, name)
+                for name in ("iterations", "collision_slop", "collision_bias", "damping", "sleep_time_threshold")
+            },
+        }
+        return {name: (self.asked.get(name), value) for name, value in resolved.items()}
+
+    def versions(self) -> dict[str, str]:
+        """The wrapper and the C engine inside it."""
+        return {"pymunk": pymunk.version, "Munk2D": pymunk.chipmunk_version}
+
+    def close(self) -> None:
+        """Drop the space; pymunk frees it with the last reference."""
+        self.space = self.bodies = self.index = None  # type: ignore[assignment]

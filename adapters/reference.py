@@ -1,0 +1,82 @@
+"""The hand-written solver of `reference_impl` as a player."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Hit
+from reference_impl.state import World, make_disks
+from scenarios.model import Array, Scene, State
+
+
+class Reference:
+    """Plays one variant, `reference_impl.exercise` or `reference_impl.lesson`."""
+
+    def __init__(self, variant: ModuleType) -> None:
+        self.variant = variant
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Copy the scene into the solver's arrays."""
+        self.dt, self.steps = dt, 0
+        self.log: list[Hit] = []
+        self.disks = make_disks(
+            scene.position, scene.velocity, scene.radius, scene.mass,
+            scene.inertia, scene.angle, scene.angular_velocity,
+        )  # fmt: skip
+        low, high = (np.full(2, -np.inf), np.full(2, np.inf)) if scene.wrap is None else scene.wrap
+        self.world = World(
+            restitution=float(scene.restitution), gravity=np.array(scene.gravity),
+            walls=np.array(scene.walls), low=np.array(low), high=np.array(high),
+        )  # fmt: skip
+        self.pushed = False
+        self.variant.advance(self.disks, self.world, dt, 0)  # compiles, if nobody has yet
+
+    def push(self, disk: int, force: Array, torque: float) -> None:
+        """Add to the disk's force and torque; `step` clears both."""
+        self.disks.force[disk] += force
+        self.disks.torque[disk] += torque
+        self.pushed = True
+
+    def step(self, count: int = 1) -> None:
+        """One call into the compiled solver; a push lasts for the first step only."""
+        if self.pushed:
+            self._advance(1)
+            self.disks.force.fill(0.0)
+            self.disks.torque.fill(0.0)
+            self.pushed = False
+            count -= 1
+        self._advance(count)
+
+    def _advance(self, count: int) -> None:
+        done = self.steps
+        hits = self.variant.advance(self.disks, self.world, self.dt, count)
+        self.log += [Hit(done + k, i, j, impulse) for k, i, j, impulse in hits]
+        self.steps += count
+
+    def read(self) -> State:
+        """Copies of the solver's arrays."""
+        disks = self.disks
+        return State(disks.position.copy(), disks.velocity.copy(), disks.angle.copy(), disks.angular_velocity.copy())
+
+    def hits(self) -> list[Hit]:
+        """As the solver returned them."""
+        return self.log
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """What the two variants leave free; the rest is the scene."""
+        return {
+            "integrator": (None, "symplectic Euler" if "exercise" in self.variant.__name__ else "explicit Euler"),
+            "projection split": (None, "by inverse mass"),
+            "impulse on separating pairs": (None, not self.world.approaching_only),
+        }
+
+    def versions(self) -> dict[str, str]:
+        """The compiler decides the last bit."""
+        return {"numba": version("numba"), "numpy": version("numpy")}
+
+    def close(self) -> None:
+        """Nothing is held outside Python."""

@@ -1,0 +1,1 @@
+"""Everything a person looks at: the comparison, its tables and charts, the page, the command line."""

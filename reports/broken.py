@@ -1,0 +1,77 @@
+"""How far a trajectory breaks the laws it should keep, sample by sample, relative to what is at hand.
+
+Each function returns (k,) numbers, or None where the law says nothing. Samples at which the truth has just
+hit, or is about to, are nan where the truth is what is compared with.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reports import laws
+from reports.view import View
+from scenarios.model import Array, Scenario, Thrust
+
+
+def momentum(view: View) -> Array | None:
+    """|P(t) - P(0) - impulse from outside| over the largest sum of m|v|.
+
+    From outside come weight and world-frame thrust. Where walls, static disks or a turning thrust act, nobody
+    knows the impulse without asking the player.
+    """
+    if view.other is not None or not knows_impulses(view.scenario):
+        return None
+    scene, played = view.scenario.scene, view.played
+    actual = laws.momentum(played, scene)
+    expected = actual[0] + np.outer(played.t, laws.moving_mass(scene).sum() * scene.gravity)
+    for thrust in view.scenario.thrusts:
+        expected = expected + np.outer(time_on(thrust, played.t), thrust.force)
+    return np.linalg.norm(actual - expected, axis=1) / (laws.momentum_scale(played, scene) or 1.0)
+
+
+def angular_momentum(view: View) -> Array | None:
+    """|L(t) - L(0) - angular impulse from outside|, about the origin, over the largest sum of m|x||v| + I|w|.
+
+    The weight of the whole, at the centre of mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts
+    where its disk is, which only the player knows, and a wrap moves disks: there the law says nothing.
+    """
+    scene, played = view.scenario.scene, view.played
+    silent = scene.wrap is not None or view.scenario.thrusts or not knows_impulses(view.scenario)
+    if view.other is not None or silent:
+        return None
+    m, g, t = laws.moving_mass(scene), scene.gravity, played.t
+    lever = np.outer(t, m @ played.position[0]) + np.outer(t**2 / 2, m @ played.velocity[0])
+    actual = laws.angular_momentum(played, scene)
+    expected = actual[0] + lever[:, 0] * g[1] - lever[:, 1] * g[0]
+    return np.abs(actual - expected) / (laws.angular_momentum_scale(played, scene) or 1.0)
+
+
+def energy(view: View) -> Array | None:
+    """|E(t) - E_expected(t)| over the energy at hand (kinetic, and what a disk can gain by falling).
+
+    At e = 1 without thrust E_expected is E(0); else it is the truth's.
+    """
+    scene, conserved = view.scenario.scene, keeps_energy(view.scenario)
+    if conserved == (view.other is not None):
+        return None
+    actual = laws.energy(view.played, scene)
+    if view.other is None:
+        return np.abs(actual - actual[0]) / (laws.energy_scale(view.played, scene) or 1.0)
+    off = np.abs(actual - laws.energy(view.other, scene)) / (laws.energy_scale(view.other, scene) or 1.0)
+    return np.where(view.calm, off, np.nan)
+
+
+def knows_impulses(scenario: Scenario) -> bool:
+    """Whether all that acts from outside is weight and world-frame thrust."""
+    fixed = len(scenario.scene.walls) or scenario.scene.static.any()
+    return not fixed and all(thrust.frame == "world" for thrust in scenario.thrusts)
+
+
+def keeps_energy(scenario: Scenario) -> bool:
+    """Whether no hit takes energy and no thrust brings any."""
+    return scenario.scene.restitution == 1 and not scenario.thrusts
+
+
+def time_on(thrust: Thrust, t: Array) -> Array:
+    """(k,) s for which the thrust has been on by `t`."""
+    return np.clip(t - thrust.start, 0.0, thrust.stop - thrust.start)

@@ -1,0 +1,156 @@
+"""What the commands do: check what is asked for, do it, say it. Bad input is one clear message and exit 2."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from rich.console import Console
+from rich.table import Table
+
+from adapters.engines import ENGINES
+from reports.metrics import METRICS
+from reports.report import make_report
+from reports.suite import FolderTaken, Plan, carry_out, may_write, replace_folder
+from reports.terminal import print_summary
+from scenarios.catalogue import DRAWN, SCENARIOS, scenario
+from scenarios.files import SceneFileError
+
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def run_plan(
+    scenes: Sequence[str],
+    engines: Sequence[str],
+    dts: Sequence[float],
+    full: bool,
+    seed: int,
+    out: Path,
+    workers: int,
+    command: str,
+) -> NoReturn:
+    """Play, compare, report into `out`; exits 0, 1 (an engine could not be compared at all), 2 or 130."""
+    plan = Plan(
+        scenes=checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
+        engines=checked_engines(engines),
+        seed=seed,
+        dts=dts,
+        full=full,
+        workers=workers or os.cpu_count() or 1,
+        command=command,
+    )
+    try:
+        may_write(out)
+        out.parent.mkdir(parents=True, exist_ok=True)
+    except (FolderTaken, OSError) as fault:
+        refuse([str(fault)])
+    part = out.with_name(f"{out.name}.part-{os.getpid()}")
+    try:
+        carry_out(plan, part)
+        report = make_report(part)
+    except KeyboardInterrupt:
+        say(f"\nInterrupted. What was played is kept: crosscheck report {part}")
+        sys.exit(INTERRUPTED)
+    except OSError as fault:
+        say(f"cannot write to {part}: {fault}; what was played before is kept there")
+        sys.exit(FAILED)
+    replace_folder(part, out)
+    print_summary(report, str((out / "report.html").resolve()))
+    played = report.runs[report.runs.status == "ok"]
+    names = set(played.engine + ":" + played.profile)
+    if lost := [name for name in plan.engines if name not in names]:
+        say(f"no cell of {', '.join(lost)} was played to its end: see the status column of {out / 'runs.csv'}")
+    sys.exit(FAILED if lost else DONE)
+
+
+def report_again(out: Path) -> NoReturn:
+    """Tables and page from the journal in `out`."""
+    if not (out / "journal.jsonl").is_file():
+        refuse([f"{out}: has no journal.jsonl, so it is not the folder of a run"])
+    try:
+        report = make_report(out)
+    except (ValueError, KeyError, StopIteration) as fault:
+        refuse([f"{out}: the journal cannot be used: {fault}"])
+    print_summary(report, str((out / "report.html").resolve()))
+    sys.exit(DONE)
+
+
+def explain(what: str) -> None:
+    """A line for every engine, scenario and metric, or for one of the three kinds."""
+    kinds = {
+        "engines": ("engine:profile", {name: row.summary for name, row in ENGINES.items()}),
+        "scenarios": ("scenario", {name: _line(name) for name in SCENARIOS}),
+        "metrics": ("metric, unit", {f"{name}, {row.unit}": row.summary for name, row in METRICS.items()}),
+    }
+    if what and what not in kinds:
+        refuse([unknown("list", what, kinds)])
+    console = Console()
+    for kind, (heading, lines) in kinds.items():
+        if what in ("", kind):
+            table = Table(heading, "what it is", title=f"{len(lines)} {kind}", title_justify="left")
+            for name, line in lines.items():
+                table.add_row(name, line)
+            console.print(table)
+
+
+def _line(name: str) -> str:
+    drawn = " (drawn from --seed)" if name in DRAWN else ""
+    return scenario(name).asks + drawn
+
+
+def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int) -> list[str]:
+    """The scenes asked for, once each; exits 2 with every fault of every scene, one line each."""
+    scenes = list(dict.fromkeys(scenes))
+    faults: list[str] = []
+    names: dict[str, str] = {}
+    for scene in scenes:
+        if not scene.endswith(".toml") and scene not in SCENARIOS:
+            faults.append(unknown("scenario", scene, SCENARIOS) + " (a scene file ends in .toml)")
+            continue
+        try:
+            name = Plan([scene], [], seed, dts, full, 1, "").scenario(scene).name
+        except SceneFileError as error:
+            faults += error.faults
+        except ValueError as error:
+            faults.append(str(error))
+        else:
+            if name in names or (scene.endswith(".toml") and name in SCENARIOS):
+                faults.append(f"{scene}: name = {name!r}: taken by {names.get(name, 'a scenario of the catalogue')}")
+            names[name] = scene
+    if faults:
+        refuse(faults)
+    return scenes
+
+
+def checked_engines(asked: Sequence[str]) -> list[str]:
+    """The rows of `ENGINES` that NAME or NAME:PROFILE stand for, in their order; all if nothing is asked."""
+    chosen = set()
+    for name in asked:
+        matching = {row for row in ENGINES if name in (row, row.split(":")[0])}
+        if not matching:
+            refuse([unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)})])
+        chosen |= matching
+    return [row for row in ENGINES if row in chosen or not asked]
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> str:
+    """A sentence that names what is near."""
+    near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
+    hint = f"did you mean {' or '.join(near)}?" if near else "see: crosscheck list"
+    return f"{kind} {name!r} is not known; {hint}"
+
+
+def refuse(faults: Sequence[str]) -> NoReturn:
+    """Say what is wrong, one line each, and exit 2."""
+    for fault in faults:
+        say(fault)
+    sys.exit(BAD_INPUT)
+
+
+def say(line: str) -> None:
+    """One line on standard error, as it is."""
+    print(line, file=sys.stderr)

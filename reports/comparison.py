@@ -1,0 +1,87 @@
+"""Runs of one scenario set against the truth and against each other, as one tidy table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from adapters.play import Run
+from reports.metrics import METRICS
+from reports.view import Value, View
+from scenarios.model import Collisions, Scenario, Trajectory
+
+COLUMNS = (
+    "scenario", "engine", "profile", "dt_s", "metric", "disk", "value", "unit", "versus", "at_s", "note",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """One scenario, all that was played of it, and what came out.
+
+    Attributes:
+        scenario: the question.
+        truth: the exact answer up to its horizon, or None.
+        runs: every run, failed and refused ones too, in the order of `ENGINES`, coarse dt first.
+        table: one number a row, columns `COLUMNS`.
+    """
+
+    scenario: Scenario
+    truth: Trajectory | None
+    runs: Sequence[Run]
+    table: pd.DataFrame
+
+
+def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
+    """Every metric of every run against the laws, the truth and every other engine at the same dt."""
+    truth = scenario.truth(scenario.times) if scenario.truth else None
+    rows: list[dict] = []
+    for run in runs:
+        if run.status != "ok":
+            rows.append(_row(run, "status", Value(np.nan, note=f"{run.status}: {run.reason}"), "", "itself"))
+        if run.trajectory is None:
+            continue
+        for versus, other in _opponents(run, runs, truth):
+            rows += _measure(scenario, run, versus, other)
+    return Comparison(scenario, truth, tuple(runs), pd.DataFrame(rows, columns=list(COLUMNS)))
+
+
+def _opponents(run: Run, runs: Sequence[Run], truth: Trajectory | None) -> Iterator[tuple[str, Trajectory | None]]:
+    """What a run is set against: the laws, the truth, and each engine that stands after it in the list."""
+    yield "itself", None
+    if truth is not None:
+        yield "truth", truth
+    for other in runs[runs.index(run) + 1 :]:
+        if other.dt == run.dt and other.name != run.name and other.trajectory is not None:
+            yield other.name, other.trajectory
+
+
+def _measure(scenario: Scenario, run: Run, versus: str, other: Trajectory | None) -> list[dict]:
+    assert run.trajectory is not None
+    kind = versus if versus in ("itself", "truth") else "engine"
+    k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
+    view = View(scenario, run.dt, cut(run.trajectory, k), None if other is None else cut(other, k))
+    rows = []
+    for name, metric in METRICS.items():
+        if kind in metric.against and (value := metric.of(view)) is not None:
+            rows.append(_row(run, name, value, metric.unit, versus))
+    return rows
+
+
+def cut(trajectory: Trajectory, k: int) -> Trajectory:
+    """The first `k` samples and the hits up to the last of them."""
+    if k == len(trajectory):
+        return trajectory
+    names = ("t", "position", "velocity", "angle", "angular_velocity")
+    hits = trajectory.collisions
+    early = hits.t <= trajectory.t[k - 1]
+    kept = Collisions(hits.t[early], hits.i[early], hits.j[early], hits.impulse[early])
+    return replace(trajectory, **{name: getattr(trajectory, name)[:k] for name in names}, collisions=kept)
+
+
+def _row(run: Run, metric: str, value: Value, unit: str, versus: str) -> dict:
+    numbers = (value.disk, value.value, unit, versus, value.at, value.note)
+    return dict(zip(COLUMNS, (run.scenario, run.engine, run.profile, run.dt, metric, *numbers)))

@@ -1,0 +1,83 @@
+"""The finding in three sentences, computed from the table: nothing here is written by hand but the grammar."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from reports.comparison import Comparison
+
+FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
+
+
+def findings(comparisons: Sequence[Comparison]) -> list[str]:
+    """Three sentences: who is closest, what settings are worth, where each fails."""
+    off = at_middle_step(comparisons, "position_max_radii", "truth")
+    statuses = [run.status for comparison in comparisons for run in comparison.runs]
+    return [closest(off), worth_of_settings(off), where_it_fails(off, statuses)]
+
+
+def at_middle_step(comparisons: Sequence[Comparison], metric: str, versus: str | None = None) -> pd.DataFrame:
+    """A metric at the middle of each dt ladder: a row a scenario, a column an `engine:profile`, NaN where absent."""
+    tables = []
+    for comparison in comparisons:
+        table = comparison.table
+        rows = table[(table.metric == metric) & (table.dt_s == middle_dt(comparison))]
+        tables.append(rows if versus is None else rows[rows.versus == versus])
+    if not tables or not sum(map(len, tables)):
+        return pd.DataFrame()
+    rows = pd.concat(tables)
+    rows = rows.assign(name=rows.engine + ":" + rows.profile)
+    wide = rows.pivot(index="scenario", columns="name", values="value")
+    return wide.reindex(index=rows.scenario.unique(), columns=rows.name.unique())
+
+
+def middle_dt(comparison: Comparison) -> float:
+    """s, the step size at which a scenario is read when one must be chosen."""
+    scenario = comparison.scenario
+    return scenario.dt(scenario.substeps[len(scenario.substeps) // 2])
+
+
+def closest(off: pd.DataFrame) -> str:
+    """Who comes closest to the exact answers."""
+    if off.empty:
+        return "No scene here has an exact answer, so nobody is scored: only laws and differences are shown."
+    medians = off.median().sort_values()
+    best, *others = (f"{name} ({value:.2g})" for name, value in medians.items())
+    wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())  # within 1 % counts as equal
+    ranking = f", then {', '.join(others[:2])}" + (f", last {others[-1]}" if len(others) > 2 else "") if others else ""
+    return (
+        f"Closest to the exact answers, by the largest deviation in radii, median of {len(off)} scenes: {best}, "
+        f"unbeaten in {wins}{ranking}."
+    )
+
+
+def worth_of_settings(off: pd.DataFrame) -> str:
+    """How much of an engine's deviation is its settings."""
+    parts = []
+    for engine in dict.fromkeys(name.split(":")[0] for name in off.columns):
+        shipped, matched = f"{engine}:shipped", f"{engine}:matched"
+        if shipped in off and matched in off:
+            closer = int((off[matched] < 0.99 * off[shipped]).sum())
+            farther = int((off[matched] > 1.01 * off[shipped]).sum())
+            parts.append(f"{engine} closer in {closer} (farther in {farther})")
+    if not parts:
+        return "No engine was played in both profiles, so the worth of settings is not known from this run."
+    return f"Matching an engine to the scene brings {', '.join(parts)} of {len(off)} scenes."
+
+
+def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
+    """Scenes in which an engine ends up more than a radius away, and cells without a result."""
+    failed = sum(status != "ok" for status in statuses)
+    cells = f"{failed} of {len(statuses)} cells were not played to their end."
+    lost = off > FAR_OFF
+    if off.empty or not lost.any(axis=None):
+        return f"Nobody is off by more than a radius; {cells}" if not off.empty else cells
+    counts = lost.sum().sort_values(ascending=False, kind="stable")
+    who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
+    defeated = lost.sum(axis=1)
+    return (
+        f"More than a whole radius off: {who} of {len(off)} scenes; the hardest is {defeated.idxmax()}, which defeats "
+        f"{defeated.max()} of {lost.shape[1]}; {cells}"
+    )

@@ -1,0 +1,75 @@
+"""Known answers from outside: SimBenchmark's published bouncing test, made again by adapters and by six lines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from adapters.engines import ENGINES
+from scenarios.placing import lay_out
+
+KNOWN_SCENE = "simbenchmark_bouncing"  # whose run brings this table along
+SOURCE = "leggedrobotics/SimBenchmark, data/bouncing/sample.csv"
+DISKS, MASS, RADIUS, HEIGHT, GRAVITY, DURATION = 49, 10.0, 0.1, 5.0, 9.81, 20.0
+ENERGY = DISKS * MASS * GRAVITY * HEIGHT  # 24034.5 J
+
+# dt in s -> mean over the steps of (E - 24034.5 J)^2 in J2, as published.
+PUBLISHED = {
+    "ODE": {1e-2: 18808.3, 1e-3: 185.027, 1e-4: 1.85055},
+    "Bullet": {1e-2: 7.40664e6, 1e-3: 75245.4, 1e-4: 752.345},
+}
+MEANING = (
+    "49 balls of 10 kg dropped from 5 m on a floor, e = 1, for 20 s: SimBenchmark ranked six engines by how well they "
+    "keep the energy here. Its ODE column comes out of pymunk, digit for digit, and its Bullet column out of six lines "
+    "of Python that apply gravity and then reflect. So that ranking is the order of operations inside a step (reflect "
+    "the velocity from before or from after gravity), not the quality of contacts."
+)
+
+
+def known_answers() -> pd.DataFrame:
+    """Mean squared energy error as published and as made again; columns column, made_by, dt_s, published_J2, ..."""
+    rows = []
+    for dt, published in PUBLISHED["ODE"].items():
+        rows.append(("ODE", "pymunk:matched", dt, published, mean_squared_error_of("pymunk:matched", dt), SOURCE))
+    for dt, published in PUBLISHED["Bullet"].items():
+        rows.append(("Bullet", "gravity, then reflect", dt, published, gravity_then_reflect(dt), SOURCE))
+    columns = ["column", "made_by", "dt_s", "published_J2", "ours_J2", "source"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def mean_squared_error_of(name: str, dt: float) -> float:
+    """J2 from one disk of an engine times 49: the disks never meet. E is taken before each step, as published."""
+    scene = lay_out(
+        position=[[0.0, HEIGHT]], velocity=[[0.0, 0.0]], radius=[RADIUS], mass=[MASS], restitution=1.0,
+        gravity=[0.0, -GRAVITY], walls=[[[-1.0, 0.0], [1.0, 0.0]]],
+    )  # fmt: skip
+    engine = ENGINES[name].make()
+    engine.load(scene, dt)
+    steps = round(DURATION / dt)
+    y, v = np.empty(steps), np.empty(steps)
+    for k in range(steps):
+        state = engine.read()
+        y[k], v[k] = state.position[0, 1], state.velocity[0, 1]
+        engine.step()
+    engine.close()
+    return mean_squared_error(y, v)
+
+
+def gravity_then_reflect(dt: float) -> float:
+    """J2 of a symplectic Euler step whose reflection sees the velocity gravity has already changed."""
+    steps = round(DURATION / dt)
+    ys, vs = np.empty(steps), np.empty(steps)
+    y, v = HEIGHT, 0.0
+    for k in range(steps):
+        ys[k], vs[k] = y, v
+        v -= GRAVITY * dt
+        if y < RADIUS and v < 0:
+            v = -v
+        y += v * dt
+    return mean_squared_error(ys, vs)
+
+
+def mean_squared_error(y: np.ndarray, v: np.ndarray) -> float:
+    """Mean over the steps of (E - 24034.5 J)^2 in J2, for 49 disks that do as this one."""
+    energy = DISKS * (MASS * GRAVITY * y + MASS * v**2 / 2)
+    return float(((energy - ENERGY) ** 2).mean())

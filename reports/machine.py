@@ -1,0 +1,37 @@
+"""What every table and page carries: machine, versions, seed, command."""
+
+from __future__ import annotations
+
+import os
+import platform
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from reports.cells import source_hash, versions
+
+
+def about(command: str, seed: int) -> dict[str, Any]:
+    """The header of a run."""
+    return {
+        "command": command,
+        "seed": seed,
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": {**versions(), "Python": platform.python_version(), "players' source": source_hash()},
+        "machine": {
+            "system": f"{platform.system()} {platform.release()}",
+            "architecture": platform.machine(),
+            "processor": processor(),
+            "cores": os.cpu_count() or 1,
+        },
+    }
+
+
+def processor() -> str:
+    """The processor's name where the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown"

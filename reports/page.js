@@ -1,0 +1,147 @@
+"use strict";
+// The page around the players: charts drawn when they come into view, the legend, the index, light and dark.
+
+const looks = JSON.parse(document.getElementById("looks").textContent);
+const darkness = matchMedia("(prefers-color-scheme: dark)");
+const darkPage = () => darkness.matches;
+const drawn = new Map();  // the element of a chart -> its figure as JSON text, on light
+
+function themed(text) {
+  if (!darkPage()) return JSON.parse(text);
+  return JSON.parse(Object.values(looks).reduce((all, look) => all.replaceAll(look.light, look.dark), text));
+}
+
+function layoutOf(figure) {
+  const css = getComputedStyle(document.documentElement);
+  const [text, line, soft] = ["--text", "--line", "--soft"].map((name) => css.getPropertyValue(name).trim());
+  const axis = { gridcolor: line, linecolor: line, zeroline: false, ticks: "outside", tickcolor: line, automargin: true };
+  const layout = figure.layout;
+  for (const name of ["xaxis", "yaxis"]) {
+    const title = layout[name].title;
+    layout[name] = { ...layout[name], ...axis, title: { ...title, font: { size: 12 }, standoff: 8 } };
+  }
+  return {
+    ...layout, template: null, showlegend: false, height: 290, margin: { l: 58, r: 12, t: 26, b: 44 },
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: "system-ui, sans-serif", size: 12, color: text },
+    dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",  // a finger scrolls the page
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: soft, activecolor: text },
+    hoverlabel: { font: { family: "system-ui, sans-serif" }, namelength: -1 },
+  };
+}
+
+function drawChart(plot, text) {
+  const figure = themed(text);
+  const off = hiddenIn(plot.closest(".scenario"));
+  for (const trace of figure.data) trace.visible = !off.has(trace.name);
+  drawn.set(plot, text);
+  return Plotly.react(plot, figure.data, layoutOf(figure), {
+    responsive: true, displaylogo: false,
+    modeBarButtons: [["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]],  // none that goes online
+  });
+}
+
+function hiddenIn(scenario) {
+  const off = [...scenario.querySelectorAll(".legend input:not(:checked)")];
+  return new Set(off.map((box) => box.value));
+}
+
+async function openCharts(scenario) {
+  const charts = JSON.parse(new TextDecoder().decode(await unpack(`charts:${scenario.dataset.name}`)));
+  const watch = new IntersectionObserver((entries) => {
+    for (const entry of entries.filter((each) => each.isIntersecting)) {
+      watch.unobserve(entry.target);
+      drawChart(entry.target, JSON.stringify(charts[entry.target.dataset.chart]));
+    }
+  }, { rootMargin: "300px" });
+  scenario.querySelectorAll(".plot").forEach((plot) => watch.observe(plot));
+}
+
+async function openPlayer(scenario) {
+  const element = scenario.querySelector(".player");
+  if (!element) return;
+  const player = new Player(element, readPack(await unpack(`replay:${scenario.dataset.name}`)), looks);
+  hiddenIn(scenario).forEach((name) => player.hidden.add(name));
+  player.seek(0);
+  players[scenario.dataset.name] = player;
+}
+
+function openScenario(scenario) {
+  openPlayer(scenario);
+  openCharts(scenario);
+  const boxes = [...scenario.querySelectorAll(".legend input")];
+  boxes.forEach((box) => { box.onchange = () => showLayers(scenario, [box]); });
+  scenario.querySelectorAll(".picks button").forEach((button) => {
+    button.onclick = () => {
+      boxes.forEach((box) => { box.checked = Boolean(button.dataset.all); });
+      showLayers(scenario, boxes);
+    };
+  });
+}
+
+// Shows or hides in the replay and in the charts what these boxes of the legend stand for.
+function showLayers(scenario, boxes) {
+  boxes.forEach((box) => players[scenario.dataset.name]?.show(box.value, box.checked));
+  const shown = new Map(boxes.map((box) => [box.value, box.checked]));
+  scenario.querySelectorAll(".plot").forEach((plot) => {
+    const traces = (plot.data || []).map((trace, k) => [trace.name, k]).filter(([name]) => shown.has(name));
+    if (!traces.length) return;
+    Plotly.restyle(plot, { visible: traces.map(([name]) => shown.get(name)) }, traces.map(([, k]) => k));
+  });
+}
+
+function watchScenarios() {
+  const near = new IntersectionObserver((entries) => {
+    for (const entry of entries.filter((each) => each.isIntersecting)) {
+      near.unobserve(entry.target);
+      openScenario(entry.target);
+    }
+  }, { rootMargin: "600px" });
+  const links = new Map([...document.querySelectorAll("#index a")].map((a) => [a.hash.slice(1), a]));
+  const here = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      const link = links.get(entry.target.id);
+      if (entry.isIntersecting) {
+        links.forEach((other) => other.removeAttribute("aria-current"));
+        link?.setAttribute("aria-current", "true");
+        keepInSight(link);
+      } else if (!entry.isIntersecting) players[entry.target.dataset.name]?.stop();
+    }
+  }, { rootMargin: "-15% 0px -75% 0px" });
+  document.querySelectorAll(".scenario").forEach((scenario) => near.observe(scenario));
+  document.querySelectorAll("section[id]").forEach((section) => here.observe(section));
+}
+
+// The index scrolls by itself, and never moves the page while it does.
+function keepInSight(link) {
+  const list = document.querySelector("#index .list");
+  if (!link || list.clientHeight >= list.scrollHeight) return;
+  const [inner, outer] = [link.getBoundingClientRect(), list.getBoundingClientRect()];
+  if (inner.top < outer.top || inner.bottom > outer.bottom) list.scrollTop += inner.top - outer.top - outer.height / 2;
+}
+
+function startIndex() {
+  const index = document.getElementById("index");
+  const wide = matchMedia("(min-width: 1000px)");
+  const arrange = () => { index.open = wide.matches; };
+  wide.addEventListener("change", arrange);
+  arrange();
+  index.addEventListener("click", (event) => { if (event.target.closest("a") && !wide.matches) index.open = false; });
+  const filter = index.querySelector("input");
+  filter.addEventListener("input", () => {
+    const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
+    index.querySelectorAll("li[data-find]").forEach((item) => {
+      item.hidden = !words.every((word) => item.dataset.find.includes(word));
+    });
+    index.querySelectorAll(".family").forEach((family) => {
+      family.hidden = !family.querySelector("li:not([hidden])");
+    });
+  });
+}
+
+darkness.addEventListener("change", () => {
+  drawn.forEach((text, plot) => drawChart(plot, text));
+  Object.values(players).forEach((player) => player.draw());
+});
+startIndex();
+watchScenarios();

@@ -1,0 +1,225 @@
+"""Writes report.html: one file that holds everything it shows and asks nothing of anywhere."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from adapters.play import Run
+from reports import overview, style
+from reports.charts import CHARTS, POINTS, Drawing, middle_dt
+from reports.comparison import Comparison
+from reports.known_answers import MEANING
+from reports.metrics import METRICS
+from reports.replay import frames, name_of, pack, played, ratio_of
+from scenarios.catalogue import SCENARIOS
+
+HERE = Path(__file__).parent
+SCRIPTS = ("player.js", "player_canvas.js", "page.js")
+VERDICTS = ("keeps", "departs", "breaks")
+FAMILIES = {
+    "scenarios.lesson": "The lesson",
+    "scenarios.pairs": "Two disks meet",
+    "scenarios.walls": "Walls, floors and fixed disks",
+    "scenarios.rows": "Disks in a row",
+    "scenarios.thrusts": "Pushes and spin",
+    "scenarios.exercise": "The exercise",
+    "scenarios.crowds": "Crowds",
+}
+OWN = "Scenes of your own"
+
+
+@dataclass(frozen=True)
+class Section:
+    """One scenario as the page shows it."""
+
+    comparison: Comparison
+    family: str
+    dt: float
+    failures: list[overview.Failure]
+    drawings: dict[str, Drawing]
+    charts: str
+    replay: str
+    layers: list[tuple[str, Run | None]]
+    frames: int
+    ratio: float
+    table: list[tuple[str, str, str, list[overview.Cell]]]
+    settings: dict[str, list[tuple[str, str, str]]]
+    pairs: dict[str, list[overview.Cell]]
+
+
+def write_page(
+    path: Path,
+    comparisons: Sequence[Comparison],
+    *,
+    findings: Sequence[str],
+    conformance: pd.DataFrame,
+    known_answers: pd.DataFrame,
+    about: Mapping[str, Any],
+) -> None:
+    """Write the page of `comparisons`, in reading order, to `path`.
+
+    `findings` are the sentences on top; `conformance` and `known_answers` the tables below them; `about` holds
+    command, seed, machine, versions, started and seconds.
+    """
+    names = overview.names_of(comparisons)
+    common = overview.common_settings(comparisons)
+    sections = [section_of(comparison, names, common) for comparison in comparisons]
+    scripts = [get_plotlyjs(), *((HERE / script).read_text() for script in SCRIPTS)]
+    environment = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
+    )
+    environment.filters["number"] = style.number
+    looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
+    html = environment.get_template("page.html.j2").render(
+        names=names, sections=sections, families=by_family(sections), findings=findings, about=about, points=POINTS,
+        engines=versions_of(comparisons), steps=step_range(comparisons), columns=overview.SUMMARY, looks=looks,
+        summary=overview.summary(comparisons, names), heat_map=overview.heat_map(comparisons, names),
+        conformance=conformance_matrix(conformance), departures=departures(conformance), probes=records(conformance),
+        known_answers=records(known_answers), known_answers_text=about.get("known_answers_text", MEANING),
+        css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
+        policy=content_policy(scripts),
+        heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, truth_of=truth_of,
+        common=by_name(common),
+    )  # fmt: skip
+    path.write_text(html, encoding="utf-8")
+
+
+def section_of(comparison: Comparison, names: Sequence[str], common: overview.Settings) -> Section:
+    """All that the page shows of one scenario; of its settings those that are not `common`."""
+    own = {key: pair for key, pair in overview.settings(comparison).items() if key not in common}
+    drawings = {key: chart.draw(comparison) for key, chart in CHARTS.items()}
+    builder = SCENARIOS.get(comparison.scenario.name)
+    layers = played(comparison)
+    module = getattr(getattr(builder, "func", builder), "__module__", "")
+    return Section(
+        comparison=comparison,
+        family=FAMILIES.get(module, OWN),
+        dt=middle_dt(comparison.scenario),
+        failures=overview.failures(comparison),
+        drawings=drawings,
+        charts=packed_charts(drawings),
+        replay=pack(comparison),
+        layers=[(name_of(run), run) for run, _ in layers],
+        frames=len(frames(comparison.scenario, layers)) if layers else 0,
+        ratio=ratio_of(comparison.scenario, layers),
+        table=overview.scenario_table(comparison, names),
+        settings=by_name(own),
+        pairs=overview.between_engines(comparison, names),
+    )
+
+
+def packed_charts(drawings: Mapping[str, Drawing]) -> str:
+    """The figures as JSON, deflated, as base64; what they share with every other figure is left to page.js."""
+    figures = {}
+    for key, drawing in drawings.items():
+        if drawing.figure is not None:
+            figures[key] = drawing.figure.to_dict()
+            figures[key]["layout"].pop("template", None)
+    text = json.dumps(figures, separators=(",", ":"), default=list)
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
+
+
+def by_family(sections: Sequence[Section]) -> dict[str, list[Section]]:
+    """The sections under their headings, both in the order of appearance."""
+    families: dict[str, list[Section]] = {}
+    for section in sections:
+        families.setdefault(section.family, []).append(section)
+    return families
+
+
+def versions_of(comparisons: Sequence[Comparison]) -> dict[str, str]:
+    """engine -> its libraries and their versions, as its runs say."""
+    found: dict[str, dict[str, str]] = {}
+    for comparison in comparisons:
+        for run in comparison.runs:
+            found.setdefault(run.engine, {}).update(run.versions)
+    return {
+        engine: ", ".join(f"{library} {version[:16]}" for library, version in libraries.items())
+        for engine, libraries in found.items()
+    }
+
+
+def step_range(comparisons: Sequence[Comparison]) -> tuple[float, float]:
+    """s, the smallest and the largest step size of all runs."""
+    steps = [run.dt for comparison in comparisons for run in comparison.runs]
+    return (min(steps), max(steps)) if steps else (np.nan, np.nan)
+
+
+def by_name(settings: overview.Settings) -> dict[str, list[tuple[str, str, str]]]:
+    """`engine:profile` -> its (setting, asked, used)."""
+    found: dict[str, list[tuple[str, str, str]]] = {}
+    for (name, setting), (asked, used) in settings.items():
+        found.setdefault(name, []).append((setting, asked, used))
+    return found
+
+
+def truth_of(comparison: Comparison) -> str:
+    """What is known of the right answer, in a sentence."""
+    scenario, truth = comparison.scenario, comparison.truth
+    if truth is None:
+        return f"none: {scenario.without_truth or 'the scene comes without an exact answer'}"
+    ends = "at every sample"
+    if truth.valid_until < scenario.duration:
+        ends = f"up to its horizon at {style.number(truth.valid_until)} s, and no further"
+    return f"exact {ends}" + (f"; off by at most {style.number(truth.error_bound)} m" if truth.error_bound else "")
+
+
+def records(table: pd.DataFrame | None) -> list[dict[str, Any]]:
+    """The rows of a table; [] if there is none."""
+    rows = [] if table is None else table.to_dict("records")
+    return [{str(column): value for column, value in row.items()} for row in rows]
+
+
+def conformance_matrix(table: pd.DataFrame) -> dict[str, dict[str, tuple[str, int]]]:
+    """probe -> `engine:profile` -> (the worst verdict, how many of its questions got it)."""
+    order = VERDICTS
+    matrix: dict[str, dict[str, tuple[str, int]]] = {}
+    for row in records(table):
+        name = f"{row['engine']}:{row['profile']}"
+        worst, count = matrix.setdefault(str(row["probe"]), {}).get(name, ("keeps", 0))
+        verdict = row["verdict"] if row["verdict"] in order else "breaks"
+        if order.index(verdict) > order.index(worst):
+            worst, count = verdict, 0
+        matrix[str(row["probe"])][name] = (worst, count + (verdict == worst))
+    return matrix
+
+
+def departures(table: pd.DataFrame) -> dict[str, list[dict[str, Any]]]:
+    """`engine:profile` -> the rows of what it does not keep."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for row in records(table):
+        if row["verdict"] != "keeps":
+            found.setdefault(f"{row['engine']}:{row['profile']}", []).append(row)
+    return found
+
+
+def css() -> str:
+    """The page's style sheet with the colours of style.py in front, for light and for dark."""
+    light, dark = style.css_variables(dark=False), style.css_variables(dark=True)
+    return f":root{{{light}}}@media(prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (HERE / "page.css").read_text()
+
+
+def looks_as_json(looks: Mapping[str, style.Look]) -> str:
+    """The looks for the scripts, with no `<` that could end the block they stand in."""
+    shown = {name: look._asdict() | {"path": look.path} for name, look in looks.items()}
+    return json.dumps(shown).replace("<", "\\u003c")
+
+
+def content_policy(scripts: Sequence[str]) -> str:
+    """A Content-Security-Policy by which the browser runs these scripts only and fetches nothing."""
+    hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in hashes)
+    return f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"

@@ -1,0 +1,169 @@
+"use strict";
+// How the player's picture is drawn: the plane fitted into the canvas, walls, paths, disks, hits, the scale bar.
+
+const HIT_LASTS = 0.12;  // s of the wall clock at speed 1: long enough to be seen
+const FEW = 24;  // more disks than this are drawn without paths and centre marks
+
+Object.assign(Player.prototype, {
+  fit() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;  // page.css fits the height to the view
+    if (!width) return;
+    const [left, bottom, right, top] = this.pack.view;
+    const margin = 16, foot = 18;  // px around the picture, and below it for the scale bar
+    const sharp = window.devicePixelRatio || 1;
+    this.scale = Math.min((width - 2 * margin) / (right - left), (height - 2 * margin - foot) / (top - bottom));
+    this.centre = [(width - this.scale * (left + right)) / 2, (height - foot + this.scale * (top + bottom)) / 2];
+    Object.assign(this.canvas, { width: Math.round(width * sharp), height: Math.round(height * sharp) });
+    this.size = [width, height, sharp];
+    this.draw();
+  },
+
+  pixel([x, y]) { return [this.centre[0] + this.scale * x, this.centre[1] - this.scale * y]; },
+
+  draw() {
+    if (!this.size) return;
+    const pen = this.canvas.getContext("2d");
+    const css = getComputedStyle(this.element);
+    this.ink = { text: css.getPropertyValue("--text"), soft: css.getPropertyValue("--soft"), wall: css.getPropertyValue("--wall") };
+    pen.setTransform(this.size[2], 0, 0, this.size[2], 0, 0);
+    pen.clearRect(0, 0, this.size[0], this.size[1]);
+    this.drawWalls(pen);
+    const layers = this.pack.layers.filter((layer) => !this.hidden.has(layer.name));
+    const few = this.pack.radius.length <= FEW;
+    this.drawStatic(pen);
+    if (few) layers.forEach((layer) => this.drawPath(pen, layer));
+    layers.forEach((layer, k) => this.ended(layer) || this.drawDisks(pen, layer, few, layers.length - k));
+    layers.forEach((layer) => this.drawHits(pen, layer));
+    this.drawScaleBar(pen);
+    this.note.textContent = layers.filter((layer) => this.ended(layer))
+      .map((layer) => `${layer.name} ends at ${layer.ends} s`).join("; ");
+  },
+
+  colour(layer) { return this.looks[layer.name][darkPage() ? "dark" : "light"]; },
+
+  drawWalls(pen) {
+    pen.setLineDash([]);
+    pen.strokeStyle = this.ink.wall;
+    pen.lineWidth = 2;
+    for (const [x0, y0, x1, y1] of this.pack.walls) {
+      pen.beginPath();
+      pen.moveTo(...this.pixel([x0, y0]));
+      pen.lineTo(...this.pixel([x1, y1]));
+      pen.stroke();
+    }
+    if (!this.pack.wrap) return;
+    const [left, bottom, right, top] = this.pack.wrap;
+    pen.setLineDash([2, 4]);
+    pen.lineWidth = 1;
+    pen.strokeRect(...this.pixel([left, top]), this.scale * (right - left), this.scale * (top - bottom));
+  },
+
+  // Nobody moves these, so they are drawn once, and for all.
+  drawStatic(pen) {
+    const [layer] = this.pack.layers;
+    pen.fillStyle = this.ink.wall;
+    this.pack.radius.forEach((radius, disk) => {
+      if (!this.pack.static[disk]) return;
+      pen.beginPath();
+      pen.arc(...this.pixel([0, 1].map((axis) => this.coordinate(layer, 0, disk, axis))), radius * this.scale, 0, 2 * Math.PI);
+      pen.fill();
+    });
+  },
+
+  // Where the centres go in the whole replay, faintly: the still picture then says what happens.
+  drawPath(pen, layer) {
+    const box = this.pack.wrap;
+    pen.setLineDash([]);
+    pen.globalAlpha = 0.3;
+    pen.lineWidth = 1;
+    pen.strokeStyle = this.colour(layer);
+    this.pack.radius.forEach((_, disk) => {
+      if (this.pack.static[disk]) return;
+      let before = null;
+      pen.beginPath();
+      for (let k = 0; k < layer.frames; k++) {
+        const here = [this.coordinate(layer, k, disk, 0), this.coordinate(layer, k, disk, 1)];
+        const jumps = before && box && [0, 1].some((a) => Math.abs(here[a] - before[a]) > (box[2 + a] - box[a]) / 2);
+        before && !jumps ? pen.lineTo(...this.pixel(here)) : pen.moveTo(...this.pixel(here));
+        before = here;
+      }
+      pen.stroke();
+    });
+    pen.globalAlpha = 1;
+  },
+
+  drawDisks(pen, layer, few, rank) {
+    const look = this.looks[layer.name];
+    const truth = layer.name === "truth";
+    const colour = this.colour(layer);
+    pen.strokeStyle = pen.fillStyle = colour;
+    this.pack.radius.forEach((radius, disk) => {
+      if (this.pack.static[disk]) return;
+      const [x, y] = this.pixel(this.place(layer, disk));
+      const r = Math.max(1.5, radius * this.scale);
+      pen.beginPath();
+      pen.arc(x, y, r, 0, 2 * Math.PI);
+      pen.globalAlpha = 0.09;
+      if (!truth) pen.fill();
+      pen.globalAlpha = 1;
+      pen.setLineDash(look.dash);
+      // Coinciding outlines stay visible as rings in each other: the lower the layer, the wider its line.
+      pen.lineWidth = truth ? 1.2 : few ? 1.4 + 0.45 * Math.min(rank, 8) : 1.2;
+      pen.stroke();
+      pen.setLineDash([]);
+      pen.lineWidth = 1.2;
+      if (layer.turns) this.drawSpoke(pen, [x, y], r, this.angle(layer, disk));
+      if (few && !truth && r > 9) this.drawMark(pen, look, x, y);
+    });
+  },
+
+  drawSpoke(pen, [x, y], r, angle) {
+    pen.beginPath();
+    pen.moveTo(x, y);
+    pen.lineTo(x + r * Math.cos(angle), y - r * Math.sin(angle));
+    pen.stroke();
+  },
+
+  drawMark(pen, look, x, y) {
+    const mark = new Path2D(look.path);
+    pen.save();
+    pen.translate(x, y);
+    look.filled ? pen.fill(mark) : pen.stroke(mark);
+    pen.restore();
+  },
+
+  drawHits(pen, layer) {
+    const lasts = HIT_LASTS * Math.max(this.speed, 0.25);
+    for (const hit of layer.hitList) {
+      const age = (this.time - hit.t) / lasts;
+      if (age < 0 || age > 1 || hit.i >= this.pack.radius.length) continue;
+      const [x, y] = this.pixel(this.place(layer, hit.i));
+      pen.globalAlpha = 1 - age;
+      pen.strokeStyle = this.colour(layer);
+      pen.lineWidth = 2;
+      pen.beginPath();
+      pen.arc(x, y, this.pack.radius[hit.i] * this.scale + 3 + 9 * age, 0, 2 * Math.PI);
+      pen.stroke();
+      pen.globalAlpha = 1;
+    }
+  },
+
+  drawScaleBar(pen) {
+    const [width, height] = this.size;
+    const wanted = (0.2 * width) / this.scale;
+    const power = 10 ** Math.floor(Math.log10(wanted));
+    const length = power * [5, 2, 1].find((k) => k * power <= wanted);
+    const right = width - 12;
+    pen.strokeStyle = pen.fillStyle = this.ink.soft;
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    pen.moveTo(right - length * this.scale, height - 12);
+    pen.lineTo(right - length * this.scale, height - 7);
+    pen.lineTo(right, height - 7);
+    pen.lineTo(right, height - 12);
+    pen.stroke();
+    pen.font = "12px system-ui, sans-serif";
+    pen.textAlign = "right";
+    pen.fillText(`${Number(length.toPrecision(3))} m`, right - length * this.scale - 6, height - 6);
+  },
+});

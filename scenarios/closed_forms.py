@@ -1,0 +1,202 @@
+"""Closed forms of flights, bounces, single hits and pushes: exact answers without any stepping.
+
+SI units, float64. Every form avoids the subtraction of nearly equal numbers, so that what is left is
+the rounding of its last operations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from scenarios.model import Array, Collisions, Scene, Thrust, Trajectory, frozen
+
+Hit = tuple[float, int, int, float]
+"""t s, disk, other disk or -1 - wall, impulse N s."""
+Motion = tuple[Array, Array]
+"""Position and velocity at k instants, (k, ...) m and m/s; or angle and angular velocity, rad and rad/s."""
+
+
+def answer(
+    scene: Scene,
+    t: Array,
+    motion: Motion,
+    hits: Iterable[Hit] = (),
+    turning: Motion | None = None,
+    valid_until: float = np.inf,
+    error_bound: float = 0.0,
+) -> Trajectory:
+    """An exact motion as the `Trajectory` of `scene` at the times t (k,) s, cut at `valid_until` s.
+
+    motion: position and velocity (k, n, 2) m, m/s. turning: angle and angular velocity (k, n) rad, rad/s;
+    left out where nothing turns a disk: it keeps its spin. hits: those after the last sample are dropped.
+    """
+    angle, angular_velocity = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
+    kept = t <= valid_until
+    return Trajectory(
+        t=frozen(t[kept]),
+        position=frozen(motion[0][kept]),
+        velocity=frozen(motion[1][kept]),
+        angle=frozen(angle[kept]),
+        angular_velocity=frozen(angular_velocity[kept]),
+        collisions=Collisions.of([hit for hit in hits if hit[0] <= t[kept][-1]]),
+        valid_until=valid_until,
+        error_bound=error_bound,
+    )
+
+
+def at_rest(scene: Scene, t: Array, hits: Iterable[Hit] = ()) -> Trajectory:
+    """The disks stay where they are (a stack whose supports carry it), at the times t (k,) s."""
+    position = np.broadcast_to(scene.position, (len(t), scene.n, 2))
+    return answer(scene, t, (position, np.zeros_like(position)), hits)
+
+
+def flight(t: Array, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike = 0.0) -> Motion:
+    """Position x + v t + a t2 / 2 and velocity v + a t after t s, all broadcast (Galilei's parabola)."""
+    x, v, a = np.asarray(position), np.asarray(velocity), np.asarray(acceleration)
+    return x + (v + a * t / 2) * t, v + a * t + np.zeros_like(x)
+
+
+@dataclass(frozen=True, eq=False)
+class Legs:
+    """A motion made of flights, each from one hit to the next.
+
+    Attributes:
+        start: (s,) s, increasing, from 0; all but the first are hits.
+        position, velocity, acceleration: (s, ...) at the start of each flight, m, m/s, m/s2.
+    """
+
+    start: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    def at(self, t: Array) -> Motion:
+        """Position and velocity (k, ...) at the times t (k,) s."""
+        leg = np.searchsorted(self.start, t, side="right") - 1
+        since = (t - self.start[leg]).reshape(-1, *[1] * (self.position.ndim - 1))
+        return flight(since, self.position[leg], self.velocity[leg], self.acceleration[leg])
+
+    def wall_hits(self, disk: int, walls: Sequence[int], mass: float, restitution: float) -> list[Hit]:
+        """Hits of a motion along one axis: on walls[0], walls[1] ... in turn, m (1 + e) |v| N s each."""
+        before = np.abs(self.velocity[1:]) / restitution
+        impulse = mass * (1 + restitution) * before
+        return [
+            (float(t), disk, -1 - walls[k % len(walls)], float(kick))
+            for k, (t, kick) in enumerate(zip(self.start[1:], impulse))
+        ]
+
+
+def geometric(ratio: float, count: Array) -> Array:
+    """1 + ratio + ratio^2 + ... of `count` terms; any shape."""
+    return count if ratio == 1 else (1 - ratio**count) / (1 - ratio)
+
+
+def bouncing(height: float, gravity: float, restitution: float, until: float) -> Legs:
+    """The gap m under a ball dropped from rest over a floor, to rest (e < 1) or `until` s (e = 1).
+
+    Bounce k leaves with u e^k at t_k = t_1 (1 + 2 e (1 - e^(k-1)) / (1 - e)), t_1 = sqrt(2 h / g),
+    u = sqrt(2 g h); they accumulate at t_1 (1 + e) / (1 - e), after which the ball lies still
+    (any textbook of mechanics, under "bouncing ball"). The last leg is the rest. 0 < e <= 1.
+    """
+    e, fall, speed = restitution, np.sqrt(2 * height / gravity), np.sqrt(2 * gravity * height)
+    # For e < 1 the bounces left out last 1e-14 of the fall each and are lower than a float can tell.
+    count = int(until / (2 * fall)) + 2 if e == 1 else int(np.log(1e-14) / np.log(e))
+    k = np.arange(1.0, count + 1)
+    rest = np.inf if e == 1 else fall * (1 + e) / (1 - e)
+    start = np.minimum(fall * (1 + 2 * e * geometric(e, k - 1)), rest)
+    return Legs(
+        start=np.array([0, *start, rest]),
+        position=np.array([height, *np.zeros(count), 0]),
+        velocity=np.array([0, *speed * e**k, 0]),
+        acceleration=np.array([-gravity, *np.full(count, -gravity), 0]),
+    )
+
+
+def to_and_fro(place: float, velocity: float, length: float, restitution: float, until: float) -> Legs:
+    """A point between 0 and `length` m that flies freely and is thrown back at both ends, up to `until` s.
+
+    Leg k has speed v e^k and lasts D / (v e^k) (elementary; e = 1: the triangle wave). 0 < e <= 1, v != 0.
+    """
+    speed, up = abs(velocity), velocity > 0
+    k = np.arange(1.0, int(until * speed / length) + 3)
+    first = (length - place if up else place) / speed
+    at_top = (k % 2 == 1) == up
+    return Legs(
+        start=np.array([0, *first + length / (speed * restitution) * geometric(1 / restitution, k - 1)]),
+        position=np.array([place, *np.where(at_top, length, 0.0)]),
+        velocity=np.array([velocity, *np.where(at_top, -1, 1) * speed * restitution**k]),
+        acceleration=np.zeros(len(k) + 1),
+    )
+
+
+def pair(position: Array, velocity: Array, radius: Array, mass: Array, restitution: float) -> tuple[Legs, Array]:
+    """Two disks that fly freely and hit once or never: their legs (s, 2, 2) and the impulses (s - 1,) N s.
+
+    position, velocity (2, 2) m, m/s; radius, mass (2,) m, kg. Contact at |r + u t| = R = r_1 + r_2:
+    t = c / (-b + sqrt(d)), c = r.r - R^2, b = r.u, d = b^2 - u.u c = u.u R^2 - (r x u)^2; impulse
+    (1 + e) mu v_n along the line of centres, v_n = sqrt(d) / R (Landau & Lifshitz, Mechanics, 17).
+    """
+    r, u, reach = position[1] - position[0], velocity[1] - velocity[0], radius.sum()
+    distance, speed = np.hypot(*r), np.hypot(*u)
+    cross = abs(r[0] * u[1] - r[1] * u[0])
+    d = (speed * reach - cross) * (speed * reach + cross)
+    if r @ u >= 0 or d <= 0:
+        return Legs(np.zeros(1), position[None], velocity[None], np.zeros((1, 1, 1))), np.zeros(0)
+    t = (distance - reach) * (distance + reach) / (-(r @ u) + np.sqrt(d))
+    contact = r + u * t
+    normal = contact / np.hypot(*contact)
+    impulse = (1 + restitution) * np.sqrt(d) / reach / (1 / mass).sum()
+    after = velocity + np.array([[-1.0], [1.0]]) * impulse / mass[:, None] * normal
+    legs = Legs(
+        start=np.array([0, t]),
+        position=np.array([position, position + velocity * t]),
+        velocity=np.array([velocity, after]),
+        acceleration=np.zeros((2, 1, 1)),
+    )
+    return legs, np.array([impulse])
+
+
+def offset_growth(free_path: float, reach: float) -> float:
+    """How much a distance from the centre line grows per bounce between two static disks.
+
+    q + sqrt(q^2 - 1), q = 1 + s / R: s m from surface to surface, R m the sum of the two radii that meet
+    (the eigenvalue of the two-disk orbit; Gaspard & Rice, J. Chem. Phys. 90, 2225, 1989).
+    """
+    q = 1 + free_path / reach
+    return float(q + np.sqrt(q * q - 1))
+
+
+def world_pushes(scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
+    """Free disks under constant pushes fixed in the world, at the times t (k,) s.
+
+    The sum of x + v t and, for each push, a (acted^2 / 2 + acted (t - stop)+), acted = how long it has
+    acted; torque and angle alike (Newton's second law, twice integrated).
+    """
+    position, velocity = flight(t[:, None, None], scene.position, scene.velocity)
+    angle, angular_velocity = flight(t[:, None], scene.angle, scene.angular_velocity)
+    for push in thrusts:
+        acted = np.clip(t - push.start, 0, push.stop - push.start)
+        moved = acted * (acted / 2 + np.maximum(t - push.stop, 0))
+        acceleration, spin_up = push.force / scene.mass[push.disk], push.torque / scene.inertia[push.disk]
+        velocity[:, push.disk] += acted[:, None] * acceleration
+        position[:, push.disk] += moved[:, None] * acceleration
+        angular_velocity[:, push.disk] += acted * spin_up
+        angle[:, push.disk] += moved * spin_up
+    return answer(scene, t, (position, velocity), turning=(angle, angular_velocity))
+
+
+def body_push(t: Array, acceleration: Array, angle: float, spin: float) -> Motion:
+    """Displacement m and gain of velocity m/s, (k, 2) each, after t (k,) s of a push fixed to its disk.
+
+    acceleration (2,) m/s2 in the disk's own axes, turned by angle + spin t; spin != 0. In the complex
+    plane the integrals of exp(i w t): gain = f (exp(i w t) - 1) / (i w), displacement = (gain - f t) / (i w).
+    """
+    f = complex(*acceleration) * np.exp(1j * angle)
+    half = spin * t / 2
+    gain = f * t * np.sinc(half / np.pi) * np.exp(1j * half)
+    displacement = (gain - f * t) / (1j * spin)
+    return displacement.view(float).reshape(-1, 2), gain.view(float).reshape(-1, 2)

@@ -1,0 +1,43 @@
+"""How a scene is laid out: from lists, with walls, with drawn disks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from scenarios.model import Array, Scene
+
+
+def lay_out(**fields: Any) -> Scene:
+    """The `Scene` of these fields, given as nested lists or arrays. Raises what `Scene` raises."""
+    return Scene(**fields)
+
+
+def box(low: ArrayLike, high: ArrayLike) -> Array:
+    """(4, 2, 2) m, the walls of a box from its low to its high corner: left, bottom, right, top."""
+    (left, bottom), (right, top) = np.asarray(low, float), np.asarray(high, float)
+    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
+    return np.array([(corners[side - 1], corners[side]) for side in range(4)])
+
+
+def scatter(
+    rng: np.random.Generator,
+    low: Sequence[float],
+    high: Sequence[float],
+    radius: Array,
+    first: ArrayLike | None = None,
+) -> Array:
+    """(n, 2) m, centres drawn uniformly between the corners, each again until its disk meets none before it.
+
+    radius (n,) m. first (2,) m: where disk 0 stands, if it is not drawn. For sparse disks only: equal ones
+    close four times their own area to the next, so up to a quarter of the box a free place always remains.
+    """
+    centres: list[Array] = [] if first is None else [np.asarray(first, float)]
+    while len(centres) < len(radius):
+        drawn, n = rng.uniform(low, high), len(centres)
+        if all(np.hypot(*(drawn - centre)) > r + radius[n] for centre, r in zip(centres, radius)):
+            centres.append(drawn)
+    return np.array(centres)

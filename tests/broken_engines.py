@@ -1,0 +1,294 @@
+"""Adapters with one fault each, made from the reference adapter: what the conformance suite is there to catch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from adapters.engine import Engine, Hit, Unsupported
+from adapters.engines import ENGINES, Row
+from adapters.reference import Reference
+from reference_impl import exercise
+from scenarios.model import State
+
+
+class Sound(Reference):
+    """The reference as it is; the base of everything below."""
+
+    def __init__(self) -> None:
+        super().__init__(exercise)
+
+
+class LeaksMomentum(Sound):
+    """A millionth of a disk's velocity is lost in every hit."""
+
+    def step(self, count=1):
+        for _ in range(count):
+            before = len(self.log)
+            super().step()
+            for hit in self.log[before:]:
+                self.disks.velocity[hit.i] *= 1 - 1e-6
+
+
+class GivesLiveView(Sound):
+    """`read` hands out the solver's own arrays."""
+
+    def read(self):
+        disks = self.disks
+        return State(disks.position, disks.velocity, disks.angle, disks.angular_velocity)
+
+
+class IgnoresDt(Sound):
+    """Always 1/60 s."""
+
+    def load(self, scene, dt):
+        super().load(scene, dt)
+        self.dt = 1 / 60
+
+
+class IgnoresCount(Sound):
+    """`step(3)` is one step."""
+
+    def step(self, count=1):
+        super().step(min(count, 1))
+
+
+class SquaresRestitution(Sound):
+    """e on both bodies, and the engine multiplies."""
+
+    def load(self, scene, dt):
+        super().load(replace(scene, restitution=scene.restitution**2), dt)
+
+
+class StopsSlowHits(Sound):
+    """Everything that closes at less than 1 m/s is inelastic."""
+
+    def load(self, scene, dt):
+        slow = np.ptp(scene.velocity, axis=0).max() < 1
+        super().load(replace(scene, restitution=0.0) if slow else scene, dt)
+
+
+class NanAtStep7(Sound):
+    """The seventh step divides by zero."""
+
+    def step(self, count=1):
+        for _ in range(count):
+            super().step()
+            if self.steps == 7:
+                self.disks.velocity[0] = np.nan
+
+
+class PushLasts(Sound):
+    """Nobody clears the forces."""
+
+    def step(self, count=1):
+        self.pushed = False
+        super().step(count)
+
+
+class LoadKeepsHits(Sound):
+    """The log of the last scene is still there."""
+
+    def load(self, scene, dt):
+        kept = getattr(self, "log", [])
+        super().load(scene, dt)
+        self.log = kept
+
+
+class LoadKeepsPush(Sound):
+    """A push that waited for a step waits on."""
+
+    def load(self, scene, dt):
+        waiting = self.disks.force.sum(axis=0) if getattr(self, "pushed", False) else None
+        super().load(scene, dt)
+        if waiting is not None:
+            self.push(0, waiting, 0.0)
+
+
+class SharesOneWorld(Sound):
+    """All engines of the process step by the dt of the one loaded last."""
+
+    latest = SimpleNamespace(dt=0.0)
+
+    def load(self, scene, dt):
+        super().load(scene, dt)
+        self.latest.dt = dt * scene.radius.max()
+
+    def _advance(self, count):
+        self.dt = self.latest.dt
+        super()._advance(count)
+
+
+class PutsStaticLast(Sound):
+    """Moving bodies first, as an engine keeps them."""
+
+    def read(self):
+        order = np.argsort(np.isinf(self.disks.mass), kind="stable")
+        return State(*(array[order] for array in vars(super().read()).values()))
+
+
+class ReadsFloat32(Sound):
+    """The engine's own precision, passed on."""
+
+    def read(self):
+        return State(*(array.astype(np.float32) for array in vars(super().read()).values()))
+
+
+class MassFromDensity(Sound):
+    """A fixture of density 1 set the mass after it was given."""
+
+    def load(self, scene, dt):
+        super().load(replace(scene, mass=np.where(scene.static, np.inf, np.pi * scene.radius**2)), dt)
+
+
+class SolidDiskInertia(Sound):
+    """The inertia of the scene is not set."""
+
+    def load(self, scene, dt):
+        super().load(replace(scene, inertia=scene.mass * scene.radius**2 / 2), dt)
+
+
+class VelocityHalfAStepOff(Sound):
+    """Leapfrog: the velocities belong to the middle of the step."""
+
+    def read(self):
+        state = super().read()
+        state.velocity[...] += self.world.gravity * self.dt / 2
+        return state
+
+
+class OtherOrderOfUpdates(Sound):
+    """Gravity by Verlet, while the row says symplectic Euler."""
+
+    def step(self, count=1):
+        moving = np.isfinite(self.disks.mass)
+        for _ in range(count):
+            super().step()
+            self.disks.position[moving] -= self.world.gravity * self.dt**2 / 2
+
+
+class StaticGivesWay(Sound):
+    """A static disk is only heavy."""
+
+    def load(self, scene, dt):
+        super().load(replace(scene, mass=np.where(scene.static, 1e6, scene.mass), inertia=None), dt)
+
+
+class TellsNoHits(Sound):
+    """The contact listener was never registered."""
+
+    def hits(self):
+        return []
+
+
+class NumbersWallsFromTheEnd(Sound):
+    """Walls are known by the engine's list, which is the scene's reversed."""
+
+    def hits(self):
+        return [Hit(h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse) for h in self.log]
+
+
+class CountsStepsFromOne(Sound):
+    """The step counter is raised before the hits are logged."""
+
+    def hits(self):
+        return [hit._replace(step=hit.step + 1) for hit in self.log]
+
+
+class TellsImpulsePerSecond(Sound):
+    """A contact force is told where an impulse is asked for."""
+
+    def hits(self):
+        return [hit._replace(impulse=hit.impulse / self.dt) for hit in self.log]
+
+
+class RubsSidewise(Sound):
+    """The default friction is on: a hit turns a part of the spin into sideways speed."""
+
+    def step(self, count=1):
+        for _ in range(count):
+            before = len(self.log)
+            super().step()
+            for hit in self.log[before:]:
+                for disk in (hit.i, hit.j):
+                    self.disks.velocity[disk, 1] += 0.01 * self.disks.angular_velocity[disk]
+
+
+class FallsAsleep(Sound):
+    """What is slower than 1 cm/s is stopped."""
+
+    def step(self, count=1):
+        super().step(count)
+        self.disks.velocity[np.hypot(*self.disks.velocity.T) < 0.01] = 0.0
+
+
+class HasSpeedLimit(Sound):
+    """No disk is faster than 400 m/s."""
+
+    def step(self, count=1):
+        super().step(count)
+        self.disks.velocity[...] = np.clip(self.disks.velocity, -400.0, 400.0)
+
+
+class WrapsAngles(Sound):
+    """The engine keeps cos and sin, and nobody unwinds."""
+
+    def read(self):
+        state = super().read()
+        state.angle[...] = np.arctan2(np.sin(state.angle), np.cos(state.angle))
+        return state
+
+
+class RaisesInStep(Sound):
+    """An engine that gives up."""
+
+    def step(self, count=1):
+        super().step(count)
+        raise RuntimeError("island solver ran out of memory")
+
+
+class RefusesAll(Sound):
+    """An engine that can model nothing."""
+
+    def load(self, scene, dt):
+        super().load(scene, dt)
+        raise Unsupported("no disks here")
+
+
+# Which probe is meant for which fault; other probes may see it too.
+CAUGHT_BY: dict[type[Engine], str] = {
+    PutsStaticLast: "order_and_shapes",
+    ReadsFloat32: "order_and_shapes",
+    WrapsAngles: "order_and_shapes",
+    GivesLiveView: "read_copies",
+    LoadKeepsHits: "load_forgets",
+    LoadKeepsPush: "load_forgets",
+    SharesOneWorld: "worlds_are_apart",
+    IgnoresCount: "counts_are_steps",
+    IgnoresDt: "steps_obey_dt",
+    NanAtStep7: "stays_finite",
+    PushLasts: "push_lasts_one_step",
+    MassFromDensity: "mass_by_push",
+    SolidDiskInertia: "inertia_by_push",
+    VelocityHalfAStepOff: "same_instant",
+    TellsNoHits: "hits_are_told",
+    NumbersWallsFromTheEnd: "walls_are_told",
+    CountsStepsFromOne: "hits_name_their_step",
+    TellsImpulsePerSecond: "impulse_is_told",
+    StaticGivesWay: "static_stays",
+    OtherOrderOfUpdates: "free_flight",
+    FallsAsleep: "slow_flight",
+    HasSpeedLimit: "fast_flight",
+    LeaksMomentum: "pair_momentum",
+    StopsSlowHits: "restitution_0.5",
+    SquaresRestitution: "restitution_wall",
+    RubsSidewise: "friction",
+}
+
+
+def row_of(make: Callable[[], Engine]) -> Row:
+    """A row like the reference's, with another engine."""
+    return replace(ENGINES["reference:exercise"], make=make)

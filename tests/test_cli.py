@@ -1,0 +1,168 @@
+"""The command line as people and scripts use it: files, words, exit status."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from adapters.engines import ENGINES
+from reports.comparison import COLUMNS
+from reports.metrics import METRICS
+from scenarios.catalogue import SCENARIOS
+
+CROSSCHECK = Path(sys.executable).parent / "crosscheck"
+SCENES = Path(__file__).parent / "scenes"
+SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference", "--engine", "pymunk:matched", "--dt", str(1 / 60)]
+
+
+def crosscheck(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The command in a process of its own."""
+    return subprocess.run([CROSSCHECK, *words], cwd=cwd, capture_output=True, text=True, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a finished run of two scenarios and three players."""
+    cwd = tmp_path_factory.mktemp("small")
+    done = crosscheck(*SMALL, "--out", "here", cwd=cwd)
+
+    assert done.returncode == 0, done.stderr
+    assert str(cwd / "here" / "report.html") in done.stdout
+    return cwd / "here"
+
+
+def test_help_loads_no_number_library():
+    """`--help` answers at once because nothing heavy is imported for it."""
+    code = (
+        "import sys, reports.cli\n"
+        "from typer.testing import CliRunner\n"
+        "assert CliRunner().invoke(reports.cli.app, ['run', '--help']).exit_code == 0\n"
+        "print([name for name in ('numpy', 'pandas', 'numba', 'plotly', 'pymunk') if name in sys.modules])"
+    )
+
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_list_explains_every_engine_scenario_and_metric(tmp_path: Path):
+    """Every name of the three tables is in the list, with a line."""
+    listed = crosscheck("list", cwd=tmp_path).stdout
+
+    for name in (*ENGINES, *SCENARIOS, *METRICS):
+        assert name in listed
+
+
+def test_a_run_writes_its_files(small_run: Path):
+    """Tables, journal, machine, page, and a trajectory a cell."""
+    runs = pd.read_csv(small_run / "runs.csv", keep_default_na=False)
+    deviations = pd.read_csv(small_run / "deviations.csv")
+    lines = [json.loads(line) for line in (small_run / "journal.jsonl").read_text().splitlines()]
+
+    assert list(deviations.columns) == list(COLUMNS)
+    assert len(runs) == 2 * 3
+    assert set(runs.status) == {"ok"}
+    assert {path.stem for path in (small_run / "trajectories").iterdir()} == set(runs.cell)
+    assert "header" in lines[0]
+    assert lines[-1]["footer"]["cells"] == 6
+    assert json.loads((small_run / "machine.json").read_text())["seed"] == 0
+    assert (small_run / "report.html").stat().st_size < 8e6
+
+
+def test_tables_are_made_again_from_the_journal(small_run: Path):
+    """`report` gives the same bytes."""
+    names = ("deviations.csv", "runs.csv")
+    before = {name: (small_run / name).read_bytes() for name in names}
+    for name in names:
+        (small_run / name).unlink()
+
+    assert crosscheck("report", small_run, cwd=small_run.parent).returncode == 0
+    assert {name: (small_run / name).read_bytes() for name in names} == before
+
+
+def test_the_same_command_gives_the_same_numbers_whatever_the_workers(small_run: Path, tmp_path: Path):
+    """deviations.csv is byte for byte the same with one worker as with all."""
+    assert crosscheck(*SMALL, "--workers", "1", "--out", "again", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "again" / "deviations.csv").read_bytes() == (small_run / "deviations.csv").read_bytes()
+
+
+def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
+    """A TOML file without a truth is compared by laws and pairs; its run can be reported again without the file."""
+    scene = tmp_path / "mine.toml"
+    scene.write_text((SCENES / "two.toml").read_text())
+    done = crosscheck("run", scene, "--engine", "pymunk", "--out", "out", cwd=tmp_path)
+    versus = set(pd.read_csv(tmp_path / "out" / "deviations.csv").versus)
+    scene.unlink()
+
+    assert done.returncode == 0, done.stderr
+    assert versus == {"itself", "pymunk:matched"}
+    assert crosscheck("report", "out", cwd=tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["run", "head_on_equl_e1"], "scenario 'head_on_equl_e1' is not known; did you mean head_on_equal_e1"),
+        (["run", "slow_hit", "--engine", "pymonk"], "engine 'pymonk' is not known; did you mean pymunk"),
+        (["run", "slow_hit", "--engine", "box2d:mached"], "did you mean box2d:matched"),
+        (["run", "slow_hit", "--dt", "0.007"], "--dt 0.007 does not fit slow_hit"),
+        (["run", "slow_hit", "--dt", "-1"], "--dt -1 does not fit slow_hit"),
+        (["run", "slow_hit", "--dt", "nan"], "--dt nan does not fit slow_hit"),
+        (["run", "nowhere.toml"], "nowhere.toml"),
+        (["run", "slow_hit", "--seed", "-1"], "--seed"),
+        (["list", "engine"], "did you mean engines"),
+        (["report", "nowhere"], "nowhere: has no journal.jsonl"),
+        (["fly"], "fly"),
+    ],
+)
+def test_bad_input_is_one_clear_message_and_exit_2(words: list[str], said: str, tmp_path: Path):
+    """The message says what is wrong and what is near; no traceback; nothing is written."""
+    done = crosscheck(*words, cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_all_faults_of_all_scene_files_come_at_once(tmp_path: Path):
+    """Two bad files, three faults, three lines."""
+    (tmp_path / "a.toml").write_text((SCENES / "two.toml").read_text().replace("radius = 0.25", "radius = -0.25"))
+    (tmp_path / "b.toml").write_text("name = 3\n")
+    done = crosscheck("run", "a.toml", "b.toml", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "a.toml: disk[0].radius = -0.25: must be positive" in done.stderr
+    assert "b.toml: name = 3" in done.stderr
+
+
+def test_a_scene_file_may_not_take_a_name_that_is_taken(tmp_path: Path):
+    """Two scenes of one name would be one row in the table."""
+    (tmp_path / "mine.toml").write_text((SCENES / "two.toml").read_text().replace('"two-disks"', '"slow_hit"'))
+    done = crosscheck("run", "mine.toml", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "taken by a scenario of the catalogue" in done.stderr
+
+
+def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_path: Path):
+    """Files that are not ours are never overwritten, not even beside a run of ours."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.txt").write_text("years of work")
+    (small_run / "note.txt").write_text("mine")
+    done = crosscheck(*SMALL, "--out", "out", cwd=tmp_path), crosscheck(*SMALL, "--out", small_run, cwd=tmp_path)
+    (small_run / "note.txt").unlink()
+
+    assert [one.returncode for one in done] == [2, 2]
+    assert "thesis.txt" in done[0].stderr
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.txt"]
+
+
+def test_an_earlier_run_is_replaced_as_a_whole(small_run: Path):
+    """The second run into a folder leaves nothing of the first behind, and no folder beside it."""
+    again = crosscheck("run", "near_miss", "--engine", "pymunk:matched", "--out", "here", cwd=small_run.parent)
+
+    assert again.returncode == 0
+    assert set(pd.read_csv(small_run / "runs.csv").scenario) == {"near_miss"}
+    assert [path.name for path in small_run.parent.iterdir()] == ["here"]

@@ -1,0 +1,214 @@
+"""The judge judged: metrics of trajectories whose faults were put in by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adapters.engines import ENGINES
+from adapters.play import Run, play
+from reports.collisions import closest_in_order, match
+from reports.comparison import COLUMNS, compare, cut
+from reports.metrics import METRICS
+from reports.view import View
+from scenarios.catalogue import SCENARIOS, scenario
+from scenarios.model import Collisions, Scenario, Scene, Thrust, Trajectory
+
+WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
+
+
+def truth_of(name: str) -> tuple[Scenario, Trajectory]:
+    """A scenario and its exact answer."""
+    one = scenario(name)
+    assert one.truth is not None
+    return one, one.truth(one.times)
+
+
+def value(metric: str, view: View) -> float:
+    """The value of a metric that applies."""
+    found = METRICS[metric].of(view)
+    assert found is not None
+    return found.value
+
+
+@pytest.mark.parametrize("name", WITH_TRUTH)
+def test_the_truth_against_itself_is_zero(name: str):
+    """Every error of the truth measured against the truth is 0, it never leaves the 1 % band, it misses no hit."""
+    one, truth = truth_of(name)
+    view = View(one, one.dt(1), truth, truth)
+
+    for metric, row in METRICS.items():
+        if "truth" in row.against and (found := row.of(view)) is not None:
+            expected = np.inf if row.better == "higher" else 0.0
+            assert found.value == expected, metric
+
+
+@pytest.mark.parametrize("name", WITH_TRUTH)
+def test_the_truth_keeps_the_laws(name: str):
+    """Momentum, energy and non-penetration hold in the truth to the rounding of a sum over its disks."""
+    one, truth = truth_of(name)
+    view = View(one, one.dt(1), truth)
+
+    for metric in ("momentum_error", "angular_momentum_error", "energy_error", "energy_created", "penetration_radii"):
+        if (found := METRICS[metric].of(view)) is not None:
+            # A few hundred roundings of terms of the size of the scale; angular momentum squares the distances.
+            assert found.value < 1e-12, metric
+
+
+@pytest.mark.parametrize("name", ["head_on_equal_e09", "line_gas", "ping_pong"])
+def test_a_disk_moved_by_a_millimetre_reads_a_millimetre(name: str):
+    """One sample of one disk moved by 1 mm: the largest deviation is 1 mm, at that disk and that instant."""
+    one, truth = truth_of(name)
+    position = truth.position.copy()
+    k, disk = len(truth) // 2, one.scene.n - 1
+    position[k, disk] += [0.0006, 0.0008]
+    found = METRICS["position_max"].of(View(one, one.dt(1), replace(truth, position=position), truth))
+
+    assert found is not None
+    assert found.value == pytest.approx(1e-3, rel=1e-9)  # the rounding of x + 0.0008 at |x| < 20, over 1e-3
+    assert (found.disk, found.at) == (disk, truth.t[k])
+
+
+def test_momentum_that_leaks_is_seen():
+    """A velocity off by 1 % on one of two equal disks is a momentum error of half a percent."""
+    one, truth = truth_of("head_on_equal_e1")
+    velocity = truth.velocity.copy()
+    velocity[-1, 0] *= 1.01
+    found = value("momentum_error", View(one, one.dt(1), replace(truth, velocity=velocity)))
+    share = np.linalg.norm(truth.velocity[-1, 0]) / np.linalg.norm(truth.velocity[-1], axis=1).sum()
+
+    assert found == pytest.approx(0.01 * share, rel=0.02)  # the scale grows by the leak itself, 1 %
+
+
+def test_energy_that_is_created_is_seen():
+    """A speed that rises by 1 % raises the energy by 2 % of that disk's share."""
+    one, truth = truth_of("box_billiard")
+    spin = (truth.angular_velocity[0] ** 2 @ one.scene.inertia) / 2
+    velocity = truth.velocity.copy()
+    velocity[len(truth) // 2 :] *= 1.01
+    found = value("energy_created", View(one, one.dt(1), replace(truth, velocity=velocity)))
+    kinetic = (velocity[-1] ** 2).sum() * one.scene.mass[0] / 2
+
+    assert found == pytest.approx(kinetic * (1 - 1.01**-2) / (kinetic + spin), rel=1e-6)
+
+
+def test_weight_and_thrust_are_accounted_for():
+    """Free flight under gravity and a world-frame push has no momentum error."""
+    scene = Scene(position=[[0, 0]], velocity=[[1, 2]], radius=[0.1], mass=[2], restitution=1, gravity=[0, -9.81])
+    one = Scenario(
+        name="pushed", asks="?", source="", scene=scene, duration=1.0, sample_interval=0.1,
+        thrusts=[Thrust(0, 0.25, 0.6, [3.0, 1.0])],
+    )  # fmt: skip
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
+    assert run.trajectory is not None
+
+    assert value("momentum_error", View(one, run.dt, run.trajectory)) < 1e-14  # ten additions of float64
+
+
+def test_deviation_is_measured_across_the_seam():
+    """Where the scene wraps, two disks on both sides of the same edge are close."""
+    one = scenario("asteroids")
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(4))
+    assert run.trajectory is not None
+    moved = replace(run.trajectory, position=run.trajectory.position + [10.0, 0.0])  # the box is 10 m wide
+
+    assert value("position_max", View(one, run.dt, moved, run.trajectory)) < 1e-14  # rounding of x + 10
+
+
+def hits(*times: float) -> Collisions:
+    """Hits of disks 0 and 1 at these times."""
+    return Collisions.of([(t, 0, 1, 1.0) for t in times])
+
+
+def test_a_missing_hit_is_missed_and_an_extra_hit_is_invented():
+    """The hit that is left over is the one whose absence makes the others match."""
+    missed = match(hits(1.01, 3.01), hits(1, 2, 3), 10, 0)
+    invented = match(hits(1.01, 2.5, 3.01), hits(1, 3), 10, 0)
+
+    assert missed.missed == [(2.0, 0, 1)]
+    assert missed.invented == []
+    assert invented.invented == [(2.5, 0, 1)]
+    assert invented.missed == []
+    np.testing.assert_allclose(invented.delay, 0.01)
+
+
+def test_a_player_that_drifts_late_keeps_its_hits():
+    """Hits that come later and later are delays, not missed and invented hits."""
+    true = np.arange(1.0, 20.0)
+    late = match(hits(*(true + 0.1 * true)), hits(*true), 100, 0)
+
+    assert late.first_wrong is None
+    np.testing.assert_allclose(late.delay, 0.1 * true)
+
+
+def test_a_hit_that_the_end_cuts_off_is_not_blamed():
+    """A true hit just before the end may fall behind it for a late player."""
+    assert match(hits(1.0), hits(1.0, 9.99), 10.0, 0.05).missed == []
+    assert match(hits(1.0), hits(1.0, 9.90), 10.0, 0.05).missed == [(9.90, 0, 1)]
+
+
+def test_weight_on_a_contact_at_rest_is_no_hit():
+    """A pair that rests from the start (a true hit without impulse) is not counted."""
+    resting = Collisions.of([(0.0, 0, -1, 0.0)])
+    weight = Collisions.of([(0.1, 0, -1, 0.3), (0.5, 0, -1, 0.3)])
+
+    assert match(weight, resting, 1.0, 0.0).first_wrong is None
+
+
+def test_matching_in_order_is_the_closest_there_is():
+    """Dynamic programming finds what trying all choices finds."""
+    from itertools import combinations
+
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        many = np.sort(rng.uniform(size=rng.integers(0, 7)))
+        few = np.sort(rng.uniform(size=rng.integers(0, len(many) + 1)))
+        chosen = closest_in_order(few, many)
+        best = min(np.abs(few - many[list(some)]).sum() for some in combinations(range(len(many)), len(few)))
+
+        assert (np.diff(chosen) > 0).all()
+        assert np.abs(few - many[chosen]).sum() == pytest.approx(best)
+
+
+@pytest.mark.parametrize("e", ["e0", "e05", "e09", "e1"])
+def test_restitution_is_read_off_the_velocities(e: str):
+    """The exact answer has the restitution it was made with."""
+    one, truth = truth_of(f"oblique_{e}")
+
+    # Sampled velocities are exact up to rounding; the quotient amplifies it by v / v_n, below 10 here.
+    assert value("restitution_error", View(one, one.dt(1), truth)) < 1e-14
+
+
+def test_comparison_stops_where_the_other_ends():
+    """Samples and hits beyond the truth's horizon are cut off."""
+    _, truth = truth_of("line_gas")
+    short = cut(truth, 100)
+
+    assert len(short) == 100
+    assert short.collisions.t[-1] <= short.t[-1]
+    assert len(short.collisions) == (truth.collisions.t <= truth.t[99]).sum()
+
+
+def test_the_table_has_failures_too_and_every_pair_once():
+    """A refused run is a row with its reason; engines are compared pairwise at the same dt, in one direction."""
+    one = scenario("head_on_equal_e1")
+    names = ["reference:exercise", "reference:lesson", "pymunk:matched"]
+    runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in (1, 2)]
+    refused = Run("box2d", "matched", one.name, one.dt(1), "unsupported", "mass 1e+300 does not fit into float32")
+    table = compare(one, [*runs, refused]).table
+    status = table[table.metric == "status"]
+    pairs = table[~table.versus.isin(["itself", "truth"]) & (table.metric == "position_rms")]
+
+    assert list(table.columns) == list(COLUMNS)
+    assert status.note.tolist() == ["unsupported: mass 1e+300 does not fit into float32"]
+    assert len(pairs) == 2 * 3  # two dt, three pairs
+    assert not table.duplicated(["scenario", "engine", "profile", "dt_s", "metric", "versus"]).any()
+
+
+def test_without_a_truth_nothing_is_called_an_error_of_position():
+    """Where nobody knows the answer the table has laws and pairs only."""
+    one = replace(scenario("gas_of_100"), duration=0.5)
+    runs = [play(ENGINES[name].make(), name, one, one.dt(4)) for name in ("reference:exercise", "pymunk:matched")]
+    table = compare(one, runs).table
+
+    assert set(table.versus) == {"itself", "pymunk:matched"}

@@ -1,0 +1,65 @@
+"""What the README says to type works as it stands."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+TEXT = (ROOT / "README.md").read_text()
+BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
+COMMANDS = [line for kind, block in BLOCKS[1:] if kind == "sh" for line in block.splitlines() if line.strip()]
+BIN = Path(sys.executable).parent
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that the README shows, under the names it gives them."""
+    where = tmp_path_factory.mktemp("readme")
+    for name, block in re.findall(r"`(\w+\.toml)`[^`]*?:\n\n```toml\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL):
+        (where / name).write_text(block)
+    return where
+
+
+def test_the_first_block_is_the_two_commands():
+    """They set up and run everything; the gate runs them as they are written."""
+    kind, block = BLOCKS[0]
+
+    assert kind == "sh"
+    assert block.splitlines() == ["pip install uv && uv run crosscheck", "uv run pytest"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_of_the_readme_succeeds(command: str, folder: Path):
+    """Every line of a shell block, run in order in one folder, exits with 0."""
+    words = shlex.split(command, comments=True)
+
+    assert words[:2] == ["uv", "run"]
+    program, *arguments = words[2:]
+    if program == "pytest":
+        pytest.skip("runs the tests themselves")
+    done = subprocess.run([BIN / program, *arguments], cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_python_blocks_run_one_after_the_other(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """They share their names, as in one session."""
+    monkeypatch.chdir(folder)
+    names: dict[str, object] = {}
+
+    blocks = [block for kind, block in BLOCKS if kind == "python"]
+    assert blocks
+    for block in blocks:
+        exec(block, names)
+
+
+def test_every_file_the_readme_names_exists():
+    """Paths in backquotes that look like files of the repository are files of the repository."""
+    named = set(re.findall(r"`((?:reference_impl|scenarios|adapters|reports|tests|\.ci)/[\w./]*)`", TEXT))
+
+    assert named
+    for path in named - {"reports/out/latest/"}:
+        assert (ROOT / path).exists(), path

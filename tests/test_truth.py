@@ -1,0 +1,290 @@
+"""The exact answers, each against something that knows nothing of its closed form."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from scenarios.catalogue import SCENARIOS, scenario
+from scenarios.model import Scene
+
+ANSWERED = [name for name in SCENARIOS if scenario(name).truth]
+PUSHED = [name for name in ANSWERED if scenario(name).thrusts]
+RESTING = ["rest_on_floor", "slide_on_incline", "column_of_ten"]
+FLYING = [name for name in ANSWERED if name not in (*PUSHED, *RESTING)]
+
+
+def exact(name):
+    """A scenario, its truth, and until when hits can be told apart (a ball settles after infinitely many)."""
+    run = scenario(name)
+    truth = run.truth(run.times)
+    return run, truth, 8.0 if name == "bouncing_ball_e09" else truth.t[-1]
+
+
+def between(hits, until):
+    """An instant between each two hits, those that coincide (49 balls on one floor) taken as one."""
+    apart = np.append(0, hits)[np.diff(np.append(0, hits), append=np.inf) > 1e-6]
+    return (apart + np.append(apart[1:], until)) / 2
+
+
+# An event-by-event simulation over all pairs, written here so that it shares nothing with the closed forms.
+
+
+def wall_frames(scene):
+    """A point of each wall and its unit normal, (w, 2) each."""
+    along = scene.walls[:, 1] - scene.walls[:, 0]
+    return scene.walls[:, 0], np.stack([-along[:, 1], along[:, 0]], -1) / np.hypot(*along.T)[:, None]
+
+
+def next_events(scene: Scene, x, v):
+    """The earliest hit ahead: (time, disk, other disk or -1 - wall)."""
+    found = [(np.inf, 0, 0)]
+    a, b = np.triu_indices(scene.n, 1)
+    dr, dv, reach = x[b] - x[a], v[b] - v[a], scene.radius[a] + scene.radius[b]
+    closing, gap = (dr * dv).sum(1), (dr**2).sum(1) - reach**2
+    disc = closing**2 - (dv**2).sum(1) * gap
+    # After a hit at e = 0 nothing closes in; what is computed is the rounding of 1 m/s.
+    can = (closing < -1e-14) & (disc > 0)
+    if can.any():
+        t = np.full(len(a), np.inf)
+        t[can] = np.maximum(gap[can], 0) / (-closing[can] + np.sqrt(disc[can]))
+        found.append((t.min(), a[t.argmin()], b[t.argmin()]))
+    for w, (point, normal) in enumerate(zip(*wall_frames(scene))):
+        side = np.sign((scene.position - point) @ normal)
+        gap = np.maximum((x - point) @ normal * side - scene.radius, 0)
+        speed, pull = v @ normal * side, scene.gravity @ normal * side
+        for i in np.flatnonzero(np.isfinite(scene.mass)):
+            if pull[i] < 0:
+                root = np.sqrt(speed[i] ** 2 - 2 * pull[i] * gap[i])
+                t = 2 * gap[i] / (root - speed[i]) if speed[i] < 0 else (speed[i] + root) / -pull[i]
+                found.append((t, i, -1 - w))
+            elif speed[i] < 0:
+                found.append((gap[i] / -speed[i], i, -1 - w))
+    return min(found)
+
+
+def simulate(scene: Scene, until):
+    """State after each hit up to `until`: a list of (t, position, velocity), the first one at 0."""
+    t, x, v = 0.0, np.array(scene.position), np.array(scene.velocity)
+    g, w = np.where(scene.static[:, None], 0.0, scene.gravity), 1 / scene.mass
+    path = [(t, x, v)]
+    while True:
+        after, i, j = next_events(scene, x, v)
+        if t + after > until:
+            return path
+        t, x, v = t + after, x + v * after + g * after**2 / 2, v + g * after
+        n = wall_frames(scene)[1][-1 - j] if j < 0 else (x[j] - x[i]) / np.hypot(*(x[j] - x[i]))
+        kick = (1 + scene.restitution) * ((v[j] if j >= 0 else 0) - v[i]) @ n / (w[i] + (w[j] if j >= 0 else 0))
+        v[i] += kick * w[i] * n
+        if j >= 0:
+            v[j] -= kick * w[j] * n
+        path.append((t, x, v))
+
+
+@pytest.mark.parametrize("name", FLYING)
+def test_truth_is_what_an_event_by_event_simulation_finds(name):
+    """Same hits at the same times, same states between them."""
+    run, truth, until = exact(name)
+    path = simulate(run.scene, until)
+    hits = truth.collisions.t[truth.collisions.t <= until]
+    # Rounding of the simulation, 1e-16 a hit over hundreds of hits; on the two-disk orbit it grows to 1e-9 m.
+    tolerance = 1e-8 if name == "disk_between_static_disks" else 1e-10
+    np.testing.assert_allclose([t for t, _, _ in path[1:]], hits, rtol=0, atol=tolerance)
+    times = between(hits, until)
+    answer = run.truth(times)
+    last = np.searchsorted([t for t, _, _ in path], times) - 1
+    g = np.where(run.scene.static[:, None], 0.0, run.scene.gravity)
+    for k, (start, x, v) in enumerate(path[i] for i in last):
+        since = times[k] - start
+        np.testing.assert_allclose(answer.velocity[k], v + g * since, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(answer.position[k], x + v * since + g * since**2 / 2, rtol=0, atol=tolerance)
+
+
+def contact(scene, position, i, j):
+    """Gap m and unit normal (2,) from disk i to disk j or to wall -1 - j, at the positions (n, 2) m."""
+    if j < 0:
+        point, across = (a[-1 - j] for a in wall_frames(scene))
+        offset = (point - position[i]) @ across
+        return abs(offset) - scene.radius[i], across * np.sign(offset)
+    r = position[j] - position[i]
+    return np.hypot(*r) - scene.radius[i] - scene.radius[j], r / np.hypot(*r)
+
+
+@pytest.mark.parametrize("name", FLYING)
+def test_hits_lie_at_touching_distance_and_their_impulse_is_the_change_of_momentum(name):
+    """Each listed hit is one: contact, restitution, action and reaction."""
+    run, truth, until = exact(name)
+    scene, hits = run.scene, truth.collisions
+    gravity = np.where(scene.static[:, None], 0.0, scene.gravity)
+    times = between(hits.t[hits.t <= until], until)
+    around, at = run.truth(times), run.truth(np.append(hits.t, until))
+    for k in np.flatnonzero(hits.t <= until):
+        i, j, step = hits.i[k], hits.j[k], np.searchsorted(times, hits.t[k])
+        gap, normal = contact(scene, at.position[k], i, j)
+        # Positions and paths of 10 m have a last place of 2e-15; Galperin's weighted axis adds two digits.
+        assert abs(gap) < 1e-13
+        before, after = (around.velocity[s] + gravity * (hits.t[k] - times[s]) for s in (step - 1, step))
+        approach, parting = (((v[j] if j >= 0 else 0) - v[i]) @ normal for v in (before, after))
+        # The same of velocities up to 25 m/s.
+        assert parting == pytest.approx(-scene.restitution * approach, abs=1e-13)
+        for disk, sign in ((i, -1), (j, 1)):
+            if disk >= 0:
+                kick = sign * hits.impulse[k] * normal / scene.mass[disk]
+                np.testing.assert_allclose(after[disk] - before[disk], kick, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ANSWERED)
+def test_velocity_is_the_derivative_of_position(name):
+    """So is the angular velocity that of the angle."""
+    run, truth, until = exact(name)
+    h = 1e-4
+    times = np.linspace(0.01, until - 0.01, 301)
+    edges = np.concatenate([truth.collisions.t, *([push.start, push.stop] for push in run.thrusts), [-1]])
+    times = times[np.abs(times[:, None] - edges).min(axis=1) > 2 * h]
+    before, now, after = (run.truth(times + shift) for shift in (-h, 0, h))
+    # Central differences: jerk h2 / 6 < 5 m/s3 1e-8 / 6 = 1e-8 (0 in a parabola), rounding 15 m 1e-16 / h = 3e-11.
+    for moved, rate in (("position", "velocity"), ("angle", "angular_velocity")):
+        slope = (getattr(after, moved) - getattr(before, moved)) / (2 * h)
+        np.testing.assert_allclose(slope, getattr(now, rate), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", PUSHED)
+def test_velocity_and_spin_change_by_the_pushes_as_quadrature_has_it(name):
+    """The integral of force and torque over every sample interval, world and body frame."""
+    run, truth, _ = exact(name)
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    gained, turned = np.zeros_like(truth.velocity), np.zeros_like(truth.angle)
+    for k, start in enumerate(truth.t[:-1]):
+        width = truth.t[k + 1] - start
+        t = start + width * (nodes + 1) / 2
+        angle = run.truth(t).angle
+        gained[k + 1], turned[k + 1] = gained[k], turned[k]
+        for push in run.thrusts:
+            if not push.start - 1e-9 < start < push.stop - 1e-9:
+                continue
+            turn = np.exp(1j * angle[:, push.disk]) if push.frame == "body" else np.ones(8)
+            force = (complex(*push.force) * turn * weights).sum() * width / 2
+            gained[k + 1, push.disk] += np.array([force.real, force.imag]) / run.scene.mass[push.disk]
+            turned[k + 1, push.disk] += push.torque * width / run.scene.inertia[push.disk]
+    # Eight nodes per 1/60 s are exact to rounding: some hundreds of sums of 1e-16.
+    np.testing.assert_allclose(truth.velocity, run.scene.velocity + gained, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(truth.angular_velocity, run.scene.angular_velocity + turned, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("ping_pong", 4),  # 40 s, a period of 20 s
+        ("mass_ratios", 7),
+        ("near_miss", 0),
+        ("line_gas", 272),
+        ("galperin_3", 3),
+        ("galperin_31", 31),
+        ("galperin_314", 314),
+        ("cradle_with_gaps", 6),
+        ("simbenchmark_bouncing", 490),
+    ],
+)
+def test_number_of_hits(name, count):
+    """Known counts: pi, all pairs of a cradle, ten bounces of 49 balls."""
+    _, truth, _ = exact(name)
+    assert len(truth.collisions) == count
+
+
+@pytest.mark.parametrize("name", [name for name in FLYING if scenario(name).scene.restitution == 1])
+def test_energy_is_kept_at_restitution_one(name):
+    """At every sample, to rounding."""
+    run, truth, _ = exact(name)
+    mass, g = np.where(run.scene.static, 0, run.scene.mass), run.scene.gravity
+    kinetic = (mass * (truth.velocity**2).sum(axis=2)).sum(axis=1) / 2
+    energy = kinetic - (mass * (truth.position @ g)).sum(axis=1)
+    # Rounding of one hit's velocities and of a sum of at most 49 terms.
+    np.testing.assert_allclose(energy, energy[0], rtol=4e-15)
+
+
+@pytest.mark.parametrize("name", [name for name in FLYING if not len(scenario(name).scene.walls)])
+def test_momentum_is_kept_without_walls(name):
+    """At every sample, to rounding, whatever the restitution."""
+    run, truth, _ = exact(name)
+    if run.scene.static.any() or run.scene.gravity.any():
+        pytest.skip("something outside takes momentum up")
+    momentum = np.einsum("i,kid->kd", run.scene.mass, truth.velocity)
+    # A unit in the last place of the largest momentum, 1e6 N s in the heaviest lane.
+    np.testing.assert_allclose(momentum - momentum[0], 0, rtol=0, atol=1e-15 * run.scene.mass.sum())
+
+
+@pytest.mark.parametrize("name", ["galperin_3", "galperin_31", "galperin_314"])
+def test_galperin_is_within_its_error_bound_of_rational_arithmetic(name):
+    """Events in exact fractions, all samples."""
+    run, truth, _ = exact(name)
+    m, r = [Fraction(a) for a in run.scene.mass], [Fraction(a) for a in run.scene.radius]
+    x, v = ([Fraction(a) for a in part[:, 0]] for part in (run.scene.position, run.scene.velocity))
+    x = [x[0] - r[0], x[1] - 2 * r[0] - r[1]]
+    now, sample = Fraction(0), 0
+    while sample < len(truth):
+        wall = -x[0] / v[0] if v[0] < 0 else None
+        pair = (x[1] - x[0]) / (v[0] - v[1]) if v[0] > v[1] else None
+        ahead = min((t for t in (wall, pair) if t is not None), default=None)
+        while sample < len(truth) and (ahead is None or truth.t[sample] <= now + ahead):
+            since = Fraction(truth.t[sample]) - now
+            right = [x[0] + v[0] * since + r[0], x[1] + v[1] * since + 2 * r[0] + r[1]]
+            # The start data are rounded on their own: 2.4 m to the last place.
+            error = [abs(float(a - Fraction(b))) for a, b in zip(right, truth.position[sample, :, 0])]
+            assert max(error) < truth.error_bound + 1e-15 * max(2.4, truth.position[sample].max())
+            sample += 1
+        if ahead is None:
+            break
+        now, x = now + ahead, [x[0] + v[0] * ahead, x[1] + v[1] * ahead]
+        if ahead == wall:
+            v = [-v[0], v[1]]
+        else:
+            centre = (m[0] * v[0] + m[1] * v[1]) / (m[0] + m[1])
+            v = [2 * centre - v[0], 2 * centre - v[1]]
+
+
+def test_a_bouncing_ball_rests_from_its_accumulation_point_on():
+    """Exactly at rest, exactly on the floor."""
+    run, truth, _ = exact("bouncing_ball_e09")
+    height = run.scene.position[0, 1] - run.scene.radius[0]
+    rest = np.sqrt(2 * height / 9.81) * 1.9 / 0.1
+    later = truth.t > rest
+    assert later.any()
+    assert (truth.position[later, 0, 1] == run.scene.radius[0]).all()
+    assert not truth.velocity[later].any()
+    # The last listed bounce lasts 1e-4 s; the rest of the series is ten times that.
+    assert truth.collisions.t[-1] == pytest.approx(rest, abs=1.2e-3)
+
+
+def test_an_offset_grows_between_static_disks_as_the_horizon_assumes():
+    """The horizon rests on this factor."""
+    run, truth, _ = exact("disk_between_static_disks")
+    scene = run.scene
+    along = np.array([0.8, 0.6])
+    start = np.array(scene.position)
+    start[0] += 1e-7 * np.array([-0.6, 0.8])
+    moved = Scene(position=start, velocity=scene.velocity, radius=scene.radius, mass=scene.mass, restitution=1.0)
+    offset = [abs(along[0] * x[0, 1] - along[1] * x[0, 0]) for _, x, _ in simulate(moved, 7.0)][1:]
+    # q = 1 + 0.75 / 1.5; after a few bounces only the growing direction is left, while 1e-7 m is still small.
+    assert offset[7] / offset[6] == pytest.approx(1.5 + np.sqrt(1.25), rel=1e-3)
+    assert truth.valid_until < run.duration
+    assert truth.t[-1] <= truth.valid_until
+
+
+def test_a_disk_slides_down_the_incline_in_contact_and_does_not_turn():
+    """Gap 0 and speed g sin(alpha) t throughout."""
+    run, truth, _ = exact("slide_on_incline")
+    point, normal = (a[0] for a in wall_frames(run.scene))
+    # A unit in the last place of 10 m.
+    np.testing.assert_allclose((truth.position[:, 0] - point) @ normal, 0.625, rtol=0, atol=4e-15)
+    np.testing.assert_allclose(np.hypot(*truth.velocity[:, 0].T), 9.81 * 0.6 * truth.t, rtol=1e-14)
+    assert not truth.angle.any()
+
+
+def test_what_rests_stays():
+    """The truth of an equilibrium is the start."""
+    for name in ("rest_on_floor", "column_of_ten"):
+        run, truth, _ = exact(name)
+        assert (truth.position == run.scene.position).all()
+        assert not truth.velocity.any()

@@ -1,0 +1,89 @@
+"""Every known departure of an engine from the scenes it is given, with its size and its cause: strict both ways."""
+
+from __future__ import annotations
+
+from math import atan
+from typing import NamedTuple
+
+FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
+
+
+class Departure(NamedTuple):
+    """One probe that an engine does not keep.
+
+    Attributes:
+        engine: a key of `ENGINES`.
+        probe: a key of `PROBES`.
+        value: what the cause makes the probe read.
+        bound: how far rounding may take the reading from it.
+        why: the cause, verified by turning it off or by its formula in test_conformance.py.
+        source: where the engine says so.
+    """
+
+    engine: str
+    probe: str
+    value: float
+    bound: float
+    why: str
+    source: str
+
+
+PRODUCT = "the elasticities of the two shapes are multiplied, so e on every shape gives e2"
+THRESHOLD = "hits that close at less than 1 m/s are taken as inelastic"
+ASLEEP = "a disk below the sleep tolerance for 0.5 s is put to sleep, and its velocity set to 0"
+CAP = "a disk moves at most 2 units of length a step; the velocity is cut, not only the path"
+NO_FRICTION_IN_BOUNCE = (
+    "every shape has friction 0.6, bounded by the normal impulse before restitution is added: 0.6 / (1 + e)"
+)
+NORMALISED_EULER = "(cos, sin) += w h (-sin, cos) and then normalised turns by atan(w h) a substep h = dt / 4"
+
+MUNK_ARBITER = "Munk2D src/cpArbiter.c, cpArbiterUpdate: arb->e = a->e * b->e"
+BOX2D_SETTINGS = "Box2D 2.3 Common/b2Settings.h: "
+BOX2D_TYPES = "Box2D 3.1 src/types.c: "
+
+DEPARTURES = [
+    # Two equal roundings of e2 in float64, in velocities of the order of the closing speed.
+    *(
+        Departure("pymunk:shipped", probe, 0.25, 8 * FLOAT64, PRODUCT, MUNK_ARBITER)
+        for probe in (
+            "restitution_0.01", "restitution_0.1", "restitution_0.5", "restitution_2", "restitution_10",
+            "restitution_100", "restitution_wall",
+        )
+    ),
+    # What stops does so exactly: the two velocities of an inelastic hit agree to rounding in float32.
+    *(
+        Departure(engine, probe, 0.0, 8 * FLOAT32, THRESHOLD, source)
+        for engine, source in (
+            ("box2d:shipped", BOX2D_SETTINGS + "b2_velocityThreshold 1.0f"),
+            ("box2d_v3:shipped", BOX2D_TYPES + "b2DefaultWorldDef, restitutionThreshold = 1 m/s"),
+        )
+        for probe in ("restitution_0.01", "restitution_0.1", "restitution_0.5")
+    ),
+    Departure("box2d:shipped", "slow_flight", 0.0, 0.0, ASLEEP, BOX2D_SETTINGS + "b2_linearSleepTolerance 0.01f"),
+    Departure(
+        "box2d_v3:shipped", "slow_flight", 0.0, 0.0, ASLEEP, BOX2D_TYPES + "b2DefaultBodyDef, sleepThreshold = 0.05 m/s"
+    ),
+    # 2 units in 1/64 s, cut by a float32 ratio.
+    Departure("box2d:shipped", "fast_flight", 128.0, 128 * 4 * FLOAT32, CAP, BOX2D_SETTINGS + "b2_maxTranslation 2.0f"),
+    Departure(
+        "box2d_v3:shipped", "fast_flight", 400.0, 400 * 4 * FLOAT32, "a disk is no faster than 400 m/s",
+        BOX2D_TYPES + "b2DefaultWorldDef, maximumLinearSpeed = 4 m * 100 / s",
+    ),
+    # A ratio of two momenta that round as often as a hit does.
+    Departure(
+        "box2d:shipped", "friction", 0.2, 8 * FLOAT32, "every shape has friction 0.2, and the pair sqrt(0.2 * 0.2)",
+        "Box2D 2.3 Dynamics/b2Fixture.h: b2FixtureDef, friction = 0.2f",
+    ),
+    Departure(
+        "box2d_v3:shipped", "friction", 0.6 / 1.5, 8 * FLOAT32, NO_FRICTION_IN_BOUNCE,
+        BOX2D_TYPES + "b2DefaultSurfaceMaterial, friction = 0.6f; src/contact_solver.c: b2ApplyRestitutionTask",
+    ),
+    # 1024 substeps, each of which rounds cos and sin.
+    *(
+        Departure(
+            engine, "spins_freely", 1024 * atan(20 / 1024), 1024 * FLOAT32, NORMALISED_EULER,
+            "Box2D 3.1 include/box2d/math_functions.h: b2IntegrateRotation",
+        )
+        for engine in ("box2d_v3:shipped", "box2d_v3:matched")
+    ),
+]  # fmt: skip
