@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
-
-import pandas as pd
+from dataclasses import dataclass
 
 from adapters.engine import Unsupported
-from adapters.engines import ENGINES, Row
+from adapters.engines import Row
 from adapters.probe import Probe, Reading
 from adapters.probes_contract import CONTRACT
 from adapters.probes_physics import PHYSICS
@@ -52,9 +49,14 @@ def conform(name: str, row: Row) -> list[Finding]:
     try:
         row.make().close()
     except Exception as error:  # a missing library, or one that fails as it starts
-        reason = f"{type(error).__name__}: {error}"
-        return [Finding(engine, profile, "make", "Can the engine be made?", "no", "yes", 0.0, "breaks", reason)]
+        return [no_answer(name, type(error).__name__, str(error))]
     return [ask(engine, profile, probe, row) for probe in PROBES]
+
+
+def no_answer(name: str, what: str, why: str) -> Finding:
+    """The one finding of an engine that could not be made, or did not survive its probes."""
+    engine, profile = name.split(":")
+    return Finding(engine, profile, "make", "Does the engine answer?", "no", "yes", 0.0, "breaks", f"{what}: {why}")
 
 
 def ask(engine: str, profile: str, name: str, row: Row) -> Finding:
@@ -70,13 +72,3 @@ def ask(engine: str, profile: str, name: str, row: Row) -> Finding:
     return Finding(
         engine, profile, name, probe.asked, reading.got, reading.expected, reading.bound, verdict, reading.note
     )
-
-
-def conform_all(names: Iterable[str]) -> list[Finding]:
-    """The findings of these rows of `ENGINES`, in their order."""
-    return [finding for name in names for finding in conform(name, ENGINES[name])]
-
-
-def to_table(findings: Iterable[Finding]) -> pd.DataFrame:
-    """A row a finding, a column a field of `Finding`."""
-    return pd.DataFrame([asdict(finding) for finding in findings], columns=[field.name for field in fields(Finding)])

@@ -74,9 +74,9 @@ class Archive:
         """What `begin` wrote."""
         return next(self.lines())["header"]
 
-    def rows(self, kind: str) -> list[dict[str, Any]]:
-        """The rows of a table that was written as one line; empty if it was not."""
-        return next((line[kind] for line in self.lines() if kind in line), [])
+    def parts(self, kind: str) -> list[Any]:
+        """What the lines of one kind hold, in the order in which they were written."""
+        return [line[kind] for line in self.lines() if kind in line]
 
     def records(self) -> list[dict[str, Any]]:
         """The lines of the cells that ended."""

@@ -13,7 +13,7 @@ from adapters.play import Run
 from reports import broken, laws, style
 from reports.comparison import Comparison, cut
 from reports.view import TOUCHY, View
-from scenarios.model import Array, Scenario, Trajectory
+from scenarios.model import Array, Trajectory
 
 ZERO = 1e-17
 """Where 0, and what is smaller than this, is drawn on a log axis: below the rounding of any number compared."""
@@ -46,21 +46,10 @@ class Chart:
     draw: Callable[[Comparison], Drawing]
 
 
-def middle_dt(scenario: Scenario) -> float:
-    """s, the step size that the page shows: the middle of the scenario's ladder."""
-    return scenario.dt(scenario.substeps[len(scenario.substeps) // 2])
-
-
-def at_middle_dt(comparison: Comparison) -> list[Run]:
-    """The runs at the middle dt, failed ones too."""
-    dt = middle_dt(comparison.scenario)
-    return [run for run in comparison.runs if abs(run.dt - dt) < 1e-9 * dt]
-
-
 def views(comparison: Comparison, other: Trajectory | None) -> list[tuple[Run, View]]:
     """What the middle dt's runs played, each beside `other` and cut to the samples both have."""
     played = []
-    for run in at_middle_dt(comparison):
+    for run in comparison.middle_runs:
         if run.trajectory is not None and len(run.trajectory) > 1:
             k = min(len(run.trajectory), len(other) if other is not None else len(run.trajectory))
             mine = cut(run.trajectory, k)
@@ -131,7 +120,7 @@ def deviation(comparison: Comparison) -> Drawing:
     scene, truth = comparison.scenario.scene, comparison.truth
     held: Run | None = None
     if truth is None:
-        played = [run for run in at_middle_dt(comparison) if run.trajectory is not None]
+        played = [run for run in comparison.middle_runs if run.trajectory is not None]
         held = next((run for run in played if run.name == LAW), played[0] if played else None)
         if held is None:
             return Drawing("Trajectories", "No engine played this scene.", None)

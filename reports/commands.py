@@ -16,7 +16,7 @@ from adapters.engines import ENGINES
 from reports.metrics import METRICS
 from reports.report import make_report
 from reports.suite import FolderTaken, Plan, carry_out, may_write, replace_folder
-from reports.terminal import print_summary
+from reports.terminal import Progress, print_summary
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 from scenarios.files import SceneFileError
 
@@ -50,8 +50,9 @@ def run_plan(
         refuse([str(fault)])
     part = out.with_name(f"{out.name}.part-{os.getpid()}")
     try:
-        carry_out(plan, part)
-        report = make_report(part)
+        with Progress() as progress:
+            carry_out(plan, part, progress)
+            report = make_report(part, progress.say)
     except KeyboardInterrupt:
         say(f"\nInterrupted. What was played is kept: crosscheck report {part}")
         sys.exit(INTERRUPTED)
@@ -72,7 +73,8 @@ def report_again(out: Path) -> NoReturn:
     if not (out / "journal.jsonl").is_file():
         refuse([f"{out}: has no journal.jsonl, so it is not the folder of a run"])
     try:
-        report = make_report(out)
+        with Progress() as progress:
+            report = make_report(out, progress.say)
     except (ValueError, KeyError, StopIteration) as fault:
         refuse([f"{out}: the journal cannot be used: {fault}"])
     print_summary(report, str((out / "report.html").resolve()))

@@ -34,6 +34,16 @@ class Comparison:
     runs: Sequence[Run]
     table: pd.DataFrame
 
+    @property
+    def middle_dt(self) -> float:
+        """s, the step size in the middle of the ladder: where a scenario is read when one must be chosen."""
+        return self.scenario.dt(self.scenario.substeps[len(self.scenario.substeps) // 2])
+
+    @property
+    def middle_runs(self) -> list[Run]:
+        """The runs at the middle dt, failed ones too."""
+        return [run for run in self.runs if run.dt == self.middle_dt]
+
 
 def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     """Every metric of every run against the laws, the truth and every other engine at the same dt."""

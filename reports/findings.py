@@ -7,36 +7,26 @@ from collections.abc import Sequence
 import pandas as pd
 
 from reports.comparison import Comparison
+from reports.overview import MAPPED, values
 
 FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
 
 
 def findings(comparisons: Sequence[Comparison]) -> list[str]:
     """Three sentences: who is closest, what settings are worth, where each fails."""
-    off = at_middle_step(comparisons, "position_max_radii", "truth")
+    off = position_errors(comparisons)
     statuses = [run.status for comparison in comparisons for run in comparison.runs]
     return [closest(off), worth_of_settings(off), where_it_fails(off, statuses)]
 
 
-def at_middle_step(comparisons: Sequence[Comparison], metric: str, versus: str | None = None) -> pd.DataFrame:
-    """A metric at the middle of each dt ladder: a row a scenario, a column an `engine:profile`, NaN where absent."""
-    tables = []
-    for comparison in comparisons:
-        table = comparison.table
-        rows = table[(table.metric == metric) & (table.dt_s == middle_dt(comparison))]
-        tables.append(rows if versus is None else rows[rows.versus == versus])
-    if not tables or not sum(map(len, tables)):
-        return pd.DataFrame()
-    rows = pd.concat(tables)
-    rows = rows.assign(name=rows.engine + ":" + rows.profile)
-    wide = rows.pivot(index="scenario", columns="name", values="value")
-    return wide.reindex(index=rows.scenario.unique(), columns=rows.name.unique())
-
-
-def middle_dt(comparison: Comparison) -> float:
-    """s, the step size at which a scenario is read when one must be chosen."""
-    scenario = comparison.scenario
-    return scenario.dt(scenario.substeps[len(scenario.substeps) // 2])
+def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
+    """Largest deviation from the truth in radii at the middle dt: a row a scenario, a column an `engine:profile`."""
+    scored = [comparison for comparison in comparisons if comparison.truth is not None]
+    rows = [
+        {name: value for (name, metric), (value, _) in values(comparison).items() if metric == MAPPED}
+        for comparison in scored
+    ]
+    return pd.DataFrame(rows, index=[comparison.scenario.name for comparison in scored])
 
 
 def closest(off: pd.DataFrame) -> str:
@@ -55,6 +45,8 @@ def closest(off: pd.DataFrame) -> str:
 
 def worth_of_settings(off: pd.DataFrame) -> str:
     """How much of an engine's deviation is its settings."""
+    if off.empty:
+        return "What settings are worth is shown by the scenes that have one."
     parts = []
     for engine in dict.fromkeys(name.split(":")[0] for name in off.columns):
         shipped, matched = f"{engine}:shipped", f"{engine}:matched"

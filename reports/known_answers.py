@@ -2,39 +2,58 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-import pandas as pd
 
 from adapters.engines import ENGINES
 from scenarios.placing import lay_out
 
 KNOWN_SCENE = "simbenchmark_bouncing"  # whose run brings this table along
-SOURCE = "leggedrobotics/SimBenchmark, data/bouncing/sample.csv"
 DISKS, MASS, RADIUS, HEIGHT, GRAVITY, DURATION = 49, 10.0, 0.1, 5.0, 9.81, 20.0
 ENERGY = DISKS * MASS * GRAVITY * HEIGHT  # 24034.5 J
 
-# dt in s -> mean over the steps of (E - 24034.5 J)^2 in J2, as published.
-PUBLISHED = {
-    "ODE": {1e-2: 18808.3, 1e-3: 185.027, 1e-4: 1.85055},
-    "Bullet": {1e-2: 7.40664e6, 1e-3: 75245.4, 1e-4: 752.345},
-}
+
+@dataclass(frozen=True)
+class KnownAnswer:
+    """A published mean over the steps of (E - 24034.5 J)^2.
+
+    Attributes:
+        column: the engine of the published column.
+        dt_s: s.
+        published_J2: J2, six digits.
+        made_by: what makes it here: a key of `ENGINES`, or `SIX_LINES`.
+        source: where it was published.
+    """
+
+    column: str
+    dt_s: float
+    published_J2: float
+    made_by: str
+    source: str = "leggedrobotics/SimBenchmark, data/bouncing/sample.csv"
+
+    def reproduce(self) -> float:
+        """J2, played here."""
+        if self.made_by == SIX_LINES:
+            return gravity_then_reflect(self.dt_s)
+        return mean_squared_error_of(self.made_by, self.dt_s)
+
+
+SIX_LINES = "gravity, then reflect"
+KNOWN_ANSWERS = (
+    KnownAnswer("ODE", 1e-2, 18808.3, "pymunk:matched"),
+    KnownAnswer("ODE", 1e-3, 185.027, "pymunk:matched"),
+    KnownAnswer("ODE", 1e-4, 1.85055, "pymunk:matched"),
+    KnownAnswer("Bullet", 1e-2, 7.40664e6, SIX_LINES),
+    KnownAnswer("Bullet", 1e-3, 75245.4, SIX_LINES),
+    KnownAnswer("Bullet", 1e-4, 752.345, SIX_LINES),
+)
 MEANING = (
     "49 balls of 10 kg dropped from 5 m on a floor, e = 1, for 20 s: SimBenchmark ranked six engines by how well they "
     "keep the energy here. Its ODE column comes out of pymunk, digit for digit, and its Bullet column out of six lines "
     "of Python that apply gravity and then reflect. So that ranking is the order of operations inside a step (reflect "
     "the velocity from before or from after gravity), not the quality of contacts."
 )
-
-
-def known_answers() -> pd.DataFrame:
-    """Mean squared energy error as published and as made again; columns column, made_by, dt_s, published_J2, ..."""
-    rows = []
-    for dt, published in PUBLISHED["ODE"].items():
-        rows.append(("ODE", "pymunk:matched", dt, published, mean_squared_error_of("pymunk:matched", dt), SOURCE))
-    for dt, published in PUBLISHED["Bullet"].items():
-        rows.append(("Bullet", "gravity, then reflect", dt, published, gravity_then_reflect(dt), SOURCE))
-    columns = ["column", "made_by", "dt_s", "published_J2", "ours_J2", "source"]
-    return pd.DataFrame(rows, columns=columns)
 
 
 def mean_squared_error_of(name: str, dt: float) -> float:

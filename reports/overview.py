@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.charts import at_middle_dt, middle_dt
 from reports.comparison import Comparison
 from reports.metrics import METRICS
 from reports.style import TRUTH, heat, number
@@ -63,7 +62,7 @@ def names_of(comparisons: Iterable[Comparison]) -> list[str]:
 def values(comparison: Comparison) -> dict[tuple[str, str], tuple[float, str]]:
     """(`engine:profile`, metric) -> (value, note) at the middle dt, against the truth or else the laws of physics."""
     table = comparison.table
-    near = np.isclose(table.dt_s.astype(float), middle_dt(comparison.scenario), rtol=1e-9, atol=0)
+    near = table.dt_s == comparison.middle_dt
     found: dict[tuple[str, str], tuple[float, str]] = {}
     for versus in ("itself", TRUTH):  # the truth comes last and wins
         rows = table[near & (table.versus == versus) & table.metric.isin(list(METRICS))]
@@ -89,7 +88,7 @@ def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
     """`engine:profile` -> (what happened, reason) of the runs at the middle dt that are not "ok"."""
     return {
         run.name: (OUTCOMES.get(run.status, run.status), run.reason)
-        for run in at_middle_dt(comparison)
+        for run in comparison.middle_runs
         if run.status != "ok"
     }
 
@@ -127,7 +126,7 @@ def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[st
     rows = {}
     for comparison in comparisons:
         found, failed = values(comparison), outcome_at_middle_dt(comparison)
-        played = {run.name for run in at_middle_dt(comparison)}
+        played = {run.name for run in comparison.middle_runs}
         cells = []
         for name in names:
             if name in failed:
@@ -166,7 +165,7 @@ def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[s
 def between_engines(comparison: Comparison, names: Sequence[str]) -> dict[str, list[Cell]]:
     """name -> how far apart its trajectory is from each other name's, at most, in radii; {} if there is no pair."""
     table = comparison.table
-    near = np.isclose(table.dt_s.astype(float), middle_dt(comparison.scenario), rtol=1e-9, atol=0)
+    near = table.dt_s == comparison.middle_dt
     apart: dict[frozenset[str], float] = {}
     for row in table[near & (table.metric == MAPPED) & table.versus.isin(list(names))].to_dict("records"):
         apart[frozenset((f"{row['engine']}:{row['profile']}", str(row["versus"])))] = float(row["value"])
@@ -187,7 +186,7 @@ def settings(comparison: Comparison) -> Settings:
     """(`engine:profile`, setting) -> (asked, used) at the middle dt; asked "–" where it is the engine's own."""
     return {
         (run.name, setting): (number(asked, 6), number(used, 6))
-        for run in at_middle_dt(comparison)
+        for run in comparison.middle_runs
         for setting, (asked, used) in run.settings.items()
     }
 

@@ -19,7 +19,7 @@ from plotly.offline import get_plotlyjs
 
 from adapters.play import Run
 from reports import overview, style
-from reports.charts import CHARTS, POINTS, Drawing, middle_dt
+from reports.charts import CHARTS, POINTS, Drawing
 from reports.comparison import Comparison
 from reports.known_answers import MEANING
 from reports.metrics import METRICS
@@ -77,7 +77,7 @@ def write_page(
     names = overview.names_of(comparisons)
     common = overview.common_settings(comparisons)
     sections = [section_of(comparison, names, common) for comparison in comparisons]
-    scripts = [get_plotlyjs(), *((HERE / script).read_text() for script in SCRIPTS)]
+    scripts = [(HERE / script).read_text() for script in SCRIPTS]
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
@@ -90,7 +90,7 @@ def write_page(
         conformance=conformance_matrix(conformance), departures=departures(conformance), probes=records(conformance),
         known_answers=records(known_answers), known_answers_text=about.get("known_answers_text", MEANING),
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
-        policy=content_policy(scripts),
+        library=deflated(get_plotlyjs()), policy=content_policy([get_plotlyjs(), *scripts]),
         heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, truth_of=truth_of,
         common=by_name(common),
     )  # fmt: skip
@@ -107,7 +107,7 @@ def section_of(comparison: Comparison, names: Sequence[str], common: overview.Se
     return Section(
         comparison=comparison,
         family=FAMILIES.get(module, OWN),
-        dt=middle_dt(comparison.scenario),
+        dt=comparison.middle_dt,
         failures=overview.failures(comparison),
         drawings=drawings,
         charts=packed_charts(drawings),
@@ -128,7 +128,11 @@ def packed_charts(drawings: Mapping[str, Drawing]) -> str:
         if drawing.figure is not None:
             figures[key] = drawing.figure.to_dict()
             figures[key]["layout"].pop("template", None)
-    text = json.dumps(figures, separators=(",", ":"), default=list)
+    return deflated(json.dumps(figures, separators=(",", ":"), default=list))
+
+
+def deflated(text: str) -> str:
+    """Text, deflated, as base64: what `unpack` of player.js reads."""
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
 
 

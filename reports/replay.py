@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.play import Run
-from reports.charts import at_middle_dt
 from reports.comparison import Comparison
 from reports.style import TRUTH
 from scenarios.model import Array, Scenario, Trajectory
@@ -44,7 +43,7 @@ def pack(comparison: Comparison) -> str:
 def played(comparison: Comparison) -> list[tuple[Run | None, Trajectory]]:
     """What can be drawn: (run, trajectory) at the middle dt, and (None, truth) last, so that it lies on top."""
     layers: list[tuple[Run | None, Trajectory]] = [
-        (run, run.trajectory) for run in at_middle_dt(comparison) if run.trajectory is not None
+        (run, run.trajectory) for run in comparison.middle_runs if run.trajectory is not None
     ]
     if comparison.truth is not None and len(comparison.truth):
         layers.append((None, comparison.truth))

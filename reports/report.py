@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,27 +31,34 @@ class Report:
     findings: list[str]
 
 
-def make_report(folder: Path) -> Report:
-    """Read the journal of `folder`, write deviations.csv, runs.csv and report.html into it."""
+def make_report(folder: Path, say: Callable[[str], None]) -> Report:
+    """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what is being done."""
     archive = Archive(folder)
     header, records = archive.header(), archive.records()
     by_scene: dict[str, list[dict[str, Any]]] = {}
     for record in records:
         by_scene.setdefault(record["scene"], []).append(record)
-    comparisons = [compare_scene(archive, scene, by_scene[scene]) for scene in header["scenes"] if scene in by_scene]
+    comparisons = []
+    for scene in header["scenes"]:
+        if scene in by_scene:
+            say(f"comparing {by_scene[scene][0]['scenario']}")
+            comparisons.append(compare_scene(archive, scene, by_scene[scene]))
+    say("writing tables and page")
     deviations = pd.concat([comparison.table for comparison in comparisons], ignore_index=True)
     runs = table_of_runs([record for comparison in by_scene.values() for record in comparison], header["scenes"])
     deviations.to_csv(folder / "deviations.csv", index=False)
     runs.to_csv(folder / "runs.csv", index=False)
     sentences = findings(comparisons)
-    footer = next((line["footer"] for line in archive.lines() if "footer" in line), {"seconds": None})
+    asked = sorted(archive.parts("conformance"), key=lambda rows: place_in_table(rows[0]))
+    known = sorted(archive.parts("known_answer"), key=lambda row: (row["column"], row["dt_s"]), reverse=True)
+    footer = archive.parts("footer")
     write_page(
         folder / "report.html",
         comparisons,
         findings=sentences,
-        conformance=pd.DataFrame(archive.rows("conformance")),
-        known_answers=pd.DataFrame(archive.rows("known_answers")),
-        about=header | {"seconds": footer["seconds"], "known_answers_text": MEANING},
+        conformance=pd.DataFrame([row for rows in asked for row in rows]),
+        known_answers=pd.DataFrame(known),
+        about=header | {"seconds": footer[0]["seconds"] if footer else float("nan"), "known_answers_text": MEANING},
     )
     return Report(header, comparisons, deviations, runs, sentences)
 
@@ -60,20 +68,22 @@ def compare_scene(archive: Archive, scene: str, records: list[dict[str, Any]]) -
     stored = archive.folder / "scenes" / f"{records[0]['scenario']}.toml"
     scenario = open_scene(scene if scene in SCENARIOS else str(stored), records[0]["seed"])
     ladder = tuple(sorted({record["substeps"] for record in records}))
-    ordered = sorted(records, key=place_in_table)
+    ordered = sorted(records, key=lambda record: (place_in_table(record), record["substeps"]))
     runs: list[Run] = [archive.run(record) for record in ordered]
     return compare(replace(scenario, substeps=ladder), runs)
 
 
-def place_in_table(record: dict[str, Any]) -> tuple[int, int]:
-    """Where a cell stands among those of its scenario."""
-    return list(ENGINES).index(f"{record['engine']}:{record['profile']}"), record["substeps"]
+def place_in_table(row: dict[str, Any]) -> int:
+    """Where the engine of a row stands in `ENGINES`."""
+    return list(ENGINES).index(f"{row['engine']}:{row['profile']}")
 
 
 def table_of_runs(records: list[dict[str, Any]], scenes: list[str]) -> pd.DataFrame:
     """A row a cell: what was played, how it ended, how long the engine took, with which settings and versions."""
     columns = ["scenario", "engine", "profile", "dt_s", "seed", "status", "reason", "seconds", "cell"]
-    ordered = sorted(records, key=lambda record: (scenes.index(record["scene"]), *place_in_table(record)))
+    ordered = sorted(
+        records, key=lambda record: (scenes.index(record["scene"]), place_in_table(record), record["substeps"])
+    )
     rows = [
         {name: record[name] for name in columns}
         | {

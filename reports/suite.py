@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-from adapters.conformance import conform, to_table
+from adapters.conformance import conform, no_answer
 from adapters.engines import ENGINES
 from adapters.play import Run
-from reports.archive import FILES, Archive
+from reports.archive import FILES, Archive, save_trajectory
 from reports.cells import Cell, open_scene, with_steps
-from reports.known_answers import KNOWN_SCENE, known_answers
+from reports.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.machine import about
-from reports.runner import play_all
+from reports.runner import Failure, run_all
 from reports.terminal import Progress
 from scenarios.model import Scenario
 
@@ -47,37 +49,51 @@ class Plan:
         return with_steps(open_scene(scene, self.seed), self.dts, self.full)
 
 
-def carry_out(plan: Plan, folder: Path) -> None:
-    """Play every cell of the plan into `folder`, which must not exist or be empty; report progress as it goes."""
+def carry_out(plan: Plan, folder: Path, progress: Progress) -> None:
+    """Ask, then play, every engine and cell of the plan; all goes into `folder`, which must not exist or be empty."""
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
     archive = Archive(folder)
     archive.begin(about(plan.command, plan.seed) | {"scenes": list(plan.scenes)})
     for scene in plan.scenes:
         if scene.endswith(".toml"):
             shutil.copy(scene, folder / "scenes" / f"{scenarios[scene].name}.toml")
-    with Progress() as progress:
-        progress.say("conformance of every engine")
-        findings = [finding for name in plan.engines for finding in conform(name, ENGINES[name])]
-        archive.append({"conformance": to_table(findings).to_dict("records")})
-        if KNOWN_SCENE in plan.scenes:
-            progress.say("known answers from outside")
-            archive.append({"known_answers": known_answers().to_dict("records")})
-        cells = [
-            (cell, cell.key(scenario))
-            for scene, scenario in scenarios.items()
-            for cell in cells_of(scene, scenario, plan)
-        ]
-        progress.start(len(cells))
 
-        def failed(cell: Cell, status: str, reason: str) -> Run:
-            engine, profile = cell.engine.split(":")
-            scenario = scenarios[cell.scene]
-            return Run(engine, profile, scenario.name, scenario.dt(cell.substeps), status, reason)
-
-        for cell, key, run in play_all(cells, folder / "trajectories", plan.workers, failed):
-            archive.add(cell, key, run)
+    tasks: dict[Any, Callable[[], Any]] = {engine: partial(conform, engine, ENGINES[engine]) for engine in plan.engines}
+    if KNOWN_SCENE in plan.scenes:
+        tasks |= {answer: partial(answer.reproduce) for answer in KNOWN_ANSWERS}
+    for scene, scenario in scenarios.items():
+        for cell in cells_of(scene, scenario, plan):
+            tasks[cell] = partial(play_and_save, cell, folder / "trajectories" / f"{cell.key(scenario)}.npz")
+    progress.start(len(tasks))
+    for task, result in run_all(tasks, plan.workers):
+        if isinstance(task, Cell):
+            scenario = scenarios[task.scene]
+            run = failed_run(task, scenario, result) if isinstance(result, Failure) else result
+            archive.add(task, task.key(scenario), run)
             progress.done(f"{run.scenario}  {run.name}  dt {run.dt:.4g} s", run.status)
-    archive.append({"footer": {"cells": len(cells), "seconds": progress.seconds}})
+        elif isinstance(task, KnownAnswer):
+            ours = float("nan") if isinstance(result, Failure) else result
+            archive.append({"known_answer": asdict(task) | {"ours_J2": ours}})
+            progress.done(f"known answer: {task.column} at dt {task.dt_s:g} s")
+        else:
+            findings = [no_answer(task, *result)] if isinstance(result, Failure) else result
+            archive.append({"conformance": [asdict(finding) for finding in findings]})
+            progress.done(f"conformance of {task}")
+    archive.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
+
+
+def play_and_save(cell: Cell, path: Path) -> Run:
+    """In the worker: play, save the trajectory, and send back the rest."""
+    run = cell.play()
+    if run.trajectory is not None:
+        save_trajectory(path, run.trajectory)
+    return replace(run, trajectory=None)
+
+
+def failed_run(cell: Cell, scenario: Scenario, failure: Failure) -> Run:
+    """The run of a cell whose worker died or was stopped."""
+    engine, profile = cell.engine.split(":")
+    return Run(engine, profile, scenario.name, scenario.dt(cell.substeps), failure.status, failure.reason)
 
 
 def cells_of(scene: str, scenario: Scenario, plan: Plan) -> list[Cell]:

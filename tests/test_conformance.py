@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache
 from math import atan, sqrt
 
@@ -11,7 +11,7 @@ import pytest
 from broken_engines import CAUGHT_BY, RaisesInStep, RefusesAll, Sound, row_of
 from tolerances import DEPARTURES
 
-from adapters.conformance import PROBES, Finding, conform, conform_all, to_table
+from adapters.conformance import PROBES, conform
 from adapters.engines import ENGINES
 from adapters.probe import head_on, loaded, one_disk
 from adapters.probes_physics import restitution
@@ -232,13 +232,3 @@ def test_every_engine_that_is_made_is_closed():
 
     conform("broken:one", row_of(Counted))
     assert alive == []
-
-
-def test_the_table_has_a_row_a_finding_and_a_column_a_field():
-    """In the order of engines, then of probes."""
-    table = to_table(conform_all(["reference:lesson", "pymunk:shipped"]))
-    assert list(table.columns) == [field.name for field in fields(Finding)]
-    assert list(table.probe) == list(PROBES) * 2
-    assert set(table.engine + ":" + table.profile) == {"reference:lesson", "pymunk:shipped"}
-    assert table.asked.str.contains("?", regex=False).all()
-    assert list(to_table([]).columns) == list(table.columns)

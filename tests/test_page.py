@@ -16,7 +16,6 @@ from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_pla
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
-from reports.charts import middle_dt
 from reports.comparison import Comparison, compare
 from reports.page import write_page
 from scenarios.catalogue import scenario
@@ -170,7 +169,7 @@ def test_the_player_shows_the_trajectory(page: Page, comparisons: list[Compariso
     shown = [page.evaluate(at_all, [name, player]) for player in PLAYERS]
     rows = np.rint(instants / comparison.scenario.sample_interval).astype(int)
     for player, positions in zip(PLAYERS, shown):
-        run = next(r for r in comparison.runs if r.name == player and r.dt == middle_dt(comparison.scenario))
+        run = next(r for r in comparison.runs if r.name == player and r.dt == comparison.middle_dt)
         assert run.trajectory is not None
         expected = run.trajectory.position[rows]
         half_step = np.ptp(expected, axis=(0, 1)) / 65535 / 2
@@ -281,12 +280,13 @@ def test_the_page_never_scrolls_sideways(browser: Browser, path: Path, width: in
 
 
 def test_the_page_fits_in_eight_megabytes(path: Path) -> None:
-    """Plotly is there once; what a scenario adds leaves room for forty in 8 MB."""
+    """Plotly is there once, deflated; what a scenario adds leaves room for forty in 8 MB."""
     html = path.read_text()
-    rest = len(html) - max(len(part) for part in html.split("<script>"))
+    library = html.split('id="library">')[1].split("</script>")[0]
 
-    assert html.count("* plotly.js v") == 1
-    assert rest / 3 < (8e6 - 5e6) / 40
+    assert html.count(library[:1000]) == 1
+    assert len(library) < 2.5e6
+    assert (len(html) - len(library)) / 3 < (8e6 - 2.5e6) / 40
     assert "http://" not in html.split("<script>")[0]
 
 

@@ -2,54 +2,46 @@
 
 import ctypes
 import os
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from adapters.play import Run
 from reports.archive import load_trajectory
 from reports.cells import Cell
-from reports.runner import play_all
+from reports.runner import Failure, run_all
+from reports.suite import play_and_save
 
 
-@dataclass(frozen=True)
-class Misbehaving(Cell):
-    """A cell whose engine does what engines do."""
-
-    how: str = ""
-
-    def play(self) -> Run:
-        """Abort, hang in C, exit, or raise where nobody expects it."""
-        if self.how == "abort":
-            os.abort()
-        if self.how == "hang":
-            ctypes.CDLL(None).sleep(1000)
-        if self.how == "raise":
-            raise RuntimeError("no such luck")
-        return super().play()
+def abort() -> None:
+    """As an engine does on an assertion in C."""
+    os.abort()
 
 
-def failed(cell: Cell, status: str, reason: str) -> Run:
-    """The run of a cell that did not come back."""
-    return Run(*cell.engine.split(":"), cell.scene, 0.0, status, reason)  # type: ignore[arg-type]
+def hang() -> None:
+    """In C, where no Python signal handler runs."""
+    ctypes.CDLL(None).sleep(1000)
 
 
-def test_what_aborts_hangs_or_raises_is_named_and_every_good_cell_is_kept(tmp_path: Path):
-    """Six cells on two workers, three of them bad: three good trajectories, three statuses with their reasons."""
-    names = ("", "abort", "", "hang", "raise", "")
-    cells = [(Misbehaving("slow_hit", 0, "reference:exercise", 1, how), f"{k}") for k, how in enumerate(names)]
-    runs = {key: run for _, key, run in play_all(cells, tmp_path, 2, failed, timeout=8.0)}
+def fail() -> None:
+    """As an engine does whose binding is older than its library."""
+    raise RuntimeError("no such luck")
 
-    assert [runs[f"{k}"].status for k in range(6)] == ["ok", "crashed", "ok", "timeout", "error", "ok"]
-    assert "SIGABRT" in runs["1"].reason
-    assert "8 s" in runs["3"].reason
-    assert "no such luck" in runs["4"].reason
-    assert {path.stem for path in tmp_path.iterdir()} == {"0", "2", "5"}
+
+def test_what_aborts_hangs_or_raises_is_named_and_every_good_task_is_kept():
+    """Six tasks on two workers, three of them bad: three results, three failures with their reasons."""
+    tasks = {0: partial(pow, 2, 3), 1: abort, 2: partial(pow, 2, 4), 3: hang, 4: fail, 5: partial(pow, 2, 5)}
+    ended = dict(run_all(tasks, workers=2, timeout=8.0))
+
+    assert {key: result for key, result in ended.items() if not isinstance(result, Failure)} == {0: 8, 2: 16, 5: 32}
+    assert [ended[key].status for key in (1, 3, 4)] == ["crashed", "timeout", "error"]
+    assert "SIGABRT" in ended[1].reason
+    assert "8 s" in ended[3].reason
+    assert "no such luck" in ended[4].reason
 
 
 def test_a_trajectory_comes_back_from_its_file_bit_for_bit(tmp_path: Path):
     """The .npz holds every array of the trajectory and its hits."""
     cell = Cell("line_gas", 0, "pymunk:matched", 1)
-    [(_, _, run)] = play_all([(cell, "one")], tmp_path, 1, failed)
+    [(_, run)] = run_all({cell: partial(play_and_save, cell, tmp_path / "one.npz")}, workers=1)
     here = cell.play().trajectory
     there = load_trajectory(tmp_path / "one.npz")
 
