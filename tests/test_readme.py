@@ -8,6 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from adapters.conformance import PROBES
+from adapters.engines import ENGINES
+from scenarios.catalogue import SCENARIOS
+
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
@@ -54,6 +58,15 @@ def test_the_python_blocks_run_one_after_the_other(folder: Path, monkeypatch: py
     assert blocks
     for block in blocks:
         exec(block, names)
+
+
+def test_the_readme_counts_as_the_tables_do():
+    """Scenes, players and probes are as many as it says."""
+    said = re.search(r"(\d+) scenes through\s+(\d+) players", TEXT), re.search(r"answers (\d+) probes", TEXT)
+
+    assert [int(number) for one in said if one for number in one.groups()] == [
+        len(SCENARIOS), len(ENGINES), len(PROBES),
+    ]  # fmt: skip
 
 
 def test_every_file_the_readme_names_exists():
