@@ -8,7 +8,7 @@ from typing import Any
 import Box2D
 import numpy as np
 
-from adapters.engine import Hit
+from adapters.engine import UNREAD, Hit, Unsupported
 from adapters.float32 import must_fit, rounding
 from scenarios.model import Array, Scene, State
 
@@ -20,9 +20,10 @@ class Box2DEngine:
 
     `matched`: the scene in other units. Box2D treats hits below 1 unit of length per unit of time as
     inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The length unit
-    is the smallest radius, so that the slop (0.005) is 0.5 % of it; or the way of the fastest disk in a
-    step where that is longer, because nothing moves by more than 2 units a step. No friction, sleep,
-    continuous collision or wall skin; at e = 1 no push-out, because it adds energy.
+    is the smallest radius, so that the slop (0.005) is 0.5 % of it; or what the fastest disk moves in a
+    step where that is more, because nothing moves by more than 2 units a step; a scene that comes
+    there all the same is refused. No friction, sleep, continuous collision or wall skin; at e = 1 no
+    push-out, because it adds energy.
     """
 
     def __init__(self, profile: str) -> None:
@@ -45,6 +46,8 @@ class Box2DEngine:
             walls=scene.walls * self.length,
             gravity=scene.gravity * self.speed * self.time,
         )
+        self.speed_cap = Box2D.b2_maxTranslation / self.length / dt
+        self.spin_cap = Box2D.b2_maxRotation / dt
         self.listener = Listener(self)
         gravity = scene.gravity * self.speed * self.time
         self.world = Box2D.b2World(gravity=vector(gravity), contactListener=self.listener)
@@ -117,24 +120,33 @@ class Box2DEngine:
         velocity = np.array([tuple(b.linearVelocity) for b in bodies], float).reshape(n, 2) / self.speed
         angle = np.array([b.angle for b in bodies], float)
         angular_velocity = np.array([b.angularVelocity for b in bodies], float) / self.time
+        self._refuse_what_is_cut(np.hypot(velocity[:, 0], velocity[:, 1]), angular_velocity)
         return State(position, velocity, angle, angular_velocity)
+
+    def _refuse_what_is_cut(self, speed: Array, spin: Array) -> None:
+        """Raise `Unsupported` where the engine has cut a velocity: a matched scene is played as it is or not at all."""
+        for name, values, cap in (("speed", speed, self.speed_cap), ("spin", spin, self.spin_cap)):
+            if self.matched and np.abs(values).max() > cap * (1 - 1e-5):  # float32 leaves it a little below
+                unit = "m/s" if name == "speed" else "rad/s"
+                raise Unsupported(f"a disk reaches a {name} of {cap:g} {unit}, where Box2D cuts it at this dt")
 
     def hits(self) -> list[Hit]:
         """From `PostSolve`, impulses back in N s."""
         return [Hit(step, i, j, impulse / self.speed) for step, i, j, impulse in self.listener.log]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """Resolved values are read back from the world and a fixture."""
+        """Resolved values are read back from the world, a fixture and the engine's constants."""
         matched, world = self.matched, self.world
         fixture = self.bodies[0].fixtures[0]
         iterations = f"{VELOCITY_ITERATIONS}, {self.position_iterations}"
         return {
-            "unit of time in s": (self.time if matched else None, self.time),
-            "unit of length in m": (1 / self.length if matched else None, 1 / self.length),
+            "unit of time in s": (self.time if matched else None, "kept by the adapter"),
+            "unit of length in m": (1 / self.length if matched else None, "kept by the adapter"),
             "restitution threshold in m/s": (None, Box2D.b2_velocityThreshold / self.speed),
             "linear slop in m": (None, Box2D.b2_linearSlop / self.length),
-            "speed cap in m per step": (None, Box2D.b2_maxTranslation / self.length),
-            "wall skin in m": (0.0 if matched else None, 0.0 if matched else Box2D.b2_polygonRadius / 2),
+            "speed cap in m/s": (None, self.speed_cap),
+            "spin cap in rad/s": (None, self.spin_cap),
+            "wall skin": (0.0 if matched else None, UNREAD),
             "friction": (0.0 if matched else None, fixture.friction),
             "restitution": (self.scene.restitution, fixture.restitution),
             "sleeping": (False if matched else None, world.GetAllowSleeping()),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
-from adapters.engine import Hit
+from adapters.engine import UNREAD, Hit, Unsupported
 from adapters.float32 import must_fit, rounding
 from scenarios.model import Array, Scene, State
 
@@ -21,7 +21,8 @@ class Box2DV3:
     """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
 
     `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap; the length
-    unit is 2 % of the smallest radius, which shrinks slop and speculative margin with it.
+    unit is 2 % of the smallest radius, which shrinks slop and speculative margin with it. The cap on
+    spins cannot be lifted: a scene that reaches it is refused.
     """
 
     def __init__(self, profile: str) -> None:
@@ -38,6 +39,7 @@ class Box2DV3:
         self.log: list[Hit] = []
         self.unit = float(0.02 * scene.radius.min()) if self.matched else 1.0
         pyb2d3.set_length_units_per_meter(self.unit)
+        self.spin_cap = pi / 4 / dt
         self.options = self._options()
         self.world = pyb2d3.World(gravity=vector(scene.gravity), **self.options)
         if self.matched:
@@ -122,6 +124,8 @@ class Box2DV3:
         position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2)
         velocity = np.array([tuple(b.linear_velocity) for b in bodies], float).reshape(n, 2)
         angular_velocity = np.array([b.angular_velocity for b in bodies], float)
+        if self.matched and np.abs(angular_velocity).max() > self.spin_cap * (1 - 1e-5):
+            raise Unsupported(f"a disk reaches a spin of {self.spin_cap:g} rad/s, where Box2D cuts it at this dt")
         return State(position, velocity, self._unwound(angular_velocity), angular_velocity)
 
     def _unwound(self, spin: Array) -> Array:
@@ -140,14 +144,14 @@ class Box2DV3:
         """Resolved values are read back where the binding lets one read them."""
         matched, world, options = self.matched, self.world, self.options
         return {
-            "length unit in m": (self.unit if matched else None, self.unit),
+            "length unit in m": (self.unit if matched else None, UNREAD),
             "restitution threshold in m/s": (options.get("restitution_threshold"), world.restitution_threshold),
-            "speed cap in m/s": (options.get("maximum_linear_speed"), 1e9 if matched else 400.0),
-            "linear slop in m": (None, 0.005 * self.unit),
-            "speculative margin in m": (None, 0.02 * self.unit),
+            "speed cap in m/s": (options.get("maximum_linear_speed"), UNREAD),
+            "spin cap in rad/s": (None, UNREAD),
+            "linear slop, speculative margin in m": (None, UNREAD),
             "contact tuning (hertz, damping ratio, push speed in m/s)": (
                 "30, 10, 3" if matched else None,
-                "30, 10, 3",
+                UNREAD,
             ),
             "friction": (0.0 if matched else None, self.bodies[0].shapes[0].friction),
             "restitution": (self.scene.restitution, self.bodies[0].shapes[0].restitution),

@@ -6,6 +6,8 @@ from typing import Any, NamedTuple, Protocol
 
 from scenarios.model import Array, Scene, State
 
+UNREAD = "cannot be read back"  # what an engine resolved a setting to, where its binding does not tell
+
 
 class Unsupported(Exception):
     """An engine cannot model this scene, and says why rather than approximate it."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Engine, Hit, Unsupported
-from scenarios.model import Array, Collisions, Scenario, State, Thrust, Trajectory, frozen
+from scenarios.model import Array, Collisions, Scenario, Scene, State, Thrust, Trajectory, frozen
 
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
 RUNAWAY = 1e9  # m; no scene is this large, so a disk beyond it has been thrown
@@ -71,17 +71,27 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float) -> Run:
         states.append(engine.read())
         for k in range(scenario.samples):
             seconds += advance(engine, scenario, k * substeps, substeps, dt)
-            states.append(engine.read())
-            if fault := fault_of(states[-1]):
+            state = engine.read()
+            if fault := fault_of(state):
                 status, reason = "diverged", f"{fault} at {(k + 1) * scenario.sample_interval:g} s"
                 break
-        hits = engine.hits()
+            states.append(state)
     except Unsupported as refusal:
         status, reason = "unsupported", str(refusal)
     except Exception as error:  # an engine may raise anything; the run says what
         status, reason = "error", f"{type(error).__name__}: {error}"
-    trajectory = gather(scenario, states, first_hits(hits, dt)) if states else None
+    if states:
+        hits = hits_of(engine)
+    trajectory = gather(scenario, states, first_hits(hits, dt, weight_impulse(scenario.scene, dt))) if states else None
     return Run(engine_name, profile, scenario.name, dt, status, reason, trajectory, seconds, settings, versions)
+
+
+def hits_of(engine: Engine) -> list[Hit]:
+    """The hits of an engine that may have failed; none if it cannot tell any more."""
+    try:
+        return engine.hits()
+    except Exception:  # the run already carries the reason
+        return []
 
 
 def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: float) -> float:
@@ -140,8 +150,19 @@ def fault_of(state: State) -> str:
     return ""
 
 
-def first_hits(hits: Sequence[Hit], dt: float) -> Collisions:
-    """One collision where a pair begins to push: pushes in consecutive steps are one. Its time is the step's end."""
+def weight_impulse(scene: Scene, dt: float) -> float:
+    """N s, the most that the weight of everything can push on a contact during one step."""
+    moving = scene.mass[~scene.static].sum()
+    return float(2 * moving * np.linalg.norm(scene.gravity) * dt)
+
+
+def first_hits(hits: Sequence[Hit], dt: float, weight: float = 0.0) -> Collisions:
+    """One collision where a pair begins to push; its time is the end of the step.
+
+    A push in the step after another of the same pair goes on with it if it is no stronger than `weight` N s, or if
+    the engine does not tell how strong it is: else it is a hit of its own. Pushes of less than a millionth of the
+    pair's strongest are rounding, and left out.
+    """
     if not hits:
         return Collisions.of([])
     step, i, j = (np.array(column) for column in list(zip(*hits))[:3])
@@ -149,14 +170,23 @@ def first_hits(hits: Sequence[Hit], dt: float) -> Collisions:
     low, high = np.minimum(i, j), np.maximum(i, j)
     disk, other = np.where(low < 0, high, low), np.where(low < 0, low, high)
     order = np.lexsort((step, other, disk))
-    step, disk, other, impulse = step[order], disk[order], other[order], impulse[order]
-    same_pair = (np.diff(disk, prepend=-1) == 0) & (np.diff(other, prepend=disk[0]) == 0)
-    begins = ~(same_pair & (np.diff(step, prepend=-9) <= 1))
+    rows = step[order], disk[order], other[order], impulse[order]
+    starts = first_of_pair(rows[1], rows[2])
+    strongest = np.maximum.reduceat(np.nan_to_num(rows[3]), np.flatnonzero(starts))[np.cumsum(starts) - 1]
+    step, disk, other, impulse = (row[~(rows[3] < 1e-6 * strongest)] for row in rows)
+    begins = first_of_pair(disk, other) | (np.diff(step, prepend=step[0]) > 1) | (impulse > weight)
     order = np.flatnonzero(begins)[np.lexsort((other[begins], disk[begins], step[begins]))]
     return Collisions(
-        frozen((step[order] + 1) * dt), frozen(disk[order], np.int64), frozen(other[order], np.int64),
-        frozen(impulse[order]),
-    )  # fmt: skip
+        t=frozen((step[order] + 1) * dt),
+        i=frozen(disk[order], np.int64),
+        j=frozen(other[order], np.int64),
+        impulse=frozen(impulse[order]),
+    )
+
+
+def first_of_pair(disk: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(h,) True where rows sorted by pair come to a new pair."""
+    return np.append(True, (np.diff(disk) != 0) | (np.diff(other) != 0))
 
 
 def gather(scenario: Scenario, states: Sequence[State], collisions: Collisions) -> Trajectory:

@@ -42,6 +42,14 @@ def fast_flight(row: Row) -> Reading:
         return Reading(float(engine.read().velocity[0, 0]), speed, 2 * row.digits * speed)
 
 
+def fast_spin(row: Row) -> Reading:
+    """Spin in rad/s of a free disk after 4 steps of 1/64 s, three quarters of a turn each."""
+    spin = 300.0
+    with loaded(row, one_disk(spin=spin), 1 / 64) as engine:
+        engine.step(4)
+        return Reading(float(engine.read().angular_velocity[0]), spin, 2 * row.digits * spin)
+
+
 def spins_freely(row: Row) -> Reading:
     """Angle in rad after 1 s at 20 rad/s; an angle rounds once a step."""
     steps, spin = 256, 20.0
@@ -102,6 +110,7 @@ PHYSICS: dict[str, Probe] = {
     "free_flight": Probe("How far is a thrown disk from the parabola after 1 s? (m)", free_flight, "departs"),
     "slow_flight": Probe("How fast is a free disk of 3.9 mm/s after 2 s? (m/s)", slow_flight, "departs"),
     "fast_flight": Probe("How fast is a free disk of 512 m/s after 4 steps? (m/s)", fast_flight, "departs"),
+    "fast_spin": Probe("How fast does a free disk of 300 rad/s spin after 4 steps? (rad/s)", fast_spin, "departs"),
     "spins_freely": Probe("What angle has a free disk after 1 s at 20 rad/s? (rad)", spins_freely, "departs"),
     "pair_momentum": Probe("How much momentum does a hit of two disks make? (of sum m v)", pair_momentum, "departs"),
     **{

@@ -10,7 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from adapters.play import Run
-from reports import broken, laws, style
+from reports import laws, scales, style, violations
 from reports.comparison import Comparison, cut
 from reports.view import TOUCHY, View
 from scenarios.model import Array, Trajectory
@@ -19,7 +19,7 @@ ZERO = 1e-17
 """Where 0, and what is smaller than this, is drawn on a log axis: below the rounding of any number compared."""
 POINTS = 300
 TIME = "time (s)"
-LAW = "reference:exercise"  # what the others are held against where there is no truth; not a truth itself
+BASELINE = "reference:exercise"  # drawn as the zero line where there is no truth; it is no truth itself
 
 
 class Drawing(NamedTuple):
@@ -64,13 +64,13 @@ def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None])
 
 def momentum(comparison: Comparison) -> Drawing:
     """Momentum that should not be there; where walls take some up, momentum apart from the truth's."""
-    if broken.knows_impulses(comparison.scenario):
+    if violations.knows_impulses(comparison.scenario):
         caption = (
-            "Distance of the momentum from P(0) and what weight and pushes have added since, over the largest Σ m|v|. "
+            "Distance of the momentum from P(0) and what weight and pushes have added since, over the Σ m|v| at hand. "
             "Lower is better."
         )
-        lines = over(views(comparison, None), broken.momentum)
-        return Drawing("Momentum error", caption, over_time(comparison, lines, "error / largest Σ m|v|"))
+        lines = over(views(comparison, None), violations.momentum)
+        return Drawing("Momentum error", caption, over_time(comparison, lines, "error / Σ m|v| at hand"))
     if comparison.truth is None:
         why = "Walls, static disks or turning pushes take up momentum, and no exact answer says how much."
         return Drawing("Momentum", why, None)
@@ -78,13 +78,13 @@ def momentum(comparison: Comparison) -> Drawing:
     for run, view in views(comparison, comparison.truth):
         assert view.other is not None
         apart = np.linalg.norm(laws.momentum(view.played, scene) - laws.momentum(view.other, scene), axis=1)
-        scale = laws.momentum_scale(view.other, scene) or 1.0
+        scale = scales.momentum(comparison.scenario) or 1.0
         lines.append(Line(run, view.played.t, np.where(view.calm, apart / scale, np.nan)))
     caption = (
-        "Walls and static disks take up momentum, so none is broken here: how far the momentum is from the truth's, "
-        f"over the largest Σ m|v|{HITS}. A late hit is a spike."
+        "Walls and static disks take up momentum, so no law is broken here: how far the momentum is from the truth's, "
+        f"over the Σ m|v| at hand{HITS}. A late hit is a spike."
     )
-    return Drawing("Momentum apart from the truth's", caption, over_time(comparison, lines, "apart / largest Σ m|v|"))
+    return Drawing("Momentum apart from the truth's", caption, over_time(comparison, lines, "apart / Σ m|v| at hand"))
 
 
 HITS = f" (within {TOUCHY} dt of a true hit left out: a late hit is measured as such)"
@@ -92,10 +92,10 @@ HITS = f" (within {TOUCHY} dt of a true hit left out: a late hit is measured as 
 
 def energy(comparison: Comparison) -> Drawing:
     """Energy that should not be there or is missing, relative to the energy at hand."""
-    conserved = broken.keeps_energy(comparison.scenario)
+    conserved = violations.keeps_energy(comparison.scenario)
     if not conserved and comparison.truth is None:
         return energy_course(comparison)
-    lines = over(views(comparison, None if conserved else comparison.truth), broken.energy)
+    lines = over(views(comparison, None if conserved else comparison.truth), violations.energy)
     against = "what it was at the start, as no hit takes any (e = 1)," if conserved else "the truth's" + HITS
     caption = f"Distance of the energy from {against} over the energy at hand. Lower is better."
     return Drawing("Energy error", caption, over_time(comparison, lines, "error / energy at hand"))
@@ -106,13 +106,13 @@ def energy_course(comparison: Comparison) -> Drawing:
     scene = comparison.scenario.scene
     lines = []
     for run, view in views(comparison, None):
-        scale = laws.energy_scale(view.played, scene) or 1.0
+        scale = scales.energy(comparison.scenario) or 1.0
         lines.append(Line(run, view.played.t, laws.energy(view.played, scene) / scale))
     caption = (
-        "No exact answer says how much energy the hits should take, so this is no error: the energy over the largest "
+        "No exact answer says how much energy the hits should take, so this is no error: the energy over that "
         "at hand. Without pushes it must never rise."
     )
-    return Drawing("Energy", caption, over_time(comparison, lines, "energy / largest at hand", log=False))
+    return Drawing("Energy", caption, over_time(comparison, lines, "energy / energy at hand", log=False))
 
 
 def deviation(comparison: Comparison) -> Drawing:
@@ -121,7 +121,7 @@ def deviation(comparison: Comparison) -> Drawing:
     held: Run | None = None
     if truth is None:
         played = [run for run in comparison.middle_runs if run.trajectory is not None]
-        held = next((run for run in played if run.name == LAW), played[0] if played else None)
+        held = next((run for run in played if run.name == BASELINE), played[0] if played else None)
         if held is None:
             return Drawing("Trajectories", "No engine played this scene.", None)
     lines = [

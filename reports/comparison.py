@@ -75,9 +75,10 @@ def _measure(scenario: Scenario, run: Run, versus: str, other: Trajectory | None
     k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
     view = View(scenario, run.dt, cut(run.trajectory, k), None if other is None else cut(other, k))
     rows = []
-    for name, metric in METRICS.items():
-        if kind in metric.against and (value := metric.of(view)) is not None:
-            rows.append(_row(run, name, value, metric.unit, versus))
+    with np.errstate(over="ignore", invalid="ignore"):  # what was thrown far enough overflows; the value says so
+        for name, metric in METRICS.items():
+            if kind in metric.against and (value := metric.of(view)) is not None:
+                rows.append(_row(run, name, value, metric.unit, versus))
     return rows
 
 

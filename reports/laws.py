@@ -15,49 +15,32 @@ def moving_mass(scene: Scene) -> Array:
     return np.where(scene.static, 0.0, scene.mass)
 
 
+def moving_inertia(scene: Scene) -> Array:
+    """(n,) kg m2, 0 for disks that do not turn: static ones, and those of infinite inertia."""
+    return np.where(scene.static | np.isinf(scene.inertia), 0.0, scene.inertia)
+
+
 def momentum(trajectory: Trajectory, scene: Scene) -> Array:
     """(k, 2) kg m/s: sum of m v."""
     return np.einsum("i,kia->ka", moving_mass(scene), trajectory.velocity)
-
-
-def momentum_scale(trajectory: Trajectory, scene: Scene) -> float:
-    """kg m/s: the largest sum of m |v| over the samples; what a momentum error is relative to."""
-    speed = np.linalg.norm(trajectory.velocity, axis=2)
-    return float((speed @ moving_mass(scene)).max())
 
 
 def angular_momentum(trajectory: Trajectory, scene: Scene) -> Array:
     """(k,) kg m2/s about the origin: sum of m x cross v + I w."""
     x, v = trajectory.position, trajectory.velocity
     orbital = (x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]) @ moving_mass(scene)
-    return orbital + trajectory.angular_velocity @ np.where(scene.static, 0.0, scene.inertia)
-
-
-def angular_momentum_scale(trajectory: Trajectory, scene: Scene) -> float:
-    """kg m2/s: the largest sum of m |x| |v| + I |w| over the samples."""
-    arm = np.linalg.norm(trajectory.position, axis=2) * np.linalg.norm(trajectory.velocity, axis=2)
-    spin = np.abs(trajectory.angular_velocity) @ np.where(scene.static, 0.0, scene.inertia)
-    return float((arm @ moving_mass(scene) + spin).max())
+    return orbital + trajectory.angular_velocity @ moving_inertia(scene)
 
 
 def kinetic_energy(trajectory: Trajectory, scene: Scene) -> Array:
     """(k,) J: sum of m v2 / 2 + I w2 / 2."""
     linear = (trajectory.velocity**2).sum(axis=2) @ moving_mass(scene) / 2
-    return linear + trajectory.angular_velocity**2 @ np.where(scene.static, 0.0, scene.inertia) / 2
+    return linear + trajectory.angular_velocity**2 @ moving_inertia(scene) / 2
 
 
 def energy(trajectory: Trajectory, scene: Scene) -> Array:
     """(k,) J: kinetic energy less sum of m g.x (zero at the origin)."""
     return kinetic_energy(trajectory, scene) - (trajectory.position @ scene.gravity) @ moving_mass(scene)
-
-
-def energy_scale(trajectory: Trajectory, scene: Scene) -> float:
-    """J: the energy at hand: the largest kinetic, plus what every disk can gain by falling to its lowest sample
-    and one radius further, so that a scene at rest has a scale, too.
-    """
-    height = -(trajectory.position @ scene.gravity)
-    fall = height.max(axis=0) - height.min(axis=0) + scene.radius * np.linalg.norm(scene.gravity)
-    return float(kinetic_energy(trajectory, scene).max() + fall @ moving_mass(scene))
 
 
 def penetration(trajectory: Trajectory, scene: Scene) -> Array:
@@ -80,6 +63,22 @@ def distance_to_segment(x: Array, start: Array, end: Array) -> Array:
     """(k,) m from points x (k, 2) to the segment."""
     along = np.clip((x - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
     return np.linalg.norm(x - (start + along[:, None] * (end - start)), axis=1)
+
+
+def through_walls(trajectory: Trajectory, scene: Scene) -> np.ndarray:
+    """(n,) True for disks whose centre has crossed a wall between two samples, on a straight line."""
+    through = np.zeros(scene.n, dtype=bool)
+    start, end = trajectory.position[:-1], trajectory.position[1:]
+    for a, b in scene.walls:
+        sides = cross(start - a, b - a) * cross(end - a, b - a)
+        ends = cross(a - start, end - start) * cross(b - start, end - start)
+        through |= ((sides < 0) & (ends < 0)).any(axis=0)
+    return through
+
+
+def cross(u: Array, v: Array) -> Array:
+    """(...) the third component of the cross product of (..., 2) vectors."""
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
 def deviation(a: Trajectory, b: Trajectory, scene: Scene) -> Array:

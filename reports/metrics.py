@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports import broken, laws
+from reports import laws, scales, violations
 from reports.collisions import effective_restitution
 from reports.view import Value, View
 from scenarios.model import Array
@@ -18,52 +18,73 @@ from scenarios.model import Array
 
 def momentum_error(view: View) -> Value | None:
     """Largest |P(t) - P(0) - impulse from outside| over the largest sum of m|v|; where that impulse is known."""
-    return _largest(broken.momentum(view), view)
+    return _largest(violations.momentum(view), view)
 
 
 def angular_momentum_error(view: View) -> Value | None:
     """Largest |L(t) - L(0) - angular impulse from outside|, about the origin, over the largest m|x||v| + I|w|."""
-    return _largest(broken.angular_momentum(view), view)
+    return _largest(violations.angular_momentum(view), view)
 
 
 def energy_error(view: View) -> Value | None:
     """Largest |E(t) - E_expected(t)| over the energy at hand; E(0) at e = 1, else the truth's in calm samples."""
-    return _largest(broken.energy(view), view)
+    return _largest(violations.energy(view), view)
 
 
 def energy_created(view: View) -> Value | None:
     """Largest rise of the energy above an earlier sample, over the energy at hand; no hit can give any."""
-    if view.scenario.thrusts:
-        return None
-    actual = laws.energy(view.played, view.scenario.scene)
-    rise = actual - np.minimum.accumulate(actual)
-    return _largest(rise / (laws.energy_scale(view.played, view.scenario.scene) or 1.0), view)
+    return _largest(violations.energy_rise(view), view)
+
+
+def energy_apart(view: View) -> Value | None:
+    """Root mean square difference of the energy in calm samples, over the energy at hand."""
+    assert view.other is not None
+    scene = view.scenario.scene
+    apart = laws.energy(view.played, scene) - laws.energy(view.other, scene)
+    return Value(_rms(apart[view.calm]) / (scales.energy(view.scenario) or 1.0))
+
+
+def momentum_apart(view: View) -> Value | None:
+    """Root mean square distance of the momenta in calm samples, over the sum of m|v| at hand."""
+    assert view.other is not None
+    scene = view.scenario.scene
+    apart = np.linalg.norm(laws.momentum(view.played, scene) - laws.momentum(view.other, scene), axis=1)
+    return Value(_rms(apart[view.calm]) / (scales.momentum(view.scenario) or 1.0))
 
 
 def energy_loss_error(view: View) -> Value | None:
     """Energy lost from the first to the last calm sample, less what the truth loses, over the energy at hand."""
-    scene = view.scenario.scene
-    if broken.keeps_energy(view.scenario) or view.scenario.thrusts or view.other is None:
+    scenario = view.scenario
+    if violations.keeps_energy(scenario) or scenario.thrusts or violations.lifts(scenario) or view.other is None:
         return None
     last = int(np.flatnonzero(view.calm)[-1])
-    played, true = laws.energy(view.played, scene), laws.energy(view.other, scene)
+    played, true = laws.energy(view.played, scenario.scene), laws.energy(view.other, scenario.scene)
     excess = (played[0] - played[last]) - (true[0] - true[last])
-    return Value(float(excess) / (laws.energy_scale(view.other, scene) or 1.0), at=float(view.played.t[last]))
+    return Value(float(excess) / (scales.energy(scenario, view.other) or 1.0), at=float(view.played.t[last]))
+
+
+def restitution(view: View) -> Value | None:
+    """Median e = -(dv after).n / (dv before).n over the hits that can be read off the samples."""
+    values, _ = _restitutions(view)
+    return Value(float(np.median(values)), note=f"{len(values)} hits read") if len(values) else None
 
 
 def restitution_error(view: View) -> Value | None:
-    """Largest |e_measured - e| over hits that can be read off the samples; slow hits under gravity are left out."""
-    scenario = view.scenario
-    if scenario.thrusts:
-        return None
-    slowest = 20 * float(np.linalg.norm(scenario.scene.gravity)) * scenario.sample_interval
-    values, times = effective_restitution(view.played, scenario.scene, slowest)
+    """Largest |e - what the scene states| over the hits that can be read off the samples."""
+    values, times = _restitutions(view)
     if not len(values):
         return None
-    off = np.abs(values - scenario.scene.restitution)
+    off = np.abs(values - view.scenario.scene.restitution)
     worst = int(np.argmax(off))
-    note = f"{len(values)} hits read, median e {np.median(values):.4g}"
-    return Value(float(off[worst]), at=float(times[worst]), note=note)
+    return Value(float(off[worst]), at=float(times[worst]), note=f"{len(values)} hits read")
+
+
+def _restitutions(view: View) -> tuple[Array, Array]:
+    """The hits' e and times; none under thrust. Slow hits are left out under gravity, which is taken out to O(dt)."""
+    if view.scenario.thrusts:
+        return np.zeros(0), np.zeros(0)
+    slowest = 20 * float(np.linalg.norm(view.scenario.scene.gravity)) * view.scenario.sample_interval
+    return effective_restitution(view.played, view.scenario.scene, slowest)
 
 
 def penetration_radii(view: View) -> Value | None:
@@ -73,9 +94,22 @@ def penetration_radii(view: View) -> Value | None:
     return _largest(laws.penetration(view.played, view.scenario.scene), view)
 
 
+def disks_through_walls(view: View) -> Value | None:
+    """Disks whose centre has crossed a wall: they are where no hit can bring them back from."""
+    if not len(view.scenario.scene.walls):
+        return None
+    through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))
+    return Value(len(through), int(through[0]) if len(through) else -1)
+
+
 def position_rms(view: View) -> Value | None:
     """Root mean square distance over disks and samples."""
-    return Value(float(np.sqrt((view.apart**2).mean())))
+    return Value(_rms(view.apart))
+
+
+def position_rms_radii(view: View) -> Value | None:
+    """Root mean square distance over disks and samples, each in radii of its disk."""
+    return Value(_rms(view.apart / view.scenario.scene.radius))
 
 
 def position_max(view: View) -> Value | None:
@@ -90,7 +124,7 @@ def position_max_radii(view: View) -> Value | None:
 
 def velocity_rms(view: View) -> Value | None:
     """Root mean square difference of velocity over disks and calm samples."""
-    return Value(float(np.sqrt((_velocity_apart(view)[view.calm] ** 2).mean())))
+    return Value(_rms(_velocity_apart(view)[view.calm]))
 
 
 def velocity_max(view: View) -> Value | None:
@@ -100,7 +134,7 @@ def velocity_max(view: View) -> Value | None:
 
 def angle_rms(view: View) -> Value | None:
     """Root mean square difference of angle over disks and samples."""
-    return Value(float(np.sqrt((_angle_apart(view) ** 2).mean())))
+    return Value(_rms(_angle_apart(view)))
 
 
 def angle_max(view: View) -> Value | None:
@@ -138,15 +172,24 @@ def first_wrong_collision_s(view: View) -> Value | None:
 def hit_delay_dt(view: View) -> Value | None:
     """Median over the hits of played time less true time, in dt; a hit is dated to the end of its step."""
     delay = view.matched.delay
-    if not len(delay):
-        return None
-    note = f"{len(delay)} hits, largest {np.abs(delay).max() / view.dt:.3g} dt"
-    return Value(float(np.median(delay)) / view.dt, note=note)
+    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+
+
+def hit_delay_max_dt(view: View) -> Value | None:
+    """Largest difference in time of any hit from the true one, in dt."""
+    delay = view.matched.delay
+    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _largest(series: Array | None, view: View) -> Value | None:
     if series is None:
         return None
+    if np.isnan(series).all():
+        return Value(np.nan, note="too large for float64")
     k = int(np.nanargmax(series))
     return Value(float(series[k]), at=float(view.played.t[k]))
 
@@ -172,7 +215,7 @@ class Metric:
         of: the function.
         unit: of the value, "1" for a ratio.
         against: what it is measured against: "itself" (laws of physics and the start), "truth", "engine".
-        better: "lower", "higher" or "zero" (the best value).
+        better: "lower", "higher", "zero" or "as stated" (the best value).
     """
 
     of: Callable[[View], Value | None]
@@ -186,24 +229,31 @@ class Metric:
         return (self.of.__doc__ or "").splitlines()[0]
 
 
+TRUTH, ITSELF, ENGINE = "truth", "itself", "engine"
 METRICS: dict[str, Metric] = {
-    "position_max_radii": Metric(position_max_radii, "radii", ("truth", "engine")),
-    "position_max": Metric(position_max, "m", ("truth",)),
-    "position_rms": Metric(position_rms, "m", ("truth", "engine")),
-    "velocity_max": Metric(velocity_max, "m/s", ("truth",)),
-    "velocity_rms": Metric(velocity_rms, "m/s", ("truth", "engine")),
-    "angle_max": Metric(angle_max, "rad", ("truth", "engine")),
-    "angle_rms": Metric(angle_rms, "rad", ("truth",)),
-    "time_to_1pct_s": Metric(time_to_1pct_s, "s", ("truth", "engine"), "higher"),
-    "momentum_error": Metric(momentum_error, "1", ("itself",)),
-    "angular_momentum_error": Metric(angular_momentum_error, "1", ("itself",)),
-    "energy_error": Metric(energy_error, "1", ("itself", "truth")),
-    "energy_created": Metric(energy_created, "1", ("itself",)),
-    "energy_loss_error": Metric(energy_loss_error, "1", ("truth",), "zero"),
-    "restitution_error": Metric(restitution_error, "1", ("itself",)),
-    "penetration_radii": Metric(penetration_radii, "radii", ("itself",)),
-    "collisions_missed": Metric(collisions_missed, "hits", ("truth",)),
-    "collisions_invented": Metric(collisions_invented, "hits", ("truth",)),
-    "first_wrong_collision_s": Metric(first_wrong_collision_s, "s", ("truth",), "higher"),
-    "hit_delay_dt": Metric(hit_delay_dt, "dt", ("truth",), "zero"),
+    "position_max_radii": Metric(position_max_radii, "radii", (TRUTH, ENGINE)),
+    "position_rms_radii": Metric(position_rms_radii, "radii", (TRUTH, ENGINE)),
+    "position_max": Metric(position_max, "m", (TRUTH, ENGINE)),
+    "position_rms": Metric(position_rms, "m", (TRUTH, ENGINE)),
+    "velocity_max": Metric(velocity_max, "m/s", (TRUTH, ENGINE)),
+    "velocity_rms": Metric(velocity_rms, "m/s", (TRUTH, ENGINE)),
+    "angle_max": Metric(angle_max, "rad", (TRUTH, ENGINE)),
+    "angle_rms": Metric(angle_rms, "rad", (TRUTH, ENGINE)),
+    "time_to_1pct_s": Metric(time_to_1pct_s, "s", (TRUTH, ENGINE), "higher"),
+    "momentum_error": Metric(momentum_error, "1", (ITSELF,)),
+    "momentum_apart": Metric(momentum_apart, "1", (TRUTH, ENGINE)),
+    "angular_momentum_error": Metric(angular_momentum_error, "1", (ITSELF,)),
+    "energy_error": Metric(energy_error, "1", (ITSELF, TRUTH)),
+    "energy_apart": Metric(energy_apart, "1", (TRUTH, ENGINE)),
+    "energy_created": Metric(energy_created, "1", (ITSELF,)),
+    "energy_loss_error": Metric(energy_loss_error, "1", (TRUTH,), "zero"),
+    "restitution": Metric(restitution, "1", (ITSELF,), "as stated"),
+    "restitution_error": Metric(restitution_error, "1", (ITSELF,)),
+    "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,)),
+    "disks_through_walls": Metric(disks_through_walls, "disks", (ITSELF,)),
+    "collisions_missed": Metric(collisions_missed, "hits", (TRUTH, ENGINE)),
+    "collisions_invented": Metric(collisions_invented, "hits", (TRUTH, ENGINE)),
+    "first_wrong_collision_s": Metric(first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"),
+    "hit_delay_dt": Metric(hit_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
+    "hit_delay_max_dt": Metric(hit_delay_max_dt, "dt", (TRUTH, ENGINE)),
 }

@@ -63,4 +63,4 @@ class View:
         """The hits of the two."""
         assert self.other is not None
         end = float(min(self.played.t[-1], self.other.t[-1]))
-        return match(self.played.collisions, self.other.collisions, end, TOUCHY * self.dt)
+        return match(self.played.collisions, self.other.collisions, end, self.dt)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from broken_engines import NanAtStep7
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
@@ -87,9 +88,10 @@ def test_energy_that_is_created_is_seen():
     velocity = truth.velocity.copy()
     velocity[len(truth) // 2 :] *= 1.01
     found = value("energy_created", View(one, one.dt(1), replace(truth, velocity=velocity)))
-    kinetic = (velocity[-1] ** 2).sum() * one.scene.mass[0] / 2
+    kinetic = (truth.velocity[0] ** 2).sum() * one.scene.mass[0] / 2
 
-    assert found == pytest.approx(kinetic * (1 - 1.01**-2) / (kinetic + spin), rel=1e-6)
+    # Differences of energies that round in the last of 16 digits, over 2 % of them.
+    assert found == pytest.approx(kinetic * (1.01**2 - 1) / (kinetic + spin), rel=1e-12)
 
 
 def test_weight_and_thrust_are_accounted_for():
@@ -122,8 +124,8 @@ def hits(*times: float) -> Collisions:
 
 def test_a_missing_hit_is_missed_and_an_extra_hit_is_invented():
     """The hit that is left over is the one whose absence makes the others match."""
-    missed = match(hits(1.01, 3.01), hits(1, 2, 3), 10, 0)
-    invented = match(hits(1.01, 2.5, 3.01), hits(1, 3), 10, 0)
+    missed = match(hits(1.01, 3.01), hits(1, 2, 3), 10, 0.01)
+    invented = match(hits(1.01, 2.5, 3.01), hits(1, 3), 10, 0.01)
 
     assert missed.missed == [(2.0, 0, 1)]
     assert missed.invented == []
@@ -132,19 +134,30 @@ def test_a_missing_hit_is_missed_and_an_extra_hit_is_invented():
     np.testing.assert_allclose(invented.delay, 0.01)
 
 
-def test_a_player_that_drifts_late_keeps_its_hits():
-    """Hits that come later and later are delays, not missed and invented hits."""
-    true = np.arange(1.0, 20.0)
-    late = match(hits(*(true + 0.1 * true)), hits(*true), 100, 0)
+def test_a_player_that_drifts_late_keeps_its_hits_until_it_is_half_a_gap_late():
+    """Hits that come later and later are delays; beyond half the time between true hits nobody knows which is which."""
+    true = np.arange(1.0, 9.0)
+    late = match(hits(*(true + 0.06 * true)), hits(*true), 100, 0.01)
+    too_late = match(hits(9.0), hits(1.0), 100, 0.01)
 
     assert late.first_wrong is None
-    np.testing.assert_allclose(late.delay, 0.1 * true)
+    np.testing.assert_allclose(late.delay, 0.06 * true)
+    assert (too_late.missed, too_late.invented) == ([(1.0, 0, 1)], [(9.0, 0, 1)])
 
 
 def test_a_hit_that_the_end_cuts_off_is_not_blamed():
-    """A true hit just before the end may fall behind it for a late player."""
-    assert match(hits(1.0), hits(1.0, 9.99), 10.0, 0.05).missed == []
-    assert match(hits(1.0), hits(1.0, 9.90), 10.0, 0.05).missed == [(9.90, 0, 1)]
+    """A true hit less than 3 dt before the end may fall behind it for a late player."""
+    assert match(hits(1.0), hits(1.0, 9.98), 10.0, 0.01).missed == []
+    assert match(hits(1.0), hits(1.0, 9.96), 10.0, 0.01).missed == [(9.96, 0, 1)]
+
+
+def test_hits_that_no_step_can_tell_apart_are_not_blamed():
+    """Of ever faster bounces those closer together than 2 dt are left out, with what the player makes of them."""
+    true = 2.0 - 0.5 ** np.arange(12.0)
+    played = [t for t in true if t < 1.97]
+    found = match(hits(*played, 1.99, 2.01), hits(*true), 10.0, 0.01)
+
+    assert found.first_wrong is None
 
 
 def test_weight_on_a_contact_at_rest_is_no_hit():
@@ -152,7 +165,7 @@ def test_weight_on_a_contact_at_rest_is_no_hit():
     resting = Collisions.of([(0.0, 0, -1, 0.0)])
     weight = Collisions.of([(0.1, 0, -1, 0.3), (0.5, 0, -1, 0.3)])
 
-    assert match(weight, resting, 1.0, 0.0).first_wrong is None
+    assert match(weight, resting, 1.0, 0.01).first_wrong is None
 
 
 def test_matching_in_order_is_the_closest_there_is():
@@ -177,6 +190,79 @@ def test_restitution_is_read_off_the_velocities(e: str):
 
     # Sampled velocities are exact up to rounding; the quotient amplifies it by v / v_n, below 10 here.
     assert value("restitution_error", View(one, one.dt(1), truth)) < 1e-14
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_reference_has_the_restitution_of_the_scene_in_every_scene(name: str):
+    """Its impulse is exact, so what is read off its samples is e, or the reading is wrong."""
+    one = scenario(name)
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(one.substeps[0]))
+    assert run.trajectory is not None
+    found = METRICS["restitution_error"].of(View(one, run.dt, run.trajectory))
+
+    # Rounding of v, twice over the closing speed: once in the normal, once in e. The slowest graze here is 1e-3 v.
+    assert found is None or found.value < 1e-8
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
+    """Also for one that explodes, one that stands still, one sample, and a disk that does not turn."""
+    scene = replace(scenario("box_billiard").scene, inertia=np.array([np.inf]))
+    one = replace(scenario("box_billiard"), scene=scene)
+    assert one.truth is not None
+    truth = one.truth(one.times)
+    huge = replace(truth, position=truth.position * 1e200, velocity=truth.velocity * 1e200)
+    still = replace(truth, position=truth.position * 0, velocity=truth.velocity * 0)
+    for played in (huge, still, cut(truth, 1)):
+        for other in (None, cut(truth, len(played))):
+            kind = "itself" if other is None else "truth"
+            if kind in METRICS[metric].against:
+                with np.errstate(over="ignore", invalid="ignore"):  # as `compare` does
+                    found = METRICS[metric].of(View(one, one.dt(1), played, other))
+                assert found is None or isinstance(found.value, float | int)
+
+
+def test_a_run_that_diverged_is_compared_up_to_there():
+    """A player that gives NaN at step 7 has its samples before it in the table, and a row that says so."""
+    one = scenario("slow_hit")
+    run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
+    table = compare(one, [run]).table
+
+    assert table[table.metric == "status"].note.str.contains("not finite").all()
+    assert np.isfinite(table[table.metric == "position_max"].value).all()
+
+
+def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():
+    """The centre crosses the segment; a disk that stays inside has not."""
+    one, truth = truth_of("box_billiard")
+    away = replace(truth, position=truth.position + np.linspace(0, 50, len(truth))[:, None, None])
+
+    assert value("disks_through_walls", View(one, one.dt(1), truth)) == 0
+    assert value("disks_through_walls", View(one, one.dt(1), away)) == 1
+
+
+def test_an_explosion_does_not_make_itself_small():
+    """Speeds a thousand times too high are an energy error of a million, not of one."""
+    one, truth = truth_of("line_gas")
+    velocity = truth.velocity.copy()
+    velocity[len(truth) // 2 :] *= 1000
+
+    assert value("energy_error", View(one, one.dt(1), replace(truth, velocity=velocity))) > 1e5
+
+
+def test_falling_through_a_wrap_is_no_energy_error():
+    """A disk that is set from the bottom to the top has more height; that is the scene's doing."""
+    scene = Scene(
+        position=[[0, 0]], velocity=[[0, 0]], radius=[0.1], mass=[1], restitution=1, gravity=[0, -1],
+        wrap=[[-1, -1], [1, 1]],
+    )  # fmt: skip
+    one = Scenario(name="rain", asks="?", source="", scene=scene, duration=5.0, sample_interval=0.1)
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
+    assert run.trajectory is not None
+    view = View(one, run.dt, run.trajectory)
+
+    assert METRICS["energy_error"].of(view) is None
+    assert METRICS["energy_created"].of(view) is None
 
 
 def test_comparison_stops_where_the_other_ends():

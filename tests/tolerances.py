@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan
+from math import atan, pi
 from typing import NamedTuple
 
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
@@ -14,7 +14,7 @@ class Departure(NamedTuple):
     Attributes:
         engine: a key of `ENGINES`.
         probe: a key of `PROBES`.
-        value: what the cause makes the probe read.
+        value: what the cause makes the probe read, or "refused".
         bound: how far rounding may take the reading from it.
         why: the cause, verified by turning it off or by its formula in test_conformance.py.
         source: where the engine says so.
@@ -22,7 +22,7 @@ class Departure(NamedTuple):
 
     engine: str
     probe: str
-    value: float
+    value: float | str
     bound: float
     why: str
     source: str
@@ -39,6 +39,8 @@ NORMALISED_EULER = "(cos, sin) += w h (-sin, cos) and then normalised turns by a
 
 MUNK_ARBITER = "Munk2D src/cpArbiter.c, cpArbiterUpdate: arb->e = a->e * b->e"
 BOX2D_SETTINGS = "Box2D 2.3 Common/b2Settings.h: "
+TURN = "a disk turns at most by a quarter (3.1: an eighth) of a circle a step; the spin is cut, and matched refuses"
+MAX_ROTATION = "Box2D 3.1 src/constants.h: B2_MAX_ROTATION (0.25f * B2_PI)"
 BOX2D_TYPES = "Box2D 3.1 src/types.c: "
 
 DEPARTURES = [
@@ -69,6 +71,11 @@ DEPARTURES = [
         "box2d_v3:shipped", "fast_flight", 400.0, 400 * 4 * FLOAT32, "a disk is no faster than 400 m/s",
         BOX2D_TYPES + "b2DefaultWorldDef, maximumLinearSpeed = 4 m * 100 / s",
     ),
+    # A quarter or half a turn a step, cut by a float32 ratio.
+    Departure("box2d:shipped", "fast_spin", 32 * pi, 32 * pi * 4 * FLOAT32, TURN, BOX2D_SETTINGS + "b2_maxRotation"),
+    Departure("box2d:matched", "fast_spin", "refused", 0.0, TURN, BOX2D_SETTINGS + "b2_maxRotation (0.5f * b2_pi)"),
+    Departure("box2d_v3:shipped", "fast_spin", 16 * pi, 16 * pi * 4 * FLOAT32, TURN, MAX_ROTATION),
+    Departure("box2d_v3:matched", "fast_spin", "refused", 0.0, TURN, MAX_ROTATION),
     # A ratio of two momenta that round as often as a hit does.
     Departure(
         "box2d:shipped", "friction", 0.2, 8 * FLOAT32, "every shape has friction 0.2, and the pair sqrt(0.2 * 0.2)",

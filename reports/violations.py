@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports import laws
+from reports import laws, scales
 from reports.view import View
 from scenarios.model import Array, Scenario, Thrust
 
 
 def momentum(view: View) -> Array | None:
-    """|P(t) - P(0) - impulse from outside| over the largest sum of m|v|.
+    """|P(t) - P(0) - impulse from outside| over the sum of m|v| at hand (scales.py).
 
     From outside come weight and world-frame thrust. Where walls, static disks or a turning thrust act, nobody
     knows the impulse without asking the player.
@@ -26,11 +26,11 @@ def momentum(view: View) -> Array | None:
     expected = actual[0] + np.outer(played.t, laws.moving_mass(scene).sum() * scene.gravity)
     for thrust in view.scenario.thrusts:
         expected = expected + np.outer(time_on(thrust, played.t), thrust.force)
-    return np.linalg.norm(actual - expected, axis=1) / (laws.momentum_scale(played, scene) or 1.0)
+    return np.linalg.norm(actual - expected, axis=1) / (scales.momentum(view.scenario) or 1.0)
 
 
 def angular_momentum(view: View) -> Array | None:
-    """|L(t) - L(0) - angular impulse from outside|, about the origin, over the largest sum of m|x||v| + I|w|.
+    """|L(t) - L(0) - angular impulse from outside|, about the origin, over the sum of m|x||v| + I|w| at hand.
 
     The weight of the whole, at the centre of mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts
     where its disk is, which only the player knows, and a wrap moves disks: there the law says nothing.
@@ -43,22 +43,36 @@ def angular_momentum(view: View) -> Array | None:
     lever = np.outer(t, m @ played.position[0]) + np.outer(t**2 / 2, m @ played.velocity[0])
     actual = laws.angular_momentum(played, scene)
     expected = actual[0] + lever[:, 0] * g[1] - lever[:, 1] * g[0]
-    return np.abs(actual - expected) / (laws.angular_momentum_scale(played, scene) or 1.0)
+    return np.abs(actual - expected) / (scales.angular_momentum(view.scenario) or 1.0)
 
 
 def energy(view: View) -> Array | None:
-    """|E(t) - E_expected(t)| over the energy at hand (kinetic, and what a disk can gain by falling).
+    """|E(t) - E_expected(t)| over the energy at hand (scales.py).
 
-    At e = 1 without thrust E_expected is E(0); else it is the truth's.
+    At e = 1 without thrust E_expected is E(0); else it is the truth's. Where a scene wraps under gravity the law
+    says nothing: a disk that is set onto the opposite edge has another height.
     """
-    scene, conserved = view.scenario.scene, keeps_energy(view.scenario)
-    if conserved == (view.other is not None):
+    scenario, conserved = view.scenario, keeps_energy(view.scenario)
+    if conserved == (view.other is not None) or lifts(scenario):
         return None
-    actual = laws.energy(view.played, scene)
+    actual = laws.energy(view.played, scenario.scene)
     if view.other is None:
-        return np.abs(actual - actual[0]) / (laws.energy_scale(view.played, scene) or 1.0)
-    off = np.abs(actual - laws.energy(view.other, scene)) / (laws.energy_scale(view.other, scene) or 1.0)
+        return np.abs(actual - actual[0]) / (scales.energy(scenario) or 1.0)
+    off = np.abs(actual - laws.energy(view.other, scenario.scene)) / (scales.energy(scenario, view.other) or 1.0)
     return np.where(view.calm, off, np.nan)
+
+
+def energy_rise(view: View) -> Array | None:
+    """E(t) less the smallest E before t, over the energy at hand: no hit can give any, only thrust can."""
+    if view.scenario.thrusts or lifts(view.scenario):
+        return None
+    actual = laws.energy(view.played, view.scenario.scene)
+    return (actual - np.minimum.accumulate(actual)) / (scales.energy(view.scenario) or 1.0)
+
+
+def lifts(scenario: Scenario) -> bool:
+    """Whether the wrap of the scene lifts disks against gravity."""
+    return scenario.scene.wrap is not None and bool(scenario.scene.gravity.any())
 
 
 def knows_impulses(scenario: Scenario) -> bool:
