@@ -96,7 +96,7 @@ class Box2DEngine:
         self.bodies[disk].ApplyTorque(float(torque * self.length**2 * per_time2), True)
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `Step`; where the scene wraps, leavers are set over after each."""
+        """`count` calls of `Step`; where the scene wraps, disks that leave are set onto the opposite edge."""
         dt = self.dt / self.time
         for _ in range(count):
             self.world.Step(dt, VELOCITY_ITERATIONS, self.position_iterations)

@@ -18,13 +18,13 @@ class Row:
         summary: one line for `crosscheck list`.
         alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t is
             (alpha - 1/2) a dt t. A property of the order of updates, not an error of the adapter.
-        digits: relative precision of the numbers the engine keeps.
+        rounding: the relative rounding of the numbers the engine keeps.
     """
 
     make: Callable[[], Engine]
     summary: str
     alpha: float
-    digits: float
+    rounding: float
 
 
 def _exercise() -> Engine:

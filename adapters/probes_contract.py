@@ -38,7 +38,7 @@ def order_and_shapes(row: Row) -> Reading:
         array = getattr(state, name)
         if array.dtype != np.float64 or array.shape != wanted.shape:
             faults.append(f"{name} is {array.dtype} {array.shape}")
-        elif (off := np.abs(array - wanted)).max() > 4 * row.digits * largest(wanted):
+        elif (off := np.abs(array - wanted)).max() > 4 * row.rounding * largest(wanted):
             faults.append(f"{name} of disk {int(np.argwhere(off == off.max())[0][0])} is off by {off.max():.3g}")
     return Reading("; ".join(faults) or "as the scene", "as the scene")
 
@@ -109,7 +109,7 @@ def steps_obey_dt(row: Row) -> Reading:
             start = engine.read().position
             engine.step(steps)
             worst = max(worst, abs((engine.read().position - start)[0, 0] / (steps * dt) - speed))
-    return Reading(speed + worst, speed, row.digits * steps * speed)
+    return Reading(speed + worst, speed, row.rounding * steps * speed)
 
 
 def stays_finite(row: Row) -> Reading:
@@ -145,7 +145,7 @@ def push_lasts_one_step(row: Row) -> Reading:
         )
     ]
     # Nothing acts on the disk afterwards, so its velocity is not even rounded again.
-    return Reading(max(pushes, key=lambda ratio: abs(ratio - 1)), 1.0, 4 * row.digits)
+    return Reading(max(pushes, key=lambda ratio: abs(ratio - 1)), 1.0, 4 * row.rounding)
 
 
 def mass_by_push(row: Row) -> Reading:
@@ -154,7 +154,7 @@ def mass_by_push(row: Row) -> Reading:
         engine.push(0, np.array([30.0, 0.0]), 0.0)
         engine.step()
         dv = float(engine.read().velocity[0, 0])
-    return Reading(30.0 * DT / dv if dv else np.inf, 7.3, ROUNDINGS * row.digits * 7.3)
+    return Reading(30.0 * DT / dv if dv else np.inf, 7.3, ROUNDINGS * row.rounding * 7.3)
 
 
 def inertia_by_push(row: Row) -> Reading:
@@ -163,7 +163,7 @@ def inertia_by_push(row: Row) -> Reading:
         engine.push(0, NONE, 2.0)
         engine.step()
         dw = float(engine.read().angular_velocity[0])
-    return Reading(2.0 * DT / dw if dw else np.inf, 0.9, ROUNDINGS * row.digits * 0.9)
+    return Reading(2.0 * DT / dw if dw else np.inf, 0.9, ROUNDINGS * row.rounding * 0.9)
 
 
 def same_instant(row: Row) -> Reading:
@@ -172,7 +172,7 @@ def same_instant(row: Row) -> Reading:
     with loaded(row, one_disk(gravity=gravity)) as engine:
         engine.step(steps)
         speed = -float(engine.read().velocity[0, 1])
-    return Reading(speed, gravity * steps * DT, row.digits * steps * gravity)
+    return Reading(speed, gravity * steps * DT, row.rounding * steps * gravity)
 
 
 def hits_are_told(row: Row) -> Reading:
@@ -214,7 +214,7 @@ def impulse_is_told(row: Row) -> Reading:
         impulses = [hit.impulse for hit in engine.hits()]
     if np.isnan(impulses).any():
         return Reading("not told", "not told", note="the engine's events carry no impulse")
-    return Reading(float(sum(impulses)), float(moved), ROUNDINGS * row.digits * abs(moved))
+    return Reading(float(sum(impulses)), float(moved), ROUNDINGS * row.rounding * abs(moved))
 
 
 def static_stays(row: Row) -> Reading:

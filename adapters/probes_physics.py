@@ -22,7 +22,7 @@ def free_flight(row: Row) -> Reading:
         start = float(engine.read().position[0, 1])
         engine.step(steps)
         moved = float(engine.read().position[0, 1]) - start
-    bound = row.digits * steps * (1.0 + gravity * t * t)
+    bound = row.rounding * steps * (1.0 + gravity * t * t)
     return Reading(moved - (speed * t - gravity * t * t / 2), -(row.alpha - 0.5) * gravity * DT * t, bound)
 
 
@@ -31,7 +31,7 @@ def slow_flight(row: Row) -> Reading:
     speed = 2.0**-8
     with loaded(row, one_disk(velocity=(speed, 0.0))) as engine:
         engine.step(512)
-        return Reading(float(engine.read().velocity[0, 0]), speed, 2 * row.digits * speed)
+        return Reading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
 
 
 def fast_flight(row: Row) -> Reading:
@@ -39,7 +39,7 @@ def fast_flight(row: Row) -> Reading:
     speed = 512.0
     with loaded(row, one_disk(velocity=(speed, 0.0)), 1 / 64) as engine:
         engine.step(4)
-        return Reading(float(engine.read().velocity[0, 0]), speed, 2 * row.digits * speed)
+        return Reading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
 
 
 def fast_spin(row: Row) -> Reading:
@@ -47,7 +47,7 @@ def fast_spin(row: Row) -> Reading:
     spin = 300.0
     with loaded(row, one_disk(spin=spin), 1 / 64) as engine:
         engine.step(4)
-        return Reading(float(engine.read().angular_velocity[0]), spin, 2 * row.digits * spin)
+        return Reading(float(engine.read().angular_velocity[0]), spin, 2 * row.rounding * spin)
 
 
 def spins_freely(row: Row) -> Reading:
@@ -57,7 +57,7 @@ def spins_freely(row: Row) -> Reading:
         for _ in range(8):
             engine.step(steps // 8)
             angle = float(engine.read().angle[0])  # read often: an engine may keep only cos and sin
-    return Reading(angle, spin * steps * DT, row.digits * steps * spin)
+    return Reading(angle, spin * steps * DT, row.rounding * steps * spin)
 
 
 def pair_momentum(row: Row) -> Reading:
@@ -73,7 +73,7 @@ def pair_momentum(row: Row) -> Reading:
     if np.abs(after - before).max() < 0.1:
         return Reading("no hit", 0.0)
     change = largest(scene.mass @ (after - before)) / float(scene.mass @ np.hypot(*before.T))
-    return Reading(change, 0.0, ROUNDINGS * row.digits)
+    return Reading(change, 0.0, ROUNDINGS * row.rounding)
 
 
 def restitution(row: Row, closing: float) -> Reading:
@@ -82,7 +82,7 @@ def restitution(row: Row, closing: float) -> Reading:
         before = engine.read().velocity
         engine.step(24)
         after = engine.read().velocity
-    return Reading(float((after[2] - after[1])[0] / (before[1] - before[2])[0]), 0.5, ROUNDINGS * row.digits)
+    return Reading(float((after[2] - after[1])[0] / (before[1] - before[2])[0]), 0.5, ROUNDINGS * row.rounding)
 
 
 def wall_restitution(row: Row) -> Reading:
@@ -93,7 +93,7 @@ def wall_restitution(row: Row) -> Reading:
     )  # fmt: skip
     with loaded(row, scene) as engine:
         engine.step(24)
-        return Reading(-float(engine.read().velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.digits)
+        return Reading(-float(engine.read().velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.rounding)
 
 
 def friction(row: Row) -> Reading:
@@ -103,7 +103,7 @@ def friction(row: Row) -> Reading:
         before = engine.read().velocity[1]
         engine.step(24)
         taken = engine.read().velocity[1] - before
-    return Reading(float(abs(taken[1] / taken[0])) if taken[0] else np.nan, 0.0, row.digits)
+    return Reading(float(abs(taken[1] / taken[0])) if taken[0] else np.nan, 0.0, row.rounding)
 
 
 PHYSICS: dict[str, Probe] = {

@@ -90,7 +90,7 @@ class Pymunk:
             body.torque += torque
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `space.step`; where the scene wraps, leavers are set over after each."""
+        """`count` calls of `space.step`; where the scene wraps, disks that leave are set onto the opposite edge."""
         for _ in range(count):
             self.space.step(self.dt)
             self.steps += 1

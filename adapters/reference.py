@@ -9,15 +9,20 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Hit
-from reference_impl.state import World, make_disks
+from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
 from scenarios.model import Array, Scene, State
+
+SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
 
 
 class Reference:
-    """Plays one variant, `reference_impl.exercise` or `reference_impl.lesson`."""
+    """Plays one variant, `reference_impl.exercise` or `reference_impl.lesson`, or any module with their `advance`.
 
-    def __init__(self, variant: ModuleType) -> None:
-        self.variant = variant
+    `options` are fields of `World` that the exercise leaves free: split, approaching_only.
+    """
+
+    def __init__(self, variant: ModuleType, **options: Any) -> None:
+        self.variant, self.options = variant, options
 
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
@@ -30,7 +35,7 @@ class Reference:
         low, high = (np.full(2, -np.inf), np.full(2, np.inf)) if scene.wrap is None else scene.wrap
         self.world = World(
             restitution=float(scene.restitution), gravity=np.array(scene.gravity),
-            walls=np.array(scene.walls), low=np.array(low), high=np.array(high),
+            walls=np.array(scene.walls), low=np.array(low), high=np.array(high), **self.options,
         )  # fmt: skip
         self.pushed = False
         self.variant.advance(self.disks, self.world, dt, 0)  # compiles, if nobody has yet
@@ -70,8 +75,8 @@ class Reference:
         """What the two variants leave free; the rest is the scene."""
         return {
             "integrator": (None, "symplectic Euler" if "exercise" in self.variant.__name__ else "explicit Euler"),
-            "projection split": (None, "by inverse mass"),
-            "impulse on separating pairs": (None, not self.world.approaching_only),
+            "projection split": (self.options.get("split"), SPLITS[self.world.split]),
+            "approaching pairs only": (self.options.get("approaching_only"), self.world.approaching_only),
         }
 
     def versions(self) -> dict[str, str]:

@@ -14,7 +14,7 @@ from reference_impl.state import Disks, World
 @njit(cache=True, error_model="numpy")
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the hits as (step, i, j, impulse in N s), wall w as j = -1 - w."""
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]
+    hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
         step(disks, world, dt, k, hits)
     return hits

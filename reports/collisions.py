@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from scenarios.model import Array, Collisions, Scene, Trajectory
 
@@ -47,64 +49,111 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
     impulse), as what a player reports there is weight; true hits of a pair closer together than 2 dt, as no step
     can tell them apart, with all that a player makes of them; and hits within 3 dt of `end`, which may be cut off.
     """
-    delays: list[float] = []
-    missed: list[tuple[float, int, int]] = []
-    invented: list[tuple[float, int, int]] = []
-    resting = {(int(i), int(j)) for i, j, impulse in zip(true.i, true.j, true.impulse) if impulse == 0}
-    pairs = {(int(i), int(j)) for hits in (played, true) for i, j in zip(hits.i, hits.j)} - resting
-    for i, j in sorted(pairs):
-        t_played = played.t[(played.i == i) & (played.j == j) & (played.t <= end)]
-        t_true = true.t[(true.i == i) & (true.j == j) & (true.t <= end)]
-        mine, its = pair_up(t_played, t_true, 20 * dt)
-        delays += list(t_played[mine] - t_true[its])
-        crowded = too_close(t_true, 2 * dt)
-        lost = np.setdiff1d(np.flatnonzero(~crowded), its)
-        extra = np.setdiff1d(np.arange(len(t_played)), mine)
-        among = [near_any(t, t_true[crowded], 3 * dt) for t in t_played[extra]]
-        missed += [(float(t), i, j) for t in t_true[lost] if t < end - 3 * dt]
-        invented += [
-            (float(t), i, j) for t, in_crowd in zip(t_played[extra], among) if t < end - 3 * dt and not in_crowd
-        ]
-    return Matched(np.array(delays), missed, invented)
+    resting = pair_keys(true)[true.impulse == 0]
+    mine, its = (by_pair(hits, resting, end) for hits in (played, true))
+    pairs = np.union1d(mine.key, its.key)
+    limits = [np.append(np.searchsorted(side.key, pairs), len(side.key)) for side in (mine, its)]
+    partner, lost, extra = judge(mine.t, limits[0], its.t, limits[1], dt, end)
+    found = partner >= 0
+    return Matched(
+        delay=mine.t[found] - its.t[partner[found]],
+        missed=[(float(its.t[k]), int(its.i[k]), int(its.j[k])) for k in np.flatnonzero(lost)],
+        invented=[(float(mine.t[k]), int(mine.i[k]), int(mine.j[k])) for k in np.flatnonzero(extra)],
+    )
 
 
-def pair_up(played: Array, true: Array, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """Indices (m,) into `played` and (m,) into `true` (both s, sorted) of the hits that are the same."""
-    if len(played) <= len(true):
-        mine, its = np.arange(len(played)), closest_in_order(played, true)
-    else:
-        mine, its = closest_in_order(true, played), np.arange(len(true))
-    gap = np.diff(true, prepend=0.0, append=np.inf)
-    allowed = np.maximum(np.minimum(gap[:-1], gap[1:])[its] / 2, least)
-    same = np.abs(played[mine] - true[its]) <= allowed
-    return mine[same], its[same]
+class ByPair(NamedTuple):
+    """Hits sorted by pair and then by time: one number that stands for the pair, the time in s, the pair."""
+
+    key: np.ndarray
+    t: Array
+    i: np.ndarray
+    j: np.ndarray
 
 
-def too_close(t: Array, least: float) -> np.ndarray:
-    """(h,) True for times closer than `least` to a neighbour."""
-    gap = np.diff(t, prepend=-np.inf, append=np.inf)
-    return np.minimum(gap[:-1], gap[1:]) < least
+def pair_keys(hits: Collisions) -> np.ndarray:
+    """(h,) a number for the pair of each hit."""
+    return (hits.i << 32) + hits.j
 
 
-def near_any(t: float, times: Array, least: float) -> bool:
-    """Whether `t` lies within `least` of one of `times`."""
-    return bool(len(times)) and bool(np.abs(times - t).min() <= least)
+def by_pair(hits: Collisions, resting: np.ndarray, end: float) -> ByPair:
+    """The hits up to `end` s of pairs that are not `resting`."""
+    key = pair_keys(hits)
+    order = np.argsort(key, kind="stable")
+    order = order[(hits.t[order] <= end) & ~np.isin(key[order], resting)]
+    return ByPair(key[order], hits.t[order], hits.i[order], hits.j[order])
 
 
-def closest_in_order(few: Array, many: Array) -> np.ndarray:
+@njit(cache=True)
+def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no-untyped-def]
+    """Pair by pair: (partner of each played hit or -1, true hits that are missed, played hits that are invented)."""
+    partner = np.full(len(played), -1)
+    lost, extra = np.zeros(len(true), dtype=np.bool_), np.zeros(len(played), dtype=np.bool_)
+    for k in range(len(played_limits) - 1):
+        p, q = played_limits[k], played_limits[k + 1]
+        a, b = true_limits[k], true_limits[k + 1]
+        mine, its = played[p:q], true[a:b]
+        gap = gap_to_nearest(its)
+        if q - p <= b - a:
+            chosen = closest_in_order(mine, its)
+            for m in range(q - p):
+                partner[p + m] = a + chosen[m]
+        else:
+            chosen = closest_in_order(its, mine)
+            for m in range(b - a):
+                partner[p + chosen[m]] = a + m
+        lost[a:b] = (gap >= 2 * dt) & (its < end - 3 * dt)
+        for m in range(p, q):
+            t, other = played[m], partner[m]
+            if other >= 0 and abs(t - true[other]) > max(gap[other - a] / 2, 20 * dt):
+                partner[m] = other = -1
+            if other >= 0:
+                lost[other] = False
+            else:
+                extra[m] = t < end - 3 * dt and not among_crowded(t, its, gap, dt)
+    return partner, lost, extra
+
+
+@njit(cache=True)
+def gap_to_nearest(t):  # type: ignore[no-untyped-def]
+    """(h,) s from each of the sorted times to the nearest other, or to the start."""
+    gap = np.empty(len(t))
+    for k in range(len(t)):
+        gap[k] = t[k] - (t[k - 1] if k > 0 else 0.0)
+        if k + 1 < len(t):
+            gap[k] = min(gap[k], t[k + 1] - t[k])
+    return gap
+
+
+@njit(cache=True)
+def among_crowded(t, times, gap, dt):  # type: ignore[no-untyped-def]
+    """Whether `t` is within 3 dt of one of `times` that no step of dt can tell from its neighbour."""
+    for k in range(len(times)):
+        if gap[k] < 2 * dt and abs(times[k] - t) <= 3 * dt:
+            return True
+    return False
+
+
+@njit(cache=True)
+def closest_in_order(few, many):  # type: ignore[no-untyped-def]
     """(len(few),) indices into `many`, increasing, with the least sum of |few - many[index]|; both sorted, in s.
 
     Dynamic programming over how many of `many` have been skipped so far, one row per element of `few`.
     """
     spare = len(many) - len(few)
-    cost, skipped = np.zeros(spare + 1), np.zeros((len(few), spare + 1), dtype=int)
-    for k, t in enumerate(few):
-        best = np.minimum.accumulate(cost)
-        skipped[k] = np.maximum.accumulate(np.where(cost == best, np.arange(spare + 1), 0))
-        cost = best + np.abs(t - many[k : k + spare + 1])
-    chosen = np.zeros(len(few), dtype=int)
-    skips = int(np.argmin(cost)) if len(few) else 0
-    for k in reversed(range(len(few))):
+    cost = np.zeros(spare + 1)
+    skipped = np.zeros((len(few), spare + 1), dtype=np.int64)
+    for k in range(len(few)):
+        best = 0
+        lowest = cost[0]
+        for s in range(spare + 1):
+            if cost[s] <= lowest:
+                best, lowest = s, cost[s]
+            skipped[k, s] = best
+            cost[s] = lowest + abs(few[k] - many[k + s])
+    chosen = np.zeros(len(few), dtype=np.int64)
+    skips = np.argmin(cost)
+    for k in range(len(few) - 1, -1, -1):
         chosen[k] = k + skips
         skips = skipped[k, skips]
     return chosen

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import pandas as pd
 
@@ -12,11 +12,14 @@ from reports.overview import MAPPED, values
 FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
 
 
-def findings(comparisons: Sequence[Comparison]) -> list[str]:
-    """Three sentences: who is closest, what settings are worth, where each fails."""
-    off = position_errors(comparisons)
+def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
+    """Three sentences: who is closest, what settings are worth, where each fails; a fourth on who is not counted."""
+    off = position_errors(comparisons).drop(columns=list(untrusted), errors="ignore")
     statuses = [run.status for comparison in comparisons for run in comparison.runs]
-    return [closest(off), worth_of_settings(off), where_it_fails(off, statuses)]
+    sentences = [closest(off), worth_of_settings(off), where_it_fails(off, statuses)]
+    if untrusted:
+        sentences.append(f"Not counted, as it broke the protocol of the harness: {', '.join(sorted(untrusted))}.")
+    return sentences
 
 
 def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
@@ -70,6 +73,6 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
     return (
-        f"More than a whole radius off: {who} of {len(off)} scenes; the hardest is {defeated.idxmax()}, which defeats "
+        f"More than a whole radius off: {who} of {len(off)} scenes; the hardest is {defeated.idxmax()}, which is too much for "
         f"{defeated.max()} of {lost.shape[1]}; {cells}"
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports import laws, scales, violations
-from reports.collisions import effective_restitution
+from reports.collisions import pair_keys
 from reports.view import Value, View
 from scenarios.model import Array
 
@@ -65,26 +65,18 @@ def energy_loss_error(view: View) -> Value | None:
 
 def restitution(view: View) -> Value | None:
     """Median e = -(dv after).n / (dv before).n over the hits that can be read off the samples."""
-    values, _ = _restitutions(view)
+    values, _ = view.restitutions
     return Value(float(np.median(values)), note=f"{len(values)} hits read") if len(values) else None
 
 
 def restitution_error(view: View) -> Value | None:
     """Largest |e - what the scene states| over the hits that can be read off the samples."""
-    values, times = _restitutions(view)
+    values, times = view.restitutions
     if not len(values):
         return None
     off = np.abs(values - view.scenario.scene.restitution)
     worst = int(np.argmax(off))
     return Value(float(off[worst]), at=float(times[worst]), note=f"{len(values)} hits read")
-
-
-def _restitutions(view: View) -> tuple[Array, Array]:
-    """The hits' e and times; none under thrust. Slow hits are left out under gravity, which is taken out to O(dt)."""
-    if view.scenario.thrusts:
-        return np.zeros(0), np.zeros(0)
-    slowest = 20 * float(np.linalg.norm(view.scenario.scene.gravity)) * view.scenario.sample_interval
-    return effective_restitution(view.played, view.scenario.scene, slowest)
 
 
 def penetration_radii(view: View) -> Value | None:
@@ -151,13 +143,23 @@ def time_to_1pct_s(view: View) -> Value | None:
     return Value(float(view.played.t[k]), int(np.argmax(off[k])), float(view.played.t[k]))
 
 
+def collision_count_error(view: View) -> Value | None:
+    """Hits of the player less hits of the other, whenever they come; pairs at rest from the start are not counted."""
+    assert view.other is not None
+    resting = pair_keys(view.other.collisions)[view.other.collisions.impulse == 0]
+    played, true = (
+        int((~np.isin(pair_keys(hits), resting)).sum()) for hits in (view.played.collisions, view.other.collisions)
+    )
+    return Value(played - true, note=f"{played} of {true}")
+
+
 def collisions_missed(view: View) -> Value | None:
-    """True hits the player does not have."""
+    """Hits of the other, of those that a step can tell apart, that the player does not have at their time."""
     return Value(len(view.matched.missed), note=f"of {len(view.other.collisions)}")  # type: ignore[union-attr]
 
 
 def collisions_invented(view: View) -> Value | None:
-    """Hits of the player that the truth does not have."""
+    """Hits of the player that the other does not have at their time."""
     return Value(len(view.matched.invented))
 
 
@@ -251,6 +253,7 @@ METRICS: dict[str, Metric] = {
     "restitution_error": Metric(restitution_error, "1", (ITSELF,)),
     "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,)),
     "disks_through_walls": Metric(disks_through_walls, "disks", (ITSELF,)),
+    "collision_count_error": Metric(collision_count_error, "hits", (TRUTH, ENGINE), "zero"),
     "collisions_missed": Metric(collisions_missed, "hits", (TRUTH, ENGINE)),
     "collisions_invented": Metric(collisions_invented, "hits", (TRUTH, ENGINE)),
     "first_wrong_collision_s": Metric(first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"),

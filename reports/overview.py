@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from typing import NamedTuple
 
 import numpy as np
@@ -93,18 +93,23 @@ def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
     }
 
 
-def summary(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[str, list[Cell]]:
-    """`engine:profile` -> a cell for each of `SUMMARY`: medians over the scenarios, sums where the unit says so."""
+def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]) -> dict[str, list[Cell]]:
+    """`engine:profile` -> a cell for each of `SUMMARY`: medians over the scenarios, sums where the unit says so.
+
+    Who is `untrusted` broke the protocol of the harness and is not scored.
+    """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
     rows: dict[str, list[Cell]] = {name: [] for name in names}
+    for name in untrusted & set(names):
+        rows[name] = [Cell("breaks", "breaks the protocol: not scored", failed=True)] * (len(SUMMARY) - 1)
     for metric in SUMMARY:
         if metric == "failed":
             for name in names:
                 count = sum(name in each for each in failed)
                 rows[name].append(Cell(f"{count} of {len(comparisons)}", failed=count > 0))
             continue
-        pooled = {name: pool(metric, name, found) for name in names}
+        pooled = {name: pool(metric, name, found) for name in names if name not in untrusted}
         best = min((value for value, _ in pooled.values() if not np.isnan(value)), default=np.nan)
         for name, (value, count) in pooled.items():
             rows[name].append(Cell(number(value), f"in {count} scenarios", best=value == best))
@@ -157,7 +162,7 @@ def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[s
             else:
                 cells.append(Cell(failed[name][0], failed[name][1], failed=True) if name in failed else Cell("–"))
         unit = "" if metric.unit == "1" else metric.unit
-        better = {"lower": "↓", "higher": "↑", "zero": "◦"}[metric.better]
+        better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[metric.better]
         rows.append((key, unit, better, cells))
     return rows
 

@@ -6,7 +6,7 @@ import base64
 import hashlib
 import json
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,14 +65,15 @@ def write_page(
     comparisons: Sequence[Comparison],
     *,
     findings: Sequence[str],
+    untrusted: Set[str],
     conformance: pd.DataFrame,
     known_answers: pd.DataFrame,
     about: Mapping[str, Any],
 ) -> None:
     """Write the page of `comparisons`, in reading order, to `path`.
 
-    `findings` are the sentences on top; `conformance` and `known_answers` the tables below them; `about` holds
-    command, seed, machine, versions, started and seconds.
+    `findings` are the sentences on top; who is in `untrusted` is not scored; `conformance` and `known_answers` are
+    the tables below them; `about` holds command, seed, machine, versions, started and seconds.
     """
     names = overview.names_of(comparisons)
     common = overview.common_settings(comparisons)
@@ -86,7 +87,7 @@ def write_page(
     html = environment.get_template("page.html.j2").render(
         names=names, sections=sections, families=by_family(sections), findings=findings, about=about, points=POINTS,
         engines=versions_of(comparisons), steps=step_range(comparisons), columns=overview.SUMMARY, looks=looks,
-        summary=overview.summary(comparisons, names), heat_map=overview.heat_map(comparisons, names),
+        summary=overview.summary(comparisons, names, untrusted), heat_map=overview.heat_map(comparisons, names),
         conformance=conformance_matrix(conformance), departures=departures(conformance), probes=records(conformance),
         known_answers=records(known_answers), known_answers_text=about.get("known_answers_text", MEANING),
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],

@@ -22,13 +22,22 @@ from scenarios.catalogue import SCENARIOS
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What came out of a run: the header, a comparison a scenario, both tables, the sentences on top."""
+    """What came out of a run.
+
+    Attributes:
+        header: command, seed, machine and versions.
+        comparisons: one a scenario, in reading order.
+        deviations, runs: the two tables.
+        findings: the sentences on top.
+        untrusted: the players that broke the protocol: their rows are kept, but nothing is concluded from them.
+    """
 
     header: dict[str, Any]
     comparisons: list[Comparison]
     deviations: pd.DataFrame
     runs: pd.DataFrame
     findings: list[str]
+    untrusted: set[str]
 
 
 def make_report(folder: Path, say: Callable[[str], None]) -> Report:
@@ -48,19 +57,21 @@ def make_report(folder: Path, say: Callable[[str], None]) -> Report:
     runs = table_of_runs([record for comparison in by_scene.values() for record in comparison], header["scenes"])
     deviations.to_csv(folder / "deviations.csv", index=False)
     runs.to_csv(folder / "runs.csv", index=False)
-    sentences = findings(comparisons)
     asked = sorted(archive.parts("conformance"), key=lambda rows: place_in_table(rows[0]))
     known = sorted(archive.parts("known_answer"), key=lambda row: (row["column"], row["dt_s"]), reverse=True)
     footer = archive.parts("footer")
+    untrusted = {f"{row['engine']}:{row['profile']}" for rows in asked for row in rows if row["verdict"] == "breaks"}
+    sentences = findings(comparisons, untrusted)
     write_page(
         folder / "report.html",
         comparisons,
         findings=sentences,
+        untrusted=untrusted,
         conformance=pd.DataFrame([row for rows in asked for row in rows]),
         known_answers=pd.DataFrame(known),
         about=header | {"seconds": footer[0]["seconds"] if footer else float("nan"), "known_answers_text": MEANING},
     )
-    return Report(header, comparisons, deviations, runs, sentences)
+    return Report(header, comparisons, deviations, runs, sentences, untrusted)
 
 
 def compare_scene(archive: Archive, scene: str, records: list[dict[str, Any]]) -> Comparison:

@@ -19,6 +19,7 @@ from reports.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.machine import about
 from reports.runner import Failure, run_all
 from reports.terminal import Progress
+from scenarios.files import write_scene_file
 from scenarios.model import Scenario
 
 
@@ -56,7 +57,7 @@ def carry_out(plan: Plan, folder: Path, progress: Progress) -> None:
     archive.begin(about(plan.command, plan.seed) | {"scenes": list(plan.scenes)})
     for scene in plan.scenes:
         if scene.endswith(".toml"):
-            shutil.copy(scene, folder / "scenes" / f"{scenarios[scene].name}.toml")
+            write_scene_file(scenarios[scene], folder / "scenes" / f"{scenarios[scene].name}.toml")
 
     tasks: dict[Any, Callable[[], Any]] = {engine: partial(conform, engine, ENGINES[engine]) for engine in plan.engines}
     if KNOWN_SCENE in plan.scenes:

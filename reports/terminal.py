@@ -61,7 +61,8 @@ def print_summary(report: Report, page: str) -> None:
     table.add_column("engine", no_wrap=True)
     for column in overview.SUMMARY.values():
         table.add_column(column.title.replace(" ", "\n"), justify="right", no_wrap=True)
-    for name, cells in overview.summary(report.comparisons, overview.names_of(report.comparisons)).items():
+    names = overview.names_of(report.comparisons)
+    for name, cells in overview.summary(report.comparisons, names, report.untrusted).items():
         table.add_row(name, *(cell.text for cell in cells))
     console.print(table)
     for sentence in report.findings:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reports import laws
-from reports.collisions import Matched, match
+from reports.collisions import Matched, effective_restitution, match
 from scenarios.model import Array, Scenario, Trajectory
 
 TOUCHY = 3  # dt around a true hit in which velocities are not compared: the delay of the hit is measured by itself
@@ -57,6 +57,17 @@ class View:
             calm = np.minimum(np.abs(before), np.abs(after)) > TOUCHY * self.dt
             calm[0] = True
         return calm
+
+    @cached_property
+    def restitutions(self) -> tuple[Array, Array]:
+        """((m,), (m,) s) e and time of the hits that can be read; none under thrust.
+
+        Slow hits are left out under gravity, which is taken out of the samples to first order only.
+        """
+        if self.scenario.thrusts:
+            return np.zeros(0), np.zeros(0)
+        slowest = 20 * float(np.linalg.norm(self.scenario.scene.gravity)) * self.scenario.sample_interval
+        return effective_restitution(self.played, self.scenario.scene, slowest)
 
     @cached_property
     def matched(self) -> Matched:

@@ -18,6 +18,7 @@ from pydantic_core import ErrorDetails
 
 from scenarios.file_tables import TABLES, SceneTable
 from scenarios.model import Array, Scenario, Scene, Thrust
+from scenarios.placing import box
 
 MOST_BYTES = 5_000_000
 MOST_OVERLAPS = 100  # listed; n disks in one place would make n2 / 2 lines
@@ -152,9 +153,7 @@ def _scenario(file: SceneTable, source: str) -> Scenario:
     inertia = np.array([np.nan if disk.inertia is None else disk.inertia for disk in disks])
     walls = [[wall.start, wall.end] for wall in file.wall]
     if file.box:
-        (left, bottom), (right, top) = file.box.low, file.box.high
-        corners = [[left, bottom], [right, bottom], [right, top], [left, top]]
-        walls += [[corners[side - 1], corners[side]] for side in range(4)]
+        walls += box(file.box.low, file.box.high).tolist()
     return Scenario(
         name=file.name,
         asks=file.asks or f"What do the engines make of {file.name}?",

@@ -278,8 +278,8 @@ class Trajectory:
         angle: (k, n) rad, unwrapped.
         angular_velocity: (k, n) rad/s.
         collisions: the hits up to t[-1].
-        valid_until: s, the horizon of a truth: no sample lies beyond it.
-        error_bound: m, how far a truth may be off before its horizon.
+        valid_until: s, the horizon up to which players are held to a truth: no sample lies beyond it.
+        error_bound: m, how far a truth may be off before it; 0: a closed form, right to a few roundings.
     """
 
     t: Array

@@ -108,7 +108,7 @@ def slow_hit() -> Scenario:
     """Half a metre a second: slower than the threshold below which some engines make every hit dead."""
     return _pairs(
         "slow_hit",
-        "Is a hit at 0.5 m/s as elastic as a fast one, or does a restitution threshold bite?",
+        "Is a hit at 0.5 m/s as elastic as a fast one, or is it below a threshold?",
         position=[[-0.63, 0], [0.583, 0]],
         velocity=[[0.37, 0], [-0.13, 0]],
         mass=[1, 1],

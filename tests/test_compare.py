@@ -78,7 +78,7 @@ def test_momentum_that_leaks_is_seen():
     found = value("momentum_error", View(one, one.dt(1), replace(truth, velocity=velocity)))
     share = np.linalg.norm(truth.velocity[-1, 0]) / np.linalg.norm(truth.velocity[-1], axis=1).sum()
 
-    assert found == pytest.approx(0.01 * share, rel=0.02)  # the scale grows by the leak itself, 1 %
+    assert found == pytest.approx(0.01 * share, rel=1e-6)  # digits of 1.01 v - v
 
 
 def test_energy_that_is_created_is_seen():
@@ -180,7 +180,7 @@ def test_matching_in_order_is_the_closest_there_is():
         best = min(np.abs(few - many[list(some)]).sum() for some in combinations(range(len(many)), len(few)))
 
         assert (np.diff(chosen) > 0).all()
-        assert np.abs(few - many[chosen]).sum() == pytest.approx(best)
+        assert np.abs(few - many[chosen]).sum() == pytest.approx(best, rel=1e-12)  # sums of six, in another order
 
 
 @pytest.mark.parametrize("e", ["e0", "e05", "e09", "e1"])

@@ -19,7 +19,7 @@ from reports.cells import Cell
 from scenarios.catalogue import scenario as from_catalogue
 from scenarios.model import Scenario, Scene, Thrust
 
-FLOAT32_ENGINES = [name for name, row in ENGINES.items() if row.digits > 2.0**-53]
+FLOAT32_ENGINES = [name for name, row in ENGINES.items() if row.rounding > 2.0**-53]
 BOX = [[-5.0, -3.0], [5.0, 3.0]]  # of the exercise
 
 
@@ -54,7 +54,7 @@ def test_a_thrust_that_starts_and_stops_inside_steps_gives_its_exact_impulse(nam
     """0.013 s to 0.687 s in steps of 0.02 s: the first and last push carry a share of a step."""
     thrust = Thrust(0, 0.013, 0.687, [3.0, -2.0], torque=0.4)
     end = played(name, asked(one_disk(), [thrust]), 0.02).trajectory.at(-1)
-    seconds, digits = 0.687 - 0.013, ENGINES[name].digits
+    seconds, digits = 0.687 - 0.013, ENGINES[name].rounding
     # A push and a velocity round in each of 35 steps.
     assert end.velocity[0] == pytest.approx(seconds * thrust.force / 7.3, rel=2 * 35 * digits)
     assert end.angular_velocity[0] == pytest.approx(seconds * 0.4 / 0.9, rel=2 * 35 * digits)
@@ -67,7 +67,7 @@ def test_a_body_frame_thrust_turns_with_the_disk(name):
     thrust = Thrust(0, 0.0, 1.0, [7.3, 0.0], frame="body")
     end = played(name, asked(scene, [thrust]), 0.05).trajectory.at(-1)
     # The angle, pi / 2, is known to a rounding, which turns the force; each of 20 steps rounds a velocity.
-    assert end.velocity[0] == pytest.approx([0.0, 1.0], abs=(2 + 2 * 20) * ENGINES[name].digits)
+    assert end.velocity[0] == pytest.approx([0.0, 1.0], abs=(2 + 2 * 20) * ENGINES[name].rounding)
 
 
 @settings(derandomize=True)
@@ -119,7 +119,7 @@ def test_disks_do_not_see_each_other_across_the_edge_but_meet_after_it(name):
     still = played(name, asked(apart), 0.0125).trajectory
     assert len(still.collisions) == 0
     # Nothing moves: the start is rounded to float32 once, and the unit of length once more.
-    assert np.abs(still.position - apart.position).max() <= 2 * ENGINES[name].digits * 5
+    assert np.abs(still.position - apart.position).max() <= 2 * ENGINES[name].rounding * 5
     met = played(name, asked(scene), 0.0125).trajectory
     assert (met.collisions.i.tolist(), met.collisions.j.tolist()) == ([0], [1])
     # It leaves at 0.05 s and the gap of 0.3 m is closed 0.15 s later; a step to find it, and one to leave.

@@ -62,7 +62,8 @@ def path(comparisons: list[Comparison], tmp_path_factory: pytest.TempPathFactory
     about |= {"versions": {"pymunk": "7.3.1"}, "started": "2026-01-01T00:00:00+00:00", "known_answers_text": HOSTILE}
     path = tmp_path_factory.mktemp("page") / "report.html"
     write_page(
-        path, comparisons, findings=["One.", HOSTILE, "Three."], conformance=conformance,
+        path, comparisons, untrusted=set(),
+        findings=["One.", HOSTILE, "Three."], conformance=conformance,
         known_answers=pd.DataFrame([known]), about=about,
     )  # fmt: skip
     return path
@@ -294,6 +295,8 @@ def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:
     """Without scenarios, probes and known answers there is still a page, with the command that makes it."""
     about = {"command": "crosscheck run nothing", "seed": 1, "machine": {}, "versions": {}, "started": "", "seconds": 0}
     nothing = pd.DataFrame()
-    write_page(tmp_path / "r.html", [], findings=[], conformance=nothing, known_answers=nothing, about=about)
+    write_page(
+        tmp_path / "r.html", [], findings=[], untrusted=set(), conformance=nothing, known_answers=nothing, about=about
+    )
 
     assert "crosscheck run nothing" in (tmp_path / "r.html").read_text()

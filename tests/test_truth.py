@@ -179,7 +179,7 @@ def test_velocity_and_spin_change_by_the_pushes_as_quadrature_has_it(name):
         ("ping_pong", 4),  # 40 s, a period of 20 s
         ("mass_ratios", 7),
         ("near_miss", 0),
-        ("line_gas", 272),
+        ("line_gas", 278),
         ("galperin_3", 3),
         ("galperin_31", 31),
         ("galperin_314", 314),

@@ -1,5 +1,6 @@
-"""Takes the README's picture from a page: uv run python tests/picture.py reports/out/latest/report.html"""
+"""Takes the README's picture from a page: uv run python .ci/picture.py reports/out/latest/report.html"""
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -10,9 +11,9 @@ QUIET = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--
 
 
 def main(page: Path) -> None:
-    """The summary and the map of position errors, 1280 pixels wide without the index."""
+    """The map of position errors, without the index beside it."""
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=QUIET)
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=QUIET)
         tab = browser.new_page(viewport={"width": 980, "height": 1400}, device_scale_factor=1.5)
         tab.goto(page.resolve().as_uri())
         box = tab.locator("#map").bounding_box()
