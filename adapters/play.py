@@ -14,7 +14,7 @@ from adapters.engine import Engine, Hit, Unsupported
 from scenarios.model import Array, Collisions, Scenario, Scene, State, Thrust, Trajectory, frozen
 
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
-RUNAWAY = 1e9  # m; no scene is this large, so a disk beyond it has been thrown
+RUNAWAY = 1e3  # times as far as anything can fly in a scene: a disk beyond that has been thrown by the engine
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float) -> Run:
         for k in range(scenario.samples):
             seconds += advance(engine, scenario, k * substeps, substeps, dt)
             state = engine.read()
-            if fault := fault_of(state):
+            if fault := fault_of(state, RUNAWAY * reach(scenario)):
                 status, reason = "diverged", f"{fault} at {(k + 1) * scenario.sample_interval:g} s"
                 break
             states.append(state)
@@ -139,13 +139,21 @@ def world_force(thrust: Thrust, engine: Engine) -> Array:
     return np.array([cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y])
 
 
-def fault_of(state: State) -> str:
-    """What is wrong with a state that cannot be gone on from, or ""."""
+def reach(scenario: Scenario) -> float:
+    """m from the origin, no less than any disk can get in free flight under gravity and thrust."""
+    scene, t = scenario.scene, scenario.duration
+    push = sum(float(np.linalg.norm(thrust.force)) for thrust in scenario.thrusts) / scene.mass.min()
+    start = max(np.abs(scene.position).max(), np.abs(scene.walls).max(initial=0.0), scene.radius.max())
+    return float(start + np.abs(scene.velocity).max() * t + (np.linalg.norm(scene.gravity) + push) * t * t / 2)
+
+
+def fault_of(state: State, farthest: float) -> str:
+    """What is wrong with a state that cannot be gone on from, or ""; `farthest` in m from the origin."""
     for name in ("position", "velocity", "angle", "angular_velocity"):
         values = getattr(state, name)
         if not np.isfinite(values).all():
             return f"{name} of disk {int(np.argwhere(~np.isfinite(values))[0][0])} is not finite"
-    if len(state.position) and (far := np.abs(state.position).max()) > RUNAWAY:
+    if len(state.position) and (far := np.abs(state.position).max()) > farthest:
         return f"a disk is {far:.3g} m away"
     return ""
 

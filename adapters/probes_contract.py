@@ -117,7 +117,7 @@ def stays_finite(row: Row) -> Reading:
     with loaded(row, plain()) as engine:
         for k in range(20):
             engine.step()
-            if fault := fault_of(engine.read()):
+            if fault := fault_of(engine.read(), np.inf):
                 return Reading(f"{fault} after step {k + 1}", "finite")
     return Reading("finite", "finite")
 

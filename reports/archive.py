@@ -15,12 +15,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
 from adapters.play import Run
-from reports.cells import Cell
-from scenarios.model import Collisions, Trajectory, frozen
+from reports.cells import Cell, scene_hash
+from scenarios.model import Collisions, Scenario, Trajectory, frozen
 
 FILES = ("journal.jsonl", "trajectories", "scenes", "machine.json", "deviations.csv", "runs.csv", "report.html")
 ARRAYS = ("t", "position", "velocity", "angle", "angular_velocity")
@@ -50,14 +51,24 @@ class Archive:
         with self.journal.open("a") as journal:
             journal.write(json.dumps(plain(line), allow_nan=False) + "\n")
 
-    def add(self, cell: Cell, key: str, run: Run) -> None:
+    def add(self, cell: Cell, scenario: Scenario, run: Run) -> None:
         """Add the line of a cell that has ended; its trajectory is already saved."""
         record = {
-            "cell": key, "scene": cell.scene, "seed": cell.seed, "substeps": cell.substeps,
-            "scenario": run.scenario, "engine": run.engine, "profile": run.profile, "dt_s": run.dt,
-            "status": run.status, "reason": run.reason, "seconds": run.seconds,
-            "settings": run.settings, "versions": run.versions,
-        }  # fmt: skip
+            "cell": cell.key(scenario),
+            "scene_hash": scene_hash(scenario),
+            "scene": cell.scene,
+            "seed": cell.seed,
+            "substeps": cell.substeps,
+            "scenario": run.scenario,
+            "engine": run.engine,
+            "profile": run.profile,
+            "dt_s": run.dt,
+            "status": run.status,
+            "reason": run.reason,
+            "seconds": run.seconds,
+            "settings": run.settings,
+            "versions": run.versions,
+        }
         self.append(record)
 
     def lines(self) -> Iterator[dict[str, Any]]:
@@ -71,8 +82,11 @@ class Archive:
                     raise ValueError(f"{self.journal}: line {number + 1} is not JSON: {error}") from error
 
     def header(self) -> dict[str, Any]:
-        """What `begin` wrote."""
-        return next(self.lines())["header"]
+        """What `begin` wrote; raises `ValueError` if there is none."""
+        header = next(self.lines(), {}).get("header")
+        if header is None:
+            raise ValueError(f"{self.journal}: has no header, so nothing was played")
+        return header
 
     def parts(self, kind: str) -> list[Any]:
         """What the lines of one kind hold, in the order in which they were written."""
@@ -85,14 +99,21 @@ class Archive:
     def run(self, record: dict[str, Any]) -> Run:
         """The run behind a line, its trajectory read back if it has one."""
         path = self.folder / "trajectories" / f"{record['cell']}.npz"
+        status, reason, trajectory = record["status"], record["reason"], None
+        try:
+            trajectory = load_trajectory(path) if path.exists() else None
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as fault:
+            status, reason = "error", f"{path.name} cannot be read: {fault}"
+        if status == "ok" and trajectory is None:
+            status, reason = "error", f"{path.name} is missing"
         return Run(
             engine=record["engine"],
             profile=record["profile"],
             scenario=record["scenario"],
             dt=record["dt_s"],
-            status=record["status"],
-            reason=record["reason"],
-            trajectory=load_trajectory(path) if path.exists() else None,
+            status=status,
+            reason=reason,
+            trajectory=trajectory,
             seconds=record["seconds"],
             settings={name: tuple(pair) for name, pair in record["settings"].items()},
             versions=record["versions"],

@@ -14,6 +14,7 @@ import numpy as np
 from adapters.engines import ENGINES
 from adapters.play import Run, play
 from scenarios.catalogue import scenario as from_catalogue
+from scenarios.file_tables import MOST_STEPS
 from scenarios.files import read_scene_file
 from scenarios.model import Scenario
 
@@ -52,17 +53,22 @@ class Cell:
 
     def key(self, scenario: Scenario) -> str:
         """16 hex digits of a hash over all that decides the numbers: scene, engine, dt, versions, our own source."""
-        digest = hashlib.sha256(repr((self.engine, self.substeps, versions(), source_hash())).encode())
-        digest.update(repr((scenario.name, scenario.duration, scenario.sample_interval)).encode())
-        scene = scenario.scene
-        arrays = [scene.position, scene.velocity, scene.radius, scene.mass, scene.angle, scene.angular_velocity]
-        arrays += [scene.inertia, scene.walls, scene.gravity, np.array(scene.restitution)]
-        arrays += [scene.wrap] if scene.wrap is not None else []
-        for array in arrays:
-            digest.update(repr(array.shape).encode() + array.tobytes())
-        for t in scenario.thrusts:
-            digest.update(repr((t.disk, t.start, t.stop, t.force.tolist(), t.torque, t.frame)).encode())
-        return digest.hexdigest()[:16]
+        deciding = (scene_hash(scenario), self.engine, self.substeps, versions(), source_hash())
+        return hashlib.sha256(repr(deciding).encode()).hexdigest()[:16]
+
+
+def scene_hash(scenario: Scenario) -> str:
+    """16 hex digits of a hash over what is played: the scene, its thrusts, duration and sampling."""
+    digest = hashlib.sha256(repr((scenario.name, scenario.duration, scenario.sample_interval)).encode())
+    scene = scenario.scene
+    arrays = [scene.position, scene.velocity, scene.radius, scene.mass, scene.angle, scene.angular_velocity]
+    arrays += [scene.inertia, scene.walls, scene.gravity, np.array(scene.restitution)]
+    arrays += [scene.wrap] if scene.wrap is not None else []
+    for array in arrays:
+        digest.update(repr(array.shape).encode() + array.tobytes())
+    for t in scenario.thrusts:
+        digest.update(repr((t.disk, t.start, t.stop, t.force.tolist(), t.torque, t.frame)).encode())
+    return digest.hexdigest()[:16]
 
 
 def open_scene(scene: str, seed: int) -> Scenario:
@@ -74,10 +80,14 @@ def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario
     """The scenario with the dt ladder asked for: `dts` in s instead of its own, two finer steps if `full`.
 
     Raises:
-        ValueError: naming the scenario and the dt that does not divide its sample interval.
+        ValueError: naming the scenario and the dt that does not divide its sample interval, or is too small.
     """
     ladder = tuple(scenario.substeps)
+    most = MOST_STEPS // scenario.samples
     for dt in dts:
+        if 0 < dt < scenario.sample_interval / most:
+            raise ValueError(f"--dt {dt:g} gives {scenario.name} more than {MOST_STEPS} steps: allowed is "
+                             f"{scenario.sample_interval / most:.4g} s or more")  # fmt: skip
         k = round(scenario.sample_interval / dt) if dt > 0 else 0
         if k < 1 or abs(k * dt / scenario.sample_interval - 1) > 1e-9:
             raise ValueError(

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from adapters.engines import ENGINES
 from reports.metrics import METRICS
-from reports.report import make_report
+from reports.report import Report, make_report
 from reports.suite import FolderTaken, Plan, carry_out, may_write, replace_folder
 from reports.terminal import Progress, print_summary
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
@@ -43,27 +43,37 @@ def run_plan(
         workers=workers or os.cpu_count() or 1,
         command=command,
     )
+    out = out.resolve()
     try:
         may_write(out)
         out.parent.mkdir(parents=True, exist_ok=True)
-    except (FolderTaken, OSError) as fault:
+    except FolderTaken as fault:
         refuse([str(fault)])
+    except OSError as fault:
+        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
     part = out.with_name(f"{out.name}.part-{os.getpid()}")
     try:
         with Progress() as progress:
             carry_out(plan, part, progress)
             report = make_report(part, progress.say)
+        replace_folder(part, out)
     except KeyboardInterrupt:
         say(f"\nInterrupted. What was played is kept: crosscheck report {part}")
         sys.exit(INTERRUPTED)
     except OSError as fault:
-        say(f"cannot write to {part}: {fault}; what was played before is kept there")
+        say(f"cannot write to {part}: {fault.strerror or fault}")
+        if (part / "journal.jsonl").exists():
+            say(f"What was played before is kept: crosscheck report {part}")
         sys.exit(FAILED)
-    replace_folder(part, out)
+    finish(report, out)
+
+
+def finish(report: Report, out: Path) -> NoReturn:
+    """Print the summary; exit 1 if there is an engine of which nothing can be compared."""
     print_summary(report, str((out / "report.html").resolve()))
-    played = report.runs[report.runs.status == "ok"]
-    names = set(played.engine + ":" + played.profile)
-    if lost := [name for name in plan.engines if name not in names]:
+    runs = [run for comparison in report.comparisons for run in comparison.runs]
+    played = {run.name for run in runs if run.status == "ok"}
+    if lost := sorted({run.name for run in runs} - played):
         say(f"no cell of {', '.join(lost)} was played to its end: see the status column of {out / 'runs.csv'}")
     sys.exit(FAILED if lost else DONE)
 
@@ -75,10 +85,11 @@ def report_again(out: Path) -> NoReturn:
     try:
         with Progress() as progress:
             report = make_report(out, progress.say)
-    except (ValueError, KeyError, StopIteration) as fault:
+    except OSError as fault:
+        refuse([f"{out}: {fault.filename or ''}: {fault.strerror or fault}"])
+    except (ValueError, KeyError) as fault:
         refuse([f"{out}: the journal cannot be used: {fault}"])
-    print_summary(report, str((out / "report.html").resolve()))
-    sys.exit(DONE)
+    finish(report, out)
 
 
 def explain(what: str) -> None:
@@ -130,12 +141,14 @@ def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed
 
 def checked_engines(asked: Sequence[str]) -> list[str]:
     """The rows of `ENGINES` that NAME or NAME:PROFILE stand for, in their order; all if nothing is asked."""
-    chosen = set()
+    chosen, faults = set(), []
     for name in asked:
         matching = {row for row in ENGINES if name in (row, row.split(":")[0])}
         if not matching:
-            refuse([unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)})])
+            faults.append(unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)}))
         chosen |= matching
+    if faults:
+        refuse(faults)
     return [row for row in ENGINES if row in chosen or not asked]
 
 

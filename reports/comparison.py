@@ -50,9 +50,8 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     truth = scenario.truth(scenario.times) if scenario.truth else None
     rows: list[dict] = []
     for run in runs:
-        if run.status != "ok":
+        if run.status != "ok":  # what it played before it failed is kept in its file, but earns no score
             rows.append(_row(run, "status", Value(np.nan, note=f"{run.status}: {run.reason}"), "", "itself"))
-        if run.trajectory is None:
             continue
         for versus, other in _opponents(run, runs, truth):
             rows += _measure(scenario, run, versus, other)
@@ -65,7 +64,7 @@ def _opponents(run: Run, runs: Sequence[Run], truth: Trajectory | None) -> Itera
     if truth is not None:
         yield "truth", truth
     for other in runs[runs.index(run) + 1 :]:
-        if other.dt == run.dt and other.name != run.name and other.trajectory is not None:
+        if other.dt == run.dt and other.name != run.name and other.status == "ok":
             yield other.name, other.trajectory
 
 

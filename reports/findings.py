@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 
+import numpy as np
 import pandas as pd
 
 from reports.comparison import Comparison
@@ -23,12 +24,15 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
 
 
 def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """Largest deviation from the truth in radii at the middle dt: a row a scenario, a column an `engine:profile`."""
+    """Largest deviation from the truth in radii at the middle dt: a row a scenario, a column an `engine:profile`.
+
+    `inf` for who was asked and has no result, so that to refuse a hard scene does not help.
+    """
     scored = [comparison for comparison in comparisons if comparison.truth is not None]
-    rows = [
-        {name: value for (name, metric), (value, _) in values(comparison).items() if metric == MAPPED}
-        for comparison in scored
-    ]
+    rows = []
+    for comparison in scored:
+        found = {name: value for (name, metric), (value, _) in values(comparison).items() if metric == MAPPED}
+        rows.append({run.name: found.get(run.name, np.inf) for run in comparison.middle_runs})
     return pd.DataFrame(rows, index=[comparison.scenario.name for comparison in scored])
 
 
@@ -37,6 +41,8 @@ def closest(off: pd.DataFrame) -> str:
     if off.empty:
         return "No scene here has an exact answer, so nobody is scored: only laws and differences are shown."
     medians = off.median().sort_values()
+    if np.isinf(medians.iloc[0]):
+        return "No player was played to its end in half of the scenes with an exact answer, so nobody is ranked."
     best, *others = (f"{name} ({value:.2g})" for name, value in medians.items())
     wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())  # within 1 % counts as equal
     ranking = f", then {', '.join(others[:2])}" + (f", last {others[-1]}" if len(others) > 2 else "") if others else ""
@@ -49,7 +55,7 @@ def closest(off: pd.DataFrame) -> str:
 def worth_of_settings(off: pd.DataFrame) -> str:
     """How much of an engine's deviation is its settings."""
     if off.empty:
-        return "What settings are worth is shown by the scenes that have one."
+        return "What settings are worth cannot be said without an exact answer."
     parts = []
     for engine in dict.fromkeys(name.split(":")[0] for name in off.columns):
         shipped, matched = f"{engine}:shipped", f"{engine}:matched"
@@ -73,6 +79,6 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
     return (
-        f"More than a whole radius off: {who} of {len(off)} scenes; the hardest is {defeated.idxmax()}, which is too much for "
+        f"More than a whole radius off: {who} of {len(off)} scenes; the hardest is {defeated.idxmax()}, too much for "
         f"{defeated.max()} of {lost.shape[1]}; {cells}"
     )

@@ -96,7 +96,7 @@ def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
 def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]) -> dict[str, list[Cell]]:
     """`engine:profile` -> a cell for each of `SUMMARY`: medians over the scenarios, sums where the unit says so.
 
-    Who is `untrusted` broke the protocol of the harness and is not scored.
+    Who is `untrusted` broke the protocol of the harness and is not scored; who failed somewhere is never the best.
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
@@ -110,9 +110,10 @@ def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: 
                 rows[name].append(Cell(f"{count} of {len(comparisons)}", failed=count > 0))
             continue
         pooled = {name: pool(metric, name, found) for name in names if name not in untrusted}
-        best = min((value for value, _ in pooled.values() if not np.isnan(value)), default=np.nan)
+        whole = [pooled[name][0] for name in pooled if not any(name in each for each in failed)]
+        best = min((value for value in whole if not np.isnan(value)), default=np.nan)
         for name, (value, count) in pooled.items():
-            rows[name].append(Cell(number(value), f"in {count} scenarios", best=value == best))
+            rows[name].append(Cell(number(value), f"in {count} scenarios", best=value == best and value in whole))
     return rows
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 from adapters.engines import ENGINES
 from adapters.play import Run
 from reports.archive import Archive
-from reports.cells import open_scene
+from reports.cells import open_scene, scene_hash
 from reports.comparison import Comparison, compare
 from reports.findings import findings
 from reports.known_answers import MEANING
@@ -53,8 +53,11 @@ def make_report(folder: Path, say: Callable[[str], None]) -> Report:
             say(f"comparing {by_scene[scene][0]['scenario']}")
             comparisons.append(compare_scene(archive, scene, by_scene[scene]))
     say("writing tables and page")
+    if not comparisons:
+        raise ValueError(f"{archive.journal}: no cell has ended yet, so there is nothing to report")
     deviations = pd.concat([comparison.table for comparison in comparisons], ignore_index=True)
-    runs = table_of_runs([record for comparison in by_scene.values() for record in comparison], header["scenes"])
+    statuses = {(r.scenario, r.name, r.dt): (r.status, r.reason) for one in comparisons for r in one.runs}
+    runs = table_of_runs([record for records in by_scene.values() for record in records], header["scenes"], statuses)
     deviations.to_csv(folder / "deviations.csv", index=False)
     runs.to_csv(folder / "runs.csv", index=False)
     asked = sorted(archive.parts("conformance"), key=lambda rows: place_in_table(rows[0]))
@@ -78,25 +81,40 @@ def compare_scene(archive: Archive, scene: str, records: list[dict[str, Any]]) -
     """One scenario's comparison, its runs in the order of engines, coarse dt first."""
     stored = archive.folder / "scenes" / f"{records[0]['scenario']}.toml"
     scenario = open_scene(scene if scene in SCENARIOS else str(stored), records[0]["seed"])
+    if {record["scene_hash"] for record in records} != {scene_hash(scenario)}:
+        raise ValueError(f"{scenario.name} is not the scene any more that was played; play it again")
     ladder = tuple(sorted({record["substeps"] for record in records}))
     ordered = sorted(records, key=lambda record: (place_in_table(record), record["substeps"]))
     runs: list[Run] = [archive.run(record) for record in ordered]
     return compare(replace(scenario, substeps=ladder), runs)
 
 
+def _name(row: dict[str, Any]) -> str:
+    return f"{row['engine']}:{row['profile']}"
+
+
 def place_in_table(row: dict[str, Any]) -> int:
     """Where the engine of a row stands in `ENGINES`."""
-    return list(ENGINES).index(f"{row['engine']}:{row['profile']}")
+    name = _name(row)
+    if name not in ENGINES:
+        raise ValueError(f"{name} was played, but is no engine of this version")
+    return list(ENGINES).index(name)
 
 
-def table_of_runs(records: list[dict[str, Any]], scenes: list[str]) -> pd.DataFrame:
-    """A row a cell: what was played, how it ended, how long the engine took, with which settings and versions."""
+def table_of_runs(
+    records: list[dict[str, Any]], scenes: list[str], statuses: dict[tuple[str, str, float], tuple[str, str]]
+) -> pd.DataFrame:
+    """A row a cell: what was played, how it ended, how long the engine took, with which settings and versions.
+
+    `statuses`: (scenario, `engine:profile`, dt) -> (status, reason) as found now, e.g. of a file that is gone.
+    """
     columns = ["scenario", "engine", "profile", "dt_s", "seed", "status", "reason", "seconds", "cell"]
     ordered = sorted(
         records, key=lambda record: (scenes.index(record["scene"]), place_in_table(record), record["substeps"])
     )
     rows = [
         {name: record[name] for name in columns}
+        | dict(zip(("status", "reason"), statuses[record["scenario"], _name(record), record["dt_s"]]))
         | {
             "settings": "; ".join(f"{name}={resolved}" for name, (_, resolved) in record["settings"].items()),
             "versions": "; ".join(f"{name} {version}" for name, version in record["versions"].items()),

@@ -15,7 +15,7 @@ class Look(NamedTuple):
     Attributes:
         light, dark: hex colour on a light and on a dark page.
         dash: lengths of stroke and gap in px, () for a solid line.
-        shape: circle, triangle-up, square, diamond, cross or star.
+        shape: a key of `PATHS`.
         filled: whether the shape is.
     """
 
@@ -58,9 +58,16 @@ PATHS = {
     "square": "M-3.7,-3.7H3.7V3.7H-3.7Z",
     "diamond": "M0,-5L5,0L0,5L-5,0Z",
     "cross": "M-1.5,-4.4H1.5V-1.5H4.4V1.5H1.5V4.4H-1.5V1.5H-4.4V-1.5H-1.5Z",
+    "triangle-down": "M0,4.6L4.3,-3H-4.3Z",
+    "hexagon": "M-2.3,-4H2.3L4.6,0L2.3,4H-2.3L-4.6,0Z",
+    "pentagon": "M0,-4.6L4.4,-1.4L2.7,3.7H-2.7L-4.4,-1.4Z",
+    "bowtie": "M-4.2,-3.2V3.2L0,0L4.2,3.2V-3.2L0,0Z",
     "star": "M0,-5L1.3,-1.7L4.8,-1.5L2.1,0.7L2.9,4L0,2.2L-2.9,4L-2.1,0.7L-4.8,-1.5L-1.3,-1.7Z",
 }
-OTHERS = (("#6b5f00", "#d9c84a", "cross"), ("#5b6b7a", "#9fb0c0", "star"))
+OTHERS = (
+    ("#6b5f00", "#d9c84a", "cross"), ("#5b6b7a", "#9fb0c0", "star"), ("#a3123a", "#ff7a93", "triangle-down"),
+    ("#5a3d9e", "#b7a1ff", "hexagon"), ("#3d6b1f", "#a4d67a", "pentagon"), ("#7a4a21", "#e0a878", "bowtie"),
+)  # fmt: skip
 DASHED = {"shipped": (6, 3), "lesson": (2, 3)}
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep to pale on dark.

@@ -70,7 +70,7 @@ def carry_out(plan: Plan, folder: Path, progress: Progress) -> None:
         if isinstance(task, Cell):
             scenario = scenarios[task.scene]
             run = failed_run(task, scenario, result) if isinstance(result, Failure) else result
-            archive.add(task, task.key(scenario), run)
+            archive.add(task, scenario, run)
             progress.done(f"{run.scenario}  {run.name}  dt {run.dt:.4g} s", run.status)
         elif isinstance(task, KnownAnswer):
             ours = float("nan") if isinstance(result, Failure) else result
@@ -117,6 +117,8 @@ def replace_folder(made: Path, target: Path) -> None:
 
 def may_write(target: Path) -> None:
     """Raise `FolderTaken` unless `target` is absent, empty, or holds an earlier run and nothing else."""
+    if target == Path.cwd() or target in Path.cwd().parents:
+        raise FolderTaken(f"--out {target}: is where you are; name another folder, or go elsewhere")
     if target.is_file():
         raise FolderTaken(f"--out {target}: is a file; name a folder that does not exist yet")
     strange = sorted(path.name for path in target.iterdir() if path.name not in FILES) if target.exists() else []

@@ -115,7 +115,7 @@ class ThrustTable(_Table):
 class SceneTable(_Table):
     """The whole file."""
 
-    name: str = Field(pattern=r"\A[a-z0-9][a-z0-9_-]*\z", description="made of a-z, 0-9, '_' and '-'")
+    name: str = Field(pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z", description="at most 100 of a-z, 0-9, '_' and '-'")
     asks: str | None = Field(None, description="a question, a string")
     duration: Finite = Field(gt=0, description="positive and finite (s)")
     sample_interval: Finite = Field(gt=0, description="positive and finite (s)")

@@ -1,8 +1,13 @@
 """The command line as people and scripts use it: files, words, exit status."""
 
 import json
+import os
+import shutil
+import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -166,3 +171,64 @@ def test_an_earlier_run_is_replaced_as_a_whole(small_run: Path):
     assert again.returncode == 0
     assert set(pd.read_csv(small_run / "runs.csv").scenario) == {"near_miss"}
     assert [path.name for path in small_run.parent.iterdir()] == ["here"]
+
+
+def test_a_trajectory_that_is_gone_is_a_failure_of_its_cell(small_run: Path, tmp_path: Path):
+    """Deleted or torn files are errors with a reason in runs.csv; where nothing is left, exit 1."""
+    copy = tmp_path / "copy"
+    shutil.copytree(small_run, copy)
+    one, *others = sorted((copy / "trajectories").iterdir())
+    one.write_bytes(one.read_bytes()[:100])
+    some = crosscheck("report", "copy", cwd=tmp_path)
+    runs = pd.read_csv(copy / "runs.csv")
+    for path in others:
+        path.unlink()
+
+    assert some.returncode in (0, 1)  # 1 if it was the only cell of its engine
+    assert runs[runs.status == "error"].reason.str.contains("cannot be read").tolist() == [True]
+    assert crosscheck("report", "copy", cwd=tmp_path).returncode == 1
+    assert set(pd.read_csv(copy / "runs.csv").status) == {"error"}
+
+
+def test_a_scene_that_was_changed_after_it_was_played_is_not_reported(tmp_path: Path):
+    """Trajectories are judged by the scene they were played from, or not at all."""
+    crosscheck("run", SCENES / "two.toml", "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path)
+    [stored] = (tmp_path / "out" / "scenes").iterdir()
+    stored.write_text(stored.read_text().replace("mass = 2.0", "mass = 3.0"))
+    done = crosscheck("report", "out", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "two-disks is not the scene any more that was played" in done.stderr
+
+
+def test_the_folder_one_is_in_is_not_replaced(tmp_path: Path):
+    """Not the folder itself, and none above it."""
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    done = [crosscheck(*SMALL, "--out", out, cwd=tmp_path / "a" / "b") for out in (".", "..")]
+
+    assert [one.returncode for one in done] == [2, 2]
+    assert all("is where you are" in one.stderr for one in done)
+
+
+def test_an_interrupt_keeps_what_was_played_and_says_how_to_go_on(tmp_path: Path):
+    """Ctrl-C: exit 130, no worker left behind, and the journal makes a report."""
+    words = [CROSSCHECK, "run", "galperin_314", "slow_hit", "--engine", "pymunk", "--out", "out", "--workers", "1"]
+    run = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    wait_for(lambda: any('"cell"' in path.read_text() for path in tmp_path.glob("out.part-*/journal.jsonl")))
+    os.killpg(run.pid, signal.SIGINT)
+    _, said = run.communicate(timeout=60)
+    command = said.splitlines()[-1].split("crosscheck ")[-1].split()
+
+    assert run.returncode == 130
+    assert crosscheck(*command, cwd=tmp_path).returncode == 0
+    with pytest.raises(ProcessLookupError):
+        os.killpg(run.pid, 0)
+
+
+def wait_for(done: Callable[[], bool]) -> None:
+    """Until it is done, for a minute at most."""
+    for _ in range(600):
+        if done():
+            return
+        time.sleep(0.1)
+    pytest.fail("nothing was played within a minute")

@@ -10,6 +10,7 @@ from adapters.engines import ENGINES
 from adapters.play import Run, play
 from reports.collisions import closest_in_order, match
 from reports.comparison import COLUMNS, compare, cut
+from reports.findings import findings
 from reports.metrics import METRICS
 from reports.view import View
 from scenarios.catalogue import SCENARIOS, scenario
@@ -222,14 +223,35 @@ def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
                 assert found is None or isinstance(found.value, float | int)
 
 
-def test_a_run_that_diverged_is_compared_up_to_there():
-    """A player that gives NaN at step 7 has its samples before it in the table, and a row that says so."""
+def test_a_run_that_diverged_earns_a_status_and_no_score():
+    """A player that gives NaN at step 7 was right before it, for a scene that nobody else played so short."""
     one = scenario("slow_hit")
     run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
-    table = compare(one, [run]).table
+    good = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", one, one.dt(1))
+    table = compare(one, [run, good]).table
 
-    assert table[table.metric == "status"].note.str.contains("not finite").all()
-    assert np.isfinite(table[table.metric == "position_max"].value).all()
+    assert run.trajectory is not None
+    assert table[table.engine == "reference"].metric.tolist() == ["status"]
+    assert table.note.str.contains("of disk 0 is not finite").any()
+    assert "reference:exercise" not in set(table.versus)
+
+
+def test_to_refuse_a_scene_does_not_help_in_the_ranking():
+    """Who has no result in a scene is last in it, and who has none in half of them is not ranked first."""
+    one, two = scenario("slow_hit"), scenario("near_miss")
+    runs = {
+        name: [play(ENGINES[name].make(), name, each, each.dt(4)) for each in (one, two)]
+        for name in ("reference:exercise", "box2d:shipped")
+    }
+    refused = Run("pymunk", "matched", one.name, one.dt(4), "unsupported", "too hard")
+    perfect = replace(runs["reference:exercise"][1], engine="pymunk", profile="matched")
+    tables = [
+        compare(replace(one, substeps=(4,)), [refused, *(each[0] for each in runs.values())]),
+        compare(replace(two, substeps=(4,)), [perfect, *(each[1] for each in runs.values())]),
+    ]
+
+    assert "2 scenes: reference:exercise" in findings(tables, set())[0]
+    assert "pymunk:matched in 1" in findings(tables, set())[2]
 
 
 def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():

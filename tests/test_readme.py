@@ -74,5 +74,5 @@ def test_every_file_the_readme_names_exists():
     named = set(re.findall(r"`((?:reference_impl|scenarios|adapters|reports|tests|\.ci)/[\w./]*)`", TEXT))
 
     assert named
-    for path in named - {"reports/out/latest/"}:
-        assert (ROOT / path).exists(), path
+    for path in named:
+        assert (ROOT / path).exists() or path.startswith("reports/out/"), path  # the latter is there after a run
