@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import ENGINES
+from reports.cells import open_scene, with_steps
 from reports.metrics import METRICS
 from reports.report import Report, make_report
 from reports.suite import FolderTaken, Plan, carry_out, may_write, replace_folder
@@ -58,14 +59,19 @@ def run_plan(
             report = make_report(part, progress.say)
         replace_folder(part, out)
     except KeyboardInterrupt:
-        say(f"\nInterrupted. What was played is kept: crosscheck report {part}")
+        say(f"\nInterrupted. {what_is_kept(part)}")
         sys.exit(INTERRUPTED)
     except OSError as fault:
-        say(f"cannot write to {part}: {fault.strerror or fault}")
-        if (part / "journal.jsonl").exists():
-            say(f"What was played before is kept: crosscheck report {part}")
+        say(f"cannot write to {part}: {fault.strerror or fault}. {what_is_kept(part)}")
         sys.exit(FAILED)
     finish(report, out)
+
+
+def what_is_kept(part: Path) -> str:
+    """A sentence on what a run that was broken off has left."""
+    if not (part / "journal.jsonl").exists():
+        return "Nothing was played yet."
+    return f"What was played is kept: crosscheck report {part}"
 
 
 def finish(report: Report, out: Path) -> NoReturn:
@@ -125,7 +131,7 @@ def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed
             faults.append(unknown("scenario", scene, SCENARIOS) + " (a scene file ends in .toml)")
             continue
         try:
-            name = Plan([scene], [], seed, dts, full, 1, "").scenario(scene).name
+            name = with_steps(open_scene(scene, seed), dts, full).name
         except SceneFileError as error:
             faults += error.faults
         except ValueError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -51,36 +51,46 @@ class Plan:
 
 
 def carry_out(plan: Plan, folder: Path, progress: Progress) -> None:
-    """Ask, then play, every engine and cell of the plan; all goes into `folder`, which must not exist or be empty."""
+    """Put the probes to every engine and play every cell; all goes into `folder`, which must not exist or be empty."""
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
     archive = Archive(folder)
     archive.begin(about(plan.command, plan.seed) | {"scenes": list(plan.scenes)})
     for scene in plan.scenes:
         if scene.endswith(".toml"):
             write_scene_file(scenarios[scene], folder / "scenes" / f"{scenarios[scene].name}.toml")
-
-    tasks: dict[Any, Callable[[], Any]] = {engine: partial(conform, engine, ENGINES[engine]) for engine in plan.engines}
-    if KNOWN_SCENE in plan.scenes:
-        tasks |= {answer: partial(answer.reproduce) for answer in KNOWN_ANSWERS}
-    for scene, scenario in scenarios.items():
-        for cell in cells_of(scene, scenario, plan):
-            tasks[cell] = partial(play_and_save, cell, folder / "trajectories" / f"{cell.key(scenario)}.npz")
+    tasks = tasks_of(plan, scenarios, folder)
     progress.start(len(tasks))
     for task, result in run_all(tasks, plan.workers):
-        if isinstance(task, Cell):
-            scenario = scenarios[task.scene]
-            run = failed_run(task, scenario, result) if isinstance(result, Failure) else result
-            archive.add(task, scenario, run)
-            progress.done(f"{run.scenario}  {run.name}  dt {run.dt:.4g} s", run.status)
-        elif isinstance(task, KnownAnswer):
-            ours = float("nan") if isinstance(result, Failure) else result
-            archive.append({"known_answer": asdict(task) | {"ours_J2": ours}})
-            progress.done(f"known answer: {task.column} at dt {task.dt_s:g} s")
-        else:
-            findings = [no_answer(task, *result)] if isinstance(result, Failure) else result
-            archive.append({"conformance": [asdict(finding) for finding in findings]})
-            progress.done(f"conformance of {task}")
+        progress.done(*keep(archive, scenarios, task, result))
     archive.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
+
+
+def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario], folder: Path) -> dict[Any, Callable[[], Any]]:
+    """What is to be done, by what it is: an engine's name (its probes), a `KnownAnswer`, or a `Cell`."""
+    tasks: dict[Any, Callable[[], Any]] = {engine: partial(conform, engine, ENGINES[engine]) for engine in plan.engines}
+    if KNOWN_SCENE in plan.scenes:
+        tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
+    for scene, scenario in scenarios.items():
+        for engine in plan.engines:
+            for cell in (Cell(scene, plan.seed, engine, k) for k in scenario.substeps):
+                tasks[cell] = partial(play_and_save, cell, folder / "trajectories" / f"{cell.key(scenario)}.npz")
+    return tasks
+
+
+def keep(archive: Archive, scenarios: Mapping[str, Scenario], task: Any, result: Any) -> tuple[str, str]:
+    """Write what a task gave into the journal; returns what to say of it, and its status."""
+    failure = result if isinstance(result, Failure) else None
+    if isinstance(task, Cell):
+        scenario = scenarios[task.scene]
+        run = failed_run(task, scenario, failure) if failure else result
+        archive.add(task, scenario, run)
+        return f"{run.scenario}  {run.name}  dt {run.dt:.4g} s", run.status
+    if isinstance(task, KnownAnswer):
+        archive.append({"known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}})
+        return f"known answer: {task.column} at dt {task.dt_s:g} s", failure.status if failure else "ok"
+    findings = [no_answer(task, *failure)] if failure else result
+    archive.append({"conformance": [asdict(finding) for finding in findings]})
+    return f"conformance of {task}", failure.status if failure else "ok"
 
 
 def play_and_save(cell: Cell, path: Path) -> Run:
@@ -95,11 +105,6 @@ def failed_run(cell: Cell, scenario: Scenario, failure: Failure) -> Run:
     """The run of a cell whose worker died or was stopped."""
     engine, profile = cell.engine.split(":")
     return Run(engine, profile, scenario.name, scenario.dt(cell.substeps), failure.status, failure.reason)
-
-
-def cells_of(scene: str, scenario: Scenario, plan: Plan) -> list[Cell]:
-    """The cells of one scenario, in the order of engines, coarse dt first."""
-    return [Cell(scene, plan.seed, engine, k) for engine in plan.engines for k in scenario.substeps]
 
 
 class FolderTaken(Exception):
