@@ -103,7 +103,7 @@ def root(f: Quartic, low: float, high: float) -> float:
         following = t - here / slope if slope != 0.0 else low
         if following != t and not low < following < high:
             following = (low + high) / 2
-        if following == t or following == low or following == high:
+        if following in (t, low, high):
             break
         t = following
     return t

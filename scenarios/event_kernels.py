@@ -9,7 +9,7 @@ Compiled by numba; with NUMBA_DISABLE_JIT=1 the same source runs as plain Python
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from scenarios.contact_times import curved_time, disk_time, line_time
-from scenarios.event_queue import put
 from scenarios.model import Array
 
 Ints = NDArray[np.int64]
@@ -118,15 +117,6 @@ def settle(d: Disks, g: Grid, i: int) -> None:
         d.row[i, OX + axis] += laps * g.span[axis]
         d.tag[i, CX + axis] = k - laps * g.shape[axis]
     link(d, g, i)
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def image(d: Disks, g: Grid, i: int, j: int, axis: int) -> float:
-    """What to add to the position of `j` for its image next to `i`, m: by the cells they are in, not by nearness."""
-    apart = d.tag[j, CX + axis] - d.tag[i, CX + axis]
-    if not g.torus or -1 <= apart <= 1:
-        return 0.0
-    return -g.span[axis] if apart > 1 else g.span[axis]
 
 
 @njit(cache=True, error_model="numpy", _nrt=False, inline="always")
@@ -253,50 +243,3 @@ def find_pair(d: Disks, g: Grid, rules: Rules, i: int, x0: int, x1: int, y0: int
                 j = d.next[j]
     if who >= 0:
         d.row[i, PAIR_TIME], d.tag[i, PARTNER], d.tag[i, PARTNER_COUNT] = now + best, who, d.tag[who, COUNT]
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def collide(d: Disks, g: Grid, i: int, j: int, restitution: float) -> float:
-    """Hit of two disks that are in contact; the impulse N s, 0 if they do not close in.
-
-    v_i -= q w_i dr, v_j += q w_j dr, q = -(1 + e) b / (dr.dr (w_i + w_j)): a normal that is made a unit vector by a
-    square root would let the energy drift by 1.5e-17 a hit.
-    """
-    a, b = d.row[i], d.row[j]
-    dx, dy = b[X] - a[X] + image(d, g, i, j, 0), b[Y] - a[Y] + image(d, g, i, j, 1)
-    closing = dx * (b[VX] - a[VX]) + dy * (b[VY] - a[VY])
-    d.tag[i, LAST], d.tag[j, LAST] = j, i
-    a[NOISE] = b[NOISE] = ROUNDING * (abs(a[VX]) + abs(a[VY]) + abs(b[VX]) + abs(b[VY]))
-    if closing >= 0.0:
-        return 0.0
-    distance2 = dx * dx + dy * dy
-    q = -(1.0 + restitution) * closing / (distance2 * (a[WEIGHT] + b[WEIGHT]))
-    a[VX] -= q * a[WEIGHT] * dx
-    a[VY] -= q * a[WEIGHT] * dy
-    b[VX] += q * b[WEIGHT] * dx
-    b[VY] += q * b[WEIGHT] * dy
-    return q * sqrt(distance2)
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def collide_wall(d: Disks, rules: Rules, i: int, w: int, part: int) -> float:
-    """Hit of disk `i` on a wall it touches, set exactly beside the face; the impulse N s, 0 if it does not close in."""
-    row, ux, uy = d.row[i], rules.walls[w, 2], rules.walls[w, 3]
-    dx, dy = row[X] - rules.walls[w, 0], row[Y] - rules.walls[w, 1]
-    d.tag[i, LAST], row[NOISE] = -1 - w, ROUNDING * (abs(row[VX]) + abs(row[VY]))
-    if part == 0:
-        height = dy * ux - dx * uy
-        away = row[RADIUS] * (1.0 if height > 0.0 else -1.0) - height
-        row[X] -= away * uy
-        row[Y] += away * ux
-        dx, dy = (-uy, ux) if height > 0.0 else (uy, -ux)
-    elif part == 2:
-        dx, dy = dx - rules.walls[w, 4] * ux, dy - rules.walls[w, 4] * uy
-    closing = dx * row[VX] + dy * row[VY]
-    if closing >= 0.0:
-        return 0.0
-    distance2 = dx * dx + dy * dy
-    q = -(1.0 + rules.restitution) * closing / distance2
-    row[VX] += q * dx
-    row[VY] += q * dy
-    return q * sqrt(distance2) / row[WEIGHT]

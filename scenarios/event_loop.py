@@ -7,6 +7,7 @@ from math import inf
 import numpy as np
 from numba import njit
 
+from scenarios.event_impacts import collide, collide_wall
 from scenarios.event_kernels import (
     ACCUMULATION,
     AX,
@@ -44,8 +45,6 @@ from scenarios.event_kernels import (
     T,
     X,
     Y,
-    collide,
-    collide_wall,
     find_own,
     find_pair,
     fly,

@@ -178,14 +178,16 @@ def rules_of(scene: Scene) -> Rules:
     wrap = np.zeros((2, 2)) if scene.wrap is None else np.array(scene.wrap)
     return Rules(
         restitution=float(scene.restitution), falling=falling, mixed=falling and bool(scene.static.any()),
-        wrapped=scene.wrap is not None, wrap=wrap, walls=np.column_stack([scene.walls[:, 0], along / length[:, None], length]),
+        wrapped=scene.wrap is not None, wrap=wrap,
+        walls=np.column_stack([scene.walls[:, 0], along / length[:, None], length]),
     )  # fmt: skip
 
 
 def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array]:
     """The cell grid and its low corner: over the torus, or over all that is there and a cell around it."""
     least = max(2 * scene.radius.max() * WIDER, cell)
-    points = np.concatenate([scene.position, scene.walls.reshape(-1, 2), *([] if scene.wrap is None else scene.wrap[None])])
+    corners = np.empty((0, 2)) if scene.wrap is None else scene.wrap
+    points = np.concatenate([scene.position, scene.walls.reshape(-1, 2), corners])
     low, high = (points.min(axis=0), points.max(axis=0)) if torus is None else torus
     extent = high - low
     # About four cells a disk are enough for the sparsest scene.
@@ -198,8 +200,8 @@ def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array
     first, walls = walls_by_cell(scene, low, side, shape)
     head = np.full(shape.prod(), -1, np.int64)
     span = side * shape if torus is None else extent
-    two = lambda a: (a[0].item(), a[1].item())
-    return Grid(two(side), two(shape), two(span), torus is not None, head, first, walls), low
+    two = [(a[0].item(), a[1].item()) for a in (side, shape, span)]
+    return Grid(*two, torus is not None, head, first, walls), low
 
 
 def walls_by_cell(scene: Scene, low: Array, side: Array, shape: NDArray[np.int64]) -> tuple[NDArray, NDArray]:

@@ -45,6 +45,9 @@ def test_the_departures_of_an_engine_are_exactly_those_in_the_table(name):
 def test_a_departure_is_as_large_as_its_cause_makes_it(departure):
     """The cause gives a number, and the bound is rounding alone."""
     finding = findings_of(departure.engine)[departure.probe]
+    if departure.value == "refused":
+        assert (finding.got, finding.note[-15:]) == ("refused", "they accumulate")
+        return
     assert abs(finding.got - departure.value) <= departure.bound
     assert abs(departure.value - finding.expected) > finding.bound + departure.bound
 
