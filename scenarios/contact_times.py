@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from numba import njit
+from scenarios.compiled import kernel
 
 Quartic = tuple[float, float, float, float, float]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def line_time(gap: float, speed: float, pull: float) -> float:
     """First t >= 0 at which gap + speed t + pull t2 / 2 goes down through 0, without a difference of near equals.
 
@@ -30,7 +30,7 @@ def line_time(gap: float, speed: float, pull: float) -> float:
     return 2.0 * gap / (sqrt(disc) - speed) if speed < 0.0 and gap > 0.0 and disc > 0.0 else inf
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def disk_time(gap: float, closing: float, speed2: float) -> float:
     """Contact of two disks with equal accelerations: gap = dr.dr - R2, closing = dr.dv, speed2 = dv.dv.
 
@@ -42,7 +42,7 @@ def disk_time(gap: float, closing: float, speed2: float) -> float:
     return gap / (sqrt(disc) - closing) if gap > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def curved_time(
     dx: float, dy: float, ux: float, uy: float, ax: float, ay: float, gap: float, closing: float, until: float
 ) -> float:
@@ -66,7 +66,7 @@ def curved_time(
     return inf
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def turning_points(f: Quartic, end: float) -> Quartic:
     """Where f turns between 0 and `end`, and both: its third derivative's root parts the range for the second's.
 
@@ -80,13 +80,13 @@ def turning_points(f: Quartic, end: float) -> Quartic:
     return 0.0, root(first, 0.0, a), root(first, a, b), root(first, b, end), end
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def value(f: Quartic, t: float) -> float:
     """f[0] + f[1] t + ... + f[4] t4 (Horner)."""
     return (((f[4] * t + f[3]) * t + f[2]) * t + f[1]) * t + f[0]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def root(f: Quartic, low: float, high: float) -> float:
     """The root of what is monotone from low to high, or high: Newton, halving where that would leave the bracket."""
     rising = value(f, high) > 0.0

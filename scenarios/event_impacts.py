@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from numba import njit
-
+from scenarios.compiled import kernel
 from scenarios.event_kernels import (
     CX,
     LAST,
@@ -23,7 +22,7 @@ from scenarios.event_kernels import (
 )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def image(d: Disks, g: Grid, i: int, j: int, axis: int) -> float:
     """What to add to the position of `j` for its image next to `i`, m: by the cells they are in, not by nearness."""
     apart = d.tag[j, CX + axis] - d.tag[i, CX + axis]
@@ -32,7 +31,7 @@ def image(d: Disks, g: Grid, i: int, j: int, axis: int) -> float:
     return -g.span[axis] if apart > 1 else g.span[axis]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def collide(d: Disks, g: Grid, i: int, j: int, restitution: float) -> float:
     """Hit of two disks that are in contact; the impulse N s, 0 if they do not close in.
 
@@ -55,7 +54,7 @@ def collide(d: Disks, g: Grid, i: int, j: int, restitution: float) -> float:
     return q * sqrt(distance2)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def collide_wall(d: Disks, rules: Rules, i: int, w: int, part: int) -> float:
     """Hit of disk `i` on a wall it touches, set exactly beside the face; the impulse N s, 0 if it does not close in."""
     row, ux, uy = d.row[i], rules.walls[w, 2], rules.walls[w, 3]

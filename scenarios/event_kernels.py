@@ -13,9 +13,9 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scenarios.compiled import inlined, kernel
 from scenarios.contact_times import curved_time, disk_time, line_time
 from scenarios.model import Array
 
@@ -68,7 +68,7 @@ class Rules(NamedTuple):
     walls: Array  # (w, 5) start m, direction, length m
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def fly(d: Disks, i: int, now: float, falling: bool) -> None:
     """Bring disk `i` to `now` on its parabola."""
     row = d.row[i]
@@ -84,7 +84,7 @@ def fly(d: Disks, i: int, now: float, falling: bool) -> None:
     row[T] = now
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def link(d: Disks, g: Grid, i: int) -> None:
     """Put disk `i` at the head of its cell's chain."""
     c = d.tag[i, CX] * g.shape[1] + d.tag[i, CY]
@@ -95,7 +95,7 @@ def link(d: Disks, g: Grid, i: int) -> None:
     g.head[c] = i
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def unlink(d: Disks, g: Grid, i: int) -> None:
     """Take disk `i` out of its cell's chain."""
     if d.tag[i, BEFORE] >= 0:
@@ -106,7 +106,7 @@ def unlink(d: Disks, g: Grid, i: int) -> None:
         d.tag[d.next[i], BEFORE] = d.tag[i, BEFORE]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def settle(d: Disks, g: Grid, i: int) -> None:
     """Find the cell and the lap of disk `i` from its position, and link it there."""
     for axis in range(2):
@@ -119,7 +119,7 @@ def settle(d: Disks, g: Grid, i: int) -> None:
     link(d, g, i)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+@inlined
 def find_own(d: Disks, g: Grid, rules: Rules, i: int) -> None:
     """The next thing disk `i` meets by itself: an edge of its cell, of the wrap box, or a wall near its cell."""
     row, best, code = d.row[i], inf, EDGE
@@ -145,7 +145,7 @@ def find_own(d: Disks, g: Grid, rules: Rules, i: int) -> None:
     d.row[i, OWN_TIME], d.tag[i, OWN_CODE] = row[T] + best, code
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def wall_time(d: Disks, rules: Rules, i: int, w: int, part: int, until: float) -> float:
     """When disk `i` meets a wall: part 0 is either face, 1 its start, 2 its end."""
     row, ux, uy = d.row[i], rules.walls[w, 2], rules.walls[w, 3]
@@ -173,7 +173,7 @@ def wall_time(d: Disks, rules: Rules, i: int, w: int, part: int, until: float) -
     return first
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def meeting(
     dx: float, dy: float, ux: float, uy: float, ax: float, ay: float, reach: float, noise: float, until: float
 ) -> float:
@@ -192,7 +192,7 @@ def meeting(
     return curved_time(dx, dy, ux, uy, ax, ay, gap, closing, until)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+@inlined
 def find_pair(d: Disks, g: Grid, rules: Rules, i: int, x0: int, x1: int, y0: int, y1: int) -> None:
     """Look for an earlier contact of disk `i`, which is at its own time, in cells x0 .. x1, y0 .. y1 around its own."""
     row = d.row[i]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from math import inf
+from typing import Any
 
 import numpy as np
-from numba import njit
 
+from scenarios.compiled import inlined, kernel
 from scenarios.event_impacts import collide, collide_wall
 from scenarios.event_kernels import (
     ACCUMULATION,
@@ -59,7 +60,7 @@ BASE, END = 0, 1  # clock: s at which the present epoch began, s at which the an
 LOGGED, WHO, WHOM = 0, 1, 2  # told: rows in the log; the disks of the end
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def advance(d: Disks, g: Grid, rules: Rules, clock: Array, until: float, log: Array, told: Ints) -> int:
     """Let everything up to `until` s happen; log (h, 4) gets t, i, j or -1 - wall, impulse of every hit.
 
@@ -67,7 +68,7 @@ def advance(d: Disks, g: Grid, rules: Rules, clock: Array, until: float, log: Ar
     told[WHO] and told[WHOM] when and for whom the answer ends.
     """
     while True:
-        i = np.int64(d.tree[1])
+        i: Any = np.int64(d.tree[1])
         now = d.key[i]
         if clock[BASE] + now > until:
             return DONE
@@ -113,7 +114,7 @@ def advance(d: Disks, g: Grid, rules: Rules, clock: Array, until: float, log: Ar
                 renew(d, g, rules, k, fresh, x0, x1, y0, y1)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+@inlined
 def renew(d: Disks, g: Grid, rules: Rules, i: int, fresh: bool, x0: int, x1: int, y0: int, y1: int) -> None:
     """A new record of disk `i`, which is at the present; fresh: without the contact in the old one."""
     if fresh:
@@ -123,14 +124,14 @@ def renew(d: Disks, g: Grid, rules: Rules, i: int, fresh: bool, x0: int, x1: int
     put(d.key, d.tree, i, min(d.row[i, PAIR_TIME], d.row[i, OWN_TIME]))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def change(d: Disks, i: int) -> None:
     """Make void what others know of disk `i`, and forget what it hit last."""
     d.tag[i, COUNT] += 1
     d.tag[i, LAST] = NOBODY
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def note(d: Disks, clock: Array, log: Array, told: Ints, i: int, j: int, impulse: float) -> bool:
     """Count and log a hit; True if hits of disk `i` follow each other faster than float64 tells times apart."""
     now = d.row[i, T]
@@ -151,7 +152,7 @@ def note(d: Disks, clock: Array, log: Array, told: Ints, i: int, j: int, impulse
     return True
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def cross(d: Disks, g: Grid, i: int, axis: int, high: int) -> None:
     """Move disk `i` to the next cell; over the end of the grid, shift the disk (torus) or the grid under it."""
     unlink(d, g, i)
@@ -165,7 +166,7 @@ def cross(d: Disks, g: Grid, i: int, axis: int, high: int) -> None:
     link(d, g, i)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def covered(d: Disks, i: int) -> int:
     """A disk that overlaps disk `i`, -1 if there is none."""
     now = d.row[i, T]
@@ -179,7 +180,7 @@ def covered(d: Disks, i: int) -> int:
     return -1
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def begin_epoch(d: Disks, clock: Array) -> None:
     """Count all times from EPOCH s later."""
     clock[BASE] += EPOCH
@@ -191,26 +192,33 @@ def begin_epoch(d: Disks, clock: Array) -> None:
         d.key[i] -= EPOCH
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
-def begin(d: Disks, g: Grid, rules: Rules) -> None:
-    """Link all disks to their cells and make their first records."""
+@kernel
+def begin(d: Disks, g: Grid) -> None:
+    """Link all disks to their cells; their first records are made as the first events."""
     for i in range(len(d.row)):
         settle(d, g, i)
-    for i in range(len(d.row)):
-        if d.row[i, WEIGHT] > 0.0:
-            renew(d, g, rules, i, True, -1, 1, -1, 1)
+        ask_again(d, i, 0.0)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
-def pull(d: Disks, g: Grid, rules: Rules, clock: Array, i: int, at: float, ax: float, ay: float) -> None:
+@kernel
+def ask_again(d: Disks, i: int, now: float) -> None:
+    """Give disk `i` a void contact at `now`: when its time comes, a new record is made."""
+    if d.row[i, WEIGHT] > 0.0:
+        d.tag[i, PARTNER], d.tag[i, PARTNER_COUNT] = i, -1
+        d.row[i, PAIR_TIME] = now
+        put(d.key, d.tree, i, now)
+
+
+@kernel
+def pull(d: Disks, clock: Array, i: int, at: float, ax: float, ay: float) -> None:
     """From `at` s on, which must not lie before the last event, let disk `i` accelerate by (ax, ay)."""
     fly(d, i, at - clock[BASE], True)
     d.row[i, AX], d.row[i, AY] = ax, ay
     change(d, i)
-    renew(d, g, rules, i, True, -1, 1, -1, 1)
+    ask_again(d, i, at - clock[BASE])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def look(d: Disks, clock: Array, at: float, out: Array) -> None:
     """Position and velocity of all disks at `at` s, not before the last event, into out (n, 4); changes nothing."""
     for i in range(len(d.row)):
@@ -221,7 +229,7 @@ def look(d: Disks, clock: Array, at: float, out: Array) -> None:
             out[i, 2 + axis] = v + a * t
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def near_pairs(d: Disks, g: Grid, slack: float, found: Ints) -> int:
     """Pairs of disks that overlap, or nearly: rows (i, j) of found, as many as fit; their number."""
     count = 0

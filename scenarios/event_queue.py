@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scenarios.compiled import kernel
 from scenarios.model import Array
 
 
@@ -22,7 +22,7 @@ def empty_queue(n: int) -> tuple[Array, NDArray[np.int32]]:
     return np.full(p, np.inf), tree
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def put(key: Array, tree: NDArray[np.int32], i: int, new: float) -> None:
     """Give `i` a new key; above a match that `i` neither won nor wins, nothing changes."""
     key[i] = new

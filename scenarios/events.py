@@ -7,6 +7,7 @@ continuation it says so (`NoTruth`) rather than go on.
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,7 +65,7 @@ class EventEngine:
         self.clock, self.told = np.zeros(2), np.zeros(3, np.int64)
         self.log = np.zeros((LOG_ROWS, 4))
         self.kept: list[Array] = []
-        event_loop.begin(self.disks, self.grid, self.rules)
+        event_loop.begin(self.disks, self.grid)
         self.refuse_pairs()
 
     def advance(self, until: float) -> None:
@@ -93,7 +94,7 @@ class EventEngine:
     def pull(self, disk: int, at: float, acceleration: Array) -> None:
         """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so, (2,) m/s2."""
         self.rules = self.rules._replace(falling=True, mixed=True)
-        event_loop.pull(self.disks, self.grid, self.rules, self.clock, disk, at, acceleration[0], acceleration[1])
+        event_loop.pull(self.disks, self.clock, disk, at, acceleration[0], acceleration[1])
 
     def look(self, at: float) -> tuple[Array, Array]:
         """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; nothing changes by looking."""
@@ -123,7 +124,7 @@ def refuse_pair(row: Array, grid: Grid, i: int, j: int) -> None:
     gap = sum(d * d for d in apart) - reach * reach
     closing = sum(d * (Fraction(row[j, 2 + axis]) - Fraction(row[i, 2 + axis])) for axis, d in enumerate(apart))
     if gap < 0:
-        overlap = -float(gap) / (float(reach) + np.hypot(*map(float, apart)))
+        overlap = -float(gap) / (float(reach) + np.hypot(float(apart[0]), float(apart[1])))
         raise NoTruth(f"disks {i} and {j} overlap by {overlap:.3g} m at the start: move one {overlap:.3g} m away")
     if gap == 0 and closing < 0:
         speed = -float(closing) / float(reach)
@@ -200,8 +201,13 @@ def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array
     first, walls = walls_by_cell(scene, low, side, shape)
     head = np.full(shape.prod(), -1, np.int64)
     span = side * shape if torus is None else extent
-    two = [(a[0].item(), a[1].item()) for a in (side, shape, span)]
-    return Grid(*two, torus is not None, head, first, walls), low
+    grid = Grid(pair(side), pair(shape), pair(span), torus is not None, head, first, walls)
+    return grid, low
+
+
+def pair(array: NDArray) -> Any:
+    """(2,) as the two Python numbers in it."""
+    return tuple(array.tolist())
 
 
 def walls_by_cell(scene: Scene, low: Array, side: Array, shape: NDArray[np.int64]) -> tuple[NDArray, NDArray]:

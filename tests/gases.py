@@ -14,7 +14,9 @@ VIRIALS = [1, 1, (16 / 3 - 4 * np.sqrt(3) / np.pi) / 4, 0.53223180, 0.33355604, 
 def compressibility(packing: float) -> float:
     """Z = p V / (N kT): the virial series in the packing, resummed as a Pade approximant [4/5]."""
     series = np.array(VIRIALS) * 2.0 ** np.arange(10)
-    matrix = np.array([[series[5 + row - col] if 5 + row - col >= 0 else 0.0 for col in range(1, 6)] for row in range(5)])
+    matrix = np.array(
+        [[series[5 + row - col] if 5 + row - col >= 0 else 0.0 for col in range(1, 6)] for row in range(5)]
+    )
     below = np.append(1.0, np.linalg.solve(matrix, -series[5:10]))
     above = [sum(below[m] * series[k - m] for m in range(min(k, 5) + 1)) for k in range(5)]
     return float(np.polyval(above[::-1], packing) / np.polyval(below[::-1], packing))
