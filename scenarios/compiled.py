@@ -21,4 +21,4 @@ def kernel(function: Kernel) -> Kernel:
 
 def inlined(function: Kernel) -> Kernel:
     """The compiled function, pasted where it is called: handing it fifty arguments takes as long as its work."""
-    return njit(**OPTIONS, forceinline=True)(function)
+    return njit(**OPTIONS, inline="always")(function)
