@@ -1,4 +1,7 @@
-"""How the event engine's kernels are compiled: by numba, cached on disk; plain Python with NUMBA_DISABLE_JIT=1."""
+"""How the event engine's kernels are compiled: by numba, cached on disk; plain Python with NUMBA_DISABLE_JIT=1.
+
+The cache of a file does not see that a file it imports has changed: after editing a kernel, remove `__pycache__`.
+"""
 
 from __future__ import annotations
 
