@@ -59,6 +59,12 @@ def _box2d_v3(profile: str) -> Engine:
     return Box2DV3(profile)
 
 
+def _event_driven() -> Engine:
+    from adapters.event_driven import EventDriven
+
+    return EventDriven()
+
+
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
 
 ENGINES: dict[str, Row] = {
@@ -88,5 +94,8 @@ ENGINES: dict[str, Row] = {
     "box2d_v3:matched": Row(
         partial(_box2d_v3, "matched"),
         "Box2D 3.1, matched: no thresholds, small length unit, no friction", 0.625, FLOAT32
+    ),
+    "event_driven:float64": Row(
+        _event_driven, "from hit to hit without steps: parabolas and contact times, in float64", 0.5, FLOAT64
     ),
 }  # fmt: skip

@@ -103,11 +103,19 @@ def test_a_disk_that_leaves_the_box_is_set_onto_the_opposite_edge_and_keeps_its_
         over = engine.read()
         engine.step(3)
         later = engine.read()
-    # The edges and the unit of length are short binary numbers, so even float32 sets them exactly.
-    assert over.position.tolist() == [[-5.0, 1.0], [1.0, 3.0]]
+    # Who steps finds a disk beyond the edge when the step ends; by events it flies on from there for the rest of it.
+    rest = 2 / 64 - 0.01 if name == "event_driven:float64" else 0.0
+    # The edges and the unit of length are short binary numbers, so even float32 sets them exactly; by events one
+    # time and one path are rounded.
+    exact = 4e-15 if rest else 0.0
+    assert over.position.tolist() == [
+        pytest.approx([-5.0 + rest, 1.0], abs=exact), pytest.approx([1.0, 3.0 - rest], abs=exact)
+    ]  # fmt: skip
     assert (over.velocity == start.velocity).all()
     assert (over.angular_velocity == start.angular_velocity).all()
-    assert later.position.tolist() == [[-5.0 + 3 / 32, 1.0], [1.0, 3.0 - 3 / 32]]
+    assert later.position.tolist() == [
+        pytest.approx([-5.0 + rest + 3 / 32, 1.0], abs=exact), pytest.approx([1.0, 3.0 - rest - 3 / 32], abs=exact)
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ENGINES)

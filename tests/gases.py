@@ -1,0 +1,40 @@
+"""Gases of equal disks on a torus, and what the literature says of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenarios.model import Scene
+
+# B_k / B_2^(k-1) of hard disks, k = 1 .. 10 (Clisby & McCoy, J. Stat. Phys. 122, 15, 2006).
+VIRIALS = [1, 1, (16 / 3 - 4 * np.sqrt(3) / np.pi) / 4, 0.53223180, 0.33355604, 0.1988425, 0.1148728, 0.0649930,
+           0.0362193, 0.0199537]  # fmt: skip
+
+
+def compressibility(packing: float) -> float:
+    """Z = p V / (N kT): the virial series in the packing, resummed as a Pade approximant [4/5]."""
+    series = np.array(VIRIALS) * 2.0 ** np.arange(10)
+    matrix = np.array(
+        [[series[5 + row - col] if 5 + row - col >= 0 else 0.0 for col in range(1, 6)] for row in range(5)]
+    )
+    below = np.append(1.0, np.linalg.solve(matrix, -series[5:10]))
+    above = [sum(below[m] * series[k - m] for m in range(min(k, 5) + 1)) for k in range(5)]
+    return float(np.polyval(above[::-1], packing) / np.polyval(below[::-1], packing))
+
+
+def gas(n: int, packing: float, seed: int = 0) -> tuple[Scene, np.ndarray]:
+    """Disks of diameter and mass 1, kT = 1 and no momentum, on a triangular lattice; and their torus (2, 2)."""
+    side = np.sqrt(n * np.pi / 4 / packing)
+    columns = int(np.ceil(np.sqrt(n * np.sqrt(3) / 2)))
+    rows = -(-n // columns)
+    rows += rows % 2
+    k = np.arange(n)
+    x = (k % columns + 0.5 * (k // columns % 2) + 0.25) * side / columns
+    y = (k // columns + 0.5) * side / rows
+    velocity = np.random.default_rng(seed).normal(size=(n, 2))
+    velocity -= velocity.mean(axis=0)
+    velocity *= np.sqrt(2 * (n - 1) / (velocity**2).sum())
+    scene = Scene(
+        position=np.stack([x, y], -1), velocity=velocity, radius=np.full(n, 0.5), mass=np.ones(n), restitution=1.0
+    )
+    return scene, np.array([[0.0, 0.0], [side, side]])
