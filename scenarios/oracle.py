@@ -16,6 +16,7 @@ from scenarios.truth_cache import keep, key_of, look_up
 
 FEWEST_BITS, MOST_BITS = 128, 4096
 MOST_DISKS = 200
+LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 ACCURACY = 1e-12  # m; two precisions that differ by more have parted
 CERTIFIED_BITS = 4  # times as many for balls, which lose 2.6 times as many as the motion does (ground truth, 4)
 EPS = float(np.finfo(float).eps)
@@ -109,6 +110,8 @@ def computed(scenario: Scenario, kind: Callable[[int], Numbers] = digits) -> Tru
     scene, thrusts, until = scenario.scene, scenario.thrusts, scenario.duration
     if scene.n > MOST_DISKS:
         raise NoTruth(f"{scene.n} disks are more than the {MOST_DISKS} that are followed in many digits")
+    if fault := _out_of_scale(scenario):
+        raise NoTruth(fault)
     if any(push.frame == "body" and push.force.any() for push in thrusts):
         raise NoTruth("a push that turns with its disk makes paths whose contacts no polynomial gives")
     pushes = [push for push in thrusts if push.force.any()]
@@ -128,6 +131,21 @@ def computed(scenario: Scenario, kind: Callable[[int], Numbers] = digits) -> Tru
     if not reason and has_balls() and certified(scenario, pushes, fine, 2 * bits * CERTIFIED_BITS):
         method = "certified"
     return _record(scenario, fine, end, error, 2 * bits, method, reason)
+
+
+def _out_of_scale(scenario: Scenario) -> str:
+    """What is too small or too large for `Numbers.tie`, which takes numbers to be of the order of 1; or ""."""
+    scene = scenario.scene
+    if not (scene.radius >= 1 / LARGEST).all():
+        return f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a hit from a touch"
+    sizes = {
+        "radius": scene.radius, "position": scene.position, "wall": scene.walls, "velocity": scene.velocity,
+        "gravity": scene.gravity, "duration": np.array([scenario.duration]),
+    }  # fmt: skip
+    for name, values in sizes.items():
+        if values.size and (most := float(np.abs(values).max())) > LARGEST:
+            return f"a {name} of {most:g} (SI) is above {LARGEST:g}: too large to follow to {ACCURACY:g} m"
+    return ""
 
 
 def difference(coarse: Path, fine: Path, until: float, k: Numbers) -> tuple[float, float]:

@@ -21,7 +21,8 @@ from scenarios.oracle_contacts import Pressed
 from scenarios.oracle_filter import earliest_bodies, earliest_walls
 from scenarios.oracle_ties import Blow, Contact
 
-MOST_HITS = 20_000
+MOST_HITS = 10_000
+MOST_STEPS = 20_000  # hits, edges crossed, records made anew
 CROWDED = 64  # hits of one disk ...
 INSTANT = 1e-9  # ... within so many s: they pile up towards a point in time
 
@@ -83,10 +84,12 @@ class Motion:
         try:
             for i in self.moving:
                 self.predict(int(i))
-            while len(self.path.events) < MOST_HITS:
+            for _ in range(MOST_STEPS):
                 if not self.advance():
                     return self.path
-            raise Ends(float(self.now), f"more than {MOST_HITS} hits")
+                if len(self.path.events) >= MOST_HITS:
+                    raise Ends(float(self.now), f"more than {MOST_HITS} hits")
+            raise Ends(float(self.now), f"more than {MOST_STEPS} events")
         except Ends as end:
             self.path.end, self.path.reason = end.t, str(end)
         return self.path

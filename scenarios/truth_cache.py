@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 import zipfile
+import zlib
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -66,7 +67,7 @@ def look_up(key: str) -> dict[str, Any] | None:
         if arrays["legs"].shape[1:] != (8,) or arrays["events"].shape[1:] != (5,) or set(numbers) != set(NUMBERS):
             return None
     # A torn or foreign file is as good as none.
-    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile):
+    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error):
         return None
     return arrays | numbers
 

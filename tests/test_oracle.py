@@ -273,6 +273,8 @@ CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201,
         (asked(replace(BALL, position=[[0, 0.1]])), "disk 0 and wall 0 overlap by 0.15 m at the start"),
         (asked(ROW, thrusts=BODY), "a push that turns with its disk"),
         (asked(CROWD), "201 disks are more than the 200"),
+        (asked(replace(SEAM, radius=[1e-9, 1])), "a radius of 1e-09 m is below 1e-06 m"),
+        (asked(replace(BALL, velocity=[[1e9, 0]])), r"a velocity of 1e\+09 \(SI\) is above 1e\+06"),
     ],
 )
 def test_what_it_cannot_do_is_refused(one: Scenario, reason: str):
