@@ -104,7 +104,7 @@ def balls(bits: int) -> Numbers:
 
 
 def digits(bits: int) -> Numbers:
-    """mpfr where gmpy2 is installed, else decimal: the same answers, about six times slower."""
+    """mpfr where gmpy2 is installed, else decimal: the same answers, nearly as fast up to a few hundred bits."""
     return mpfr(bits) if find_spec("gmpy2") else decimals(bits)
 
 
