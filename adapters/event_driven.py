@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Hit, Unsupported
-from scenarios.events import EventEngine, NoTruth
+from scenarios.events import EventEngine
 from scenarios.model import Array, Scene, State
+from scenarios.no_truth import NoTruth
 
 
 class EventDriven:

@@ -68,6 +68,19 @@ def report(out: Annotated[Path, typer.Argument(help="The folder of a run, finish
     report_again(out)
 
 
+@app.command()
+def truth(
+    scene: Annotated[str, typer.Argument(metavar="SCENARIO|FILE.toml")],
+    events: Annotated[bool, typer.Option("--events", help="All hits, not only the first and last ten.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs: all of it as JSON.")] = False,
+    seed: Seed = 0,
+) -> None:
+    """Print the exact answer to a scene: its hits, how far it reaches, how precise it is and what ends it."""
+    from reports.truth_command import show_truth
+
+    show_truth(scene, seed, events, as_json)
+
+
 @app.command(name="list")
 def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
     """Explain every engine, scenario and metric in a line."""

@@ -12,6 +12,7 @@ from adapters.play import Run
 from reports.metrics import METRICS
 from reports.view import Value, View
 from scenarios.model import Collisions, Scenario, Trajectory
+from scenarios.no_truth import NoTruth
 
 COLUMNS = (
     "scenario", "engine", "profile", "dt_s", "metric", "disk", "value", "unit", "versus", "at_s", "note",
@@ -47,7 +48,7 @@ class Comparison:
 
 def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     """Every metric of every run against the laws, the truth and every other engine at the same dt."""
-    truth = scenario.truth(scenario.times) if scenario.truth else None
+    scenario, truth = answered(scenario)
     rows: list[dict] = []
     for run in runs:
         if run.status != "ok":  # what it played before it failed is kept in its file, but earns no score
@@ -56,6 +57,16 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
         for versus, other in _opponents(run, runs, truth):
             rows += _measure(scenario, run, versus, other)
     return Comparison(scenario, truth, tuple(runs), pd.DataFrame(rows, columns=list(COLUMNS)))
+
+
+def answered(scenario: Scenario) -> tuple[Scenario, Trajectory | None]:
+    """The scenario and its truth at its samples; where there is none, the scenario says why."""
+    if scenario.truth is None:
+        return scenario, None
+    try:
+        return scenario, scenario.truth(scenario.times)
+    except NoTruth as refusal:
+        return replace(scenario, truth=None, without_truth=str(refusal)), None
 
 
 def _opponents(run: Run, runs: Sequence[Run], truth: Trajectory | None) -> Iterator[tuple[str, Trajectory | None]]:

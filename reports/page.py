@@ -179,6 +179,7 @@ def truth_of(comparison: Comparison) -> str:
     ends = "at every sample"
     if truth.valid_until < scenario.duration:
         ends = f"up to its horizon at {style.number(truth.valid_until)} s, and no further"
+        ends += f": {truth.reason}" if truth.reason else ""
     return f"exact {ends}" + (f"; off by at most {style.number(truth.error_bound)} m" if truth.error_bound else "")
 
 

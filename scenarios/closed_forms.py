@@ -27,11 +27,13 @@ def answer(
     turning: Motion | None = None,
     valid_until: float = np.inf,
     error_bound: float = 0.0,
+    reason: str = "",
 ) -> Trajectory:
     """An exact motion as the `Trajectory` of `scene` at the times t (k,) s, cut at `valid_until` s.
 
     motion: position and velocity (k, n, 2) m, m/s. turning: angle and angular velocity (k, n) rad, rad/s;
     left out where nothing turns a disk: it keeps its spin. hits: those after the last sample are dropped.
+    reason: why it is valid no longer.
     """
     angle, angular_velocity = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
     kept = t <= valid_until
@@ -44,6 +46,7 @@ def answer(
         collisions=Collisions.of([hit for hit in hits if hit[0] <= t[kept][-1]]),
         valid_until=valid_until,
         error_bound=error_bound,
+        reason=reason,
     )
 
 

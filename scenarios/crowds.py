@@ -6,6 +6,7 @@ import numpy as np
 
 from scenarios.closed_forms import answer, bouncing
 from scenarios.model import Array, Scenario, Trajectory
+from scenarios.oracle import with_oracle
 from scenarios.placing import box, lay_out, scatter
 
 
@@ -57,16 +58,16 @@ def gas_of_100(seed: int = 0) -> Scenario:
         walls=box([-2, -2], [2, 2]),
         restitution=1.0,
     )
-    return Scenario(
+    question = Scenario(
         name="gas_of_100",
         asks="Does a gas of a hundred disks keep its energy over hundreds of hits?",
         source="the hard-disk gas (Alder & Wainwright, J. Chem. Phys. 31, 459, 1959)",
         scene=scene,
         duration=5.0,
         sample_interval=1 / 60,
-        without_truth="chaotic, and no closed form is known",
         seed=seed,
     )
+    return with_oracle(question)
 
 
 CROWDS = (simbenchmark_bouncing, gas_of_100)

@@ -32,17 +32,10 @@ from scenarios.event_kernels import (
 )
 from scenarios.event_queue import empty_queue
 from scenarios.model import Array, Scene
+from scenarios.no_truth import NoTruth
 
 LOG_ROWS = 1 << 14
 WIDER = 1 + 1e-9  # cells are wider than the largest disk by more than rounding, so that contacts are always next door
-
-
-class NoTruth(Exception):
-    """A scene has no exact answer from `at` s on, for a reason said in one sentence."""
-
-    def __init__(self, reason: str, at: float = 0.0) -> None:
-        super().__init__(reason)
-        self.at = at
 
 
 class EventEngine:

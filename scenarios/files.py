@@ -18,6 +18,7 @@ from pydantic_core import ErrorDetails
 
 from scenarios.file_tables import TABLES, SceneTable
 from scenarios.model import Array, Scenario, Scene, Thrust
+from scenarios.oracle import with_oracle
 from scenarios.placing import box
 
 MOST_BYTES = 5_000_000
@@ -39,7 +40,7 @@ _KINDS = {bool: "boolean", str: "string", int: "integer", float: "float", list: 
 
 
 def read_scene_file(path: str | Path) -> Scenario:
-    """The scenario a TOML file describes; its source is the file's name, it has no truth.
+    """The scenario a TOML file describes; its source is the file's name, its truth is the oracle's, if it has one.
 
     Raises:
         SceneFileError: with one line per fault, `FILE: KEY = VALUE: what is wrong; what is allowed`.
@@ -154,7 +155,7 @@ def _scenario(file: SceneTable, source: str) -> Scenario:
     walls = [[wall.start, wall.end] for wall in file.wall]
     if file.box:
         walls += box(file.box.low, file.box.high).tolist()
-    return Scenario(
+    question = Scenario(
         name=file.name,
         asks=file.asks or f"What do the engines make of {file.name}?",
         source=source,
@@ -172,8 +173,8 @@ def _scenario(file: SceneTable, source: str) -> Scenario:
         sample_interval=file.sample_interval,
         substeps=file.substeps,
         thrusts=[Thrust(**dict(thrust)) for thrust in file.thrust],
-        without_truth="no exact answer is known for a scene from a file",
     )
+    return with_oracle(question)
 
 
 def _outside_wrap(file: SceneTable) -> Iterator[str]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from scenarios.closed_forms import answer, flight, to_and_fro
 from scenarios.model import Array, Scenario, Trajectory
+from scenarios.oracle import with_oracle
 from scenarios.placing import box, lay_out, scatter
 
 SOURCE = 'the lesson "Simple body dynamics"'
@@ -81,16 +82,16 @@ def falling_box(seed: int = 0) -> Scenario:
         gravity=[0.0, -9.81],
         restitution=0.95,
     )
-    return Scenario(
+    question = Scenario(
         name="falling_box",
         asks="Do thirty disks that fall in a box stay inside it and apart, and lose energy only by hits?",
         source=f"{SOURCE}, parts 3 and 4, in two dimensions",
         scene=scene,
         duration=2.0,
         sample_interval=1 / 60,
-        without_truth="no closed form is known for many disks under gravity",
         seed=seed,
     )
+    return with_oracle(question)
 
 
 LESSON = (free_fall, ping_pong, falling_box)

@@ -1,7 +1,6 @@
 """The nouns: what is asked (`Scene`, `Thrust`, `Scenario`), what is answered (`State`, `Collisions`, `Trajectory`).
 
-SI units, float64, y up, counter-clockwise positive. n disks, w walls, k samples, h collisions.
-All arrays are read-only: data flows one way, from a scenario to a table.
+SI units, float64, y up, counter-clockwise positive. n disks, w walls, k samples, h collisions; arrays are read-only.
 """
 
 from __future__ import annotations
@@ -152,7 +151,7 @@ class Thrust:
     frame: Literal["world", "body"] = "world"
 
     def __post_init__(self) -> None:
-        """Copy, freeze and check."""
+        """Freeze and check."""
         object.__setattr__(self, "force", frozen(self.force))
         if self.force.shape != (2,) or not np.isfinite([*self.force, self.torque]).all():
             raise ValueError(f"thrust: force {self.force} and torque {self.torque} must be finite (2,) and scalar")
@@ -175,7 +174,7 @@ class Scenario:
         sample_interval: s; every player is sampled at i * sample_interval.
         substeps: the dt ladder, dt = sample_interval / k, coarse to fine; the middle one is the page's.
         thrusts: piecewise-constant pushes.
-        truth: times (k,) s -> the exact `Trajectory` at those times, cut at its `valid_until`; or None.
+        truth: times (k,) s -> the exact `Trajectory` there, cut at its horizon, or it raises `NoTruth`; or None.
         without_truth: why there is no exact answer, in one sentence, where `truth` is None.
         seed: what the scene was drawn from, or None.
     """
@@ -279,6 +278,7 @@ class Trajectory:
         angular_velocity: (k, n) rad/s.
         collisions: the hits up to t[-1].
         valid_until: s, the horizon up to which players are held to a truth: no sample lies beyond it.
+        reason: why the truth ends there; "" if it does not.
         error_bound: m, how far a truth may be off before it; 0: a closed form, right to a few roundings.
     """
 
@@ -290,6 +290,7 @@ class Trajectory:
     collisions: Collisions = field(default_factory=lambda: NO_COLLISIONS)
     valid_until: float = np.inf
     error_bound: float = 0.0
+    reason: str = ""
 
     def __len__(self) -> int:
         return len(self.t)

@@ -93,7 +93,7 @@ def test_the_same_command_gives_the_same_numbers_whatever_the_workers(small_run:
 
 
 def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
-    """A TOML file without a truth is compared by laws and pairs; its run can be reported again without the file."""
+    """A TOML file is compared with the oracle's truth too; its run can be reported again without the file."""
     scene = tmp_path / "mine.toml"
     scene.write_text((SCENES / "two.toml").read_text())
     done = crosscheck("run", scene, "--engine", "pymunk", "--out", "out", cwd=tmp_path)
@@ -101,7 +101,7 @@ def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
     scene.unlink()
 
     assert done.returncode == 0, done.stderr
-    assert versus == {"itself", "pymunk:matched"}
+    assert versus == {"itself", "truth", "pymunk:matched"}
     assert crosscheck("report", "out", cwd=tmp_path).returncode == 0
 
 
@@ -117,6 +117,8 @@ def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
         (["run", "nowhere.toml"], "nowhere.toml"),
         (["run", "slow_hit", "--seed", "-1"], "--seed"),
         (["list", "engine"], "did you mean engines"),
+        (["truth", "asteroid"], "scenario 'asteroid' is not known; did you mean asteroids"),
+        (["truth", "nowhere.toml"], "nowhere.toml"),
         (["report", "nowhere"], "nowhere: has no journal.jsonl"),
         (["fly"], "fly"),
     ],
@@ -129,6 +131,25 @@ def test_bad_input_is_one_clear_message_and_exit_2(words: list[str], said: str, 
     assert said in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_truth_prints_the_exact_answer(tmp_path: Path):
+    """For people with the ends of its list of hits, for programs as JSON with all of them."""
+    told, listed = (crosscheck("truth", "line_gas", *more, cwd=tmp_path).stdout for more in ([], ["--events"]))
+    for word in ("closed form", "horizon", "error bound", "252 more: --events"):
+        assert word in told
+    assert len(listed.splitlines()) > 272
+    answer = json.loads(crosscheck("truth", "asteroids", "--json", cwd=tmp_path).stdout)
+    assert answer["method"] in ("certified", "two-precision")
+    assert (answer["valid_until_s"], answer["reason"], len(answer["hits"])) == (10.0, "", 20)
+
+
+def test_truth_says_why_there_is_none(tmp_path: Path):
+    """Exit 1: the name is known, the answer is not."""
+    done = crosscheck("truth", "cradle_touching", cwd=tmp_path)
+
+    assert done.returncode == 1
+    assert "no exact answer: shown, never scored" in done.stderr
 
 
 def test_all_faults_of_all_scene_files_come_at_once(tmp_path: Path):

@@ -15,6 +15,7 @@ from reports.metrics import METRICS
 from reports.view import View
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Collisions, Scenario, Scene, Thrust, Trajectory
+from scenarios.oracle import with_oracle
 
 WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
 
@@ -315,8 +316,17 @@ def test_the_table_has_failures_too_and_every_pair_once():
 
 def test_without_a_truth_nothing_is_called_an_error_of_position():
     """Where nobody knows the answer the table has laws and pairs only."""
-    one = replace(scenario("gas_of_100"), duration=0.5)
+    one = replace(scenario("gas_of_100"), duration=0.5, truth=None)
     runs = [play(ENGINES[name].make(), name, one, one.dt(4)) for name in ("reference:exercise", "pymunk:matched")]
     table = compare(one, runs).table
 
     assert set(table.versus) == {"itself", "pymunk:matched"}
+
+
+def test_where_the_oracle_refuses_the_comparison_says_why():
+    """Disks that overlap have no exact answer: no error is claimed, and the reason is at hand."""
+    scene = Scene(position=[[0, 0], [0.3, 0]], velocity=[[0, 0], [0, 0]], radius=[0.2, 0.2], mass=[1, 1], restitution=1)
+    refused = compare(with_oracle(Scenario("two", "?", "", scene, 1.0, 0.1)), [])
+
+    assert refused.truth is None
+    assert "disk 0 and disk 1 overlap by 0.1 m" in refused.scenario.without_truth

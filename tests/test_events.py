@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from scenarios import events
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.event_truth import float64_truth
-from scenarios.events import EventEngine, NoTruth
+from scenarios.events import EventEngine
 from scenarios.model import Scenario, Scene, Thrust
+from scenarios.no_truth import NoTruth
 from scenarios.placing import box, scatter
 
 REFUSED = {

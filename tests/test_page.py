@@ -49,7 +49,7 @@ def comparisons() -> list[Comparison]:
     return [
         played(HEAD_ON, asks=f"Is this inert? {HOSTILE} {LONG}", source=HOSTILE),
         played(ORBIT),
-        played(ASTEROIDS, without_truth=HOSTILE),
+        played(ASTEROIDS, truth=None, without_truth=HOSTILE),
     ]
 
 

@@ -8,7 +8,8 @@ import pytest
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 
 ANSWERED = [name for name in SCENARIOS if scenario(name).truth]
-MOVING = [name for name in ANSWERED if name not in ("rest_on_floor", "slide_on_incline", "column_of_ten")]
+# Among the hundreds of hits of a drawn scene some fall on a step, in every draw.
+MOVING = [name for name in ANSWERED if name not in (*DRAWN, "rest_on_floor", "slide_on_incline", "column_of_ten")]
 
 
 def smallest_gap(scene, position):

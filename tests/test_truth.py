@@ -9,8 +9,9 @@ import pytest
 
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Scene
+from scenarios.oracle import OracleTruth
 
-ANSWERED = [name for name in SCENARIOS if scenario(name).truth]
+ANSWERED = [name for name in SCENARIOS if (truth := scenario(name).truth) and not isinstance(truth, OracleTruth)]
 PUSHED = [name for name in ANSWERED if scenario(name).thrusts]
 RESTING = ["rest_on_floor", "slide_on_incline", "column_of_ten"]
 FLYING = [name for name in ANSWERED if name not in (*PUSHED, *RESTING)]
@@ -60,8 +61,8 @@ def next_events(scene: Scene, x, v):
                 root = np.sqrt(speed[i] ** 2 - 2 * pull[i] * gap[i])
                 t = 2 * gap[i] / (root - speed[i]) if speed[i] < 0 else (speed[i] + root) / -pull[i]
                 found.append((t, i, -1 - w))
-            elif speed[i] < 0:
-                found.append((gap[i] / -speed[i], i, -1 - w))
+            elif speed[i] < 0 and speed[i] ** 2 > 2 * pull[i] * gap[i]:
+                found.append((2 * gap[i] / (np.sqrt(speed[i] ** 2 - 2 * pull[i] * gap[i]) - speed[i]), i, -1 - w))
     return min(found)
 
 

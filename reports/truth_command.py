@@ -1,0 +1,113 @@
+"""`crosscheck truth`: the exact answer to one scene, its hits, how far it reaches and what ends it."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from reports.archive import plain
+from reports.cells import open_scene
+from reports.commands import DONE, FAILED, checked_scenes, say
+from reports.style import number
+from scenarios.model import Scenario
+from scenarios.no_truth import NoTruth
+from scenarios.oracle import OracleTruth, TruthRecord
+
+SHOWN = 10  # hits at the start and at the end
+HEADINGS = ("t, s", "disk", "other", "impulse, N s", "cos of impact angle")
+
+
+def show_truth(scene: str, seed: int, every: bool, as_json: bool) -> None:
+    """Print the exact answer to a scene; exits 1 where there is none, 2 on a name or file that is no scene."""
+    (checked,) = checked_scenes([scene], [], False, seed)
+    scenario = open_scene(checked, seed)
+    try:
+        record = record_of(scenario)
+    except NoTruth as refusal:
+        say(f"{scenario.name}: no exact answer: {refusal}")
+        sys.exit(FAILED)
+    if as_json:
+        print(json.dumps(as_plain(scenario, record), indent=2, allow_nan=False))
+    else:
+        print_truth(scenario, record, every)
+    sys.exit(DONE)
+
+
+def record_of(scenario: Scenario) -> TruthRecord:
+    """The oracle's record, or a record of what a closed form says. Raises `NoTruth`."""
+    if isinstance(scenario.truth, OracleTruth):
+        record = scenario.truth.record()
+        if record.valid_until < scenario.sample_interval:
+            raise NoTruth(record.reason)
+        return record
+    if scenario.truth is None:
+        raise NoTruth(scenario.without_truth)
+    truth = scenario.truth(scenario.times)
+    hits = truth.collisions
+    angles = np.full(len(hits), np.nan)  # a closed form does not need them
+    return TruthRecord(
+        legs=np.zeros((0, 8)),
+        events=np.stack([hits.t, hits.i, hits.j, hits.impulse, angles], axis=-1),
+        valid_until=truth.valid_until,
+        error_bound=truth.error_bound,
+        bits=53,
+        method="closed form",
+        reason=truth.reason,
+    )
+
+
+def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
+    """The record for programs; numbers that are not finite are text or null, as JSON has none."""
+    hits = [
+        {"t_s": t, "i": int(i), "j": int(j), "impulse_Ns": impulse, "cosine": None if np.isnan(cosine) else cosine}
+        for t, i, j, impulse, cosine in record.events.tolist()
+    ]
+    return plain(
+        {
+            "scenario": scenario.name, "method": record.method, "bits": record.bits, "duration_s": scenario.duration,
+            "valid_until_s": min(record.valid_until, scenario.duration),
+            "followed_until_s": min(record.followed_until, scenario.duration), "reason": record.reason,
+            "error_bound_m": record.error_bound, "hits": hits,
+        }
+    )  # fmt: skip
+
+
+def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
+    """The record for people."""
+    console = Console()
+    ends = f"{number(min(record.valid_until, scenario.duration), 6)} s of {number(scenario.duration, 6)} s"
+    lines = {
+        "scenario": f"{scenario.name}: {scenario.asks}",
+        "method": record.method,
+        "precision": "float64" if record.bits == 53 else f"{record.bits} bits, checked against {record.bits // 2}",
+        "horizon": ends,
+        "ends because": record.reason or "it is asked for no longer" * (record.valid_until >= scenario.duration),
+        "players held to it": f"up to {number(min(record.followed_until, record.valid_until, scenario.duration), 6)} s",
+        "error bound": f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64",
+        "hits": str(len(record.events)),
+    }
+    grid = Table.grid(padding=(0, 2))
+    for name, text in lines.items():
+        if text:
+            grid.add_row(name, text)
+    console.print(grid)
+    if len(record.events):
+        console.print(table_of_hits(record, every))
+
+
+def table_of_hits(record: TruthRecord, every: bool) -> Table:
+    """The hits, or the first and the last ten."""
+    table, rows = Table(*HEADINGS), record.events.tolist()
+    skipped = 0 if every else max(0, len(rows) - 2 * SHOWN)
+    for k, (t, i, j, impulse, cosine) in enumerate(rows):
+        if skipped and k == SHOWN:
+            table.add_row("...", "", "", f"{skipped} more: --events", "")
+        if skipped and SHOWN <= k < len(rows) - SHOWN:
+            continue
+        other = f"disk {int(j)}" if j >= 0 else f"wall {-1 - int(j)}"
+        table.add_row(f"{t:.12g}", str(int(i)), other, f"{impulse:.6g}", "" if np.isnan(cosine) else f"{cosine:.6g}")
+    return table

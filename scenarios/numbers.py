@@ -1,0 +1,113 @@
+"""Numbers of as many digits as asked for, under one set of verbs: gmpy2's mpfr, the library's decimal, arb's balls.
+
+A kind makes numbers out of float64 (exactly), takes roots and tells signs. What lies below its `tie` counts as zero:
+no precision can tell an exact equality from a small difference, and half the digits are far more than chance needs.
+Balls never guess: where zero lies inside one, they raise `Undecided`.
+"""
+
+from __future__ import annotations
+
+import decimal
+from collections.abc import Callable
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec
+from math import ceil, log10
+from typing import Any
+
+Number = Any
+"""What a kind makes: mpfr, Decimal, arb. They share the operators of arithmetic and nothing else."""
+
+
+class Undecided(ArithmeticError):
+    """A ball holds zero, so its sign is not proven."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """One kind of numbers at one precision.
+
+    Attributes:
+        name: the library's type.
+        bits: of each number.
+        exact: float64 -> the same number, unrounded.
+        sqrt: number -> its root.
+        sign: number -> -1, 0 or 1; 0 where it is below `tie`.
+        precise: makes the context within which all arithmetic is done.
+        tie: number; what is smaller counts as zero. s, m, m/s: scenes are of the order of 1.
+    """
+
+    name: str
+    bits: int
+    exact: Callable[[float], Number]
+    sqrt: Callable[[Number], Number]
+    sign: Callable[[Number], int]
+    precise: Callable[[], AbstractContextManager[Any]]
+    tie: Number
+
+    def zeroed(self, x: Number) -> Number:
+        """`x`, or an exact 0 where it cannot be told from it."""
+        return x if self.sign(x) else self.exact(0.0)
+
+
+def mpfr(bits: int) -> Numbers:
+    """MPFR's correctly rounded numbers. Raises ImportError where gmpy2 is missing."""
+    import gmpy2
+
+    tie = gmpy2.mpfr(2) ** -(bits // 2)
+
+    def sign(x: Number) -> int:
+        return 1 if x > tie else -1 if x < -tie else 0
+
+    def precise() -> AbstractContextManager[Any]:
+        return gmpy2.context(gmpy2.get_context(), precision=bits)
+
+    # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.
+    return Numbers("mpfr", bits, lambda x: gmpy2.mpfr(x, 53), gmpy2.sqrt, sign, precise, tie)
+
+
+def decimals(bits: int) -> Numbers:
+    """The standard library's decimal numbers, of the same accuracy."""
+    context = decimal.Context(prec=ceil(bits * log10(2)) + 1, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX)
+    tie = decimal.Decimal(2) ** -(bits // 2)
+
+    def sign(x: Number) -> int:
+        return 1 if x > tie else -1 if x < -tie else 0
+
+    return Numbers(
+        "decimal", bits, decimal.Decimal, lambda x: x.sqrt(context), sign, lambda: decimal.localcontext(context), tie
+    )
+
+
+def balls(bits: int) -> Numbers:
+    """Arb's real balls, which hold the right number for certain. Raises ImportError where python-flint is missing."""
+    import flint
+
+    def sign(x: Number) -> int:
+        if x > 0:
+            return 1
+        if x < 0:
+            return -1
+        if x == 0:
+            return 0
+        raise Undecided
+
+    @contextmanager
+    def precise() -> Any:
+        before, flint.ctx.prec = flint.ctx.prec, bits
+        try:
+            yield
+        finally:
+            flint.ctx.prec = before
+
+    return Numbers("arb", bits, flint.arb, lambda x: x.sqrt(), sign, precise, flint.arb(0))
+
+
+def digits(bits: int) -> Numbers:
+    """mpfr where gmpy2 is installed, else decimal: the same answers, nearly as fast up to a few hundred bits."""
+    return mpfr(bits) if find_spec("gmpy2") else decimals(bits)
+
+
+def has_balls() -> bool:
+    """Whether python-flint is installed."""
+    return find_spec("flint") is not None

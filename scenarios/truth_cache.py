@@ -1,0 +1,95 @@
+"""Truth records kept on disk under a hash of what was asked, in the user's cache folder; never needed, only faster."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+import zlib
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.model import Scenario, frozen
+
+HERE = Path(__file__).parent
+ARRAYS = ("legs", "events")
+NUMBERS = ("valid_until", "error_bound", "bits", "method", "reason", "followed_until")
+
+
+def folder() -> Path | None:
+    """$CROSSCHECK_CACHE, or crosscheck2d in $XDG_CACHE_HOME or ~/.cache; None where there is no home."""
+    if given := os.environ.get("CROSSCHECK_CACHE"):
+        return Path(given)
+    if base := os.environ.get("XDG_CACHE_HOME"):
+        return Path(base) / "crosscheck2d"
+    try:
+        return Path.home() / ".cache" / "crosscheck2d"
+    except RuntimeError:
+        return None
+
+
+def key_of(scenario: Scenario, certifying: bool) -> str:
+    """A hash over all that decides a record: scene, pushes, duration, the oracle's source and what it can prove."""
+    scene, hashed = scenario.scene, hashlib.sha256()
+    parts = [
+        scene.position, scene.velocity, scene.radius, scene.mass, scene.walls, scene.gravity, scene.restitution,
+        [] if scene.wrap is None else scene.wrap, scenario.duration,
+        *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
+    ]  # fmt: skip
+    hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())
+    for part in parts:
+        hashed.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
+    return hashed.hexdigest()[:32]
+
+
+@cache
+def source_hash() -> str:
+    """A hash over the oracle's own source, so that a changed oracle never answers with what it said before."""
+    ours = ("numbers", "oracle*", "truth_*", "event*", "contact_times", "compiled")
+    files = sorted(path for name in ours for path in HERE.glob(f"{name}.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
+
+
+def look_up(key: str) -> dict[str, Any] | None:
+    """The fields of the record kept under `key`; None where there is none that can be read in full."""
+    where = folder()
+    if where is None:
+        return None
+    try:
+        with np.load(where / f"{key}.npz", allow_pickle=False) as saved:
+            arrays = {name: frozen(saved[name]) for name in ARRAYS}
+            numbers = json.loads(str(saved["numbers"]))
+        if arrays["legs"].shape[1:] != (8,) or arrays["events"].shape[1:] != (5,) or set(numbers) != set(NUMBERS):
+            return None
+    # A torn or foreign file is as good as none.
+    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error):
+        return None
+    return arrays | numbers
+
+
+def keep(key: str, fields: dict[str, Any]) -> bool:
+    """Write the fields of a record under `key`, whole or not at all; False where the folder cannot be written to."""
+    where = folder()
+    if where is None:
+        return False
+    temporary = None
+    try:
+        where.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=where, suffix=".part")
+        with os.fdopen(handle, "wb") as file:
+            numbers = json.dumps({name: fields[name] for name in NUMBERS})
+            np.savez_compressed(file, **{name: fields[name] for name in ARRAYS}, numbers=np.array(numbers))
+        # Another process may write the same record at the same time: the last rename wins, both are whole.
+        os.replace(temporary, where / f"{key}.npz")
+    except OSError:
+        if temporary:
+            with suppress(OSError):
+                os.unlink(temporary)
+        return False
+    return True

@@ -1,0 +1,136 @@
+"""The cache of truth records: it is never trusted blindly and never needed."""
+
+from __future__ import annotations
+
+import os
+import stat
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios import oracle, truth_cache
+from scenarios.catalogue import scenario
+from scenarios.model import Scenario
+from scenarios.oracle import OracleTruth, TruthRecord
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache folder."""
+    monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the scenarios that are computed, not read."""
+    names: list[str] = []
+    real = oracle.computed
+
+    def computed(one: Scenario) -> TruthRecord:
+        names.append(one.name)
+        return real(one)
+
+    monkeypatch.setattr(oracle, "computed", computed)
+    return names
+
+
+def record_of(one: Scenario) -> TruthRecord:
+    """Its record by way of the cache."""
+    return OracleTruth(one).record()
+
+
+ONE = scenario("oblique_e09")
+
+
+def test_a_record_is_computed_once(folder: Path, made: list[str]):
+    """The second time it is read, the same to the bit; nothing but the record lies in the folder."""
+    first, second = record_of(ONE), record_of(ONE)
+
+    assert made == [ONE.name]
+    assert first.legs.tobytes() == second.legs.tobytes()
+    assert first.events.tobytes() == second.events.tobytes()
+    assert [getattr(first, name) for name in truth_cache.NUMBERS] == [
+        getattr(second, name) for name in truth_cache.NUMBERS
+    ]
+    assert [path.suffix for path in folder.iterdir()] == [".npz"]
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04 torn"])
+def test_a_corrupted_file_is_made_anew(content: bytes, folder: Path, made: list[str]):
+    """Whatever lies there; and so is a file cut in half."""
+    record_of(ONE)
+    (file,) = folder.iterdir()
+    whole = file.read_bytes()
+    for bad in (content, whole[: len(whole) // 2]):
+        file.write_bytes(bad)
+        record_of(ONE)
+    record_of(ONE)
+
+    assert len(made) == 3
+
+
+def test_what_decides_the_answer_decides_the_key():
+    """Duration, scene and pushes; not the name, the question or the ladder."""
+    keys = {
+        truth_cache.key_of(one, False)
+        for one in (
+            ONE,
+            replace(ONE, duration=3.0),
+            replace(ONE, scene=replace(ONE.scene, restitution=0.8)),
+            replace(ONE, scene=replace(ONE.scene, velocity=ONE.scene.velocity * (1 + 2**-52))),
+            replace(ONE, thrusts=[oracle.Thrust(0, 0.0, 1.0, np.ones(2))]),
+        )
+    }
+    assert len(keys) == 5
+    assert truth_cache.key_of(replace(ONE, name="other", substeps=(3,)), False) in keys
+
+
+def test_many_writers_leave_one_whole_record(folder: Path):
+    """Threads that write the same record at once."""
+    with ThreadPoolExecutor(8) as pool:
+        records = list(pool.map(record_of, [ONE] * 16))
+
+    assert len({record.legs.tobytes() for record in records}) == 1
+    assert [path.suffix for path in folder.iterdir()] == [".npz"]
+
+
+def test_without_a_home_there_is_no_cache(monkeypatch: pytest.MonkeyPatch, made: list[str]):
+    """No folder, no failure."""
+    for name in ("CROSSCHECK_CACHE", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+
+    def homeless() -> Path:
+        raise RuntimeError("no home")
+
+    monkeypatch.setattr(Path, "home", homeless)
+    record_of(ONE)
+    record_of(ONE)
+    assert len(made) == 2
+
+
+def test_a_folder_that_cannot_be_written_to_is_no_cache(folder: Path, made: list[str]):
+    """A file stands where the folder should; or it is read-only, which root does not mind."""
+    folder.write_text("in the way")
+    record_of(ONE)
+    assert len(made) == 1
+    folder.unlink()
+    folder.mkdir()
+    folder.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    record_of(ONE)
+    assert len(list(folder.iterdir())) == (os.geteuid() == 0)
+
+
+def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """$CROSSCHECK_CACHE before $XDG_CACHE_HOME before ~/.cache."""
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    monkeypatch.delenv("CROSSCHECK_CACHE", raising=False)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    assert truth_cache.folder() == tmp_path / ".cache" / "crosscheck2d"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert truth_cache.folder() == tmp_path / "xdg" / "crosscheck2d"
+    monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "own"))
+    assert truth_cache.folder() == tmp_path / "own"
