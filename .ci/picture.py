@@ -14,7 +14,7 @@ def main(page: Path) -> None:
     """The map of position errors, without the index beside it."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=QUIET)
-        tab = browser.new_page(viewport={"width": 980, "height": 1400}, device_scale_factor=1.5)
+        tab = browser.new_page(viewport={"width": 1320, "height": 1400}, device_scale_factor=1.5)
         tab.goto(page.resolve().as_uri())
         box = tab.locator("#map").bounding_box()
         assert box is not None

@@ -79,6 +79,6 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
     return (
-        f"More than a whole radius off: {who} of {len(off)} scenes; the hardest is {defeated.idxmax()}, too much for "
-        f"{defeated.max()} of {lost.shape[1]}; {cells}"
+        f"More than a whole radius off, or without a result: {who} of {len(off)} scenes; the hardest is "
+        f"{defeated.idxmax()}, too much for {defeated.max()} of {lost.shape[1]}; {cells}"
     )

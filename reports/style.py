@@ -49,6 +49,7 @@ ENGINE = {
     "pymunk": ("#d1540a", "#ff9a4d", "triangle-up"),
     "box2d": ("#00876c", "#5be0b5", "square"),
     "box2d_v3": ("#b84fb0", "#c46bd8", "diamond"),
+    "event_driven": ("#6b5f00", "#d9c84a", "star"),
     TRUTH: ("#16191d", "#f4f4f2", "circle"),
 }
 # The shapes as SVG paths about the origin, as large as an 8 px mark of plotly.
@@ -65,7 +66,7 @@ PATHS = {
     "star": "M0,-5L1.3,-1.7L4.8,-1.5L2.1,0.7L2.9,4L0,2.2L-2.9,4L-2.1,0.7L-4.8,-1.5L-1.3,-1.7Z",
 }
 OTHERS = (
-    ("#6b5f00", "#d9c84a", "cross"), ("#5b6b7a", "#9fb0c0", "star"), ("#a3123a", "#ff7a93", "triangle-down"),
+    ("#5b6b7a", "#9fb0c0", "cross"), ("#a3123a", "#ff7a93", "triangle-down"),
     ("#5a3d9e", "#b7a1ff", "hexagon"), ("#3d6b1f", "#a4d67a", "pentagon"), ("#7a4a21", "#e0a878", "bowtie"),
 )  # fmt: skip
 DASHED = {"shipped": (6, 3), "lesson": (2, 3)}

