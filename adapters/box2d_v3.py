@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
-from adapters.engine import UNREAD, Hit, Unsupported
-from adapters.float32 import must_fit, rounding
+from adapters.engine import UNREAD, Hit
+from adapters.float32 import must_fit, must_not_be_cut, rounding
 from scenarios.model import Array, Scene, State
 
 SUBSTEPS = 4  # as the manual recommends; `step` has no default
@@ -124,8 +124,8 @@ class Box2DV3:
         position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2)
         velocity = np.array([tuple(b.linear_velocity) for b in bodies], float).reshape(n, 2)
         angular_velocity = np.array([b.angular_velocity for b in bodies], float)
-        if self.matched and np.abs(angular_velocity).max() > self.spin_cap * (1 - 1e-5):
-            raise Unsupported(f"a disk reaches a spin of {self.spin_cap:g} rad/s, where Box2D cuts it at this dt")
+        if self.matched:
+            must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
         return State(position, velocity, self._unwound(angular_velocity), angular_velocity)
 
     def _unwound(self, spin: Array) -> Array:

@@ -18,6 +18,12 @@ def must_fit(**quantities: Array) -> None:
             raise Unsupported(f"{name} {bad:g} does not fit into float32")
 
 
+def must_not_be_cut(what: str, values: Array, cap: float, unit: str) -> None:
+    """Raise `Unsupported` where the engine has cut `values` to its cap: a scene is played as it is or not at all."""
+    if np.abs(values).max() > cap * (1 - 1e-5):  # float32 leaves what was cut a little below the cap
+        raise Unsupported(f"a disk reaches a {what} of {cap:g} {unit}, where Box2D cuts it at this dt")
+
+
 def rounding(scene: Scene) -> float:
     """Largest change of a start position by rounding to float32, in m."""
     nearest: Array = scene.position.astype(np.float32).astype(np.float64)

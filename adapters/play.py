@@ -63,7 +63,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float) -> Run:
     hits: list[Hit] = []
     settings: dict[str, tuple[Any, Any]] = {}
     versions: dict[str, str] = {}
-    seconds = 0.0
+    seconds, farthest = 0.0, RUNAWAY * reach(scenario)
     status, reason = "ok", ""
     try:
         engine.load(scenario.scene, dt)
@@ -72,7 +72,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float) -> Run:
         for k in range(scenario.samples):
             seconds += advance(engine, scenario, k * substeps, substeps, dt)
             state = engine.read()
-            if fault := fault_of(state, RUNAWAY * reach(scenario)):
+            if fault := fault_of(state, farthest):
                 status, reason = "diverged", f"{fault} at {(k + 1) * scenario.sample_interval:g} s"
                 break
             states.append(state)

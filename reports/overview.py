@@ -110,10 +110,10 @@ def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: 
                 rows[name].append(Cell(f"{count} of {len(comparisons)}", failed=count > 0))
             continue
         pooled = {name: pool(metric, name, found) for name in names if name not in untrusted}
-        whole = [pooled[name][0] for name in pooled if not any(name in each for each in failed)]
-        best = min((value for value in whole if not np.isnan(value)), default=np.nan)
+        whole = {name: value for name, (value, _) in pooled.items() if not any(name in each for each in failed)}
+        best = min((value for value in whole.values() if not np.isnan(value)), default=np.nan)
         for name, (value, count) in pooled.items():
-            rows[name].append(Cell(number(value), f"in {count} scenarios", best=value == best and value in whole))
+            rows[name].append(Cell(number(value), f"in {count} scenarios", best=whole.get(name) == best))
     return rows
 
 

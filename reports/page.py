@@ -78,7 +78,7 @@ def write_page(
     names = overview.names_of(comparisons)
     common = overview.common_settings(comparisons)
     sections = [section_of(comparison, names, common) for comparison in comparisons]
-    scripts = [(HERE / script).read_text() for script in SCRIPTS]
+    plotly, scripts = get_plotlyjs(), [(HERE / script).read_text() for script in SCRIPTS]
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
@@ -91,7 +91,7 @@ def write_page(
         conformance=conformance_matrix(conformance), departures=departures(conformance), probes=records(conformance),
         known_answers=records(known_answers), known_answers_text=about.get("known_answers_text", MEANING),
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
-        library=deflated(get_plotlyjs()), policy=content_policy([get_plotlyjs(), *scripts]),
+        library=deflated(plotly), policy=content_policy([plotly, *scripts]),
         heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, truth_of=truth_of,
         common=by_name(common),
     )  # fmt: skip

@@ -15,7 +15,6 @@ from reports.archive import Archive
 from reports.cells import open_scene, scene_hash
 from reports.comparison import Comparison, compare
 from reports.findings import findings
-from reports.known_answers import MEANING
 from reports.page import write_page
 from scenarios.catalogue import SCENARIOS
 
@@ -72,7 +71,7 @@ def make_report(folder: Path, say: Callable[[str], None]) -> Report:
         untrusted=untrusted,
         conformance=pd.DataFrame([row for rows in asked for row in rows]),
         known_answers=pd.DataFrame(known),
-        about=header | {"seconds": footer[0]["seconds"] if footer else float("nan"), "known_answers_text": MEANING},
+        about=header | {"seconds": footer[0]["seconds"] if footer else float("nan")},
     )
     return Report(header, comparisons, deviations, runs, sentences, untrusted)
 

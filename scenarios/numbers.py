@@ -45,10 +45,6 @@ class Numbers:
     precise: Callable[[], AbstractContextManager[Any]]
     tie: Number
 
-    def zeroed(self, x: Number) -> Number:
-        """`x`, or an exact 0 where it cannot be told from it."""
-        return x if self.sign(x) else self.exact(0.0)
-
 
 def mpfr(bits: int) -> Numbers:
     """MPFR's correctly rounded numbers. Raises ImportError where gmpy2 is missing."""
