@@ -29,9 +29,9 @@ class Row:
 
 def _exercise() -> Engine:
     from adapters.reference import Reference
-    from reference_impl import exercise
+    from reference_impl import crowd
 
-    return Reference(exercise)
+    return Reference(crowd)
 
 
 def _lesson() -> Engine:

@@ -13,10 +13,11 @@ from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_
 from scenarios.model import Array, Scene, State
 
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
+INTEGRATORS = {"exercise": "symplectic Euler", "crowd": "symplectic Euler", "lesson": "explicit Euler"}
 
 
 class Reference:
-    """Plays one variant, `reference_impl.exercise` or `reference_impl.lesson`, or any module with their `advance`.
+    """Plays one variant of `reference_impl`, or any module with the `advance` of `exercise`.
 
     `options` are fields of `World` that the exercise leaves free: split, approaching_only.
     """
@@ -74,7 +75,7 @@ class Reference:
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """What the two variants leave free; the rest is the scene."""
         return {
-            "integrator": (None, "symplectic Euler" if "exercise" in self.variant.__name__ else "explicit Euler"),
+            "integrator": (None, INTEGRATORS.get(self.variant.__name__.split(".")[-1], "its own")),
             "projection split": (self.options.get("split"), SPLITS[self.world.split]),
             "approaching pairs only": (self.options.get("approaching_only"), self.world.approaching_only),
         }
