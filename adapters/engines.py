@@ -41,6 +41,13 @@ def _lesson() -> Engine:
     return Reference(lesson)
 
 
+def _ordered() -> Engine:
+    from adapters.reference import Reference
+    from reference_impl import ordered
+
+    return Reference(ordered)
+
+
 def _pymunk(profile: str) -> Engine:
     from adapters.pymunk import Pymunk
 
@@ -73,6 +80,9 @@ ENGINES: dict[str, Row] = {
     ),
     "reference:lesson": Row(
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
+    ),
+    "reference:ordered": Row(
+        _ordered, "hand-written: exact flight, hits in the order in which they happen within a step", 0.5, FLOAT64
     ),
     "pymunk:shipped": Row(
         partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64

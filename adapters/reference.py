@@ -13,7 +13,12 @@ from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_
 from scenarios.model import Array, Scene, State
 
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
-INTEGRATORS = {"exercise": "symplectic Euler", "crowd": "symplectic Euler", "lesson": "explicit Euler"}
+METHODS = {  # of the variants by their module
+    "exercise": {"integrator": "symplectic Euler"},
+    "crowd": {"integrator": "symplectic Euler"},
+    "lesson": {"integrator": "explicit Euler"},
+    "ordered": {"integrator": "parabolas", "hits": "in order, each where and when it happens", "projection": "none"},
+}
 
 
 class Reference:
@@ -73,9 +78,12 @@ class Reference:
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """What the two variants leave free; the rest is the scene."""
-        return {
-            "integrator": (None, INTEGRATORS.get(self.variant.__name__.split(".")[-1], "its own")),
+        """The variant's method, and what it leaves free; the rest is the scene."""
+        name = self.variant.__name__.split(".")[-1]
+        method = {setting: (None, value) for setting, value in METHODS.get(name, {}).items()}
+        if name == "ordered":
+            return method
+        return method | {
             "projection split": (self.options.get("split"), SPLITS[self.world.split]),
             "approaching pairs only": (self.options.get("approaching_only"), self.world.approaching_only),
         }

@@ -9,9 +9,9 @@ from pathlib import Path
 
 SCENE = """
 import sys, numpy as np
-from reference_impl import crowd, exercise, lesson
+from reference_impl import crowd, exercise, lesson, ordered
 from reference_impl.state import World, make_disks
-for solver, side, steps in ((exercise, 4, 600), (lesson, 4, 600), (crowd, 9, 200)):
+for solver, side, steps in ((exercise, 4, 600), (lesson, 4, 600), (ordered, 4, 600), (crowd, 9, 200)):
     grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2)
     n = np.arange(side**2)
     mass = np.where(n == 5, np.inf, 1 + n % 3)
