@@ -39,23 +39,21 @@ def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
 @njit(cache=True, error_model="numpy")
 def integrate(disks: Disks, world: World, dt: float) -> None:
     """Task 1, symplectic Euler: velocities from force and torque, then positions from the NEW velocities."""
-    x, v, g = disks.position, disks.velocity, world.gravity
+    x, v, g, force, torque = disks.position, disks.velocity, world.gravity, disks.force, disks.torque
     for i in range(len(disks.mass)):
         if disks.mass[i] == inf:
             continue
-        v[i, 0] += (g[0] + per(disks.force[i, 0], disks.mass[i])) * dt
-        v[i, 1] += (g[1] + per(disks.force[i, 1], disks.mass[i])) * dt
-        disks.angular_velocity[i] += per(disks.torque[i], disks.inertia[i]) * dt
+        if force[i, 0] == 0.0 and force[i, 1] == 0.0 and torque[i] == 0.0:  # as most are: spare the divisions
+            v[i, 0] += g[0] * dt
+            v[i, 1] += g[1] * dt
+        else:
+            v[i, 0] += (g[0] + force[i, 0] / disks.mass[i]) * dt
+            v[i, 1] += (g[1] + force[i, 1] / disks.mass[i]) * dt
+            disks.angular_velocity[i] += torque[i] / disks.inertia[i] * dt
 
         x[i, 0] += v[i, 0] * dt
         x[i, 1] += v[i, 1] * dt
         disks.angle[i] += disks.angular_velocity[i] * dt
-
-
-@njit(cache=True, error_model="numpy")
-def per(push: float, inertia: float) -> float:
-    """push / inertia. Most disks are not pushed, and to see that takes less time than to divide."""
-    return push / inertia if push != 0.0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")
