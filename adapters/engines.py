@@ -29,9 +29,9 @@ class Row:
 
 def _exercise() -> Engine:
     from adapters.reference import Reference
-    from reference_impl import exercise
+    from reference_impl import crowd
 
-    return Reference(exercise)
+    return Reference(crowd)
 
 
 def _lesson() -> Engine:
@@ -39,6 +39,13 @@ def _lesson() -> Engine:
     from reference_impl import lesson
 
     return Reference(lesson)
+
+
+def _ordered() -> Engine:
+    from adapters.reference import Reference
+    from reference_impl import ordered
+
+    return Reference(ordered)
 
 
 def _pymunk(profile: str) -> Engine:
@@ -73,6 +80,9 @@ ENGINES: dict[str, Row] = {
     ),
     "reference:lesson": Row(
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
+    ),
+    "reference:ordered": Row(
+        _ordered, "hand-written: exact flight, hits in the order in which they happen within a step", 0.5, FLOAT64
     ),
     "pymunk:shipped": Row(
         partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64
