@@ -9,13 +9,14 @@ from typing import Any
 
 import pandas as pd
 
-from adapters.engines import ENGINES
 from adapters.play import Run
-from reports.archive import Archive
-from reports.cells import open_scene, scene_hash
+from reports.archive import Archive, stored_scene
+from reports.cells import scene_hash
 from reports.comparison import Comparison, compare
 from reports.findings import findings
+from reports.journal import JOURNAL
 from reports.page import write_page
+from reports.scenes import open_scene
 from scenarios.catalogue import SCENARIOS
 
 
@@ -24,14 +25,14 @@ class Report:
     """What came out of a run.
 
     Attributes:
-        header: command, seed, machine and versions.
+        archive: what it was made from.
         comparisons: one a scenario, in reading order.
         deviations, runs: the two tables.
         findings: the sentences on top.
         untrusted: the players that broke the protocol: their rows are kept, but nothing is concluded from them.
     """
 
-    header: dict[str, Any]
+    archive: Archive
     comparisons: list[Comparison]
     deviations: pd.DataFrame
     runs: pd.DataFrame
@@ -41,10 +42,10 @@ class Report:
 
 def make_report(folder: Path, say: Callable[[str], None]) -> Report:
     """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what is being done."""
-    archive = Archive(folder)
-    header, records = archive.header(), archive.records()
+    archive = Archive.read(folder)
+    header, players = archive.header, archive.header["engines"]
     by_scene: dict[str, list[dict[str, Any]]] = {}
-    for record in records:
+    for record in sorted(archive.records, key=lambda record: (players.index(_name(record)), record["substeps"])):
         by_scene.setdefault(record["scene"], []).append(record)
     comparisons = []
     for scene in header["scenes"]:
@@ -53,15 +54,20 @@ def make_report(folder: Path, say: Callable[[str], None]) -> Report:
             comparisons.append(compare_scene(archive, scene, by_scene[scene]))
     say("writing tables and page")
     if not comparisons:
-        raise ValueError(f"{archive.journal}: no cell has ended yet, so there is nothing to report")
+        raise ValueError(f"{folder / JOURNAL}: no cell has ended yet, so there is nothing to report")
     deviations = pd.concat([comparison.table for comparison in comparisons], ignore_index=True)
     statuses = {(r.scenario, r.name, r.dt): (r.status, r.reason) for one in comparisons for r in one.runs}
-    runs = table_of_runs([record for records in by_scene.values() for record in records], header["scenes"], statuses)
+    runs = table_of_runs(
+        [record for scene in header["scenes"] for record in by_scene.get(scene, [])], archive, statuses
+    )
     deviations.to_csv(folder / "deviations.csv", index=False)
     runs.to_csv(folder / "runs.csv", index=False)
-    asked = sorted(archive.parts("conformance"), key=lambda rows: place_in_table(rows[0]))
-    known = sorted(archive.parts("known_answer"), key=lambda row: (row["column"], row["dt_s"]), reverse=True)
-    footer = archive.parts("footer")
+    asked = [archive.conformance[name]["conformance"] for name in players if name in archive.conformance]
+    known = sorted(
+        (line["known_answer"] for line in archive.known_answers),
+        key=lambda row: (row["column"], row["dt_s"], row["made_by"]),
+        reverse=True,
+    )
     untrusted = {f"{row['engine']}:{row['profile']}" for rows in asked for row in rows if row["verdict"] == "breaks"}
     sentences = findings(comparisons, untrusted)
     write_page(
@@ -71,20 +77,21 @@ def make_report(folder: Path, say: Callable[[str], None]) -> Report:
         untrusted=untrusted,
         conformance=pd.DataFrame([row for rows in asked for row in rows]),
         known_answers=pd.DataFrame(known),
-        about=header | {"seconds": footer[0]["seconds"] if footer else float("nan")},
+        about=header | {"seconds": archive.seconds},
     )
-    return Report(header, comparisons, deviations, runs, sentences, untrusted)
+    return Report(archive, comparisons, deviations, runs, sentences, untrusted)
 
 
 def compare_scene(archive: Archive, scene: str, records: list[dict[str, Any]]) -> Comparison:
-    """One scenario's comparison, its runs in the order of engines, coarse dt first."""
-    stored = archive.folder / "scenes" / f"{records[0]['scenario']}.toml"
+    """One scenario's comparison; its runs in the order of `records`."""
+    stored = stored_scene(archive.folder, records[0]["scenario"])
     scenario = open_scene(scene if scene in SCENARIOS else str(stored), records[0]["seed"])
     if {record["scene_hash"] for record in records} != {scene_hash(scenario)}:
-        raise ValueError(f"{scenario.name} is not the scene any more that was played; play it again")
+        raise ValueError(
+            f"{scenario.name} is not the scene any more that was played; crosscheck run --resume plays it again"
+        )
     ladder = tuple(sorted({record["substeps"] for record in records}))
-    ordered = sorted(records, key=lambda record: (place_in_table(record), record["substeps"]))
-    runs: list[Run] = [archive.run(record) for record in ordered]
+    runs: list[Run] = [archive.run(record) for record in records]
     return compare(replace(scenario, substeps=ladder), runs)
 
 
@@ -92,32 +99,25 @@ def _name(row: dict[str, Any]) -> str:
     return f"{row['engine']}:{row['profile']}"
 
 
-def place_in_table(row: dict[str, Any]) -> int:
-    """Where the engine of a row stands in `ENGINES`."""
-    name = _name(row)
-    if name not in ENGINES:
-        raise ValueError(f"{name} was played, but is no engine of this version")
-    return list(ENGINES).index(name)
-
-
 def table_of_runs(
-    records: list[dict[str, Any]], scenes: list[str], statuses: dict[tuple[str, str, float], tuple[str, str]]
+    records: list[dict[str, Any]], archive: Archive, statuses: dict[tuple[str, str, float], tuple[str, str]]
 ) -> pd.DataFrame:
     """A row a cell: what was played, how it ended, how long the engine took, with which settings and versions.
 
     `statuses`: (scenario, `engine:profile`, dt) -> (status, reason) as found now, e.g. of a file that is gone.
     """
-    columns = ["scenario", "engine", "profile", "dt_s", "seed", "status", "reason", "seconds", "cell"]
-    ordered = sorted(
-        records, key=lambda record: (scenes.index(record["scene"]), place_in_table(record), record["substeps"])
-    )
+    columns = [
+        "scenario", "engine", "profile", "dt_s", "seed", "status", "reason", "step", "until_s", "seconds", "cell",
+    ]  # fmt: skip
     rows = [
         {name: record[name] for name in columns}
         | dict(zip(("status", "reason"), statuses[record["scenario"], _name(record), record["dt_s"]]))
         | {
+            "until_s": float(record["until_s"]),
+            "seconds_alone": min(archive.timings.get(record["cell"], [float("nan")])),
             "settings": "; ".join(f"{name}={resolved}" for name, (_, resolved) in record["settings"].items()),
             "versions": "; ".join(f"{name} {version}" for name, version in record["versions"].items()),
         }
-        for record in ordered
+        for record in records
     ]
-    return pd.DataFrame(rows, columns=[*columns, "settings", "versions"])
+    return pd.DataFrame(rows, columns=[*columns, "seconds_alone", "settings", "versions"])
