@@ -13,7 +13,7 @@ import io
 from collections.abc import Hashable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from zipfile import BadZipFile
 
 import numpy as np
@@ -122,9 +122,9 @@ def packed(trajectory: Trajectory) -> bytes:
     return file.getvalue()
 
 
-def load_trajectory(path: Path) -> Trajectory:
+def load_trajectory(file: Path | BinaryIO) -> Trajectory:
     """What `packed` put into a file."""
-    with np.load(path) as saved:
+    with np.load(file) as saved:
         hits = Collisions(**{name: frozen(saved[key], saved[key].dtype) for name, key in HITS.items()})
         t, position, velocity, angle, angular_velocity = (frozen(saved[name]) for name in ("t", *STATE))
         return Trajectory(t, position, velocity, angle, angular_velocity, hits)

@@ -87,6 +87,29 @@ def report(out: Annotated[Path, typer.Argument(help="The folder of a run, finish
 
 
 @app.command()
+def replay(
+    cell: Annotated[str, typer.Argument(help="As in the column cell of runs.csv, or how it begins.")],
+    out: Annotated[Path, typer.Option(help="The folder of the run.")] = DEFAULT_OUT,
+    timeout: Timeout = 60.0,
+) -> None:
+    """Play one cell again, step by step: one that failed from its last good state, any other from the start."""
+    from reports import replay_command
+
+    replay_command.replay(cell, out, timeout)
+
+
+@app.command()
+def diff(
+    before: Annotated[Path, typer.Argument(metavar="OUT_A", help="The folder of a run.")],
+    after: Annotated[Path, typer.Argument(metavar="OUT_B", help="The folder of a later one.")],
+) -> None:
+    """What changed between two runs: statuses, numbers, timings; exit 1 if something got worse."""
+    from reports import diff_command
+
+    diff_command.show_difference(before, after)
+
+
+@app.command()
 def truth(
     scene: Annotated[str, typer.Argument(metavar="SCENARIO|FILE.toml")],
     events: Annotated[bool, typer.Option("--events", help="All hits, not only the first and last ten.")] = False,
