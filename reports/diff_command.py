@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from math import inf
 from pathlib import Path
 from typing import NoReturn
 
@@ -35,18 +36,9 @@ def show_difference(before: Path, after: Path) -> NoReturn:
 def by_engine(changed: Difference) -> Table:
     """A row an engine: statuses and numbers that changed, and how much longer it takes."""
     table = Table(box=None, padding=(0, 1, 0, 0), title="What changed", title_justify="left")
-    columns = (
-        "engine",
-        "status\nworse",
-        "\nbetter",
-        "numbers\nthe same",
-        "\nworse",
-        "\nbetter",
-        "\nother",
-        "time taken",
-    )
-    for column in columns:
-        table.add_column(column, justify="left" if column in ("engine", "time taken") else "right", no_wrap=True)
+    for column in ("engine", "status worse", "better", "numbers the same", "worse", "better", "other", "time taken"):
+        left = column in ("engine", "time taken")
+        table.add_column(column, justify="left" if left else "right", no_wrap=column == "engine")
     timings = {timing.engine: timing for timing in changed.timings}
     every = (*changed.same, *(change.engine for change in (*changed.statuses, *changed.numbers)), *timings)
     for engine in dict.fromkeys(every):
@@ -69,8 +61,10 @@ def said_of(timing: Timing | None) -> str:
     """The factor, its interval, and what it means."""
     if timing is None:
         return ""
-    verdict = "" if timing.verdict == "same" else f"  {timing.verdict}"
-    return f"× {timing.factor:.2f} ({timing.low:.2f} to {timing.high:.2f}, {timing.n} timings){verdict}"
+    if timing.high == inf:
+        return f"×{timing.factor:.2f} (of {timing.n}: too few)"
+    verdict = "" if timing.verdict == "same" else f" {timing.verdict}"
+    return f"×{timing.factor:.2f} ({timing.low:.2f}–{timing.high:.2f}){verdict}"
 
 
 def gravity(change: Change) -> tuple[bool, bool, float]:
