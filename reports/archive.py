@@ -4,6 +4,7 @@ journal.jsonl   a header, a line a cell as it ends, a footer; after a run was re
 trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to its last good state
 scenes/         copies of the scene files
 machine.json    machine, versions, command, seed
+compared/       the scenarios' shares of deviations.csv, so that a report made again does not measure again
 deviations.csv, runs.csv, report.html
 """
 
@@ -22,7 +23,7 @@ from adapters.play import Run
 from reports.journal import JOURNAL, lines_of
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
-FILES = (JOURNAL, "trajectories", "scenes", "machine.json", "deviations.csv", "runs.csv", "report.html")
+FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html")
 STATE = ("position", "velocity", "angle", "angular_velocity")
 HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
 
@@ -79,15 +80,15 @@ class Archive:
             folder, header, records, by_engine, known, timings, seconds if complete else float("nan"), complete
         )
 
-    def run(self, record: dict[str, Any]) -> Run:
-        """The run behind a line, its trajectory read back if it has one."""
+    def run(self, record: dict[str, Any], with_trajectory: bool = True) -> Run:
+        """The run behind a line, its trajectory read back if it has one and it is wanted."""
         path = trajectory_file(self.folder, record["cell"])
         status, reason, trajectory = record["status"], record["reason"], None
         try:
-            trajectory = load_trajectory(path) if path.exists() else None
+            trajectory = load_trajectory(path) if with_trajectory and path.exists() else None
         except (OSError, ValueError, KeyError, EOFError, BadZipFile) as fault:
             status, reason = "error", f"{path.name} cannot be read: {fault}"
-        if status == "ok" and trajectory is None:
+        if status == "ok" and with_trajectory and trajectory is None:
             status, reason = "error", f"{path.name} is missing"
         return Run(
             engine=record["engine"],

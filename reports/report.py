@@ -1,23 +1,18 @@
-"""Tables and page of a run, made from its journal; nothing is played."""
+"""Page and findings of a run, from its tables; nothing is played."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
-from adapters.play import Run
-from reports.archive import Archive, stored_scene
-from reports.cells import scene_hash
-from reports.comparison import Comparison, compare
+from reports.archive import Archive
+from reports.comparison import Comparison
 from reports.findings import findings
-from reports.journal import JOURNAL
 from reports.page import write_page
-from reports.scenes import open_scene
-from scenarios.catalogue import SCENARIOS
+from reports.tables import comparisons_of, make_tables
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +22,13 @@ class Report:
     Attributes:
         archive: what it was made from.
         comparisons: one a scenario, in reading order.
-        deviations, runs: the two tables.
+        runs: runs.csv.
         findings: the sentences on top.
         untrusted: the players that broke the protocol: their rows are kept, but nothing is concluded from them.
     """
 
     archive: Archive
     comparisons: list[Comparison]
-    deviations: pd.DataFrame
     runs: pd.DataFrame
     findings: list[str]
     untrusted: set[str]
@@ -44,24 +38,9 @@ def make_report(folder: Path, say: Callable[[str], None]) -> Report:
     """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what is being done."""
     archive = Archive.read(folder)
     header, players = archive.header, archive.header["engines"]
-    by_scene: dict[str, list[dict[str, Any]]] = {}
-    for record in sorted(archive.records, key=lambda record: (players.index(_name(record)), record["substeps"])):
-        by_scene.setdefault(record["scene"], []).append(record)
-    comparisons = []
-    for scene in header["scenes"]:
-        if scene in by_scene:
-            say(f"comparing {by_scene[scene][0]['scenario']}")
-            comparisons.append(compare_scene(archive, scene, by_scene[scene]))
-    say("writing tables and page")
-    if not comparisons:
-        raise ValueError(f"{folder / JOURNAL}: no cell has ended yet, so there is nothing to report")
-    deviations = pd.concat([comparison.table for comparison in comparisons], ignore_index=True)
-    statuses = {(r.scenario, r.name, r.dt): (r.status, r.reason) for one in comparisons for r in one.runs}
-    runs = table_of_runs(
-        [record for scene in header["scenes"] for record in by_scene.get(scene, [])], archive, statuses
-    )
-    deviations.to_csv(folder / "deviations.csv", index=False)
-    runs.to_csv(folder / "runs.csv", index=False)
+    tables = make_tables(archive, say)
+    say("writing the page")
+    comparisons = comparisons_of(archive, tables)
     asked = [archive.conformance[name]["conformance"] for name in players if name in archive.conformance]
     known = sorted(
         (line["known_answer"] for line in archive.known_answers),
@@ -79,45 +58,4 @@ def make_report(folder: Path, say: Callable[[str], None]) -> Report:
         known_answers=pd.DataFrame(known),
         about=header | {"seconds": archive.seconds},
     )
-    return Report(archive, comparisons, deviations, runs, sentences, untrusted)
-
-
-def compare_scene(archive: Archive, scene: str, records: list[dict[str, Any]]) -> Comparison:
-    """One scenario's comparison; its runs in the order of `records`."""
-    stored = stored_scene(archive.folder, records[0]["scenario"])
-    scenario = open_scene(scene if scene in SCENARIOS else str(stored), records[0]["seed"])
-    if {record["scene_hash"] for record in records} != {scene_hash(scenario)}:
-        raise ValueError(
-            f"{scenario.name} is not the scene any more that was played; crosscheck run --resume plays it again"
-        )
-    ladder = tuple(sorted({record["substeps"] for record in records}))
-    runs: list[Run] = [archive.run(record) for record in records]
-    return compare(replace(scenario, substeps=ladder), runs)
-
-
-def _name(row: dict[str, Any]) -> str:
-    return f"{row['engine']}:{row['profile']}"
-
-
-def table_of_runs(
-    records: list[dict[str, Any]], archive: Archive, statuses: dict[tuple[str, str, float], tuple[str, str]]
-) -> pd.DataFrame:
-    """A row a cell: what was played, how it ended, how long the engine took, with which settings and versions.
-
-    `statuses`: (scenario, `engine:profile`, dt) -> (status, reason) as found now, e.g. of a file that is gone.
-    """
-    columns = [
-        "scenario", "engine", "profile", "dt_s", "seed", "status", "reason", "step", "until_s", "seconds", "cell",
-    ]  # fmt: skip
-    rows = [
-        {name: record[name] for name in columns}
-        | dict(zip(("status", "reason"), statuses[record["scenario"], _name(record), record["dt_s"]]))
-        | {
-            "until_s": float(record["until_s"]),
-            "seconds_alone": min(archive.timings.get(record["cell"], [float("nan")])),
-            "settings": "; ".join(f"{name}={resolved}" for name, (_, resolved) in record["settings"].items()),
-            "versions": "; ".join(f"{name} {version}" for name, version in record["versions"].items()),
-        }
-        for record in records
-    ]
-    return pd.DataFrame(rows, columns=[*columns, "seconds_alone", "settings", "versions"])
+    return Report(archive, comparisons, tables.runs, sentences, untrusted)

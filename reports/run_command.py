@@ -14,7 +14,7 @@ from reports.commands import FAILED, INTERRUPTED, checked_engines, checked_scene
 from reports.folders import FolderTaken, open_again, open_new, part_of, replace_folder
 from reports.journal import JOURNAL, Journal
 from reports.report import make_report
-from reports.runner import NoScheduler
+from reports.runner import NoScheduler, cluster
 from reports.suite import Means, OtherVersions, Plan, carry_out
 from reports.terminal import Progress
 from scenarios.catalogue import SCENARIOS
@@ -54,10 +54,18 @@ def run_plan(
 
 
 def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means:
-    """The means that are asked for; exits 2 if no worker could start. `workers` 0: one a core; `memory` in MB."""
+    """The means that are asked for; exits 2 if no worker could start, or no scheduler answers.
+
+    `workers` 0: one a core; `memory` in MB, 0: the share of a worker.
+    """
     workers = workers or os.cpu_count() or 1
     if 0 < memory < LEAST_MEMORY:
         refuse([f"--memory {memory}: a worker takes {LEAST_MEMORY} MB before it has played anything; allowed is more"])
+    if scheduler:
+        try:
+            cluster(scheduler).close()
+        except NoScheduler as fault:
+            refuse([str(fault)])
     share = 0 if scheduler else os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // workers
     return Means(workers, timeout, memory * 1_000_000 or share, scheduler)
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import pickle
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
+import re
+from collections.abc import Callable, Collection, Generator, Hashable, Iterator, Mapping
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
 from typing import Any
 
 from reports.worker import ATTEMPTS, CREW, in_worker
@@ -24,7 +27,7 @@ def run_all(
     memory: int = 0,
     scheduler: str = "",
     alone: Collection[Hashable] = frozenset(),
-) -> Iterator[tuple[Any, Any | Failure]]:
+) -> Generator[tuple[Any, Any | Failure], None, None]:
     """Run picklable tasks, `workers` at once; yield (key, result or `Failure`) as each ends, every key once.
 
     A task may take `timeout` s and `memory` bytes (0: no limit); one that is in `alone` gets a process of its own.
@@ -34,16 +37,12 @@ def run_all(
     Raises:
         NoScheduler: nothing answers at `scheduler`, or not any more.
     """
-    executor = cluster(scheduler) if scheduler else threads(workers)
     left = dict(tasks)
-    try:
+    with executor_of(workers, scheduler) as executor:
         for attempt in range(ATTEMPTS):
             for key, result in run_once(executor, left, timeout, memory, alone, last=attempt == ATTEMPTS - 1):
                 del left[key]
                 yield key, result
-    finally:
-        CREW.dismiss()
-        executor.shutdown(wait=False)  # dask's Executor knows no cancel_futures: it cancels by itself
 
 
 def run_once(
@@ -53,7 +52,7 @@ def run_once(
     memory: int,
     alone: Collection[Hashable],
     last: bool,
-) -> Iterator[tuple[Any, Any | Failure]]:
+) -> Generator[tuple[Any, Any | Failure], None, None]:
     """As `run_all`; what was lost with the machine it ran on is left out, unless this is the last attempt."""
     futures: dict[Future, Any] = {
         executor.submit(in_worker, task, timeout, memory, key in alone): key for key, task in tasks.items()
@@ -70,22 +69,41 @@ def run_once(
         yield futures[future], pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
 
 
-def threads(workers: int) -> Executor:
-    """An `Executor` on this machine: threads, each with a worker process of its own."""
+@contextmanager
+def executor_of(workers: int, scheduler: str) -> Iterator[Executor]:
+    """Threads of this machine, each with a worker process of its own, or those of a cluster; left, all are stopped."""
+    if scheduler:
+        with cluster(scheduler) as client, client.get_executor(pure=False) as executor:
+            try:
+                yield executor
+            finally:
+                executor.shutdown(wait=False)  # which with dask cancels what is left
+        return
     CREW.dismissed = False
-    return ThreadPoolExecutor(workers)
+    executor = ThreadPoolExecutor(workers)
+    try:
+        yield executor
+    finally:
+        executor.shutdown(wait=False, cancel_futures=True)
+        CREW.dismiss()
 
 
-def cluster(scheduler: str) -> Executor:
-    """An `Executor` on the workers of a dask scheduler; raises `NoScheduler` naming what is missing."""
+def cluster(scheduler: str) -> Any:
+    """A client of a dask scheduler that has workers; raises `NoScheduler` naming what is missing."""
     try:
         from distributed import Client
     except ImportError as missing:
         raise NoScheduler(f"--scheduler needs {missing.name}: uv sync --extra cluster") from missing
+    if not re.fullmatch(r"(tcp|tls)://.+:\d+", scheduler):
+        raise NoScheduler(f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786")
+    for name in logging.root.manager.loggerDict:  # what matters is raised; each of distributed's has its own level
+        if name.startswith("distributed"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
-        client = Client(scheduler, timeout="10s", set_as_default=False)
+        client = Client(scheduler, timeout="5s", set_as_default=False)
     except (OSError, ValueError) as fault:
         raise NoScheduler(f"--scheduler {scheduler}: no scheduler answers there: {fault}") from fault
     if not client.scheduler_info()["workers"]:
-        raise NoScheduler(f"--scheduler {scheduler}: has no workers: dask worker {scheduler}")
-    return client.get_executor(pure=False)
+        client.close()
+        raise NoScheduler(f"--scheduler {scheduler}: has no workers; start some: dask worker {scheduler}")
+    return client

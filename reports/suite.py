@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
@@ -88,8 +89,10 @@ def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) ->
     ordered = {task: missing[task] for task in tasks if task in missing}
     alone = {task for task in ordered if isinstance(task, Cell) and plan.engines[task.engine].leaves_state}
     progress.start(len(ordered), len(tasks))
-    for task, result in run_all(ordered, means.workers, means.timeout, means.memory, means.scheduler, alone):
-        progress.done(*keep(journal, scenarios, means, task, result))
+    limits = means.timeout, means.memory
+    with closing(run_all(ordered, means.workers, *limits, means.scheduler, alone)) as results:
+        for task, result in results:
+            progress.done(*keep(journal, scenarios, means, task, result))
     take_timings(plan, means, journal, scenarios, progress)
     sweep(Archive.read(folder))
     journal.append({"footer": {"tasks": len(tasks), "played": len(ordered), "seconds": progress.seconds}})
@@ -219,10 +222,11 @@ def take_timings(
                     time_here, cell, plan.engines[name], replace(scenario, truth=None)
                 )
     progress.start(len(tasks), len(tasks), "taking timings, one after the other")
-    for (turn, key), seconds in run_all(tasks, 1, means.timeout, means.memory):
-        if not isinstance(seconds, Failure):
-            journal.append({"timing": key, "round": turn, "seconds": seconds})
-        progress.done(f"timings, round {turn + 1} of {plan.timings}")
+    with closing(run_all(tasks, 1, means.timeout, means.memory)) as results:
+        for (turn, key), seconds in results:
+            if not isinstance(seconds, Failure):
+                journal.append({"timing": key, "round": turn, "seconds": seconds})
+            progress.done(f"timings, round {turn + 1} of {plan.timings}")
 
 
 def sweep(archive: Archive) -> None:
