@@ -126,7 +126,7 @@ def judge() -> str:
 def read_chunk(path: Path) -> pd.DataFrame:
     """The table, bit for bit as it was written."""
     empty = {column: [""] for column in NUMBERS}
-    return pd.read_csv(path, keep_default_na=False, na_values=empty, float_precision="round_trip")
+    return pd.read_csv(path, keep_default_na=False, na_values=empty)
 
 
 def write_deviations(path: Path, chunks: Mapping[str, Path], damaged: Mapping[str, Comparison]) -> None:
