@@ -20,7 +20,15 @@ from reports.scenes import open_scene
 from scenarios.catalogue import SCENARIOS
 from scenarios.model import Scenario
 
-JUDGES = ("comparison", "metrics", "view", "laws", "collisions", "scales")  # files by which runs are compared
+JUDGES = (
+    "comparison",
+    "metrics",
+    "view",
+    "laws",
+    "collisions",
+    "violations",
+    "scales",
+)  # files by which runs are compared
 NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which nothing means NaN
 
 

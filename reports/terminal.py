@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from time import perf_counter
 from types import TracebackType
 
@@ -73,6 +74,8 @@ def print_summary(report: Report, page: str) -> None:
     for sentence in report.findings:
         console.print(sentence, highlight=False)
     console.print(statuses(report), highlight=False)
+    if failed := failures(report, Path(page).parent):
+        console.print(failed, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
 
 
@@ -83,3 +86,13 @@ def statuses(report: Report) -> str:
     if report.archive.complete:
         return f"All {len(report.runs)} cells have ended: {said}."
     return f"Not finished: {len(report.runs)} cells have ended so far: {said}."
+
+
+def failures(report: Report, out: Path) -> str:
+    """How to look into the first cell that failed; "" if none did."""
+    runs = report.runs[~report.runs.status.isin(["ok", "unsupported"])]
+    if runs.empty:
+        return ""
+    first = runs.iloc[0]
+    what = f"{first.scenario} on {first.engine}:{first.profile}"
+    return f"To look into one, e.g. {what}: crosscheck replay {first.cell} --out {out}"
