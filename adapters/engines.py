@@ -19,12 +19,15 @@ class Row:
         alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t is
             (alpha - 1/2) a dt t. A property of the order of updates, not an error of the adapter.
         rounding: the relative rounding of the numbers the engine keeps.
+        leaves_state: what it played before changes what it plays next, so that each cell needs a process of its own;
+            true of none below (a test plays each after others, bit for bit).
     """
 
     make: Callable[[], Engine]
     summary: str
     alpha: float
     rounding: float
+    leaves_state: bool = False
 
 
 def _exercise() -> Engine:

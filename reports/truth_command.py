@@ -9,9 +9,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from reports.archive import plain
-from reports.cells import open_scene
 from reports.commands import DONE, FAILED, checked_scenes, say
+from reports.journal import plain
+from reports.scenes import open_scene
 from reports.style import number
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
