@@ -43,7 +43,7 @@ DISK = np.dtype(
         ("ax", "f8"), ("ay", "f8"),  # acceleration; lying on a wall, only that along it
         ("pull_x", "f8"), ("pull_y", "f8"),  # acceleration of free flight
         ("ox", "f8"), ("oy", "f8"),  # where cell (0, 0) of its lap lies: the grid of an open scene repeats for ever
-        ("wall", "i4"),  # the wall it lies on, or -1
+        ("wall", "i4"),  # the wall it lies on; -1: none; -2 - wall: none since it slid off that one
         ("bounces", "i4"),  # hits in a row on the face of one wall
         ("", "f8"),
     ]
@@ -72,6 +72,7 @@ class Rules(NamedTuple):
     falling: bool  # something is pulled
     mixed: bool  # not everything alike
     wrapped: bool
+    crowd: float  # units in the last place of the time: who hits 64 times within so many has no single continuation
 
 
 class Walls(NamedTuple):

@@ -94,3 +94,5 @@ def jolt(walls: Walls, a: Any) -> None:
             lie_down(walls, a, a.wall)
         else:
             take_off(a)
+    elif a.wall < -1:
+        a.wall = -1

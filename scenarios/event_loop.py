@@ -34,7 +34,7 @@ from scenarios.model import Array
 DONE, GOES_ON, LOG_FULL, ACCUMULATION, REENTRY, ROUND_END = range(6)
 BASE, STOP = 0, 1  # columns of Arena.clock
 LOGGED, WHO, WHOM = 0, 1, 2  # and of Arena.told
-HITS, ULPS = 64, 1000.0  # so many hits of one disk within so many units in the last place of the time: accumulation
+HITS = 64  # so many of one disk within Rules.crowd: they accumulate
 EPOCH = 256.0  # s; the clock starts again after as many, so that its last place stays small
 
 
@@ -127,9 +127,11 @@ def hit_wall(arena: Arena, i: int, w: int, part: int) -> int:
     impulse, cosine = collide_wall(walls, a, w, part, arena.rules.restitution)
     jolt(walls, a)
     crowded = note(arena, a, i, -1 - w, impulse, cosine)
-    over = (crowded and a.bounces >= HITS) or abs(across(walls, a, w, a.vx, a.vy)) <= a.noise
+    over = a.bounces >= HITS if crowded else abs(across(walls, a, w, a.vx, a.vy)) <= a.noise
     if over and part == 0 and a.wall < 0 and arena.rules.mixed and across(walls, a, w, a.pull_x, a.pull_y) < 0.0:
         lie_down(walls, a, w)
+        if impulse == 0.0:  # a contact that begins to push without a hit
+            tell(arena, a.t, i, -1 - w, 0.0, 1.0)
         return GOES_ON
     return ACCUMULATION if crowded else GOES_ON
 
@@ -140,7 +142,7 @@ def leave(arena: Arena, i: int) -> int:
     a, w = arena.disks[i], int(arena.disks[i].wall)
     speed2, press = a.vx * a.vx + a.vy * a.vy, -across(arena.walls, a, w, a.pull_x, a.pull_y)
     take_off(a)
-    a.count += 1
+    a.wall, a.count = -2 - w, a.count + 1
     a.last, a.noise = -1 - w, ROUNDING * (abs(a.vx) + abs(a.vy))
     stop(arena, a.t, i, -1 - w)
     return GOES_ON if speed2 >= press * a.radius else ROUND_END
@@ -175,18 +177,24 @@ def change(a: Any) -> None:
 
 
 @inlined
+def tell(arena: Arena, now: float, i: int, j: int, impulse: float, cosine: float) -> None:
+    """Write a hit into the log."""
+    log, k = arena.log, arena.told[LOGGED]
+    log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = arena.clock[BASE] + now, i, j, impulse, cosine
+    arena.told[LOGGED] += 1
+
+
+@inlined
 def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) -> bool:
     """Count and log a hit; True if hits of disk `i` follow each other faster than float64 tells times apart."""
     a.count += 1
-    base, log, k = arena.clock[BASE], arena.log, arena.told[LOGGED]
     if impulse > 0.0:
-        log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = base + a.t, i, j, impulse, cosine
-        arena.told[LOGGED] += 1
+        tell(arena, a.t, i, j, impulse, cosine)
     a.mark_hits += 1
     if a.mark_hits < HITS:
         return False
     since, a.mark_hits, a.mark_time = a.t - a.mark_time, 0, a.t
-    if since > ULPS * np.spacing(base + a.t):
+    if since > arena.rules.crowd * np.spacing(arena.clock[BASE] + a.t):
         return False
     stop(arena, a.t - since, i, j)
     return True

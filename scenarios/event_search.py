@@ -58,7 +58,8 @@ def next_own(g: Grid, walls: Walls, wrapped: bool, a: Any) -> tuple[float, int]:
     for k in range(walls.first[c], walls.first[c + 1]):
         w = walls.of[k]
         for part in range(3):
-            t = inf if a.wall == w else wall_time(walls, a, w, part, best)
+            # Its own wall it does not meet; the face of one that it slid off it can only fall away from.
+            t = inf if a.wall == w or (a.wall == -2 - w and part == 0) else wall_time(walls, a, w, part, best)
             if t < best:
                 best, code = t, WALL + 3 * w + part
     if a.wall >= 0:
