@@ -1,9 +1,10 @@
-"""Gases of equal disks on a torus, and what the literature says of them."""
+"""Gases of equal disks on a torus, what the literature says of them, and how tests ask the event engine."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from scenarios.events import EventEngine
 from scenarios.model import Scene
 
 # B_k / B_2^(k-1) of hard disks, k = 1 .. 10 (Clisby & McCoy, J. Stat. Phys. 122, 15, 2006).
@@ -38,3 +39,15 @@ def gas(n: int, packing: float, seed: int = 0) -> tuple[Scene, np.ndarray]:
         position=np.stack([x, y], -1), velocity=velocity, radius=np.full(n, 0.5), mass=np.ones(n), restitution=1.0
     )
     return scene, np.array([[0.0, 0.0], [side, side]])
+
+
+def hits_of(engine):
+    """(t, i, j) of all hits, the lower disk first."""
+    return [(t, *((i, j) if j < 0 or i < j else (j, i))) for t, i, j in engine.hits[:, :3].tolist()]
+
+
+def state_after(scene, until, torus=None, cell=0.0):
+    """The engine, and position and velocity at `until` s."""
+    engine = EventEngine(scene, torus, cell)
+    engine.advance(until)
+    return engine, *engine.look(until)
