@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_event_brute_force import plain_kernels
 
+from scenarios import events
 from scenarios.closed_forms import bouncing
 from scenarios.events import EventEngine
 from scenarios.model import Scene
@@ -211,3 +213,29 @@ def test_nothing_comes_to_rest_at_restitution_one():
     assert len(engine.hits) == int((1790.0 / np.sqrt(2 / G) + 1) / 2)
     assert v[0, 1] ** 2 / 2 + G * (x[0, 1] - 0.5) == pytest.approx(G, rel=1e-12)
     assert (engine.arena.disks.wall == -1).all()
+
+
+def play_all():
+    """Some of the tests above."""
+    test_bounces_down_an_incline_end_in_a_slide()
+    test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(2.3, True)
+
+
+def test_rest_in_plain_python_is_the_same(monkeypatch):
+    """So what the next test catches is the bug."""
+    monkeypatch.setattr(events, "event_loop", plain_kernels())
+    play_all()
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("speed * uy, pull * ux, pull * uy", "speed * uy, a.pull_x, a.pull_y"),  # what lies still falls
+        ("if a.wall >= 0:\n        t = end_time", "if False:\n        t = end_time"),  # a wall without an end
+    ],
+)
+def test_a_planted_bug_in_rest_is_caught(right, wrong, monkeypatch):
+    """By the slide down an incline, or the flight over the wall's end."""
+    monkeypatch.setattr(events, "event_loop", plain_kernels(right, wrong))
+    with pytest.raises((AssertionError, NoTruth)):
+        play_all()
