@@ -1,9 +1,10 @@
-"""Gases of equal disks on a torus, and what the literature says of them."""
+"""Gases of equal disks on a torus, what the literature says of them, and how tests ask the event engine."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from scenarios.events import EventEngine
 from scenarios.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
 from scenarios.model import Scene
 from scenarios.placing import box, scatter
@@ -67,3 +68,15 @@ def boxed_asteroids(seed: int, restitution: float = 1.0, gravity: float = 0.0) -
         position=position, velocity=velocity, radius=radius, mass=np.append(SHIP_MASS, 30 * np.pi * radius[1:] ** 2),
         restitution=restitution, gravity=np.array([0.0, gravity]), walls=box(LOW, HIGH),
     )  # fmt: skip
+
+
+def hits_of(engine):
+    """(t, i, j) of all hits, the lower disk first."""
+    return [(t, *((i, j) if j < 0 or i < j else (j, i))) for t, i, j in engine.hits[:, :3].tolist()]
+
+
+def state_after(scene, until, torus=None, cell=0.0):
+    """The engine, and position and velocity at `until` s."""
+    engine = EventEngine(scene, torus, cell)
+    engine.advance(until)
+    return engine, *engine.look(until)
