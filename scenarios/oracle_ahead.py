@@ -8,7 +8,7 @@ import numpy as np
 
 from scenarios.numbers import Number
 from scenarios.oracle_bodies import STATIC, Bodies, rational
-from scenarios.oracle_contacts import crossing, falling_meeting, meeting
+from scenarios.oracle_contacts import Pressed, crossing, falling_meeting, meeting
 from scenarios.oracle_filter import soonest, touching
 from scenarios.oracle_ties import Contact, Touch
 
@@ -96,7 +96,12 @@ class Ahead:
         fall = self.k.exact(0.0) if bodies.pull[i] == STATIC else bodies.outward(contact, leg.ax, leg.ay)
         leans = contact in bodies.leaning[i] and leg.t is now
         gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.radius[i]
-        after = crossing(self.k, gap, bodies.outward(contact, u, v), fall)
+        try:
+            after = crossing(self.k, gap, bodies.outward(contact, u, v), fall)
+        except Pressed:
+            if self._above(contact.j, x, y, u, v):
+                raise
+            return None
         if after is None:
             return None
         x, y = x + (u + leg.ax * after / 2) * after, y + (v + leg.ay * after / 2) * after
@@ -104,8 +109,17 @@ class Ahead:
         beside = self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
         return None if beside else after
 
+    def _above(self, wall: int, x: Number, y: Number, u: Number, v: Number) -> bool:
+        """Whether a point (x, y) with velocity (u, v) is beside the wall and not about to leave over its ends."""
+        frame, foot = self.bodies.walls[wall], self.bodies.foot(wall, x, y)
+        heading = frame.tx * u + frame.ty * v
+        for left, leaving in ((foot, -heading), (frame.length - foot, heading)):
+            if (side := self.k.sign(left)) < 0 or (side == 0 and self.k.sign(leaving) > 0):
+                return False
+        return True
+
     def _time_to_end(self, contact: Contact, now: Number) -> Number | None:
-        """s until the point at which a disk rests on a wall comes to the wall's end, side 1, or start, side -1."""
+        """s until the point at which a disk rests on a wall comes to the wall's end (side 1) or start."""
         bodies, leg, wall = self.bodies, self.bodies.legs[contact.i], self.bodies.walls[contact.j]
         x, y, u, v = bodies.state_at(contact.i, now)
         foot, speed = bodies.foot(contact.j, x, y), wall.tx * u + wall.ty * v
@@ -136,7 +150,7 @@ class Ahead:
         return Touch(contact, contact.side * wall.ty, -contact.side * wall.tx)
 
     def alone(self, contact: Contact, now: float) -> bool:
-        """Whether the disks of a contact surely touch nothing else; what comes of more contacts hangs on all of them."""
+        """Whether the disks of a contact surely touch nothing else."""
         bodies, walls = self.bodies, self.scene.walls
         for i in contact.disks:
             count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, now, self.codes)

@@ -103,6 +103,11 @@ class Bodies:
         n = self.scene.n
         return contact.j if contact.j < n else -1 - self.owner[contact.j - n]
 
+    def pair(self, contact: Contact) -> tuple[int, int]:
+        """Both disks, the lower number first; or the disk and -1 - wall."""
+        i, j = contact.i, self.partner(contact)
+        return (i, j) if j < 0 or i < j else (j, i)
+
     def name(self, contact: Contact) -> str:
         """The other side of a contact, in words."""
         j = self.partner(contact)

@@ -55,7 +55,7 @@ class Motion:
         except Ends as end:
             self.path.end, self.path.reason = end.t, str(end)
             self.path.disks, self.path.outcomes = end.disks, end.outcomes
-            self.path.named = [[(b.contact.i, self.bodies.partner(b.contact)) for b in o.blows] for o in end.outcomes]
+            self.path.named = [[self.bodies.pair(blow.contact) for blow in one.blows] for one in end.outcomes]
         except Undecided:
             raise Undecided(float(self.now)) from None
         return self.path

@@ -107,7 +107,7 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         [k, i, *map(float, v)] for k, one in enumerate(path.outcomes) for i, v in one.velocities.items()
         if i < scenario.scene.n
     ]  # fmt: skip
-    orders = [[k, *path.named[k][hit]] for k in range(len(path.outcomes)) for hit in range(len(path.named[k]))]
+    orders = [[k, *pair] for k, hits in enumerate(path.named) for pair in hits]
     return TruthRecord(
         legs=frozen(legs),
         events=frozen(np.array(sorted(rows, key=lambda row: row[:3])).reshape(-1, 5)),

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from test_oracle import asked, states
 
+from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Scene, Thrust
-from scenarios.no_truth import NoTruth
+from scenarios.no_truth import NoTruth, truth_at
 from scenarios.numbers import mpfr
-from scenarios.oracle import computed
+from scenarios.oracle import computed, with_oracle
 from scenarios.oracle_record import TruthRecord
 from scenarios.oracle_ties import Contact, Matter, Touch
 from scenarios.placing import box, lay_out
@@ -188,3 +189,23 @@ def test_what_can_still_be_said_is_said():
     assert any("their kinetic energy" in said and "can only fall" in said for said in flat.remains)
     assert wedge.reason
     assert len(wedge.remains) == 1
+
+
+def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
+    """`truth_at` names the time, the horizon and the reason; `truth` gives what is known, be it nothing."""
+    for one, reason in (
+        (with_oracle(asked(BREAK, 4.0)), "(2 outcomes)"),
+        (scenario("disk_between_static_disks"), "the unstable orbit"),
+    ):
+        until = one.truth(one.times).valid_until
+        before, after = np.array([0.0, until * 0.99]), np.array([until * 1.01])
+
+        assert len(truth_at(one, before)) == 2
+        assert len(one.truth(after)) == 0
+        with pytest.raises(NoTruth, match=r"the truth of .* ends at its horizon at .* s") as refusal:
+            truth_at(one, np.append(before, after))
+        assert f"t = {after[0]:.9g} s" in str(refusal.value)
+        assert reason in str(refusal.value)
+        assert refusal.value.at == until
+    with pytest.raises(ValueError, match="is known up to 4 s"):
+        truth_at(with_oracle(asked(BREAK, 4.0)), np.array([5.0]))
