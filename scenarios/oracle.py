@@ -8,8 +8,8 @@ from math import ceil
 
 import numpy as np
 
-from scenarios.event_truth import float64_truth
-from scenarios.model import Array, Scenario, Thrust, Trajectory
+from scenarios.event_truth import float64_truth, perturbed
+from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
 from scenarios.numbers import Numbers, Undecided, balls, digits, has_balls
 from scenarios.oracle_bodies import Leg
@@ -19,6 +19,7 @@ from scenarios.oracle_record import TruthRecord, record_of
 from scenarios.truth_cache import keep, key_of, look_up
 
 FEWEST_BITS, MOST_BITS = 96, 8192
+ASTRAY, NEIGHBOURS = 1e-10, 2  # m, for so many starts near by: a tenth of what players are held to
 LEAST_GAIN = 1.3  # times as far must twice the bits reach, or more will not help
 SPARE = 1.15  # times as many bits as the rate so far asks for
 MOST_DISKS = 200
@@ -52,21 +53,47 @@ class OracleTruth:
         key = key_of(self.scenario, has_balls())
         found = look_up(key)
         if found is None:
-            found = vars(replace(computed(self.scenario), followed_until=followed_until(self.scenario)))
+            record = computed(self.scenario)
+            found = vars(replace(record, followed_until=followed_until(self.scenario, record)))
             keep(key, found)
         return TruthRecord(**found)
 
 
-def followed_until(scenario: Scenario) -> float:
-    """s, up to when float64 events from starts a unit in the last place apart stay together; inf: to the end.
+def followed_until(scenario: Scenario, record: TruthRecord) -> float:
+    """s, up to when motions from starts a unit in the last place apart stay together; inf: to the end.
 
-    Beyond it a distance between trajectories says nothing about a solver, only about chaos.
+    Beyond it a distance between trajectories says nothing about a solver, only about chaos. float64 events tell, or,
+    where these end by themselves (what rests is not for them), the oracle.
     """
     try:
         horizon, reason = float64_truth(scenario).horizon
     except NoTruth:  # no judge in float64: the truth stands by itself
         return np.inf
-    return horizon if reason.startswith("float64") else np.inf
+    if not reason:
+        return np.inf
+    return (
+        horizon
+        if reason.startswith("float64")
+        else min(
+            (parting(scenario, record, perturbed(scenario.scene, seed)) for seed in range(NEIGHBOURS)), default=np.inf
+        )
+    )
+
+
+def parting(scenario: Scenario, record: TruthRecord, scene: Scene) -> float:
+    """s, the last sample before the motion of a scene near by is astray from the record; inf: it is not."""
+    near, k = replace(scenario, scene=scene), digits(FEWEST_BITS)
+    try:
+        path = trace(scene, [push for push in scenario.thrusts if push.force.any()], scenario.duration, k)
+    except NoTruth:  # what touches may overlap when it is moved
+        return np.inf
+    ours = record.sampled(scenario.scene, scenario.thrusts, scenario.times)
+    theirs = record_of(near, path, 0.0, k.bits, "").sampled(scene, scenario.thrusts, scenario.times)
+    both = min(len(ours), len(theirs))
+    astray = np.abs(ours.position[:both] - theirs.position[:both]).max(axis=(1, 2)) > ASTRAY
+    if not astray.any():
+        return np.inf if both == len(ours) else float(theirs.t[-1])
+    return float(ours.t[max(int(astray.argmax()) - 1, 0)])
 
 
 def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:

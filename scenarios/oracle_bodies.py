@@ -16,6 +16,10 @@ STATIC, FALLING = 0, 1
 """Kinds of acceleration: none, gravity; each pushed disk is a kind of its own, from 2 on; below 0: slides on a wall."""
 
 
+STILL, STRAIGHT, CURVED = range(3)
+"""Shapes of legs."""
+
+
 class Hop(NamedTuple):
     """Bounces across a wall from the start of a leg on: normal (nx, ny), speed m/s, fall m/s2 towards the wall."""
 
@@ -60,6 +64,7 @@ class Bodies:
         legs: (b,) the leg each body is on.
         count: (b,) events each has had.
         table, radii: (b, 7) and (b,) the legs as float64, see `oracle_filter`, and m.
+        shape: (b,) whether each leg is a point, a straight line or a parabola.
         asleep: (b,) whose bounces die out untouched, so that nothing need be asked of them.
         held: (b,) the contacts each rests on: gap 0, no speed and no acceleration across it.
         parted: pairs that touched, and did not approach, when the two had had so many events.
@@ -87,6 +92,7 @@ class Bodies:
         self.radii = np.append(scene.radius, np.zeros(len(ends)))
         self.radius = [exact(r) for r in self.radii.tolist()]
         self.table = np.array([[float(x) for x in (*leg[1:7], leg.t)] for leg in self.legs])
+        self.shape = [shape_of(row) for row in self.table.tolist()]
         self.asleep = np.zeros(len(self.legs), bool)
         mass = [exact(m) if np.isfinite(m) else None for m in scene.mass.tolist()]
         inverse = [nought if m is None else exact(1.0) / m for m in mass] + [nought] * len(ends)
@@ -116,10 +122,10 @@ class Bodies:
     def state_at(self, i: int, now: Number) -> tuple[Number, Number, Number, Number]:
         """x, y m and vx, vy m/s of body i: x + v t + a t^2 / 2, v + a t."""
         leg = self.legs[i]
-        if leg.t is now or not self.table[i, 2:6].any():
+        if leg.t is now or self.shape[i] == STILL:
             return leg.x, leg.y, leg.vx, leg.vy
         s = now - leg.t
-        if not self.table[i, 4:6].any():
+        if self.shape[i] == STRAIGHT:
             return leg.x + leg.vx * s, leg.y + leg.vy * s, leg.vx, leg.vy
         ux, uy = leg.ax * s, leg.ay * s
         return leg.x + (leg.vx + ux / 2) * s, leg.y + (leg.vy + uy / 2) * s, leg.vx + ux, leg.vy + uy
@@ -167,7 +173,8 @@ class Bodies:
     def begin(self, i: int, leg: Leg) -> None:
         """Put body i on a new leg."""
         self.legs[i] = leg
-        self.table[i] = [float(x) for x in (*leg[1:7], leg.t)]
+        row = [float(x) for x in (*leg[1:7], leg.t)]
+        self.table[i], self.shape[i] = row, shape_of(row)
         self.count[i] += 1
         self.leaning[i] = set()
 
@@ -229,6 +236,13 @@ class Bodies:
             return False
         direction = self.scene.walls[other.j, 1], self.scene.walls[other.j, 0]
         return square_to(self.scene.walls[one.j], *direction)
+
+
+def shape_of(row: Sequence[float]) -> int:
+    """The shape of a leg given as float64 x, y, vx, vy, ax, ay, t."""
+    if row[4] or row[5]:
+        return CURVED
+    return STRAIGHT if row[2] or row[3] else STILL
 
 
 def rational(vector: Array) -> tuple[Fraction, Fraction]:

@@ -73,10 +73,13 @@ def untouched(ahead: Ahead, contact: Contact, leg: Leg, stop: float, thrusts: Se
     others = travel(bodies, states, left, thrusts)
     distance = np.hypot(states[:, 0] - x, states[:, 1] - y) - bodies.radii - bodies.radii[i]
     slack = FAR * (np.abs(states[:, :2]).max() + 1)
-    clear = distance - heights > (own + others) * SAFE + slack
+    needed = (own + others) * SAFE
+    clear = distance - heights > needed + slack
     clear[[i, *ahead.in_line[w]]] = True
-    for j in np.flatnonzero(~clear & ~bodies.asleep).tolist():  # too close for float64
-        clear[j] = apart(bodies, i, j, leg.t) > (own + others[j]) * SAFE
+    if (~clear & (bodies.asleep | (distance < needed - slack))).any():
+        return False
+    for j in np.flatnonzero(~clear).tolist():  # too close for float64
+        clear[j] = apart(bodies, i, j, leg.t) > needed[j]
     foot, length = (float(value) for value in (bodies.foot(w, leg.x, leg.y), bodies.walls[w].length))
     if not clear.all() or not own * SAFE + slack < min(foot, length - foot):
         return False
