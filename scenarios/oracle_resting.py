@@ -80,17 +80,35 @@ def untouched(ahead: Ahead, contact: Contact, leg: Leg, stop: float, thrusts: Se
         return False
     for j in np.flatnonzero(~clear).tolist():  # too close for float64
         clear[j] = apart(bodies, i, j, leg.t) > needed[j]
-    foot, length = (float(value) for value in (bodies.foot(w, leg.x, leg.y), bodies.walls[w].length))
-    if not clear.all() or not own * SAFE + slack < min(foot, length - foot):
+    room, in_line = stretch(ahead, contact, float(bodies.foot(w, leg.x, leg.y)))
+    if not clear.all() or not own * SAFE + slack < room:
         return False
     if scene.wrap is not None and (scene.n > 1 or not (np.abs(scene.wrap - [x, y]) > own * SAFE + slack).all()):
         return False
-    known = {w, *(c.j for c in bodies.held[i] if c.kind == "wall")}
+    known = in_line | {c.j for c in bodies.held[i] if c.kind == "wall"}
     walls = np.array([wall for k, wall in enumerate(scene.walls) if k not in known]).reshape(-1, 2, 2)
     span = walls[:, 1] - walls[:, 0]
     share = np.clip((([x, y] - walls[:, 0]) * span).sum(axis=1) / (span**2).sum(axis=1), 0, 1)
     away = np.hypot(*(walls[:, 0] + share[:, None] * span - [x, y]).T) - bodies.radii[i]
     return bool((away > own * SAFE + slack).all())
+
+
+def stretch(ahead: Ahead, contact: Contact, foot: float) -> tuple[float, set[int]]:
+    """How far a disk may slide either way, m, from `foot` m along its wall; and that wall with all in line with it."""
+    rooms, walls = [], {contact.j}
+    for side in (1, -1):
+        here: Contact | None = contact
+        room = foot if side < 0 else float(ahead.bodies.walls[contact.j].length) - foot
+        heading = side
+        while here is not None and (following := next_in_line(ahead, here, heading)) is not None:
+            if following.j in walls:
+                break
+            room += float(ahead.bodies.walls[following.j].length)
+            heading = heading if following.side == here.side else -heading
+            walls.add(following.j)
+            here = following
+        rooms.append(room)
+    return min(rooms), walls
 
 
 def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_oracle import asked, states
 
+from scenarios import oracle_ahead
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Scene, Thrust
 from scenarios.no_truth import NoTruth, truth_at
@@ -144,6 +145,14 @@ def test_a_cradle_that_loses_energy_has_many_outcomes(coming: int, outcomes: tup
 
     assert outcomes[0] <= len(ends(record)) <= outcomes[1]
     assert spread == pytest.approx({1: 3e-5, 2: 4e-3}[coming], rel=0.3)
+
+
+def test_taking_the_hits_of_a_chain_as_they_come_is_caught(monkeypatch: pytest.MonkeyPatch):
+    """The planted bug: each hit by itself. It ends in one of the eight, as if there were no others."""
+    one = asked(row([1.0, 0, 0, 0, 0], [1] * 5, 0.9, (1.0,)), 2.0)
+    assert len(ends(computed(one))) == 8
+    monkeypatch.setattr(oracle_ahead.Ahead, "alone", lambda *_: True)
+    assert computed(one).reason == ""
 
 
 @pytest.mark.parametrize("coming", [1, 2])

@@ -14,9 +14,10 @@ from test_scenarios import smallest_gap
 
 from scenarios import oracle_resting
 from scenarios.catalogue import scenario
+from scenarios.event_truth import float64_truth, perturbed
 from scenarios.model import Scene, Thrust
 from scenarios.numbers import has_balls, mpfr
-from scenarios.oracle import ACCURACY, computed
+from scenarios.oracle import ACCURACY, computed, followed_until, parting
 from scenarios.oracle_record import TruthRecord
 from scenarios.placing import lay_out
 
@@ -190,6 +191,55 @@ def test_a_resting_disk_slides_off_its_wall_or_on_to_the_next():
     np.testing.assert_allclose(truth.position[:, 0], np.stack([2 * t - 1, 0.25 - fallen], -1), rtol=0, atol=1e-14)
     slow = asked(replace(scene, velocity=[[1.5, 0]]), 1.5)
     assert "disk 0 turns about the end of wall 1, off which it slides at t = 1.33333333 s" in computed(slow).reason
+
+
+def test_a_floor_of_pieces_is_a_floor():
+    """Dropped onto the very seam, and drifting over seams, as on a floor of one piece."""
+    pieces = [[[x, 0], [x + 1, 0]] if x % 2 else [[x + 1, 0], [x, 0]] for x in range(-4, 4)]
+    for x, u in ((0.0, 0.0), (-1.25, 0.75)):
+        scene = lay_out(
+            position=[[x, 1.25]], velocity=[[u, 0]], radius=[0.25], mass=[1], gravity=[0, -9.81], restitution=0.5,
+            walls=FLOOR,
+        )  # fmt: skip
+        whole, apart = (asked(replace(scene, walls=walls), 2.0) for walls in (FLOOR, pieces))
+        expected, found = states(whole, computed(whole)), states(apart, computed(apart))
+
+        assert len(found) == len(whole.times)
+        np.testing.assert_allclose(found.position, expected.position, rtol=0, atol=1e-14)
+
+
+def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
+    """Held by two walls, or balanced straight above a disk that cannot move."""
+    wedge = lay_out(
+        position=[[0, 0.625]], velocity=[[0, 0]], radius=[0.5], mass=[1], gravity=[0, -9.81], restitution=0.5,
+        walls=[[[-4, 3], [0, 0]], [[0, 0], [4, 3]]],
+    )  # fmt: skip
+    balanced = lay_out(
+        position=[[0, 0], [0, 0.75], [0, 1.5]], velocity=np.zeros((3, 2)), radius=[0.5, 0.25, 0.5], mass=[np.inf, 1, 1],
+        gravity=[0, -9.81], restitution=0.5,
+    )  # fmt: skip
+    for scene in (wedge, balanced):
+        record = computed(asked(scene, 2.0))
+        assert (record.reason, len(rests(record))) == ("", 2)
+        assert (states(asked(scene, 2.0), record).position == scene.position).all()
+    aside = replace(balanced, position=[[0, 0], [0.03125, 0.75], [0, 3]])
+    # Beside the top it bounces down the round: rule Z1 is for lines.
+    assert "the hits of disk 1 on disk 0 accumulate" in computed(asked(aside, 0.1)).reason
+
+
+def test_players_are_held_to_a_settling_scene_only_while_float64_can_follow():
+    """The oracle's own estimate, where float64 events have one, too: within a few samples of theirs."""
+    one = lasting(boxed(1, 0.9, 10.0), 2.0)
+    record = computed(one, mpfr)
+    theirs, reason = float64_truth(one).horizon
+    ours = parting(one, record, perturbed(one.scene, 0))
+
+    assert reason.startswith("float64")
+    assert 1.0 < ours < 1.4
+    assert ours == pytest.approx(theirs, abs=0.2)
+    # What rests from the start is no business of float64 events; a ball that bounces to rest is followed to the end.
+    ball = scenario("bouncing_ball_e09")
+    assert followed_until(ball, computed(ball)) == np.inf
 
 
 def test_a_push_lifts_a_resting_disk_and_lets_it_fall():
