@@ -18,7 +18,7 @@ from scenarios.oracle_path import Path
 from scenarios.oracle_record import TruthRecord, record_of
 from scenarios.truth_cache import keep, key_of, look_up
 
-FEWEST_BITS, MOST_BITS = 96, 8192
+FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be told apart
 ASTRAY, NEIGHBOURS = 1e-10, 2  # m, for so many starts near by: a tenth of what players are held to
 LEAST_GAIN = 1.3  # times as far must twice the bits reach, or more will not help
 SPARE = 1.15  # times as many bits as the rate so far asks for
@@ -207,7 +207,7 @@ def difference(coarse: Path, fine: Path, until: float, k: Numbers) -> tuple[floa
                     parted = min(parted, t)
                     break
                 errors.append((t, error if t < end else 0.0))
-    return parted, max(error for t, error in errors if t < parted)
+    return parted, max((error for t, error in errors if t < parted), default=0.0)
 
 
 def _apart(one: Leg, other: Leg, left: float) -> float:

@@ -20,9 +20,9 @@ from scenarios.oracle_path import Ends, Event, Path, Recent, Record, ambiguous
 from scenarios.oracle_resting import lie_down, next_in_line, press, settle
 from scenarios.oracle_ties import Blow, Contact, Outcome, Touch
 
-MOST_HITS = 100_000
+MOST_HITS = 20_000
 MOST_IDLE = 100  # contacts on end without a hit: their signs contradict each other
-MOST_STEPS = 300_000  # hits, edges crossed, records made anew
+MOST_STEPS = 60_000  # hits, edges crossed, records made anew
 
 
 class Motion:

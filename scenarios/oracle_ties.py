@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from scenarios.numbers import Number, Numbers
@@ -66,6 +67,11 @@ class Matter:
     restitution: Number
     sticks: bool
 
+    @cached_property
+    def faint(self) -> Number:
+        """m2/s, what is slower is on its way to the tie."""
+        return self.numbers.sqrt(self.numbers.tie)
+
     def approach(self, touch: Touch, v: Mapping[int, Velocity]) -> Number:
         """dr.dv m2/s (m/s at a wall, where the direction has length 1); negative: the two approach."""
         (ux, uy), (px, py) = self._pair(touch, v)
@@ -114,6 +120,9 @@ class Matter:
             if len(blows) > LONGEST:
                 break
             closing = [touch for touch in touches if touch.contact not in still and sign(self.approach(touch, now)) < 0]
+            # Hits that die out towards the tie do not end: with more digits there would be more of them.
+            if blows and not self.numbers.proves and any(abs(self.approach(t, now)) < self.faint for t in closing):
+                break
             for touch in closing:
                 after, blow = self.hit(touch, now)
                 kept = {c for c in still if not c.disks & touch.contact.disks or upright(c, touch.contact)}
