@@ -20,8 +20,8 @@ from scenarios.truth_cache import keep, key_of, look_up
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be told apart
 ASTRAY, NEIGHBOURS = 1e-10, 2  # m, for so many starts near by: a tenth of what players are held to
-LEAST_GAIN = 1.3  # times as far must twice the bits reach, or more will not help
-SPARE = 1.15  # times as many bits as the rate so far asks for
+LEAST_GAIN = 1.05  # times as far must half as many bits again reach, or more will not help
+SPARE, LEFT = 1.3, 64  # times as many bits as the rate so far asks for, and so many to be left for the accuracy
 MOST_DISKS = 200
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 ACCURACY = 1e-12  # m; two precisions that differ by more have parted
@@ -143,7 +143,8 @@ def certified(scenario: Scenario, pushes: Sequence[Thrust]) -> TruthRecord | Non
         # Bits help against chaos, not where two things are equal.
         if reached <= before * LEAST_GAIN and before < until:
             return None
-        before, bits = reached, max(2 * bits, ceil(SPARE * bits * until / max(reached, until * bits / MOST_BITS)))
+        needed = LEFT + ceil(SPARE * bits * until / max(reached, until * bits / MOST_BITS))
+        before, bits = reached, max(bits + bits // 2, needed)
     return None
 
 

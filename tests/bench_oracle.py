@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import log
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from scenarios.oracle_record import TruthRecord
 from tests.exercise_box import boxed, lasting
 
 FIGURES = Path(__file__).parent / "oracle_figures.csv"
-REPEATS = 5
+REPEATS = 3
 FLOORS = {60.0: 0.2, 600.0: 3.0}  # s, for a certified answer of the box at e = 1
 FALLS = {0.5: range(4), 0.8: range(4), 0.9: range(2)}  # restitution and seeds
 FALL = 10.0  # s, of the falling boxes
@@ -50,12 +50,12 @@ def falling(restitution: float, seed: int) -> Scenario:
 
 
 def figures(name: str, one: Scenario, repeats: int) -> Row:
-    """One row: what the record says, and the best time of a few."""
+    """One row: what the record says, and the best time of a few, on the processor: others may use it, too."""
     best = np.inf
     for _ in range(repeats):
-        started = perf_counter()
+        started = process_time()
         record = computed(one)
-        best = min(best, perf_counter() - started)
+        best = min(best, process_time() - started)
     return {"scene": name, "duration_s": one.duration, **said(one, record), "seconds": round(best, 3)}
 
 
