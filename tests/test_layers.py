@@ -12,7 +12,7 @@ MAY_IMPORT = {
     "adapters": {"adapters", "scenarios", "reference_impl"},
     "reports": {"reports", "adapters", "scenarios"},
 }
-FILES = [path for folder in MAY_IMPORT for path in sorted((ROOT / folder).glob("*.py"))]
+FILES = [path for folder in MAY_IMPORT for path in sorted((ROOT / folder).rglob("*.py")) if "out" not in path.parts]
 
 
 def imports_of(path: Path) -> set[str]:
