@@ -81,6 +81,19 @@ def truth(
     show_truth(scene, seed, events, as_json)
 
 
+@app.command()
+def check(
+    path: Annotated[Path, typer.Argument(metavar="FILE|DIR", help="An Exercise.js, a solver.py, or a folder of them.")],
+    as_json: Annotated[bool, typer.Option("--json", help="For programs: all rows as JSON.")] = False,
+    junit: Annotated[Path | None, typer.Option(help="Write the rows as JUnit XML, too.")] = None,
+    page: Annotated[Path | None, typer.Option(help="Where the page goes.  [default: check.html]")] = None,
+) -> None:
+    """Check a hand-written solver of the exercise, and say what is wrong with it. The file is run as you."""
+    from reports.check.command import check as check_and_say
+
+    check_and_say(path, as_json, junit, page)
+
+
 @app.command(name="list")
 def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
     """Explain every engine, scenario and metric in a line."""

@@ -14,14 +14,13 @@ from rich.table import Table
 
 from adapters.engines import ENGINES
 from reports.cells import open_scene, with_steps
+from reports.exits import DONE, FAILED, INTERRUPTED, refuse, say
 from reports.metrics import METRICS
 from reports.report import Report, make_report
 from reports.suite import FolderTaken, Plan, carry_out, may_write, replace_folder
 from reports.terminal import Progress, print_summary
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 from scenarios.files import SceneFileError
-
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 def run_plan(
@@ -163,15 +162,3 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else "see: crosscheck list"
     return f"{kind} {name!r} is not known; {hint}"
-
-
-def refuse(faults: Sequence[str]) -> NoReturn:
-    """Say what is wrong, one line each, and exit 2."""
-    for fault in faults:
-        say(fault)
-    sys.exit(BAD_INPUT)
-
-
-def say(line: str) -> None:
-    """One line on standard error, as it is."""
-    print(line, file=sys.stderr)

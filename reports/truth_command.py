@@ -11,7 +11,8 @@ from rich.table import Table
 
 from reports.archive import plain
 from reports.cells import open_scene
-from reports.commands import DONE, FAILED, checked_scenes, say
+from reports.commands import checked_scenes
+from reports.exits import DONE, FAILED, say
 from reports.style import number
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth

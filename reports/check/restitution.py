@@ -43,6 +43,11 @@ class Restitution:
         free = 0 <= self.came <= 1 and not self.named
         return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
 
+    @property
+    def played(self) -> float | None:
+        """The value that whole scenes are judged by; None if no number from 0 to 1 makes sense."""
+        return next((e for e in (self.came, self.own) if 0 <= e <= 1), None)
+
     def row(self, mistake: str) -> Row:
         """0.9 is right, another number is a note if the file says so, and a fault if it says something else.
 

@@ -11,7 +11,6 @@ import numpy as np
 from adapters.solver_file import SolverFailed
 from adapters.solver_process import SolverProcess
 from adapters.student import spheres_of
-from reports.check.restitution import Restitution
 from reports.check.rows import TOLERANCE, Row, judged, near, not_asked, shown
 from scenarios.closed_forms import world_pushes
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
@@ -62,15 +61,12 @@ def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> Played:
     return Played(rows[..., 0:2], rows[..., 2:4], rows[..., 6], rows[..., 7], np.array(contacts, float).reshape(-1, 19))
 
 
-def scene_rows(process: SolverProcess, rows: Sequence[Row], restitution: Restitution | None) -> list[Row]:
-    """The rows on whole scenes, and the one on the first wrong hit in any of them."""
+def scene_rows(process: SolverProcess, rows: Sequence[Row], e: float | None) -> list[Row]:
+    """The rows on whole scenes with restitution `e`, and the one on the first wrong hit in any of them."""
     if not (process.functions["integrate"] and process.functions["collide"]):
         return [not_asked("scenes", "scenes", "a function is missing")]
     blamed = any(row.verdict == "fault" for row in rows)
-    e = float("nan") if restitution is None else restitution.came
-    if not 0 <= e <= 1:
-        e = restitution.own if restitution is not None else float("nan")
-    if not 0 <= e <= 1:
+    if e is None:
         return [not_asked("scenes", "scenes", "the collision function cannot be judged further")]
     found, wrong, dt = [], "", step_of(process)
     try:
@@ -164,9 +160,12 @@ def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
     free = vn >= 0 and near(came, 0.0)
     if not (near(apart, reach) or (vn >= 0 and near(apart, d))):
         return f"their centres are {shown(apart)} m apart after it, not {shown(reach)} m"
-    if not (free or near(came, change)):
-        return f"sphere {i} has {shown(a2[2:])} m/s after it, not {shown(a[2:] + change[0])} m/s"
-    return ""
+    if free or near(came, change):
+        return ""
+    k = 0 if not near(came[0], change[0]) else 1
+    return (
+        f"sphere {(i, j)[k]} has {shown(states[1, k, 2:])} m/s after it, not {shown(states[0, k, 2:] + change[k])} m/s"
+    )
 
 
 # question, s, then a row x, y, vx, vy (m, m/s) for every sphere, radii m, masses kg

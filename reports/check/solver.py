@@ -27,20 +27,24 @@ def check_solver(path: Path | str) -> list[Row]:
     Raises:
         NotASolver: the path is no JavaScript or Python text.
     """
-    path = Path(path)
-    read_solver(path)
+    return examine(Path(path))[0]
+
+
+def examine(path: Path) -> tuple[list[Row], float | None]:
+    """The rows of a file, and the restitution that its scenes are judged by; raises `NotASolver`."""
+    text = read_solver(path).text
     try:
         with SolverProcess(path) as process:
-            return rows_of(process, read_solver(path).text)
+            return rows_of(process, text)
     except SolverFailed as failure:
-        return [judged("loads", "file", LOADS, f"no: {failure}", "yes", False, str(failure))]
+        return [judged("loads", "file", LOADS, f"no: {failure}", "yes", False, str(failure))], None
 
 
 LOADS = "Can the file be loaded, and does it leave the language as it is?"
 
 
-def rows_of(process: SolverProcess, text: str) -> list[Row]:
-    """The rows of a file that is loaded; raises `SolverFailed` if its process is lost."""
+def rows_of(process: SolverProcess, text: str) -> tuple[list[Row], float | None]:
+    """The rows of a file that is loaded, and its restitution; raises `SolverFailed` if its process is lost."""
     if process.functions["begin"]:
         process.request([("begin", None, 2.0)])  # makes the globals that must not change; judged with the step
     asked = {k: q for k, q in QUESTIONS.items() if process.functions["integrate" if k in MOTION else "collide"]}
@@ -52,7 +56,8 @@ def rows_of(process: SolverProcess, text: str) -> list[Row]:
     rows += (
         loop_rows(process, faulty) if not stuck(answers) else [not_asked("step", "loop", "a call did not come back")]
     )
-    return rows + scene_rows(process, rows, restitution)
+    e = restitution.played if restitution is not None else None
+    return rows + scene_rows(process, rows, e), e
 
 
 MOTION = ("push", "push, other numbers", "coast", "push twice")
