@@ -18,7 +18,7 @@ from adapters.solver_file import SolverFailed, read_solver
 from scenarios.truth_cache import folder
 
 STARTING = 30.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
-GRACE = 10.0  # s beyond what the calls of a request may take
+GRACE = 4.0  # s beyond what the calls of a request may take
 Request = tuple[str, Any, float]
 """A command of the worker, its argument, and how long it may take, s."""
 
@@ -68,7 +68,7 @@ class SolverProcess:
     def request(self, requests: Sequence[Request]) -> list[Any | SolverFailed]:
         """The answer to each, or how it failed; raises `SolverFailed` if the process is lost."""
         # After one call that does not come back the worker puts no other like it, so a few limits are enough.
-        most = 3 * max((limit for _, _, limit in requests), default=0.0)
+        most = 2 * max((limit for _, _, limit in requests), default=0.0)
         answers = self.exchange(requests, most + GRACE)
         return [SolverFailed(**a["failed"]) if "failed" in a else a["done"] for a in answers]
 

@@ -31,14 +31,21 @@ class Student:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            self.process = SolverProcess(path, compiled=True)
-        except SolverFailed as failure:
-            raise Unsupported(f"{path.name} {failure}") from None
-        self.whole = self.process.surface == "advance"
+        self.started: SolverProcess | None = None
+
+    @property
+    def process(self) -> SolverProcess:
+        """The process, started when it is first needed; raises `Unsupported` if the file cannot be loaded."""
+        if self.started is None:
+            try:
+                self.started = SolverProcess(self.path, compiled=True)
+            except SolverFailed as failure:
+                raise Unsupported(f"{self.path.name} {failure}") from None
+        return self.started
 
     def load(self, scene: Scene, dt: float) -> None:
         """Make the scene's spheres; raises `Unsupported` for what the exercise has not."""
+        self.whole = self.process.surface == "advance"
         self.pushes = np.zeros((scene.n, 3))
         if self.whole:
             fields = {
@@ -101,7 +108,9 @@ class Student:
 
     def close(self) -> None:
         """End the process."""
-        self.process.close()
+        if self.started is not None:
+            self.started.close()
+            self.started = None
 
 
 def spheres_of(scene: Scene) -> list[list[float]]:

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.engines import ENGINES
+from adapters.engines import OWN, row_of
 from adapters.play import Run, play
 from scenarios.catalogue import scenario as from_catalogue
 from scenarios.file_tables import MOST_STEPS
 from scenarios.files import read_scene_file
 from scenarios.model import Scenario
 
-DECIDING = ("pymunk", "box2d-py", "pyb2d3", "numba", "numpy", "crosscheck2d")
+DECIDING = ("pymunk", "box2d-py", "pyb2d3", "mini-racer", "numba", "numpy", "crosscheck2d")
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Cell:
     Attributes:
         scene: a name of the catalogue, or the path of a scene file (ends in .toml).
         seed: what a drawn scene is drawn from.
-        engine: a key of `ENGINES`.
+        engine: a key of `ENGINES`, or a solver's file as `PATH:own`.
         substeps: steps in a sample interval.
     """
 
@@ -41,7 +41,7 @@ class Cell:
         """Play it here and now; the engine is closed again, whatever happens."""
         scenario = open_scene(self.scene, self.seed)
         try:
-            engine = ENGINES[self.engine].make()
+            engine = row_of(self.engine).make()
         except ImportError as missing:
             name, profile = self.engine.split(":")
             reason = f"{missing.name or missing} cannot be imported: {missing}"
@@ -53,7 +53,8 @@ class Cell:
 
     def key(self, scenario: Scenario) -> str:
         """16 hex digits of a hash over all that decides the numbers: scene, engine, dt, versions, our own source."""
-        deciding = (scene_hash(scenario), self.engine, self.substeps, versions(), source_hash())
+        own = Path(self.engine.removesuffix(OWN)).read_bytes() if self.engine.endswith(OWN) else b""
+        deciding = (scene_hash(scenario), self.engine, self.substeps, versions(), source_hash(), own)
         return hashlib.sha256(repr(deciding).encode()).hexdigest()[:16]
 
 

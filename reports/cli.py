@@ -21,7 +21,7 @@ DEFAULT_OUT = Path("reports/out/latest")
 
 Scenes = Annotated[list[str] | None, typer.Argument(metavar="[SCENARIO|FILE.toml]...", help="Default: all scenarios.")]
 Engines = Annotated[
-    list[str] | None, typer.Option("--engine", metavar="NAME[:PROFILE]", help="Only these; repeatable.")
+    list[str] | None, typer.Option("--engine", metavar="NAME[:PROFILE]|FILE", help="Only these; repeatable.")
 ]
 Dts = Annotated[
     list[float] | None, typer.Option("--dt", metavar="S", help="Step in s instead of each ladder; repeatable.")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, OWN
 from adapters.play import Run
 from reports.archive import Archive
 from reports.cells import open_scene, scene_hash
@@ -93,8 +93,10 @@ def _name(row: dict[str, Any]) -> str:
 
 
 def place_in_table(row: dict[str, Any]) -> int:
-    """Where the engine of a row stands in `ENGINES`."""
+    """Where the engine of a row stands in `ENGINES`; somebody's own solver after them."""
     name = _name(row)
+    if name.endswith(OWN):
+        return len(ENGINES)
     if name not in ENGINES:
         raise ValueError(f"{name} was played, but is no engine of this version")
     return list(ENGINES).index(name)

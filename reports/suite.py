@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.conformance import conform, no_answer
-from adapters.engines import ENGINES
+from adapters.engines import row_of
 from adapters.play import Run
 from reports.archive import FILES, Archive, save_trajectory
 from reports.cells import Cell, open_scene, with_steps
@@ -29,7 +29,7 @@ class Plan:
 
     Attributes:
         scenes: names of the catalogue or paths of scene files, in reading order.
-        engines: keys of `ENGINES`, in reading order.
+        engines: keys of `ENGINES`, or solvers' files as `PATH:own`, in reading order.
         seed: what drawn scenes are drawn from.
         dts: step sizes in s instead of each scenario's own; empty: its own.
         full: two finer steps for every scenario.
@@ -67,7 +67,7 @@ def carry_out(plan: Plan, folder: Path, progress: Progress) -> None:
 
 def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario], folder: Path) -> dict[Any, Callable[[], Any]]:
     """What is to be done, by what it is: an engine's name (its probes), a `KnownAnswer`, or a `Cell`."""
-    tasks: dict[Any, Callable[[], Any]] = {engine: partial(conform, engine, ENGINES[engine]) for engine in plan.engines}
+    tasks: dict[Any, Callable[[], Any]] = {engine: partial(conform, engine, row_of(engine)) for engine in plan.engines}
     if KNOWN_SCENE in plan.scenes:
         tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
     for scene, scenario in scenarios.items():

@@ -21,6 +21,7 @@ from scenarios.model import Scenario, Trajectory
 
 HERE = Path(__file__).parent
 GENERATOR = "crosscheck check"
+YOURS = style.Look("#a3123a", "#ff7a93", (), "diamond", True)  # apart from the truth in any light, by style.py
 SCRIPTS = (REPORTS / "player.js", REPORTS / "player_canvas.js", HERE / "check.js")
 
 
@@ -34,7 +35,7 @@ def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
     environment.filters["number"] = style.number
     layers = layers_of(check.path.name, smallest)
     names = [style.TRUTH if run is None else run.name for run, _ in layers]
-    looks = {name: style.look(*name.split(":", 1)) for name in names}
+    looks = {name: style.look(name) if name == style.TRUTH else YOURS for name in names}
     scripts = [script.read_text(encoding="utf-8") for script in SCRIPTS]
     html = environment.get_template("check.html.j2").render(
         name=check.path.name, check=check, tasks=TASKS, smallest=smallest, layers=names, looks=looks,

@@ -34,10 +34,17 @@ def examine(path: Path) -> tuple[list[Row], float | None]:
     """The rows of a file, and the restitution that its scenes are judged by; raises `NotASolver`."""
     text = read_solver(path).text
     try:
-        with SolverProcess(path) as process:
-            return rows_of(process, text)
+        process = SolverProcess(path)
     except SolverFailed as failure:
         return [judged("loads", "file", LOADS, f"no: {failure}", "yes", False, str(failure))], None
+    try:
+        with process:
+            return rows_of(process, text)
+    except SolverFailed as failure:
+        lost = judged(
+            "answers", "file", "Does it answer when its functions are called?", "no", "yes", False, str(failure)
+        )
+        return [loads(process), lost], None
 
 
 LOADS = "Can the file be loaded, and does it leave the language as it is?"

@@ -43,10 +43,11 @@ def print_file(one: FileCheck) -> None:
 def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
     """A row a file: a verdict for every task and the sentence to begin with."""
     console = Console()
-    table = Table("file", *TASKS, "first of all", box=None, padding=(0, 1, 0, 0))
+    table = Table("solver", *TASKS, "first of all", box=None, padding=(0, 1, 0, 0))
+    table.columns[0].no_wrap = True
     for one in checks:
         words = [f"[{STYLE[word]}]{SHORT[word]}" for word in one.tasks.values()]
-        first = "" if one.passed else one.sentences[0]
+        first = one.refused or next((row.cause for row in one.faults), "")
         table.add_row(escape(str(one.path.relative_to(folder))), *words, escape(first))
     console.print(table)
     right = sum(one.passed for one in checks)

@@ -59,7 +59,7 @@ class FileCheck:
 
 def sentence(row: Row) -> str:
     """Where, what is likely wrong, and the numbers that say so."""
-    numbers = "" if row.name in ("implemented", "loads") else f" Came: {row.got}. Expected: {row.expected}."
+    numbers = "" if row.name in ("implemented", "loads", "answers") else f" Came: {row.got}. Expected: {row.expected}."
     return f"Task {TASKS[row.task]}, {row.name}: {row.cause}.{numbers}" if row.task[0] in "12" else (
         f"{TASKS[row.task].capitalize()}, {row.name}: {row.cause}.{numbers}")  # fmt: skip
 
