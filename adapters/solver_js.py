@@ -12,7 +12,7 @@ from py_mini_racer import JSEvalException, JSOOMException, JSParseException, JST
 
 from adapters.solver_file import SolverFailed, SolverText
 
-HEAP = 256 * 2**20  # bytes; a solver needs a thousandth of it
+HEAP = 64 * 2**20  # bytes; a solver needs a hundredth of it
 LOAD_LIMIT = 2.0  # s
 NAME = "solver-file"  # how the solver's text is called in stack traces
 DRIVER = (Path(__file__).parent / "solver_driver.js").read_text(encoding="utf-8")

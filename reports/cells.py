@@ -118,5 +118,5 @@ def versions() -> dict[str, str]:
 def source_hash() -> str:
     """A hash over the players' source, so that a changed adapter is a changed cell."""
     root = Path(__file__).parent.parent
-    files = sorted(path for folder in ("adapters", "reference_impl") for path in (root / folder).glob("*.py"))
+    files = sorted(path for folder in ("adapters", "reference_impl") for path in (root / folder).glob("*.[pj][ys]"))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
