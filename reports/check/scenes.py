@@ -88,6 +88,11 @@ def scene_row(scenario: Scenario, record: TruthRecord | None, played: Played, dt
     allowed = bounds(scenario, record, truth.t, dt)[:, None] + TOLERANCE
     ratio = np.where(np.isfinite(away), away, np.inf) / allowed
     at, disk = np.unravel_index(int(ratio.argmax()), ratio.shape)
+    turned = np.abs(played.angle[:k] - truth.angle)
+    if not (turned <= turning_bounds(scenario, truth.t, dt)[:, None] + TOLERANCE).all():
+        got = f"a sphere is turned by {shown(turned.max())} rad too much or too little"
+        expected = f"at most {shown(turning_bounds(scenario, truth.t, dt)[-1])} rad, by dt = {shown(dt)} s"
+        return judged(scenario.name, "scenes", scenario.asks, got, expected, False, cause)
     got = f"sphere {disk} is {shown(away[at, disk])} m away at {shown(truth.t[at])} s"
     expected = f"at most {shown(allowed[at, 0])} m, by dt = {shown(dt)} s"
     return judged(scenario.name, "scenes", scenario.asks, got, expected, bool(ratio.max() <= 1), cause)
@@ -100,12 +105,19 @@ def truth_of(scenario: Scenario, record: TruthRecord | None) -> Trajectory:
     return record.sampled(scenario.scene, scenario.thrusts, scenario.times)
 
 
+def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
+    """(k,) rad, how far an angle may be off: symplectic Euler is w' dt t / 2 ahead, and a hit turns nothing."""
+    spin_up = max((abs(p.torque) / scenario.scene.inertia[p.disk] for p in scenario.thrusts), default=0.0)
+    return 1.001 * spin_up * dt * t / 2
+
+
 def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) -> Array:
     """(k,) m, how far a right solver in steps of `dt` s may be off at the times t (k,) s.
 
     Free flight under a push: symplectic Euler is a dt t / 2 ahead. A hit is found up to dt late, so that each disk
     goes on for u dt; its normal is turned by that and by what the disks were off before, over (rA + rB) cos, which
-    sends them off by as much of their change of velocity. Errors add up and grow with time.
+    sends them off by as much of their change of velocity. Errors add up and grow with time, so that
+    after several hits it is generous: there the row on the first wrong hit is the one that sees.
     """
     scene = scenario.scene
     push = max((float(np.hypot(*p.force)) / scene.mass[p.disk] for p in scenario.thrusts), default=0.0)

@@ -47,7 +47,7 @@ def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
     table.columns[0].no_wrap = True
     for one in checks:
         words = [f"[{STYLE[word]}]{SHORT[word]}" for word in one.tasks.values()]
-        first = one.refused or next((row.cause for row in one.faults), "")
+        first = one.refused or next((f"{row.name}: {row.cause}" for row in one.faults), "")
         table.add_row(escape(str(one.path.relative_to(folder))), *words, escape(first))
     console.print(table)
     right = sum(one.passed for one in checks)
