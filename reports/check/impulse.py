@@ -9,7 +9,7 @@ import numpy as np
 from reports.check.impacts import IMPULSES, PARTING, UPDATES, Finding, Hit, changes, hit_of, tangent
 from reports.check.questions import HITS, QUESTIONS, Answer
 from reports.check.restitution import Restitution
-from reports.check.rows import TASKS, Row, judged, near, not_asked, shown
+from reports.check.rows import Row, judged, near, not_asked, shown
 from scenarios.model import Array
 
 
@@ -37,17 +37,18 @@ def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Fi
                f"{shown(-(1 - e * e) / 2 * hit.mu * hit.vn**2)} J", bool(lost <= 1e-9), mistake),
         replace(restitution.row(mistake), task=spoilt if not near(restitution.came, e) else "2c"),
         restitution.speeds(), separating(answers, found, e),
-        judged("momentum", "2d", "How much momentum does the hit add?", f"{shown(gained)} kg m/s", "(0, 0) kg m/s",
-               near(gained, 0.0), update or impulse),
         judged("velocity of A", "2d", "What velocity has A after the hit, by the impulse that acts?",
                f"{shown(after[0].v)} m/s", f"{shown(hit.va + acts / hit.ma)} m/s",
                right_update(found) or near(came[0], acts / hit.ma), update or impulse),
         judged("velocity of B", "2d", "What velocity has B after the hit, by the impulse that acts?",
                f"{shown(after[1].v)} m/s", f"{shown(hit.vb - acts / hit.mb)} m/s",
                right_update(found) or near(came[1], -acts / hit.mb), update or impulse),
+        judged("momentum", "2d", "How much momentum does the hit add?", f"{shown(gained)} kg m/s", "(0, 0) kg m/s",
+               near(gained, 0.0), update or impulse),
         symmetry(answers, mistake), bystanders(answers),
     ]  # fmt: skip
-    return sorted(rows, key=lambda row: list(TASKS).index(row.task))
+    # The velocities say more of a mistake in (d) than the energy and the restitution that it spoils.
+    return sorted(rows, key=lambda row: (row.task, row.task == "2d" and row.name in ("energy", "restitution")))
 
 
 def right_update(found: Finding | None) -> bool:

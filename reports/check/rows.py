@@ -102,5 +102,5 @@ def shown(value: object) -> str:
 def worst(rows: Iterable[Row]) -> Verdict:
     """The verdict of a group of rows: its worst."""
     found = {row.verdict for row in rows}
-    order: tuple[Verdict, ...] = ("fault", "right", "note", "not asked")
+    order: tuple[Verdict, ...] = ("fault", "not asked", "right", "note")
     return next((verdict for verdict in order if verdict in found), "not asked")
