@@ -14,7 +14,7 @@ from typing import Any
 
 from adapters.solver_file import SolverFailed, SolverText
 
-LOAD_LIMIT = 15.0  # s; importing numba takes one or two
+LOAD_LIMIT = 4.0  # s; importing numba takes one
 LOGGED = 400  # contacts that are kept for the judge
 
 

@@ -70,6 +70,7 @@ LOADING = {
     "syntax_crlf.js": ("\ufeffvar a = 1;\r\nlet b = ;\r\n", "SyntaxError: Unexpected token ';' (line 2, column 9)"),
     "unclosed.js": (JS[:-3], "SyntaxError"),
     "throws.js": (JS + "\n  nothing.x = 1;\n", "ReferenceError: nothing is not defined (line 93, column 3)"),
+    "endless_load.py": ("while True: pass\n" + PY, "does not come back within 4 s while it is loaded"),
     "memory_load.js": ("var all = []; for (;;) all.push(new Array(1e6).fill(1));", "memory"),
     "buffer_load.js": ("var all = new Uint8Array(1e10).fill(1);", "memory"),
     "syntax.py": ("a = 1\ndef f(:\n    pass\n", "SyntaxError: invalid syntax (line 2, column 7)"),
