@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 from adapters.engine import Engine
 
@@ -112,3 +113,19 @@ ENGINES: dict[str, Row] = {
         _event_driven, "from hit to hit without steps: parabolas and contact times, in float64", 0.5, FLOAT64
     ),
 }  # fmt: skip
+
+OWN = ":own"  # the profile of a solver's file, whose path is its engine
+
+
+def row_of(name: str) -> Row:
+    """The row of an engine: of `ENGINES`, or of a solver's file as `PATH:own`.
+
+    Raises:
+        KeyError: it is neither.
+        NotASolver: the file cannot be one.
+    """
+    if name in ENGINES or not name.endswith(OWN):
+        return ENGINES[name]
+    from adapters.student import engine_file
+
+    return engine_file(Path(name.removesuffix(OWN)))

@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
+from adapters.engines import OWN
 from scenarios.model import Scenario
 
 PLAYERS = (
-    "adapters/*.py", "reference_impl/*.py",
+    "adapters/*.[pj][ys]", "reference_impl/*.py",
     "scenarios/event*.py", "scenarios/contact_times.py", "scenarios/compiled.py",  # the event-driven player
 )  # fmt: skip
-DECIDING = ("pymunk", "box2d-py", "pyb2d3", "numba", "numpy", "crosscheck2d")
+DECIDING = ("pymunk", "box2d-py", "pyb2d3", "mini-racer", "numba", "numpy", "crosscheck2d")
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Cell:
     Attributes:
         scene: a name of the catalogue, or the path of a scene file (ends in .toml).
         seed: what a drawn scene is drawn from.
-        engine: `engine:profile`.
+        engine: `engine:profile`, or a solver's file as `PATH:own`.
         substeps: steps in a sample interval.
     """
 
@@ -48,8 +49,9 @@ class Cell:
 
 
 def content_key(*what: Hashable) -> str:
-    """16 hex digits of a hash over what decides a result: `what`, the versions, the players' source."""
-    return hashlib.sha256(repr((*what, versions(), source_hash())).encode()).hexdigest()[:16]
+    """16 hex digits of a hash over what decides a result: `what`, the versions, the players' source, own files."""
+    own = [Path(name.removesuffix(OWN)).read_bytes() for name in what if isinstance(name, str) and name.endswith(OWN)]
+    return hashlib.sha256(repr((*what, own, versions(), source_hash())).encode()).hexdigest()[:16]
 
 
 def scene_hash(scenario: Scenario) -> str:

@@ -21,7 +21,7 @@ DEFAULT_OUT = Path("reports/out/latest")
 
 Scenes = Annotated[list[str] | None, typer.Argument(metavar="[SCENARIO|FILE.toml]...", help="Default: all scenarios.")]
 Engines = Annotated[
-    list[str] | None, typer.Option("--engine", metavar="NAME[:PROFILE]", help="Only these; repeatable.")
+    list[str] | None, typer.Option("--engine", metavar="NAME[:PROFILE]|FILE", help="Only these; repeatable.")
 ]
 Dts = Annotated[
     list[float] | None, typer.Option("--dt", metavar="S", help="Step in s instead of each ladder; repeatable.")
@@ -120,6 +120,19 @@ def truth(
     from reports.truth_command import show_truth
 
     show_truth(scene, seed, events, as_json)
+
+
+@app.command()
+def check(
+    path: Annotated[Path, typer.Argument(metavar="FILE|DIR", help="An Exercise.js, a solver.py, or a folder of them.")],
+    as_json: Annotated[bool, typer.Option("--json", help="For programs: all rows as JSON.")] = False,
+    junit: Annotated[Path | None, typer.Option(help="Write the rows as JUnit XML, too.")] = None,
+    page: Annotated[Path | None, typer.Option(help="Where the page goes.  [default: check.html]")] = None,
+) -> None:
+    """Check a hand-written solver of the exercise, and say what is wrong with it. The file is run as you."""
+    from reports.check.command import check as check_and_say
+
+    check_and_say(path, as_json, junit, page)
 
 
 @app.command(name="list")

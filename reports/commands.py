@@ -11,7 +11,10 @@ from typing import NoReturn
 from rich.console import Console
 from rich.table import Table
 
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, OWN
+from adapters.solver_file import KINDS, NotASolver
+from adapters.student import engine_file
+from reports.exits import DONE, FAILED, refuse, say
 from reports.folders import FolderTaken, found
 from reports.metrics import METRICS
 from reports.report import Report, make_report
@@ -19,8 +22,6 @@ from reports.scenes import open_scene, with_steps
 from reports.terminal import Progress, print_summary
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 from scenarios.files import SceneFileError
-
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 def finish(report: Report, out: Path) -> NoReturn:
@@ -96,16 +97,31 @@ def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed
 
 
 def checked_engines(asked: Sequence[str]) -> list[str]:
-    """The rows of `ENGINES` that NAME or NAME:PROFILE stand for, in their order; all if nothing is asked."""
-    chosen, faults = set(), []
+    """The rows that NAME, NAME:PROFILE or a solver's FILE stand for, files last; all of `ENGINES` if none is asked."""
+    chosen, own, faults = set(), [], []
     for name in asked:
+        if (file := Path(name.removesuffix(OWN))).suffix in KINDS:
+            own += [f"{file}{OWN}"]
+            faults += faults_of_file(file)
+            continue
         matching = {row for row in ENGINES if name in (row, row.split(":")[0])}
         if not matching:
             faults.append(unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)}))
         chosen |= matching
     if faults:
         refuse(faults)
-    return [row for row in ENGINES if row in chosen or not asked]
+    return [row for row in ENGINES if row in chosen or not asked] + list(dict.fromkeys(own))
+
+
+def faults_of_file(file: Path) -> list[str]:
+    """Why a file cannot take part as an engine."""
+    if ":" in str(file):
+        return [f"{file}: has a colon in its path, which parts engine and profile; rename it"]
+    try:
+        engine_file(file)
+    except NotASolver as refusal:
+        return [str(refusal)]
+    return []
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
@@ -113,15 +129,3 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else "see: crosscheck list"
     return f"{kind} {name!r} is not known; {hint}"
-
-
-def refuse(faults: Sequence[str]) -> NoReturn:
-    """Say what is wrong, one line each, and exit 2."""
-    for fault in faults:
-        say(fault)
-    sys.exit(BAD_INPUT)
-
-
-def say(line: str) -> None:
-    """One line on standard error, as it is."""
-    print(line, file=sys.stderr)

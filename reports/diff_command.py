@@ -10,8 +10,8 @@ from typing import NoReturn
 from rich.console import Console
 from rich.table import Table
 
-from reports.commands import DONE, FAILED, refuse
 from reports.diff import FACTOR, Change, Difference, Timing, difference
+from reports.exits import DONE, FAILED, refuse
 from reports.folders import FolderTaken, found
 
 SHOWN = 12  # changes, the worst first

@@ -10,15 +10,17 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adapters.play import Run
-from reports.comparison import Comparison
 from reports.style import TRUTH
 from scenarios.model import Array, Scenario, Trajectory
+
+if TYPE_CHECKING:
+    from reports.comparison import Comparison
 
 FRAMES = 240
 NUMBERS = 10_000  # positions of disks a layer, so that a crowd of 100 takes no more room than the page has
@@ -28,10 +30,13 @@ STEPS = 65535  # of the position grid
 
 def pack(comparison: Comparison) -> str:
     """The middle dt's trajectories and the truth, packed, as base64; "" if nothing was played."""
-    layers = played(comparison)
+    return pack_layers(comparison.scenario, played(comparison))
+
+
+def pack_layers(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> str:
+    """These layers of a scenario, packed, as base64; "" if there are none."""
     if not layers:
         return ""
-    scenario = comparison.scenario
     shown = frames(scenario, layers)
     heads, bodies = zip(*(layer(run, trajectory, shown, scenario) for run, trajectory in layers))
     head = json.dumps(head_of(scenario, shown, layers) | {"layers": heads}, separators=(",", ":")).encode()

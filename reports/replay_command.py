@@ -12,10 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
-from adapters.engines import ENGINES, Row
+from adapters.engines import ENGINES, Row, row_of
 from reports.archive import STATE, Archive, from_trail, load_trajectory, stored_scene, trajectory_file
 from reports.cells import Cell, scene_hash
-from reports.commands import DONE, FAILED, refuse
+from reports.exits import DONE, FAILED, refuse
 from reports.folders import FolderTaken, found
 from reports.playing import play_here
 from reports.scenes import open_scene
@@ -33,7 +33,8 @@ def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = EN
         archive = Archive.read(found(out))
         record = record_of(archive, name)
         scenario = scenario_of(archive, record)
-        row = engines[f"{record['engine']}:{record['profile']}"]
+        player = f"{record['engine']}:{record['profile']}"
+        row = engines[player] if player in engines else row_of(player)
         before = recorded(archive, record)
     except FolderTaken as fault:
         refuse([str(fault)])

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from adapters.engines import ENGINES
+from adapters.engines import row_of
 from reports.archive import Archive
-from reports.commands import FAILED, INTERRUPTED, checked_engines, checked_scenes, finish, refuse, say
+from reports.commands import checked_engines, checked_scenes, finish
+from reports.exits import FAILED, INTERRUPTED, refuse, say
 from reports.folders import FolderTaken, open_again, open_new, part_of, replace_folder
 from reports.journal import JOURNAL, Journal
 from reports.report import make_report
@@ -36,7 +37,7 @@ def run_plan(
     """Play, compare, report into `out`; exits 0, 1 (an engine could not be compared at all), 2 or 130."""
     plan = Plan(
         scenes=checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
-        engines={name: ENGINES[name] for name in checked_engines(engines)},
+        engines={name: row_of(name) for name in checked_engines(engines)},
         seed=seed,
         dts=dts,
         full=full,
@@ -96,7 +97,7 @@ def plan_of(folder: Path) -> Plan:
     header = Archive.read(folder).header
     names = ("seed", "dts", "full", "timings", "command")
     scenes = checked_scenes(header["scenes"], header["dts"], header["full"], header["seed"])
-    engines = {name: ENGINES[name] for name in checked_engines(header["engines"])}
+    engines = {name: row_of(name) for name in checked_engines(header["engines"])}
     return Plan(scenes=scenes, engines=engines, **{name: header[name] for name in names})
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from reports.commands import DONE, FAILED, checked_scenes, say
+from reports.commands import checked_scenes
+from reports.exits import DONE, FAILED, say
 from reports.journal import plain
 from reports.scenes import open_scene
 from reports.style import number

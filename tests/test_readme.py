@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 from adapters.conformance import PROBES
 from adapters.engines import ENGINES
 from scenarios.catalogue import SCENARIOS
+from tests.solvers.mutants import CORRECT, MUTANTS
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
@@ -27,6 +29,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     where = tmp_path_factory.mktemp("readme")
     for name, block in re.findall(r"`(\w+\.toml)`[^`]*?:\n\n```toml\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL):
         (where / name).write_text(block)
+    solver = ROOT / "tests" / "solvers" / "correct" / "plain.js"
+    (where / "class" / "anna").mkdir(parents=True)
+    for path in (where, where / "class" / "anna"):
+        shutil.copy(solver, path / "Exercise.js")
     return where
 
 
@@ -45,7 +51,7 @@ def test_a_command_of_the_readme_succeeds(command: str, folder: Path):
 
     assert words[:2] == ["uv", "run"]
     program, *arguments = words[2:]
-    if program == "pytest":
+    if program == "pytest" and "--solver" not in arguments:
         pytest.skip("runs the tests themselves")
     done = subprocess.run([BIN / program, *arguments], cwd=folder, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
@@ -95,6 +101,15 @@ def test_the_readme_counts_as_the_tables_do():
     assert [int(number) for one in said if one for number in one.groups()] == [
         len(SCENARIOS), len(ENGINES), len(PROBES),
     ]  # fmt: skip
+
+
+def test_the_readme_counts_the_solvers_of_the_confusion_table():
+    """As many faulty and correct ones as the catalogue has, and the table a row for each."""
+    said = re.search(r"what it says of (\d+) solvers with one fault each and of (\d+) without", TEXT)
+
+    assert said is not None
+    assert [int(number) for number in said.groups()] == [len(MUTANTS), len(CORRECT)]
+    assert len((ROOT / "tests" / "confusion.csv").read_text().splitlines()) == 1 + len(MUTANTS) + len(CORRECT)
 
 
 def test_every_file_the_readme_names_exists():

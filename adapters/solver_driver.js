@@ -1,0 +1,217 @@
+"use strict";
+// Stands in V8 before the solver's file does: gives it spheres, calls its functions, and reads back what they did.
+// It keeps the built-ins it needs, because a solver may replace them, and answers in JSON that it writes itself.
+Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
+  const { parse, stringify } = JSON;
+  const { keys } = Object;
+  const { sqrt } = Math;
+  const FIELDS = ["position", "velocity", "force", "alpha", "angularVelocity", "torque", "mass", "MoI", "size"];
+  const BUILT_IN = { Math, Object, Array, Number, Function, String, JSON };
+  const original = snapshot();
+  let seed = 1;
+  // The same asteroids every time. (Park & Miller, CACM 31, 1192, 1988.)
+  Math.random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
+  original["Math.random"] = Math.random;
+  for (const name of ["Date", "Temporal", "Intl", "setTimeout", "clearTimeout", "__timer_manager", "WebAssembly",
+                      "SharedArrayBuffer", "Atomics"]) Reflect.deleteProperty(globalThis, name);
+  const quiet = () => undefined;
+  globalThis.console = { log: quiet, info: quiet, warn: quiet, error: quiet, debug: quiet, table: quiet, assert: quiet };
+
+  let file;  // the solver's functions and globals, once it is loaded
+  let world;  // the scene being played
+
+  function snapshot() {
+    const found = {};
+    for (const name of keys(BUILT_IN)) {
+      const holders = [[name, BUILT_IN[name]], [name + ".prototype", BUILT_IN[name].prototype]];
+      for (const [path, holder] of holders) {
+        if (!holder) continue;
+        for (const key of Object.getOwnPropertyNames(holder)) {
+          const described = Object.getOwnPropertyDescriptor(holder, key);
+          found[path + "." + key] = described.value || described.get;
+        }
+      }
+    }
+    return found;
+  }
+
+  function bind(solver) {
+    file = solver;
+    const found = globalThis.Math === BUILT_IN.Math ? replaced() : ["Math"];
+    const has = (name) => (typeof file[name] === "function" ? "true" : "false");
+    return `{"integrate":${has("integrate")},"collide":${has("collide")},"step":${has("step")},"wrap":${has("wrap")},`
+      + `"begin":${has("begin")},"replaced":[${list(found)}]}`;
+  }
+
+  function replaced() {
+    const now = snapshot(), found = [];
+    for (const path of keys(now)) if (!Object.is(now[path], original[path])) found[found.length] = path;
+    return found;
+  }
+
+  function list(names) {
+    let text = "";
+    for (let k = 0; k < names.length && k < 9; k++) text += (k ? "," : "") + stringify("" + names[k]);
+    return text;
+  }
+
+  function sphere(r) {
+    return {
+      position: { x: r[0], y: r[1] }, velocity: { x: r[2], y: r[3] }, force: { x: r[4], y: r[5] },
+      alpha: r[6], angularVelocity: r[7], torque: r[8], mass: r[9], MoI: r[10], size: r[11],
+    };
+  }
+
+  const text = (x) => (typeof x === "number" ? "" + x : "NaN");
+
+  function row(s) {
+    return "[" + text(s.position.x) + "," + text(s.position.y) + "," + text(s.velocity.x) + "," + text(s.velocity.y)
+      + "," + text(s.force.x) + "," + text(s.force.y) + "," + text(s.alpha) + "," + text(s.angularVelocity)
+      + "," + text(s.torque) + "," + text(s.mass) + "," + text(s.MoI) + "," + text(s.size) + "]";
+  }
+
+  function rows(spheres) {
+    let all = "";
+    for (let i = 0; i < spheres.length; i++) all += (i ? "," : "") + row(spheres[i]);
+    return "[" + all + "]";
+  }
+
+  function everybody() {
+    const all = [file.ufo()], others = file.asteroids();
+    for (let i = 0; i < others.length; i++) all[all.length] = others[i];
+    return all;
+  }
+
+  // The globals as they are, or "" where the file has none.
+  function witness() {
+    try { return rows(everybody()); } catch (_) { return ""; }
+  }
+
+  function place(into, r) {
+    const from = sphere(r);
+    for (const name of ["position", "velocity", "force"]) {
+      into[name].x = from[name].x;
+      into[name].y = from[name].y;
+    }
+    for (let k = 3; k < FIELDS.length; k++) into[FIELDS[k]] = from[FIELDS[k]];
+  }
+
+  function strange(spheres) {
+    const found = [];
+    for (let i = 0; i < spheres.length; i++) {
+      const own = keys(spheres[i]);
+      for (let k = 0; k < own.length; k++) {
+        let known = false;
+        for (let f = 0; f < FIELDS.length; f++) known = known || FIELDS[f] === own[k];
+        if (!known) found[found.length] = own[k];
+      }
+    }
+    return found;
+  }
+
+  function call(what, spheres) {
+    if (what[0] === "integrate") return file.integrate(spheres[what[1]], what[2]);
+    if (what[0] === "collide") return file.collide(spheres[what[1]], spheres[what[2]]);
+    return what[0] === "step" ? file.step(what[1]) : file.wrap();
+  }
+
+  // One question: spheres, calls -> the spheres after each call, whether anything was returned, what went wrong.
+  function ask(question) {
+    let states = "", returned = false, spheres = [], known = "", problem = "null";
+    try {
+      if (question.world) {
+        spheres = everybody();
+        for (let i = 0; i < spheres.length; i++) place(spheres[i], question.spheres[i]);
+      } else {
+        for (let i = 0; i < question.spheres.length; i++) spheres[i] = sphere(question.spheres[i]);
+        known = witness();
+      }
+      for (let k = 0; k < question.calls.length; k++) {
+        const result = call(question.calls[k], spheres);
+        returned = returned || (typeof result === "object" && result !== null);
+        if (question.world) spheres = everybody();  // a ufo that is set back may be a new object
+        states += (k ? "," : "") + rows(spheres);
+      }
+    } catch (error) { problem = described(error); }
+    const strayed = !question.world && witness() !== known;
+    return `{"states":[${states}],"returned":${returned},"strayed":${strayed},"strange":[${list(strange(spheres))}],`
+      + `"error":${problem}}`;
+  }
+
+  function described(error) {
+    let what = "", stack = "";
+    try {
+      what = error && error.message !== undefined ? error.name + ": " + error.message : "threw " + error;
+      stack = typeof error.stack === "string" ? error.stack : "";
+    } catch (_) { what = what || "threw something that cannot be shown"; }
+    return `{"what":${stringify(what)},"stack":${stringify(stack)}}`;
+  }
+
+  function load(scene) {
+    world = { dt: scene.dt, gravity: scene.gravity, wrap: scene.wrap, steps: 0, hits: [], log: [], spheres: [] };
+    for (let i = 0; i < scene.spheres.length; i++) world.spheres[i] = sphere(scene.spheres[i]);
+    return "null";
+  }
+
+  function step({ count, pushes, held }) {
+    const { spheres, gravity } = world;
+    const n = spheres.length;
+    for (let k = 0; k < count; k++) {
+      for (let i = 0; i < n; i++) {
+        const s = spheres[i], push = pushes && (held || k === 0) ? pushes[i] : null;
+        s.force.x = s.mass * gravity[0] + (push ? push[0] : 0);
+        s.force.y = s.mass * gravity[1] + (push ? push[1] : 0);
+        s.torque = push ? push[2] : 0;
+        file.integrate(s, world.dt);
+      }
+      for (let i = 0; i < n; i++) for (let j = i + 1; j < n; j++) pair(i, j);
+      if (world.wrap) for (let i = 0; i < n; i++) wrapped(spheres[i].position);
+      world.steps++;
+    }
+    return "null";
+  }
+
+  function pair(i, j) {
+    const a = world.spheres[i], b = world.spheres[j];
+    const ax = a.position.x, ay = a.position.y, au = a.velocity.x, av = a.velocity.y;
+    const bx = b.position.x, by = b.position.y, bu = b.velocity.x, bv = b.velocity.y;
+    const reach = a.size + b.size, overlaps = (ax - bx) * (ax - bx) + (ay - by) * (ay - by) < reach * reach;
+    file.collide(a, b);
+    const du = a.velocity.x - au, dv = a.velocity.y - av;
+    const kicked = du !== 0 || dv !== 0 || b.velocity.x !== bu || b.velocity.y !== bv;
+    const moved = a.position.x !== ax || a.position.y !== ay || b.position.x !== bx || b.position.y !== by;
+    if (kicked) {
+      const sign = du * (ax - bx) + dv * (ay - by) < 0 ? -1 : 1;
+      world.hits[world.hits.length] = `[${world.steps},${i},${j},${sign * a.mass * sqrt(du * du + dv * dv)}]`;
+    }
+    if ((kicked || moved || overlaps) && world.log.length < 400) {
+      world.log[world.log.length] = `[${world.steps},${i},${j},${ax},${ay},${au},${av},${bx},${by},${bu},${bv},`
+        + `${text(a.position.x)},${text(a.position.y)},${text(a.velocity.x)},${text(a.velocity.y)},`
+        + `${text(b.position.x)},${text(b.position.y)},${text(b.velocity.x)},${text(b.velocity.y)}]`;
+    }
+  }
+
+  // As projectObjects: beyond an edge of the box, onto the opposite one.
+  function wrapped(p) {
+    const [left, bottom, right, top] = world.wrap;
+    p.x = p.x < left ? right : p.x > right ? left : p.x;
+    p.y = p.y < bottom ? top : p.y > top ? bottom : p.y;
+  }
+
+  function told(lines) {
+    let all = "";
+    for (let k = 0; k < lines.length; k++) all += (k ? "," : "") + lines[k];
+    return "[" + all + "]";
+  }
+
+  const commands = {
+    ask, load, step, read: () => rows(world.spheres), hits: () => told(world.hits), contacts: () => told(world.log),
+    begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
+  };
+
+  return (name, argument) => {
+    if (name === "bind") return bind(argument);
+    try { return `{"done":${commands[name](argument === undefined ? undefined : parse(argument))}}`; }
+    catch (error) { return `{"error":${described(error)}}`; }
+  };
+})() });

@@ -1,0 +1,71 @@
+"""Reads the file of somebody's solver as text, and says in a sentence why it cannot be one."""
+
+from __future__ import annotations
+
+import codecs
+from dataclasses import dataclass
+from pathlib import Path
+
+LARGEST = 2**20  # bytes; the exercise's file has about five thousand
+KINDS = {".js": "javascript", ".py": "python"}
+
+
+class NotASolver(ValueError):
+    """A path that is no JavaScript or Python text; the message names it and says what to do."""
+
+
+class SolverFailed(Exception):
+    """A solver that cannot be loaded or did not come back from a call.
+
+    Attributes:
+        kind: "error" (threw), "timeout", "memory" or "crashed".
+        what: what happened, as the end of the sentence "it ...".
+        line, column: where in the solver's file, from 1; 0 where nobody can tell.
+    """
+
+    def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
+        super().__init__(what)
+        self.kind, self.what, self.line, self.column = kind, what, line, column
+
+    def __str__(self) -> str:
+        return f"{self.what} (line {self.line}, column {self.column})" if self.line else self.what
+
+
+@dataclass(frozen=True)
+class SolverText:
+    """A solver's file: where it is, "javascript" or "python", and its text with \\n at the end of lines."""
+
+    path: Path
+    kind: str
+    text: str
+
+
+def read_solver(path: Path) -> SolverText:
+    """The text of `path`; raises `NotASolver` with one sentence."""
+    kind = KINDS.get(path.suffix.lower())
+    if kind is None:
+        raise NotASolver(f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file")
+    try:
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise NotASolver(f"{path}: has {size / 1e6:.1f} MB; a solver has a few kilobytes, at most 1 MB is read")
+        data = path.read_bytes()
+    except OSError as fault:
+        raise NotASolver(f"{path}: {fault.strerror or fault}; name a file that can be read") from None
+    text = decoded(path, data).replace("\r\n", "\n").replace("\r", "\n")
+    if not text.strip():
+        raise NotASolver(f"{path}: is empty; save your solver into it")
+    return SolverText(path, kind, text)
+
+
+def decoded(path: Path, data: bytes) -> str:
+    """Text from UTF-8, from UTF-16 with its mark, or from Windows' Latin letters."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", errors="replace")
+    odd = next((k for k, byte in enumerate(data) if byte < 32 and byte not in b"\t\n\r\f\v"), None)
+    if odd is not None:
+        raise NotASolver(f"{path}: is not text (byte {data[odd]} at offset {odd}); save it as UTF-8 text")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")

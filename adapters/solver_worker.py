@@ -1,0 +1,83 @@
+"""The process in which a solver's file runs: bounded memory, no output, one JSON line in and one out per request.
+
+It runs with the rights of the user who started it: the limits are against accidents, not against malice.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import sys
+from pathlib import Path
+from typing import IO, Any
+
+from adapters.solver_file import SolverFailed, read_solver
+
+MEMORY = 2 * 2**30  # bytes of data; V8 sets aside far more addresses than it uses, so that these cannot be bounded
+
+
+def main() -> None:
+    """Load the file that the first line names, say what it has, then answer request by request until the input ends."""
+    requests, answers = private_pipes()
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    try:
+        solver = load(Path(json.loads(requests.readline())))
+    except SolverFailed as failure:
+        tell(answers, {"failed": vars(failure)})
+        return
+    tell(answers, {"functions": solver.functions, "surface": solver.surface, "versions": solver.versions()})
+    for line in requests:
+        tell(answers, reply(solver, json.loads(line)))
+
+
+def private_pipes() -> tuple[IO[str], IO[str]]:
+    """The two ends of the talk with the parent; what the solver prints or reads goes nowhere."""
+    requests, answers = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(nowhere, stream)
+    return requests, answers
+
+
+def load(path: Path) -> Any:
+    """The solver by its kind; raises `SolverFailed`."""
+    text = read_solver(path)
+    if text.kind == "javascript":
+        from adapters.solver_js import JavaScriptSolver
+
+        return JavaScriptSolver(text)
+    from adapters.solver_py import PythonSolver
+
+    return PythonSolver(text)
+
+
+def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, Any]]:
+    """An answer for every (command, argument, limit s) of a request; one that fails does not stop the others.
+
+    After a call that did not come back, no question is put that would make the same call again.
+    """
+    answers: list[dict[str, Any]] = []
+    endless: dict[str, dict[str, Any]] = {}
+    for command, argument, limit in request:
+        calls = [call[0] for call in argument["calls"]] if command == "ask" else []
+        known = next((endless[call] for call in calls if call in endless), None)
+        try:
+            answers.append({"failed": known} if known else {"done": solver.run(command, argument, limit)})
+        except SolverFailed as failure:
+            answers.append({"failed": vars(failure)})
+            if failure.kind in ("timeout", "memory"):
+                endless |= dict.fromkeys([*calls, "step"], vars(failure))
+    return answers
+
+
+def tell(answers: IO[str], what: Any) -> None:
+    """One line to the parent."""
+    answers.write(json.dumps(what) + "\n")
+    answers.flush()
+
+
+if __name__ == "__main__":
+    sys.dont_write_bytecode = True
+    main()

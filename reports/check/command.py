@@ -1,0 +1,91 @@
+"""`crosscheck check`: one file or a folder of them, as a table, a page, JSON or JUnit."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from adapters.solver_file import KINDS, SolverFailed
+from adapters.solver_process import SolverProcess
+from reports.check.machine import as_json, as_junit
+from reports.check.terminal import print_class, print_file
+from reports.check.verdict import FileCheck, check_file
+from reports.exits import BAD_INPUT, DONE, FAILED, refuse, say
+
+HANDED_OUT = ("gl-matrix.js", "gl-matrix-min.js", "mainScript.js")  # lie beside a student's file
+
+
+def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) -> None:
+    """Check what is at `path` and say it; exits 0, 1 (a fault was found) or 2 (there is nothing to check)."""
+    files = files_of(path)
+    if page is not None and path.is_dir():
+        refuse([f"--page {page}: shows one file; {path} is a folder"])
+    checks = list(checked(files, path.is_dir() and not json_wanted))
+    if not path.is_dir() and checks[0].refused:
+        refuse([checks[0].refused])
+    if json_wanted:
+        print(json.dumps(as_json(checks), indent=2, allow_nan=False))
+    else:
+        print_class(path, checks) if path.is_dir() else print_file(checks[0])
+    if junit is not None:
+        write(junit, as_junit(checks))
+    if not path.is_dir() and (page or not json_wanted):
+        make_page(page or Path("check.html"), checks[0])
+    sys.exit(DONE if all(one.passed for one in checks) else FAILED)
+
+
+def files_of(path: Path) -> list[Path]:
+    """The file, or all solvers below a folder, in order of their names; exits 2 if there are none."""
+    if not path.exists():
+        refuse([f"{path}: is not there; name an Exercise.js, a solver.py or a folder of them"])
+    if not path.is_dir():
+        return [path]
+    found = sorted(
+        file for file in path.rglob("*")
+        if file.suffix.lower() in KINDS and file.is_file() and file.name not in HANDED_OUT
+        and not any(part.startswith((".", "__", "node_modules")) for part in file.relative_to(path).parts)
+    )  # fmt: skip
+    if not found:
+        refuse([f"{path}: holds no .js and no .py file"])
+    return found
+
+
+def checked(files: Sequence[Path], progress: bool) -> Iterator[FileCheck]:
+    """The checks in order, as many at once as there are cores: each file runs in a process of its own."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for k, one in enumerate(pool.map(check_file, files)):
+            if progress and sys.stderr.isatty():
+                print(f"\r{k + 1} of {len(files)}", end="\n" if k + 1 == len(files) else "", file=sys.stderr)
+            yield one
+
+
+def make_page(path: Path, one: FileCheck) -> None:
+    """Look for the smallest scene that shows a fault, and write the page."""
+    from reports.check.page import write_page
+    from reports.check.smallest import Smallest, smallest_scene
+
+    smallest: Smallest | None = None
+    if one.faults and one.restitution is not None:
+        try:
+            with SolverProcess(one.path) as process:
+                smallest = smallest_scene(process, one.restitution)
+        except SolverFailed:
+            smallest = None  # the rows say how it failed
+    try:
+        write_page(path, one, smallest)
+    except OSError as fault:
+        say(f"--page {path}: {fault.strerror or fault}; name another file")
+        sys.exit(BAD_INPUT)
+    say(f"{path.resolve()}")
+
+
+def write(path: Path, text: str) -> None:
+    """Write a file that was asked for; exits 2 if that is not possible."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as fault:
+        refuse([f"--junit {path}: {fault.strerror or fault}; name a file that can be written"])

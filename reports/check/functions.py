@@ -1,0 +1,61 @@
+"""Before a function is judged: is it there, does it come back, does it change what it is given and nothing else?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from reports.check.questions import QUESTIONS, Answer, Ball
+from reports.check.rows import Row, judged, near
+
+FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
+MAY_FAIL = ("same centre",)  # is judged by a row of its own
+
+
+def implemented(task: str, there: bool, answers: dict[str, Answer]) -> tuple[list[Row], bool]:
+    """The rows on the function of a task and its arguments, and whether it can be judged further."""
+    function = FUNCTIONS[task]
+    asked = f"Does {function} do something with the spheres it is given?"
+
+    def fault(got: str, cause: str) -> tuple[list[Row], bool]:
+        return [judged("implemented", task, asked, got, "it changes them", False, cause)], False
+
+    if not there:
+        return fault("there is no such function", f"not implemented: the file has no function {function}")
+    failed = {name: answer for name, answer in answers.items() if answer.failed and name not in MAY_FAIL}
+    if failed:
+        answer = next(iter(failed.values()))
+        return fault(f"it fails in {len(failed)} of {len(answers)} calls", f"{function}: {answer.failed}")
+    if not any(changed(QUESTIONS[name].balls, answer.last) for name, answer in answers.items() if answer.balls):
+        return fault("nothing is changed", nothing(function, answers.values()))
+    return [arguments(task, function, answers.values())], True
+
+
+def nothing(function: str, answers: Iterable[Answer]) -> str:
+    """Why nothing may have changed."""
+    answers = list(answers)
+    if any(answer.returned for answer in answers):
+        return f"{function} returns something new; it must change the spheres it is given"
+    if any(answer.strayed for answer in answers):
+        return f"{function} changes the global ufo or asteroids, not the spheres it is given"
+    strange = sorted({name for answer in answers for name in answer.strange})
+    if strange:
+        return f"{function} writes the field {strange[0]!r}, which a sphere does not have"
+    return f"not implemented: {function} does nothing"
+
+
+def arguments(task: str, function: str, answers: Iterable[Answer]) -> Row:
+    """Whether only the given spheres are changed, and only fields that they have."""
+    answers = list(answers)
+    strange = sorted({name for answer in answers for name in answer.strange})
+    strayed = any(answer.strayed for answer in answers)
+    cause = f"it writes the field {strange[0]!r}, which a sphere does not have" if strange else ""
+    cause = "it changes the global ufo or asteroids, too" if strayed else cause
+    return judged(
+        "input only", task, f"Does {function} change the spheres it is given and nothing else?",
+        "no" if cause else "yes", "yes", not cause, cause,
+    )  # fmt: skip
+
+
+def changed(before: tuple[Ball, ...], after: list[Ball]) -> bool:
+    """Whether any number of any sphere is another."""
+    return any(not near(y.numbers(), x.numbers()) for x, y in zip(before, after))

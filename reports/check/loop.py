@@ -1,0 +1,150 @@
+"""The step around the two tasks: every sphere once, every pair, the edges; judged by the file's own functions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.solver_file import SolverFailed
+from adapters.solver_process import SolverProcess
+from reports.check.questions import Answer, Ball, Question, ask
+from reports.check.rows import Row, judged, near, not_asked, shown
+
+DT = 1e-3  # s, the exercise's
+EDGES = {"right": (5.2, 0.1), "left": (-5.2, -0.1), "top": (0.1, 3.2), "bottom": (-0.1, -3.2)}  # m, a place beyond each
+ONTO = {"right": (-5.0, 0.1), "left": (5.0, -0.1), "top": (0.1, -3.0), "bottom": (-0.1, 3.0)}
+A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)  # a pair that hits
+
+
+def loop_rows(process: SolverProcess, faulty: bool) -> list[Row]:
+    """The rows of the step; where the file has none, a row that says so. `faulty`: the functions it calls are."""
+    has = process.functions
+    if not (has["begin"] and has["step"]):
+        missing = "initScene" if not has["begin"] else "performSimStep"
+        return [not_asked("step", "loop", f"the file has no function {missing}")]
+    try:
+        process.do("begin", limit=2.0)
+    except SolverFailed as failure:
+        return [
+            judged(
+                "step", "loop", "Does initScene make a scene?", "it fails", "a scene", False, f"initScene: {failure}"
+            )
+        ]
+    start = process.do("globals")
+    if not start or len(start) < 3:
+        got = f"{len(start)} spheres" if start else "no ufo or no asteroids"
+        return [judged("step", "loop", "Does initScene make a ufo and asteroids?", got, "a ufo and 20 asteroids", False,
+                       "initScene leaves the globals ufo and asteroids without spheres")]  # fmt: skip
+    asked = worlds(len(start), has["wrap"])
+    came = ask(process, asked)
+    failed = next((answer.failed for answer in came.values() if answer.failed), None)
+    if failed:
+        return [
+            judged(
+                "step", "loop", "Does performSimStep come back?", "it fails", "yes", False, f"performSimStep: {failed}"
+            )
+        ]
+    if faulty:
+        rows = [not_asked("all spheres", "loop", "the functions that it calls have faults of their own")]
+    else:
+        rows = [integrated(asked["free"], came["free"], came["alone"]), pairs(asked, came)]
+    if has["wrap"]:
+        rows += edges(asked["edges"], came["edges"], start, process.surface == "exercise")
+    return rows
+
+
+def worlds(n: int, wraps: bool) -> dict[str, Question]:
+    """Questions on `n` of the file's own spheres, the ufo first."""
+    step = (("step", DT),)
+    plain = parked(n)
+    pushed = tuple(b._replace(v=(0.4, -0.3), F=(2.0, 1.0), w=0.5, torque=0.3, m=1.5, MoI=0.7) for b in plain)
+    found = {
+        "free": Question(pushed, step, world=True),
+        "alone": Question((pushed[0],), (("integrate", 0, DT),)),
+    }
+    middle = n // 2
+    for i, j in sorted({(0, 1), (0, middle), (0, n - 1), (1, 2), (1, n - 1), (n - 2, n - 1), (middle - 1, middle)}):
+        if 0 <= i < j < n:
+            spheres = list(plain)
+            spheres[i], spheres[j] = A, B
+            found[f"pair {i} {j}"] = Question(tuple(spheres), step, world=True)
+    if wraps:
+        spheres = list(plain)
+        for k, place in enumerate(list(EDGES.values())[: n - 1]):
+            spheres[k + 1] = plain[k + 1]._replace(x=place, v=(0.2, 0.3))
+        spheres[0] = plain[0]._replace(x=(5.4, 0.5))
+        found["edges"] = Question(tuple(spheres), (("wrap",),), world=True)
+    return found
+
+
+def parked(n: int) -> tuple[Ball, ...]:
+    """Small spheres at rest in four rows near the edges, so that nothing touches."""
+    columns = -(-n // 4)
+    x, y = np.linspace(-4.5, 4.5, columns), (-2.6, -2.0, 2.0, 2.6)
+    return tuple(Ball((float(x[k % columns]), y[k // columns]), m=1.0, r=min(0.05, 2.0 / columns)) for k in range(n))
+
+
+def integrated(question: Question, came: Answer, alone: Answer) -> Row:
+    """Every sphere moves as one alone does by the file's own integrate."""
+    asked = "Does a step integrate every sphere once?"
+    start, end = question.balls[0], alone.last[0]
+    moved = np.subtract(end.x, start.x)
+    wrong = [
+        k for k, (b, a) in enumerate(zip(question.balls, came.last))
+        if not (near(np.subtract(a.x, b.x), moved, 1e-3) and near(a.v, end.v) and near(a.w, end.w))
+    ]  # fmt: skip
+    if not wrong:
+        return judged("all spheres", "loop", asked, "yes", "yes", True)
+    first = came.last[wrong[0]]
+    who = name_of(wrong[0])
+    cause = "a loop of performSimStep leaves spheres out" if near(first.v, question.balls[0].v) else (
+        "performSimStep integrates more than once, or not by dt")  # fmt: skip
+    got = f"{who} moves at {shown(first.v)} m/s ({len(wrong)} of {len(came.last)} wrong)"
+    return judged("all spheres", "loop", asked, got, f"{shown(end.v)} m/s", False, cause)
+
+
+def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> Row:
+    """Every pair that is put together reacts, and nobody else."""
+    silent, others = [], []
+    for name, question in asked.items():
+        if not name.startswith("pair"):
+            continue
+        i, j = map(int, name.split()[1:])
+        kicked = [k for k, (b, a) in enumerate(zip(question.balls, came[name].last)) if not near(a.v, b.v)]
+        if not {i, j} <= set(kicked):
+            silent.append(name_of(i, j))
+        elif set(kicked) != {i, j}:
+            others.append(name_of(min(set(kicked) - {i, j})))
+    got = f"no hit of {', '.join(silent)}" if silent else f"somebody else is hit: {others[0]}" if others else "yes"
+    cause = (
+        "a loop of performSimStep leaves pairs out" if silent else "performSimStep lets spheres react that are apart"
+    )
+    return judged("pairs", "loop", "Does a step let every pair collide, the ufo with each asteroid too?", got, "yes",
+                  not silent and not others, cause)  # fmt: skip
+
+
+def name_of(*spheres: int) -> str:
+    """Spheres as people call them."""
+    return " and ".join("the ufo" if k == 0 else f"asteroid {k - 1}" for k in spheres)
+
+
+def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool) -> list[Row]:
+    """An asteroid beyond an edge comes in at the opposite one; a ufo that leaves is set back to its start."""
+    wrong = []
+    for k, (edge, onto) in enumerate(list(ONTO.items())[: len(question.balls) - 1]):
+        after = came.last[k + 1]
+        if not (near(after.x, onto) and near(after.v, question.balls[k + 1].v)):
+            start_at = shown(question.balls[k + 1].x)
+            wrong.append(f"{edge}: from {start_at} to {shown(after.x)} m instead of {shown(onto)} m")
+    stayed = all(near(a.x, b.x) for b, a in list(zip(question.balls, came.last))[len(ONTO) + 1 :])
+    cause = "projectObjects sets it onto the wrong place" if wrong else "projectObjects moves spheres that are inside"
+    rows = [
+        judged("edges", "loop", "Is an asteroid beyond an edge set onto the opposite one?", wrong[0] if wrong else
+               "yes" if stayed else "others are moved", "yes", not wrong and stayed, cause),
+    ]  # fmt: skip
+    if ufo:
+        home, place = start[0][:2], came.last[0].x
+        asked = "Is a ufo that leaves set back to its start?"
+        cause = "projectObjects does not set it back"
+        got, expected = f"it is at {shown(place)} m", f"at {shown(home)} m"
+        rows.append(judged("ufo", "loop", asked, got, expected, near(place, home), cause))
+    return rows

@@ -1,0 +1,145 @@
+"""Task 2 (b): where a solver puts two spheres that overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from reports.check.questions import HITS, QUESTIONS, Answer, Ball, direction
+from reports.check.rows import Row, judged, near, not_asked, shown
+
+
+class Shift(NamedTuple):
+    """How far a pair was moved: A along the normal, B against it, both in m; and the largest way across it."""
+
+    a: float
+    b: float
+    across: float
+    overlap: float
+    distance: float
+    sizes: float
+
+
+# (shift) -> the displacement of both together that a mistake would give, m
+TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
+    "the positions are never changed: not implemented": lambda s, a, b: 0.0,
+    "the sign is wrong: they are pulled into each other": lambda s, a, b: -s.overlap,
+    "only half of the overlap is taken out: it is halved twice": lambda s, a, b: s.overlap / 2,
+    "the overlap is counted twice: each is moved by all of it": lambda s, a, b: 2 * s.overlap,
+    "the sign is wrong, and the overlap is counted twice": lambda s, a, b: -2 * s.overlap,
+    "the sign is wrong, and the overlap is halved twice": lambda s, a, b: -s.overlap / 2,
+    "the normal is not normalised": lambda s, a, b: s.overlap * s.distance,
+    "the normal is not normalised, and the overlap is counted twice": lambda s, a, b: 2 * s.overlap * s.distance,
+    "the normal is not normalised, and the overlap is halved twice": lambda s, a, b: s.overlap * s.distance / 2,
+    "it is divided by the distance once too often": lambda s, a, b: s.overlap / s.distance,
+    "they are moved by the sum of the sizes, not by the overlap": lambda s, a, b: s.sizes,
+    "they are moved by their distance, not by the overlap": lambda s, a, b: s.distance,
+    "the overlap is taken of squares": lambda s, a, b: s.sizes**2 - s.distance**2,
+    "the overlap is size plus distance": lambda s, a, b: s.sizes + s.distance,
+    "only the size of A is used": lambda s, a, b: a.r - s.distance,
+    "only the size of B is used": lambda s, a, b: b.r - s.distance,
+    "the shares are the inverse masses, which do not add up to 1": lambda s, a, b: s.overlap * (1 / a.m + 1 / b.m),
+    "the shares are the masses, which do not add up to 1": lambda s, a, b: s.overlap * (a.m + b.m),
+}
+
+
+def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
+    """The displacement of a pair in the frame of its normal."""
+    a, b = question
+    n, distance = direction(a, b)
+    t = np.array([-n[1], n[0]])
+    da, db = np.subtract(after[0].x, a.x), np.subtract(after[1].x, b.x)
+    across = max(abs(float(da @ t)), abs(float(db @ t)))
+    return Shift(float(da @ n), float(-(db @ n)), across, a.r + b.r - distance, distance, a.r + b.r)
+
+
+def projection_rows(answers: dict[str, Answer], velocities_explained: bool) -> list[Row]:
+    """The rows of (b); `velocities_explained`: what happens at relative rest follows from the impulse."""
+    seen = [(q.balls, shift_of(q.balls, answers[name].last), answers[name].last) for name, q in HITS.items()]
+    balls, shift, after = seen[0]
+    distance = float(np.hypot(*np.subtract(after[0].x, after[1].x)))
+    right = all(near(s.a + s.b, s.overlap, 0.1) for _, s, _ in seen)
+    along = all(near(s.across, 0.0, 0.1) for _, s, _ in seen)
+    rows = [
+        judged("one point", "2b", "How far apart are the centres of a pair after it?", f"{shown(distance)} m",
+               f"{shown(shift.sizes)} m: they meet in one point", right and along,
+               "" if right and along else total_cause(seen)),
+        judged("normal", "2b", "Are they moved along the line of their centres?",
+               f"{shown(shift.across)} m across it", "0 m across it", along, across_cause(seen)),
+        split(balls, shift) if right and along else not_asked("split", "2b", "they do not meet in one point"),
+    ]  # fmt: skip
+    still = QUESTIONS["at rest to each other"].balls
+    kept = all(near(x.v, y.v) for x, y in zip(still, answers["at rest to each other"].last))
+    if kept or not velocities_explained:
+        rows.append(judged(
+            "velocities", "2b", "Does the displacement leave the velocities of a pair at relative rest alone?",
+            shown(answers["at rest to each other"].last[0].v) + " m/s", shown(still[0].v) + " m/s", kept,
+            "the displacement changes the velocity, too",
+        ))  # fmt: skip
+    return [*rows, parting(answers["part"])]
+
+
+def total_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
+    """The mistake that gives the displacement of all pairs; "" if none does."""
+    if not all(np.isfinite([s.a, s.b]).all() for _, s, _ in seen):
+        return "the positions become no numbers"
+    moved = [(abs(s.a) > 1e-9, abs(s.b) > 1e-9) for _, s, _ in seen]
+    if all(a and not b for a, b in moved) or all(b and not a for a, b in moved):
+        who = "A" if moved[0][0] else "B"
+        if all(near(s.a + s.b, s.overlap / 2, 0.1) for _, s, _ in seen):
+            return f"only {who} is moved, by half of the overlap"
+    if all(near(abs(s.a) + abs(s.b), s.overlap, 0.1) and s.a * s.b < 0 for _, s, _ in seen):
+        return "B is moved the same way as A: its sign is wrong"
+    if not all(near(s.across, 0.0, 0.1) for _, s, _ in seen):
+        return across_cause(seen)
+    with np.errstate(all="ignore"):
+        for name, law in TOTALS.items():
+            if all(near(s.a + s.b, law(s, *balls), 0.1) for balls, s, _ in seen):
+                return name
+    return ""
+
+
+def across_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
+    """Along what else they are moved; "" if along nothing that is known."""
+    ways = {
+        "they are moved along x only": lambda a, b: np.array([1.0, 0.0]),
+        "they are moved along y only": lambda a, b: np.array([0.0, 1.0]),
+        "they are moved along their relative velocity": lambda a, b: np.subtract(a.v, b.v),
+        "they are moved along the tangent": lambda a, b: np.array([b.x[1] - a.x[1], a.x[0] - b.x[0]]),
+        "x and y of the normal are exchanged": lambda a, b: np.subtract(a.x, b.x)[::-1],
+        "they are moved along the sum of their positions": lambda a, b: np.add(a.x, b.x),
+        "each is moved along its own position": lambda a, b: np.array(a.x),
+    }
+    for name, way in ways.items():
+        crosses = [
+            float(np.cross([*np.subtract(after[0].x, balls[0].x), 0], [*way(*balls), 0])[2]) for balls, _, after in seen
+        ]
+        if near(crosses, 0.0, 0.01):
+            return name
+    return ""
+
+
+def split(balls: tuple[Ball, ...], shift: Shift) -> Row:
+    """Who is moved how far: free; said with what it does to the centre of mass."""
+    a, b = balls
+    share = shift.a / shift.overlap
+    known = {
+        "shared equally": 0.5, "shared by inverse mass": b.m / (a.m + b.m), "A alone is moved": 1.0,
+        "shared by mass, so that the heavier moves farther": a.m / (a.m + b.m), "B alone is moved": 0.0,
+    }  # fmt: skip
+    how = next((name for name, wanted in known.items() if near(share, wanted)), f"A is moved by {share:.3g} of it")
+    centre = (a.m * shift.a - b.m * shift.b) / (a.m + b.m)
+    aside = "stays" if abs(centre) < 1e-9 else f"is moved by {shown(abs(centre))} m"
+    asked = f"How is the overlap shared, for masses of {shown(a.m)} and {shown(b.m)} kg?"
+    return Row("split", "2b", asked, how, "any", "note", f"{how}; their centre of mass {aside}")
+
+
+def parting(answer: Answer) -> Row:
+    """A pair that overlaps and moves apart: displaced or left; free, as nothing is lost by it."""
+    shift = shift_of(QUESTIONS["part"].balls, answer.last)
+    moved = abs(shift.a) + abs(shift.b) > 1e-9
+    said = "displaced as any other" if moved else "left as it is: an early return for pairs that part"
+    return Row("parting pair", "2b", "Is a pair displaced that overlaps and moves apart?", "yes" if moved else "no",
+               "yes, or no if it returns early", "note", said)  # fmt: skip

@@ -1,0 +1,71 @@
+"""`pytest --solver FILE`: the check of a solver as tests, in anybody's project; imports what it needs when it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from reports.check.rows import Row
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The option, repeatable."""
+    group = parser.getgroup("crosscheck", "a hand-written solver of 2D disks")
+    group.addoption("--solver", action="append", default=[], metavar="FILE", help="check this Exercise.js or solver.py")
+
+
+def pytest_collection_modifyitems(session: pytest.Session, items: list[pytest.Item]) -> None:
+    """Add a test a row, before all others."""
+    for name in reversed(session.config.getoption("--solver")):
+        items[:0] = SolverFile.from_parent(session, path=(session.config.invocation_params.dir / name)).collect()
+
+
+class SolverFile(pytest.File):
+    """A solver's file as something that holds tests."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        """A test a row."""
+        from adapters.solver_file import NotASolver
+        from reports.check.solver import check_solver
+
+        try:
+            rows = check_solver(Path(self.path))
+        except NotASolver as refusal:
+            raise pytest.UsageError(f"--solver {refusal}") from None
+        for row in rows:
+            yield RowItem.from_parent(self, name=f"{row.task}-{row.name.replace(' ', '_')}", row=row)
+
+
+class Fault(Exception):
+    """A row that found a fault."""
+
+
+class RowItem(pytest.Item):
+    """A row as a test."""
+
+    def __init__(self, *, row: Row, **given: object) -> None:
+        super().__init__(**given)  # type: ignore[arg-type]
+        self.row = row
+
+    def runtest(self) -> None:
+        """Fail by a fault, skip what could not be asked."""
+        if self.row.verdict == "not asked":
+            pytest.skip(self.row.cause)
+        if self.row.verdict == "fault":
+            raise Fault(self.row.cause)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *given: Any, **named: Any) -> str:
+        """The row in words, without a stack that is not the solver's."""
+        if not isinstance(excinfo.value, Fault):
+            return str(super().repr_failure(excinfo, *given, **named))
+        row = self.row
+        lines = {"came": row.got, "expected": row.expected, "likely": row.cause, "read": row.read}
+        return "\n".join([row.asked, *(f"  {name + ':':10}{text}" for name, text in lines.items())])
+
+    def reportinfo(self) -> tuple[Path, None, str]:
+        """Where the test is said to be."""
+        return self.path, None, f"{self.path.name}: {self.row.name}"

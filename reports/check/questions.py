@@ -1,0 +1,170 @@
+"""The tiny states a solver is asked about, and its answers: one request for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from adapters.solver_file import SolverFailed
+from adapters.solver_process import SolverProcess
+from scenarios.model import Array
+
+LIMIT = 1.0  # s a question may take: it needs a few microseconds
+
+
+class Ball(NamedTuple):
+    """A sphere of the exercise: vectors x, v, F in m, m/s, N; angle, spin, torque, mass, MoI and size in SI."""
+
+    x: tuple[float, float]
+    v: tuple[float, float] = (0.0, 0.0)
+    F: tuple[float, float] = (0.0, 0.0)
+    alpha: float = 0.0
+    w: float = 0.0
+    torque: float = 0.0
+    m: float = 1.0
+    MoI: float = 1.0
+    r: float = 0.5
+
+    def numbers(self) -> list[float]:
+        """The 12 numbers that the worker makes a sphere of."""
+        return [*self.x, *self.v, *self.F, self.alpha, self.w, self.torque, self.m, self.MoI, self.r]
+
+
+def ball(numbers: ArrayLike) -> Ball:
+    """A sphere from its 12 numbers."""
+    n = [float(x) for x in np.asarray(numbers, float)]
+    return Ball((n[0], n[1]), (n[2], n[3]), (n[4], n[5]), *n[6:])
+
+
+class Question(NamedTuple):
+    """Spheres and what is called on them; `world`: they are the file's own ufo and asteroids."""
+
+    balls: tuple[Ball, ...]
+    calls: tuple[tuple, ...]
+    world: bool = False
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of a question.
+
+    Attributes:
+        balls: the spheres after each call.
+        returned: whether a function gave back an object.
+        strayed: whether the file's own ufo or asteroids changed, though they had no part in it.
+        strange: fields that the spheres did not have before.
+        failed: how it failed, or None.
+    """
+
+    balls: list[list[Ball]]
+    returned: bool = False
+    strayed: bool = False
+    strange: tuple[str, ...] = ()
+    failed: SolverFailed | None = None
+
+    @property
+    def last(self) -> list[Ball]:
+        """The spheres after the last call."""
+        return self.balls[-1]
+
+
+def pushed(dt: float, **changes: object) -> Question:
+    """A sphere that is pushed and turned, integrated once; its mass and inertia are those of no solid disk."""
+    plain = Ball((0.3, -0.7), (1.1, -0.4), (2.0, 3.0), 0.2, 0.9, 0.7, 1.7, 0.6, 0.25)
+    return Question((plain._replace(**changes),), (("integrate", 0, dt),))  # type: ignore[arg-type]
+
+
+def pair(a: Ball, b: Ball, first: int = 0) -> Question:
+    """Two spheres given to the collision function, in this order or the other."""
+    return Question((a, b), (("collide", first, 1 - first),))
+
+
+def meeting(
+    masses: tuple[float, float], va: tuple[float, float], vb: tuple[float, float], turn: float, depth: float = 0.12
+) -> Question:
+    """Two spheres of 0.5 and 0.3 m that overlap by `depth` m, b lying in the direction `turn` rad from a."""
+    d = 0.8 - depth
+    a = Ball((0.2, -0.1), va, (0.5, -0.3), 0.4, 0.6, 0.2, masses[0], 0.7, 0.5)
+    b = Ball((0.2 + d * np.cos(turn), -0.1 + d * np.sin(turn)), vb, (-0.2, 0.1), -0.3, -0.5, 0.1, masses[1], 0.3, 0.3)
+    return pair(a, b)
+
+
+SIZES = ((0.25, 0.5), (0.6, 0.35), (1.5, 0.75), (0.9, 0.9))  # m; sums below, near and above 1, where squares tell
+TURNS = (0.0, 0.65, 1.57, 3.6)  # rad
+SHARES = (0.1, 0.3, 0.45, 0.6, 0.7, 0.85, 0.97, 1.03, 1.15, 1.3, 1.6, 2.2, 4.0)  # distances over the sum of sizes
+HITS = {
+    "hit/light on heavy": meeting((1.3, 5.1), (1.4, 0.3), (-0.6, 0.5), 0.5),
+    "hit/heavy on light": meeting((4.2, 0.9), (0.7, -1.1), (0.2, 0.8), -1.1),
+    "hit/from behind": meeting((2.0, 3.0), (2.1, 0.4), (0.5, 0.1), 0.2),
+    "hit/upwards": meeting((0.8, 2.9), (-0.2, 1.9), (0.3, -0.7), 1.9),
+    "hit/shallow": meeting((3.3, 1.2), (1.2, 0.9), (-0.9, -0.2), 0.4, 0.02),
+}
+
+
+def head_on(speed: float) -> Question:
+    """Two equal spheres that meet along x, closing at `speed` m/s."""
+    return pair(Ball((-0.45, 0.0), (speed / 2, 0.0)), Ball((0.45, 0.0), (-speed / 2, 0.0)))
+
+
+def questions() -> dict[str, Question]:
+    """All but those about the file's own scene, by name."""
+    found = {
+        "push": pushed(0.1),
+        "push, other numbers": pushed(0.03, x=(-1.2, 0.4), v=(-0.5, 0.8), F=(-1.5, 4.0), m=0.6, MoI=1.9, w=-0.7),
+        "coast": pushed(0.1, F=(0.0, 0.0), torque=0.0),
+        "push twice": Question(pushed(0.1).balls, (("integrate", 0, 0.1), ("integrate", 0, 0.1))),
+        "touch": pair(Ball((0.0, 0.0), (1.0, 0.0), r=0.25), Ball((0.75, 0.0), (-1.0, 0.0), r=0.5)),
+        "same centre": pair(Ball((0.1, 0.2), (1.0, 0.5)), Ball((0.1, 0.2), (-0.5, 0.3), m=2.0)),
+        "at rest to each other": meeting((1.3, 5.1), (0.3, 0.2), (0.3, 0.2), 0.5),
+        "part": meeting((1.3, 5.1), (-1.1, 0.2), (0.7, 0.4), 0.5),
+        "part, other numbers": meeting((2.2, 1.7), (-0.3, -0.9), (0.2, 1.1), 1.3),
+        "slow": head_on(2e-3),
+        "even": head_on(2.0),
+        "fast": head_on(200.0),
+    } | HITS
+    found |= {
+        name.replace("hit/", "swapped/"): question._replace(calls=(("collide", 1, 0),))
+        for name, question in HITS.items()
+    }
+    for k, (ra, rb, turn, share) in enumerate((*s, t, f) for s in SIZES for t in TURNS for f in SHARES):
+        n, d = np.array([np.cos(turn), np.sin(turn)]), share * (ra + rb)
+        a = Ball((0.4, 0.3), tuple(0.9 * n), r=ra, m=1.3)
+        found[f"reach/{k}"] = pair(a, Ball(tuple(np.array(a.x) + d * n), tuple(-0.9 * n), r=rb, m=2.1))
+    return found
+
+
+QUESTIONS = questions()
+
+
+def ask(process: SolverProcess, asked: dict[str, Question]) -> dict[str, Answer]:
+    """The answers by name; raises `SolverFailed` if the process is lost."""
+    requests = [
+        ("ask", {"spheres": [b.numbers() for b in q.balls], "calls": q.calls, "world": q.world}, LIMIT)
+        for q in asked.values()
+    ]
+    return {name: answered(reply) for name, reply in zip(asked, process.request(requests))}
+
+
+def answered(reply: dict | SolverFailed) -> Answer:
+    """An answer from what the worker sent."""
+    if isinstance(reply, SolverFailed):
+        return Answer([], failed=reply)
+    failed = None if reply["error"] is None else SolverFailed(**reply["error"])
+    balls = [[ball(numbers) for numbers in state] for state in reply["states"]]
+    return Answer(balls, reply["returned"], reply["strayed"], tuple(reply["strange"]), failed)
+
+
+def direction(a: Ball, b: Ball) -> tuple[Array, float]:
+    """The unit vector from b to a, and the distance of their centres, m."""
+    r = np.subtract(a.x, b.x)
+    distance = float(np.hypot(*r))
+    return r / distance, distance
+
+
+def named(answers: dict[str, Answer], prefix: str) -> Iterator[tuple[Question, Answer]]:
+    """Questions whose name begins so, with their answers."""
+    return ((QUESTIONS[name], answers[name]) for name in answers if name.startswith(prefix))

@@ -1,0 +1,98 @@
+"""The restitution of a file: what is written into it, and what comes out of its hits."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from reports.check.questions import QUESTIONS, Answer
+from reports.check.rows import Row, judged, near, shown
+
+EXERCISE = 0.9
+COMMENTS = re.compile(r"/\*.*?\*/|//[^\n]*|#[^\n]*", re.DOTALL)
+NAMED = re.compile(
+    r"\b(e|eps|epsilon|cor|restitution|elasticity|bounciness|bounce|coeff\w*|c_?r)\b"
+    r"\s*(?::\s*\w+\s*)?[:=]\s*(\d*\.?\d+)",
+    re.IGNORECASE,
+)
+NUMBER = re.compile(r"(?<![\w.])\d*\.?\d+(?![\w.])")
+
+
+@dataclass(frozen=True)
+class Restitution:
+    """Of a file.
+
+    Attributes:
+        own: the value written into it, or the exercise's if none is found.
+        named: whether it is written in, by a name or as a number.
+        came: parting over closing speed of two equal spheres that meet head-on at 2 m/s.
+        slow, fast: the same at 2 mm/s and at 200 m/s.
+    """
+
+    own: float
+    named: bool
+    came: float
+    slow: float
+    fast: float
+
+    @property
+    def candidates(self) -> list[float]:
+        """The values a hit is explained by: the file's own first, then what came, if nothing contradicts it."""
+        free = 0 <= self.came <= 1 and not self.named
+        return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
+
+    @property
+    def played(self) -> float | None:
+        """The value that whole scenes are judged by; None if no number from 0 to 1 makes sense."""
+        return next((e for e in (self.came, self.own) if 0 <= e <= 1), None)
+
+    def row(self, mistake: str) -> Row:
+        """0.9 is right, another number is a note if the file says so, and a fault if it says something else.
+
+        `mistake`: what is known to be wrong with the hits, if anything.
+        """
+        asked = "What part of its closing speed has a pair when it parts?"
+        if near(self.came, EXERCISE):
+            return Row("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
+        if near(self.came, self.own) or len(self.candidates) > 1:
+            note = f"e = {shown(self.came)} is written into the file; the exercise has 0.9. It is judged by its own"
+            return Row("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "note", note)
+        cause = mistake if np.isfinite(self.came) else "the velocities become no numbers"
+        cause = cause or f"e = {shown(self.own)} is written into the file, but it is not what comes out"
+        return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
+
+    def speeds(self) -> Row:
+        """The same at any speed."""
+        return judged(
+            "any speed", "2c", "Is it the same for pairs that close at 2 mm/s and at 200 m/s?",
+            f"{shown(self.slow)} and {shown(self.fast)}", shown(self.came),
+            near([self.slow, self.fast], self.came), "the restitution depends on the speed",
+        )  # fmt: skip
+
+
+def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
+    """What the file's text says and what its hits give."""
+    came, slow, fast = (parting(answers[name], name) for name in ("even", "slow", "fast"))
+    found = written(text)
+    # A file may hold several such numbers, and use one of them.
+    own = next((e for e in found if near(e, came)), found[0] if found else EXERCISE)
+    return Restitution(own, bool(found), came, slow, fast)
+
+
+def written(text: str) -> list[float]:
+    """What may be the e of a file: numbers that a name such as e or restitution gets; 0.9 if that or 1.9 occurs."""
+    code = COMMENTS.sub(" ", text)
+    named = [float(value) for _, value in NAMED.findall(code) if 0 <= float(value) <= 1]
+    numbers = [float(x) for x in NUMBER.findall(code)]
+    return named + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
+
+
+def parting(answer: Answer, name: str) -> float:
+    """Parting over closing speed; NaN if the call failed."""
+    if answer.failed or not answer.balls:
+        return float("nan")
+    a, b = QUESTIONS[name].balls
+    after = answer.last
+    return float((after[1].v[0] - after[0].v[0]) / (a.v[0] - b.v[0]))

@@ -1,0 +1,106 @@
+"""A row of the check: what was asked of a solver, what came, what was expected, and the likely cause."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+Verdict = Literal["right", "fault", "note", "not asked"]
+# Single precision is allowed: a dozen operations of 6e-8 each. What is wrong is wrong by far more than that.
+TOLERANCE = 1e-6
+UNKNOWN = "unknown: no common mistake gives these numbers"
+TASKS = {
+    "file": "the file",
+    "1": "1 integrate",
+    "2a": "2a detect",
+    "2b": "2b project",
+    "2c": "2c impulse",
+    "2d": "2d velocities",
+    "loop": "the step around them",
+    "scenes": "whole scenes",
+}
+READ = {
+    "file": "the exercise's text: only the two tasks are to be filled in",
+    "1": "the exercise, task 1; reference_impl/exercise.py, integrate",
+    "2a": "the exercise, task 2 (a); reference_impl/exercise.py, collide (a)",
+    "2b": "the exercise, task 2 (b); reference_impl/exercise.py, collide (b)",
+    "2c": "the exercise, task 2 (c); reference_impl/exercise.py, collide (c)",
+    "2d": "the exercise, task 2 (d); reference_impl/exercise.py, collide (d)",
+    "loop": "performSimStep and projectObjects as the exercise hands them out",
+    "scenes": "scenarios/closed_forms.py, scenarios/oracle.py",
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One thing that was checked.
+
+    Attributes:
+        name: a word for it, the same for every solver.
+        task: the key in `TASKS` of the part of the exercise it belongs to.
+        asked: the question, one sentence.
+        got, expected: the answer and the right one, with units.
+        verdict: "right"; "fault"; "note": as the author chose where the exercise leaves the choice;
+            "not asked": it could not be asked, and `cause` says why.
+        cause: of a fault its likely cause; of a note what the choice is.
+    """
+
+    name: str
+    task: str
+    asked: str
+    got: str
+    expected: str
+    verdict: Verdict
+    cause: str = ""
+
+    @property
+    def read(self) -> str:
+        """Where to read how it is meant."""
+        return READ[self.task]
+
+
+def judged(name: str, task: str, asked: str, got: str, expected: str, right: bool, cause: str = "") -> Row:
+    """A row that is right or a fault with its cause."""
+    return Row(name, task, asked, got, expected, "right" if right else "fault", "" if right else cause or UNKNOWN)
+
+
+def not_asked(name: str, task: str, why: str) -> Row:
+    """A row for what could not be asked."""
+    return Row(name, task, "", "", "", "not asked", why)
+
+
+def near(got: object, expected: object, scale: float = 1.0) -> bool:
+    """Whether all numbers agree to `TOLERANCE` of themselves or of `scale`; NaN never does."""
+    one, other = np.asarray(got, float), np.asarray(expected, float)
+    return bool((np.abs(one - other) <= TOLERANCE * np.maximum(np.abs(other), scale)).all())
+
+
+Law = Callable[..., object]
+
+
+def follows(laws: Mapping[str, Law], asked: Sequence[Sequence[object]], came: Sequence[object]) -> str | None:
+    """The first law that gives what came, for everything that was asked; None if there is none."""
+    with np.errstate(all="ignore"):
+        for name, law in laws.items():
+            if all(near(answer, law(*question), 0.1) for question, answer in zip(asked, came)):
+                return name
+    return None
+
+
+def shown(value: object) -> str:
+    """Numbers for people: four digits, vectors in brackets."""
+    array = np.asarray(value, float)
+    if array.ndim:
+        return "(" + ", ".join(shown(x) for x in array) + ")"
+    x = float(array)
+    return ("NaN" if np.isnan(x) else "infinite") if not np.isfinite(x) else f"{0.0 if abs(x) < 1e-12 else x:.4g}"
+
+
+def worst(rows: Iterable[Row]) -> Verdict:
+    """The verdict of a group of rows: its worst."""
+    found = {row.verdict for row in rows}
+    order: tuple[Verdict, ...] = ("fault", "not asked", "right", "note")
+    return next((verdict for verdict in order if verdict in found), "not asked")

@@ -1,0 +1,230 @@
+"""Whole scenes: a solver's motion against the exact one, within what dt explains, and its first wrong hit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from adapters.solver_file import SolverFailed
+from adapters.solver_process import SolverProcess
+from adapters.student import spheres_of
+from reports.check.rows import TOLERANCE, Row, judged, near, not_asked, shown
+from scenarios.closed_forms import world_pushes
+from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
+from scenarios.no_truth import NoTruth
+from scenarios.oracle import TruthRecord, computed
+
+DT = 1e-3  # s, the exercise's
+INTERVAL = 0.02  # s
+SLACK = 2.0  # on a bound of first order in dt: what is left out is smaller by another dt v / r
+LIMIT = 2.0  # s that a sample interval may take
+FOLLOWS = "it follows from the faults above"
+
+
+class Played(NamedTuple):
+    """A scene by a solver: position and velocity (k, n, 2) m, m/s, and its contacts (c, 19).
+
+    A contact is: step, i, j, then x, y, vx, vy of i and of j before the call, and of both after it.
+    """
+
+    position: Array
+    velocity: Array
+    angle: Array
+    angular_velocity: Array
+    contacts: Array
+
+
+def step_of(process: SolverProcess) -> float:
+    """s; coarser where every pair costs a call of `advance` with new arrays, some 0.1 ms."""
+    return DT if process.surface == "exercise" else 5 * DT
+
+
+def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> Played:
+    """Play it by the file's own functions; its pushes last as long as it does. Raises `SolverFailed`."""
+    scene, count = scenario.scene, round(scenario.sample_interval / dt)
+    pushes = np.zeros((scene.n, 3))
+    for push in scenario.thrusts:
+        pushes[push.disk] += [*push.force, push.torque]
+    step = {"count": count, "pushes": pushes.tolist() if pushes.any() else None, "held": True}
+    start: dict[str, Any] = {"spheres": spheres_of(scene), "dt": dt, "gravity": [0.0, 0.0], "wrap": None}
+    requests = [("load", start, LIMIT), ("read", None, LIMIT)]
+    for _ in range(scenario.samples):
+        requests += [("step", step, LIMIT), ("read", None, LIMIT)]
+    *answers, contacts = process.request([*requests, ("contacts", None, LIMIT)])
+    failed = next((answer for answer in (*answers, contacts) if isinstance(answer, SolverFailed)), None)
+    if failed:
+        raise failed
+    rows = np.array(answers[1::2], float)
+    return Played(rows[..., 0:2], rows[..., 2:4], rows[..., 6], rows[..., 7], np.array(contacts, float).reshape(-1, 19))
+
+
+def scene_rows(process: SolverProcess, rows: Sequence[Row], e: float | None) -> list[Row]:
+    """The rows on whole scenes with restitution `e`, and the one on the first wrong hit in any of them."""
+    if any(row.name == "implemented" for row in rows):
+        return [not_asked("scenes", "scenes", "a function of the file cannot be used")]
+    blamed = any(row.verdict == "fault" for row in rows)
+    if e is None:
+        return [not_asked("scenes", "scenes", "the collision function cannot be judged further")]
+    found, wrong, dt = [], "", step_of(process)
+    try:
+        for scenario, record in scenes(round(e, 9)):
+            played = play_scene(process, scenario, dt)
+            found.append(scene_row(scenario, record, played, dt, FOLLOWS if blamed else ""))
+            wrong = wrong or first_wrong(scenario, played.contacts, dt)
+    except SolverFailed as failure:
+        return [judged("scenes", "scenes", "Does it play whole scenes?", "it fails", "yes", False, str(failure))]
+    return [*found, judged("first wrong hit", "scenes", "Is every hit in these scenes right by itself?",
+                           wrong or "yes", "yes", not wrong, FOLLOWS if blamed else "")]  # fmt: skip
+
+
+def scene_row(scenario: Scenario, record: TruthRecord | None, played: Played, dt: float, cause: str) -> Row:
+    """The largest distance from the exact positions, beside what the step size explains."""
+    truth = truth_of(scenario, record)
+    k = len(truth)
+    away = np.hypot(*np.moveaxis(played.position[:k] - truth.position, -1, 0))
+    allowed = bounds(scenario, record, truth.t, dt)[:, None] + TOLERANCE
+    ratio = np.where(np.isfinite(away), away, np.inf) / allowed
+    at, disk = np.unravel_index(int(ratio.argmax()), ratio.shape)
+    turned = np.abs(played.angle[:k] - truth.angle)
+    if not (turned <= turning_bounds(scenario, truth.t, dt)[:, None] + TOLERANCE).all():
+        got = f"a sphere is turned by {shown(turned.max())} rad too much or too little"
+        expected = f"at most {shown(turning_bounds(scenario, truth.t, dt)[-1])} rad, by dt = {shown(dt)} s"
+        return judged(scenario.name, "scenes", scenario.asks, got, expected, False, cause)
+    got = f"sphere {disk} is {shown(away[at, disk])} m away at {shown(truth.t[at])} s"
+    expected = f"at most {shown(allowed[at, 0])} m, by dt = {shown(dt)} s"
+    return judged(scenario.name, "scenes", scenario.asks, got, expected, bool(ratio.max() <= 1), cause)
+
+
+def truth_of(scenario: Scenario, record: TruthRecord | None) -> Trajectory:
+    """The exact motion, up to where it is known."""
+    if record is None:
+        return world_pushes(scenario.scene, scenario.thrusts, scenario.times)
+    return record.sampled(scenario.scene, scenario.thrusts, scenario.times)
+
+
+def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
+    """(k,) rad, how far an angle may be off: symplectic Euler is w' dt t / 2 ahead, and a hit turns nothing."""
+    spin_up = max((abs(p.torque) / scenario.scene.inertia[p.disk] for p in scenario.thrusts), default=0.0)
+    return 1.001 * spin_up * dt * t / 2
+
+
+def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) -> Array:
+    """(k,) m, how far a right solver in steps of `dt` s may be off at the times t (k,) s.
+
+    Free flight under a push: symplectic Euler is a dt t / 2 ahead. A hit is found up to dt late, so that each disk
+    goes on for u dt; its normal is turned by that and by what the disks were off before, over (rA + rB) cos, which
+    sends them off by as much of their change of velocity. Errors add up and grow with time, so that
+    after several hits it is generous: there the row on the first wrong hit is the one that sees.
+    """
+    scene = scenario.scene
+    push = max((float(np.hypot(*p.force)) / scene.mass[p.disk] for p in scenario.thrusts), default=0.0)
+    if record is None:
+        return 1.001 * push * dt * t / 2
+    place, speed, before = 0.0, 0.0, 0.0
+    steps = [(0.0, 0.0, 0.0)]
+    for at, i, j, kick, cosine in record.events:
+        i, j = int(i), int(j)
+        place += speed * (at - before)
+        mu = 1 / (1 / scene.mass[i] + 1 / scene.mass[j])
+        u = kick / (1 + scene.restitution) / mu / cosine
+        turned = (2 * place + u * dt) / ((scene.radius[i] + scene.radius[j]) * cosine)
+        speed += 2 * speed + turned * kick / min(scene.mass[i], scene.mass[j])
+        place += u * dt
+        steps.append((at, place, speed))
+        before = at
+    known = np.array(steps)
+    # A solver may be a step late, so that what a hit adds is allowed from a step before it on.
+    leg = np.searchsorted(known[:, 0] - dt, t, side="right") - 1
+    return SLACK * (known[leg, 1] + known[leg, 2] * np.abs(t - known[leg, 0]))
+
+
+def first_wrong(scenario: Scenario, contacts: Array, dt: float) -> str:
+    """The first contact that is not what the formula makes of the state before it, in a sentence; "" if none."""
+    scene = scenario.scene
+    for row in contacts:
+        step, i, j = int(row[0]), int(row[1]), int(row[2])
+        if fault := contact_fault(row[3:].reshape(2, 2, 4), scene, i, j):
+            return f"{scenario.name}, spheres {i} and {j} at {shown((step + 1) * dt)} s: {fault}"
+    return ""
+
+
+def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
+    """What is wrong with one call: states (2, 2, 4) before and after, of i and j, x, y, vx, vy; "" if nothing is."""
+    (a, b), (a2, b2) = states
+    if not np.isfinite(states).all():
+        return "the numbers become NaN or infinite"
+    r, reach = a[:2] - b[:2], scene.radius[i] + scene.radius[j]
+    d = float(np.hypot(*r))
+    if abs(d - reach) <= TOLERANCE * reach or d == 0:
+        return ""
+    if d > reach:
+        return (
+            "" if near(states[1], states[0]) else f"they react at a distance of {shown(d)} m, beyond {shown(reach)} m"
+        )
+    n, apart = r / d, float(np.hypot(*(a2[:2] - b2[:2])))
+    vn = float((a[2:] - b[2:]) @ n)
+    J = -(1 + scene.restitution) * vn / (1 / scene.mass[i] + 1 / scene.mass[j])
+    change = np.array([J / scene.mass[i] * n, -J / scene.mass[j] * n])
+    came = np.array([a2[2:] - a[2:], b2[2:] - b[2:]])
+    free = vn >= 0 and near(came, 0.0)
+    if not (near(apart, reach) or (vn >= 0 and near(apart, d))):
+        return f"their centres are {shown(apart)} m apart after it, not {shown(reach)} m"
+    if free or near(came, change):
+        return ""
+    k = 0 if not near(came[0], change[0]) else 1
+    return (
+        f"sphere {(i, j)[k]} has {shown(states[1, k, 2:])} m/s after it, not {shown(states[0, k, 2:] + change[k])} m/s"
+    )
+
+
+# question, s, then a row x, y, vx, vy (m, m/s) for every sphere, radii m, masses kg
+MET: dict[str, tuple] = {
+    "head_on": (
+        "Where are two unequal spheres after they meet head-on?", 1.0,
+        [[-0.6, 0.0, 0.9, 0.0], [0.5, 0.0, -0.7, 0.0]], [0.25, 0.3], [1.0, 2.5],
+    ),
+    "oblique": (
+        "Where are two unequal spheres after an oblique hit?", 1.0,
+        [[-0.7, 0.1, 1.1, 0.1], [0.5, -0.05, -0.5, 0.0]], [0.3, 0.25], [2.0, 0.8],
+    ),
+    "row": (
+        "Where are three spheres in a row after the first has hit the second, and that the third?", 1.2,
+        [[-1.0, 0.0, 1.3, 0.0], [0.0, 0.0, 0.0, 0.0], [0.9, 0.0, 0.0, 0.0]], [0.25, 0.25, 0.25], [1.0, 1.5, 0.7],
+    ),
+    "crowd": (
+        "Where are five spheres after they have hit each other?", 1.0,
+        [[-1.1, 0.0, 1.4, 0.1], [-0.2, 0.1, 0.0, 0.0], [0.8, 0.3, -0.7, 0.0], [0.1, 1.0, 0.0, -0.8],
+         [0.2, -1.1, 0.1, 0.7]],
+        [0.3, 0.25, 0.2, 0.25, 0.3], [1.0, 2.0, 0.5, 1.2, 0.8],
+    ),
+}  # fmt: skip
+
+
+@lru_cache(maxsize=8)
+def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
+    """The scenes of a check with restitution `e`, each with its exact motion: a closed form, or many digits."""
+    pushed = Scenario(
+        name="pushed", asks="Where is a sphere that a force pushes and a torque turns for a second?", source="F = m a",
+        scene=scene_of([[-1.0, 0.5, 0.6, -0.2]], [0.3], [1.4], e),
+        duration=1.0, sample_interval=INTERVAL, thrusts=[Thrust(0, 0.0, 1.0, np.array([0.5, 0.9]), 0.02)],
+    )  # fmt: skip
+    found: list[tuple[Scenario, TruthRecord | None]] = [(pushed, None)]
+    for name, (asks, duration, rows, radius, mass) in MET.items():
+        scenario = Scenario(name=name, asks=asks, source="drawn for this check", scene=scene_of(rows, radius, mass, e),
+                            duration=duration, sample_interval=INTERVAL)  # fmt: skip
+        try:
+            found.append((scenario, computed(scenario)))
+        except NoTruth:  # e = 0 leaves touching spheres, whose motion the oracle does not follow
+            continue
+    return tuple(found)
+
+
+def scene_of(rows: Sequence[Sequence[float]], radius: Sequence[float], mass: Sequence[float], e: float) -> Scene:
+    """A scene from rows x, y, vx, vy, in m and m/s."""
+    state = np.array(rows, float)
+    return Scene(
+        position=state[:, :2], velocity=state[:, 2:], radius=np.array(radius), mass=np.array(mass), restitution=e
+    )

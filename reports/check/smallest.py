@@ -1,0 +1,142 @@
+"""The smallest scene that shows a fault: drawn and shrunk by hypothesis, each judged by closed forms alone."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from time import monotonic
+
+import numpy as np
+from hypothesis import HealthCheck, Phase, find, settings
+from hypothesis import strategies as st
+from hypothesis.errors import Flaky, NoSuchExample
+
+from adapters.solver_file import SolverFailed
+from adapters.solver_process import SolverProcess
+from reports.check.rows import near, shown
+from reports.check.scenes import Played, first_wrong, play_scene, scene_of, truth_of
+from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
+from scenarios.no_truth import NoTruth
+from scenarios.oracle import computed
+
+DT = 1e-2  # s, coarse: a scene is played in milliseconds, and a hit found late is judged by the state it is found in
+SECONDS = 1.5  # for drawing and shrinking together
+DURATION, INTERVAL = 1.0, 0.02  # s
+DRAWS = 400
+GAP = 0.05  # m, least distance of two surfaces at the start
+
+Sphere = tuple[int, int, int, int, int, int]
+"""x, y in half metres, vx, vy in m/s, radius in quarters of a metre, mass in kg."""
+
+
+@dataclass(frozen=True)
+class Smallest:
+    """A scene that shows a fault, what is wrong in it, the file's motion and the exact one where there is one."""
+
+    scenario: Scenario
+    fault: str
+    yours: Trajectory
+    truth: Trajectory | None
+
+
+def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
+    """The smallest that is found within `SECONDS`; None if none shows a fault."""
+    best: dict[str, tuple[list[Sphere], tuple[int, int, int]]] = {}
+    deadline = monotonic() + SECONDS
+
+    def faulty(drawn: tuple[list[Sphere], tuple[int, int, int]]) -> bool:
+        if monotonic() > deadline or not fault_of(process, *drawn, e):
+            return False
+        best["so far"] = drawn
+        return True
+
+    sphere = st.tuples(ints(4), ints(3), ints(2), ints(2), st.integers(1, 2), st.integers(1, 3))
+    scene = st.tuples(st.lists(sphere, min_size=1, max_size=3), st.tuples(ints(2), ints(2), ints(1)))
+    rules = settings(
+        max_examples=DRAWS, derandomize=True, database=None, deadline=None,
+        suppress_health_check=list(HealthCheck), phases=(Phase.generate, Phase.shrink),
+    )  # fmt: skip
+    with suppress(NoSuchExample, Flaky):  # nothing found, or the time was up while it shrank
+        find(scene, faulty, settings=rules)
+    return shown_by(process, *without_idlers(process, *best["so far"], e), e) if best else None
+
+
+def without_idlers(
+    process: SolverProcess, spheres: list[Sphere], push: tuple[int, int, int], e: float
+) -> tuple[list[Sphere], tuple[int, int, int]]:
+    """The scene without the spheres that the fault does not need: the time may be up before hypothesis sees to it."""
+    for k in range(len(spheres)):
+        fewer = spheres[:k] + spheres[k + 1 :]
+        if fewer and fault_of(process, fewer, push, e):
+            return without_idlers(process, fewer, push, e)
+    return spheres, push
+
+
+def ints(most: int) -> st.SearchStrategy[int]:
+    """From -most to most; hypothesis shrinks them to 0."""
+    return st.integers(-most, most)
+
+
+def scenario_of(spheres: list[Sphere], push: tuple[int, int, int], e: float, interval: float) -> Scenario | None:
+    """The scene of these numbers; None if spheres are too near each other at the start. One alone is also pushed."""
+    rows = [(x / 2, y / 2, float(u), float(v)) for x, y, u, v, _, _ in spheres]
+    radius, mass = [r / 4 for *_, r, _ in spheres], [float(m) for *_, m in spheres]
+    for i in range(len(rows)):
+        for j in range(i):
+            if np.hypot(rows[i][0] - rows[j][0], rows[i][1] - rows[j][1]) < radius[i] + radius[j] + GAP:
+                return None
+    alone = len(rows) == 1 and any(push)
+    thrusts = [Thrust(0, 0.0, DURATION, np.array(push[:2], float), push[2] * 0.1)] if alone else []
+    return Scenario(
+        name="smallest", asks="Which scene is the smallest that shows the fault?", source="drawn and shrunk",
+        scene=scene_of(rows, radius, mass, e), duration=DURATION, sample_interval=interval,
+        substeps=(round(interval / DT),), thrusts=thrusts,
+    )  # fmt: skip
+
+
+def fault_of(process: SolverProcess, spheres: list[Sphere], push: tuple[int, int, int], e: float) -> str:
+    """What is wrong with the file's motion in a scene; "" if nothing is, or it is no scene."""
+    scenario = scenario_of(spheres, push, e, DURATION)
+    if scenario is None:
+        return ""
+    try:
+        played = play_scene(process, scenario, DT)
+    except SolverFailed as failure:
+        return str(failure) if failure.kind == "error" else ""
+    return first_wrong(scenario, played.contacts, DT) or flight_fault(scenario, played)
+
+
+def flight_fault(scenario: Scenario, played: Played) -> str:
+    """Whether a sphere that meets nobody flies as symplectic Euler does: x0 + v0 t + a t (t + dt) / 2 after t."""
+    scene, t = scenario.scene, scenario.duration
+    met = {int(i) for row in played.contacts for i in row[1:3]}
+    for k in set(range(scene.n)) - met:
+        force = sum((push.force for push in scenario.thrusts if push.disk == k), np.zeros(2))
+        torque = sum(push.torque for push in scenario.thrusts if push.disk == k)
+        x = scene.position[k] + scene.velocity[k] * t + force / scene.mass[k] * t * (t + DT) / 2
+        angle = torque / scene.inertia[k] * t * (t + DT) / 2
+        if not near(played.position[-1, k], x):
+            return f"sphere {k} is at {shown(played.position[-1, k])} m after {shown(t)} s, not at {shown(x)} m"
+        if not near(played.angle[-1, k], angle):
+            turned = shown(played.angle[-1, k])
+            return f"sphere {k} is turned by {turned} rad after {shown(t)} s, not by {shown(angle)} rad"
+    return ""
+
+
+def shown_by(process: SolverProcess, spheres: list[Sphere], push: tuple[int, int, int], e: float) -> Smallest:
+    """The scene with the file's motion and the exact one."""
+    scenario = scenario_of(spheres, push, e, INTERVAL)
+    assert scenario is not None
+    fault = fault_of(process, spheres, push, e)
+    played = play_scene(process, scenario, DT)
+    kicked = [row for row in played.contacts if not near(row[[5, 6, 9, 10]], row[[13, 14, 17, 18]])]
+    hits = Collisions.of([((row[0] + 1) * DT, int(row[1]), int(row[2]), float("nan")) for row in kicked])
+    yours = Trajectory(
+        frozen(scenario.times), frozen(played.position), frozen(played.velocity), frozen(played.angle),
+        frozen(played.angular_velocity), hits,
+    )  # fmt: skip
+    try:
+        truth = truth_of(scenario, None if scenario.scene.n == 1 else computed(scenario))
+    except NoTruth:
+        truth = None
+    return Smallest(scenario, fault.removeprefix("smallest, "), yours, truth)

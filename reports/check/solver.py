@@ -1,0 +1,115 @@
+"""`check_solver`: all rows of one solver's file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from adapters.solver_file import SolverFailed, read_solver
+from adapters.solver_process import SolverProcess
+from reports.check.detection import detection_rows
+from reports.check.functions import implemented
+from reports.check.impacts import explain
+from reports.check.impulse import impulse_not_asked, impulse_rows
+from reports.check.loop import loop_rows
+from reports.check.motion import motion_rows
+from reports.check.projection import projection_rows
+from reports.check.questions import HITS, QUESTIONS, Answer, ask
+from reports.check.restitution import Restitution, restitution_of
+from reports.check.rows import Row, judged, not_asked
+from reports.check.scenes import scene_rows
+
+
+def check_solver(path: Path | str) -> list[Row]:
+    """What was asked of a solver's file and what came of it, task by task.
+
+    Raises:
+        NotASolver: the path is no JavaScript or Python text.
+    """
+    return examine(Path(path))[0]
+
+
+def examine(path: Path) -> tuple[list[Row], float | None]:
+    """The rows of a file, and the restitution that its scenes are judged by; raises `NotASolver`."""
+    text = read_solver(path).text
+    try:
+        process = SolverProcess(path)
+    except SolverFailed as failure:
+        return [judged("loads", "file", LOADS, f"no: {failure}", "yes", False, str(failure))], None
+    try:
+        with process:
+            return rows_of(process, text)
+    except SolverFailed as failure:
+        lost = judged(
+            "answers", "file", "Does it answer when its functions are called?", "no", "yes", False, str(failure)
+        )
+        return [loads(process), lost], None
+
+
+LOADS = "Can the file be loaded, and does it leave the language as it is?"
+
+
+def rows_of(process: SolverProcess, text: str) -> tuple[list[Row], float | None]:
+    """The rows of a file that is loaded, and its restitution; raises `SolverFailed` if its process is lost."""
+    if process.functions["begin"]:
+        process.request([("begin", None, 2.0)])  # makes the globals that must not change; judged with the step
+    asked = {k: q for k, q in QUESTIONS.items() if process.functions["integrate" if k in MOTION else "collide"]}
+    answers = ask(process, asked)
+    rows = [loads(process), *task_1(process, answers)]
+    contact, restitution = task_2(process, answers, text)
+    rows += contact
+    faulty = any(row.verdict == "fault" for row in rows)
+    rows += (
+        loop_rows(process, faulty) if not stuck(answers) else [not_asked("step", "loop", "a call did not come back")]
+    )
+    e = restitution.played if restitution is not None else None
+    return rows + scene_rows(process, rows, e), e
+
+
+MOTION = ("push", "push, other numbers", "coast", "push twice")
+
+
+def stuck(answers: dict[str, Answer]) -> bool:
+    """Whether a call had to be stopped: whatever makes it again would have to be stopped, too."""
+    return any(answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values())
+
+
+def loads(process: SolverProcess) -> Row:
+    """Loaded, and which built-ins it has replaced for everybody."""
+    replaced = process.functions["replaced"]
+    what = ", ".join(replaced)
+    return judged("loads", "file", LOADS, f"replaces {what}" if what else "yes", "yes", not replaced,
+                  f"the file replaces {what}, which the rest of the page uses, too")  # fmt: skip
+
+
+def task_1(process: SolverProcess, answers: dict[str, Answer]) -> list[Row]:
+    """The rows of integrate."""
+    mine = {name: answer for name, answer in answers.items() if name in MOTION}
+    rows, usable = implemented("1", process.functions["integrate"], mine)
+    return rows + (motion_rows(mine) if usable else [not_asked("velocity", "1", "integrate cannot be judged further")])
+
+
+def task_2(process: SolverProcess, answers: dict[str, Answer], text: str) -> tuple[list[Row], Restitution | None]:
+    """The rows of the collision function, and its restitution where it has one."""
+    mine = {name: answer for name, answer in answers.items() if name not in MOTION}
+    rows, usable = implemented("2a", process.functions["collide"], mine)
+    if not usable:
+        why = "the collision function cannot be judged further"
+        return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None
+    rows += detection_rows(mine)
+    if not reacts(mine):
+        why = "the overlapping pairs of these questions are taken to be apart"
+        return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None
+    restitution = restitution_of(text, mine)
+    found = explain(mine, restitution)
+    rows += projection_rows(mine, found is not None and bool(found.impulse or found.update) and found.task != "2b")
+    return rows + impulse_rows(mine, restitution, found), restitution
+
+
+def reacts(answers: dict[str, Answer]) -> bool:
+    """Whether every pair that is asked about beyond detection does something."""
+    return all(
+        not np.array_equal([b.numbers() for b in answers[name].last], [b.numbers() for b in QUESTIONS[name].balls])
+        for name in HITS
+    )

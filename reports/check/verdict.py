@@ -1,0 +1,73 @@
+"""What the rows of one file come to: a verdict for each task, and the sentences that help most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from adapters.solver_file import NotASolver
+from reports.check.rows import TASKS, Row, Verdict, worst
+from reports.check.scenes import FOLLOWS
+from reports.check.solver import examine
+
+MOST = 3  # sentences
+
+
+@dataclass(frozen=True)
+class FileCheck:
+    """One file, its rows and the restitution its scenes have; or why it is no solver at all, and then no rows."""
+
+    path: Path
+    rows: Sequence[Row]
+    refused: str = ""
+    restitution: float | None = None
+
+    @property
+    def faults(self) -> list[Row]:
+        """The rows that found a fault, in order of the tasks."""
+        return [row for row in self.rows if row.verdict == "fault"]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no fault was found."""
+        return not self.refused and not self.faults
+
+    def of(self, task: str) -> list[Row]:
+        """The rows of a task."""
+        return [row for row in self.rows if row.task == task]
+
+    @property
+    def tasks(self) -> dict[str, Verdict]:
+        """Of each task its worst verdict."""
+        return {task: worst(self.of(task)) for task in TASKS}
+
+    @property
+    def sentences(self) -> list[str]:
+        """At most `MOST`, the one to begin with first: a mistake once, without what only follows from it."""
+        if self.refused:
+            return [self.refused]
+        if not self.faults:
+            asked = [row for row in self.rows if row.verdict in ("right", "note")]
+            return [
+                f"No fault found: {len(asked)} questions, {sum(row.verdict == 'note' for row in asked)} free choices."
+            ]
+        first = {row.cause: row for row in reversed(self.faults) if row.cause != FOLLOWS}
+        rows = sorted(first.values(), key=self.faults.index) or self.faults[:1]
+        return [sentence(row) for row in rows[:MOST]]
+
+
+def sentence(row: Row) -> str:
+    """Where, what is likely wrong, and the numbers that say so."""
+    numbers = "" if row.name in ("implemented", "loads", "answers") else f" Came: {row.got}. Expected: {row.expected}."
+    return f"Task {TASKS[row.task]}, {row.name}: {row.cause}.{numbers}" if row.task[0] in "12" else (
+        f"{TASKS[row.task].capitalize()}, {row.name}: {row.cause}.{numbers}")  # fmt: skip
+
+
+def check_file(path: Path) -> FileCheck:
+    """The check of one file, whatever it is."""
+    try:
+        rows, restitution = examine(path)
+        return FileCheck(path, rows, restitution=restitution)
+    except NotASolver as refusal:
+        return FileCheck(path, [], str(refusal))

@@ -1,0 +1,32 @@
+"""The catalogue of faulty solvers: mutants.toml, each a patch of a correct file."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+HERE = Path(__file__).parent
+CORRECT = sorted(path for path in (HERE / "correct").iterdir() if path.suffix in (".js", ".py"))
+
+
+class Mutant(NamedTuple):
+    """A patch: in the correct file `base`, `old` becomes `new`; task and a piece of the cause that must come first."""
+
+    name: str
+    base: str
+    task: str
+    cause: str
+    old: str
+    new: str
+
+    def write(self, folder: Path) -> Path:
+        """The faulty file in `folder`."""
+        text = (HERE / "correct" / self.base).read_text()
+        assert self.old in text, f"{self.name}: the patch does not fit {self.base}"
+        path = folder / self.name
+        path.write_text(text.replace(self.old, self.new))
+        return path
+
+
+MUTANTS = [Mutant(**row) for row in tomllib.loads((HERE / "mutants.toml").read_text())["mutant"]]

@@ -1,0 +1,136 @@
+"""What the check says of right and of wrong solvers: `python -m tests.confusion` makes the whole table."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters.solver_process import SolverProcess
+from reports.check.questions import QUESTIONS, Ball, ask
+from reports.check.rows import TASKS
+from reports.check.scenes import bounds, contact_fault, scene_of, scenes, truth_of
+from reports.check.solver import check_solver
+from reports.check.verdict import FileCheck
+from tests.confusion import TABLE, judged, said_first
+from tests.solvers.mutants import CORRECT, MUTANTS
+
+FAST = MUTANTS[::6]
+
+
+def test_the_catalogue_is_large_enough_and_covers_every_task():
+    """At least 20 mutants in each language, one or more for each task; 12 correct solvers."""
+    assert min(Counter(mutant.base[-2:] for mutant in MUTANTS).values()) >= 20
+    assert {mutant.task for mutant in MUTANTS} == set(TASKS) - {"file", "scenes"}
+    assert len(CORRECT) >= 12
+
+
+def test_no_correct_solver_is_faulted():
+    """However it is written: no fault, and every task asked that the file has."""
+    faults = {path.name: one.sentences for path, one in judged(CORRECT).items() if not one.passed}
+
+    assert faults == {}
+
+
+def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
+    """Every sixth of the catalogue; the long test has them all."""
+    checks = judged([mutant.write(tmp_path) for mutant in FAST])
+
+    assert [mutant.name for mutant in FAST if not said_first(mutant, checks[tmp_path / mutant.name])] == []
+
+
+@pytest.mark.slow
+def test_the_committed_table_is_what_comes_out(tmp_path: Path):
+    """All mutants and all correct solvers: found, cause first, as the table says; and 38 of 40 or better."""
+    checks = judged([mutant.write(tmp_path) for mutant in MUTANTS])
+    right = {mutant.name: said_first(mutant, checks[tmp_path / mutant.name]) for mutant in MUTANTS}
+    rows = {row["solver"]: row for row in csv.DictReader(TABLE.read_text().splitlines())}
+
+    assert sum(right.values()) >= 0.95 * len(right)
+    assert {name: rows[name]["first cause is right"] for name in right} == {
+        name: "yes" if is_right else "no" for name, is_right in right.items()
+    }
+
+
+def test_the_same_file_gets_the_same_rows():
+    """Nothing is drawn by chance, and no clock is read."""
+    path = CORRECT[-1]
+
+    assert check_solver(path) == check_solver(str(path))
+
+
+def test_two_mistakes_are_both_told(tmp_path: Path):
+    """One in task 1 and one in 2d: two sentences, in this order, without those that only follow."""
+    text = (CORRECT[0].parent / "plain.py").read_text()
+    text = text.replace(" / sphere.mass * dt", " * dt").replace("sphereB.velocity.x -= J", "sphereB.velocity.x += J")
+    (tmp_path / "solver.py").write_text(text.replace("sphereB.velocity.y -= J", "sphereB.velocity.y += J"))
+    sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences
+
+    assert "the force is not divided by the mass" in sentences[0]
+    assert "B gets the sign of A" in sentences[1]
+
+
+def test_another_restitution_is_a_note_and_is_judged_by_itself():
+    """The file with e = 0.5 has no fault, and its scenes have that e."""
+    rows = {row.name: row for row in check_solver(next(path for path in CORRECT if path.name == "unusual_e.js"))}
+
+    assert rows["restitution"].verdict == "note"
+    assert "e = 0.5 is written into the file" in rows["restitution"].cause
+    assert rows["oblique"].verdict == "right"
+
+
+def test_free_choices_are_notes():
+    """`<=`, a one-sided displacement, an impulse on pairs that part, no guard for equal centres."""
+    rows = {row.name: row for row in check_solver(next(path for path in CORRECT if path.name == "one_sided.js"))}
+
+    notes = [rows[name].cause for name in ("touch", "split", "parting", "same centre")]
+    assert {rows[name].verdict for name in ("touch", "split", "parting", "same centre")} == {"note"}
+    assert "compares with <=" in notes[0]
+    assert "A alone is moved" in notes[1]
+    assert "as the formula is printed" in notes[2]
+
+
+def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):
+    """Numbers that no formula of the table gives are told as numbers."""
+    text = (CORRECT[0].parent / "plain.py").read_text()
+    (tmp_path / "solver.py").write_text(text.replace("J = -(1 + RESTITUTION) * vn", "J = -(1 + RESTITUTION) * vn**3"))
+    sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences
+
+    assert "unknown" in sentences[0]
+    assert "Came:" in sentences[0]
+
+
+def test_the_bound_on_a_scene_lets_a_right_solver_pass_and_a_wrong_restitution_not():
+    """Motions that are exact but for e = 0.85 leave the bound of e = 0.9 wherever there are at most three spheres."""
+    for (scenario, record), (other, other_record) in zip(scenes(0.9)[1:4], scenes(0.85)[1:4]):
+        truth, off = truth_of(scenario, record), truth_of(other, other_record)
+
+        assert np.abs(off.position - truth.position).max() > bounds(scenario, record, truth.t, 1e-3).max()
+
+
+def test_a_contact_is_judged_by_the_formula():
+    """The right outcome passes; a velocity off by 1 % does not, nor a reaction at a distance."""
+    scene = scene_of([[0.0, 0.0, 1.0, 0.0], [0.9, 0.0, -1.0, 0.0]], [0.5, 0.5], [1.0, 1.0], 0.9)
+    before = [[0.0, 0.0, 1.0, 0.0], [0.9, 0.0, -1.0, 0.0]]
+    after = [[-0.05, 0.0, -0.9, 0.0], [0.95, 0.0, 0.9, 0.0]]
+
+    assert contact_fault(np.array([before, after]), scene, 0, 1) == ""
+    after[1][2] = 0.91
+    assert "sphere 1 has (0.91, 0) m/s after it, not (0.9, 0) m/s" in contact_fault(
+        np.array([before, after]), scene, 0, 1
+    )
+    far = np.array([before, after]) + np.array([[0.0] * 4, [0.3, 0.0, 0.0, 0.0]])
+    assert "react at a distance" in contact_fault(far, scene, 0, 1)
+
+
+def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():
+    """A call that does nothing to a sphere far away leaves its 12 numbers, bit for bit, in both languages."""
+    for name in ("plain.js", "plain.py"):
+        with SolverProcess(CORRECT[0].parent / name) as process:
+            far = QUESTIONS["touch"]._replace(balls=(Ball((0.1, 0.2), (1 / 3, 0.7)), Ball((9.0, 1e-7), m=5e-324)))
+            answer = ask(process, {"far": far})["far"]
+
+        assert answer.last == list(far.balls)

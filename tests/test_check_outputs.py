@@ -1,0 +1,240 @@
+"""The check as people, graders and projects see it: command, JSON, JUnit, page, pytest, and the file as an engine."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import jsonschema
+import pytest
+from playwright.sync_api import Error, Page, sync_playwright
+
+from adapters.play import play
+from adapters.solver_process import SolverProcess
+from adapters.student import engine_file
+from reports.check.machine import SCHEMA
+from reports.check.smallest import Smallest, smallest_scene
+from reports.check.verdict import check_file
+from scenarios.catalogue import scenario
+from tests.solvers.mutants import CORRECT, MUTANTS
+
+BIN = Path(sys.executable).parent
+RIGHT = next(path for path in CORRECT if path.name == "plain.js")
+WRONG = next(mutant for mutant in MUTANTS if mutant.name == "mass_sum.js")
+CHROMIUM = shutil.which("chromium")
+
+
+def run(*words: str | Path, cwd: Path, program: str = "crosscheck") -> subprocess.CompletedProcess[str]:
+    """A command in a process of its own."""
+    return subprocess.run([BIN / program, *words], cwd=cwd, capture_output=True, text=True, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A class of four: one right, one wrong, one that does not load, one that is no text."""
+    where = tmp_path_factory.mktemp("class")
+    for name in ("anna", "ben", "cem", "dora", ".hidden"):
+        (where / name).mkdir()
+    shutil.copy(RIGHT, where / "anna" / "Exercise.js")
+    WRONG.write(where / "ben").rename(where / "ben" / "Exercise.js")
+    (where / "cem" / "Exercise.js").write_text("function integrate( {\n")
+    (where / "dora" / "solver.py").write_bytes(b"\x00\x01")
+    (where / "anna" / "gl-matrix.js").write_text("handed out, no solver")
+    (where / ".hidden" / "x.js").write_text("none of ours")
+    return where
+
+
+def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(folder: Path):
+    """The first line is the sentence to begin with; the page is where the command was given."""
+    right, wrong = (run("check", folder / who / "Exercise.js", cwd=folder) for who in ("anna", "ben"))
+
+    assert (right.returncode, wrong.returncode) == (0, 1)
+    assert right.stdout.startswith("No fault found")
+    assert wrong.stdout.replace("\n", " ").startswith("1. Task 2c impulse, impulse: it divides by (mA + mB)")
+    assert (folder / "check.html").is_file()
+
+
+def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
+    """JSON of a folder: four files in order, as the schema says; what is no text is refused with its reason."""
+    done = run("check", folder, "--json", "--junit", folder / "class.xml", cwd=folder)
+    told = json.loads(done.stdout)
+
+    jsonschema.validate(told, json.loads(SCHEMA.read_text()))
+    assert done.returncode == 1
+    assert [(Path(one["file"]).parent.name, one["passed"]) for one in told["files"]] == [
+        ("anna", True), ("ben", False), ("cem", False), ("dora", False)
+    ]  # fmt: skip
+    assert "SyntaxError" in told["files"][2]["sentences"][0]
+    assert "is not text" in told["files"][3]["refused"]
+    suites = ElementTree.parse(folder / "class.xml").getroot()
+    assert [int(s.get("failures", "")) > 0 for s in suites] == [False, True, True, False]
+    assert [s.get("errors") for s in suites] == ["0", "0", "0", "1"]
+    assert sum(len(list(s)) for s in suites) == sum(int(s.get("tests", "")) for s in suites)
+
+
+def test_the_table_of_a_class_fits_a_terminal(folder: Path):
+    """A line a file, and how many are right."""
+    done = run("check", folder, cwd=folder)
+
+    assert "1 of 4 files without a fault." in done.stdout
+    assert max(len(line) for line in done.stdout.splitlines()) <= 80
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["nobody.js"], "nobody.js: is not there; name an Exercise.js, a solver.py or a folder of them"),
+        (["class.txt"], "a solver is a .js or a .py file"),
+        (["empty"], "holds no .js and no .py file"),
+        (["anna/Exercise.js", "--junit", "no/such/x.xml"], "--junit no/such/x.xml: No such file or directory"),
+        (["anna/Exercise.js", "--page", "class.txt"], "class.txt is there and no page of a check"),
+        ([".", "--page", "p.html"], "--page p.html: shows one file"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], message: str):
+    """No traceback, whatever is asked for."""
+    (folder / "class.txt").write_text("mine")
+    (folder / "empty").mkdir(exist_ok=True)
+    done = run("check", *words, cwd=folder)
+
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert (folder / "class.txt").read_text() == "mine"
+
+
+@pytest.mark.slow
+def test_pytest_runs_the_rows_as_tests(folder: Path):
+    """In a folder without any project: a right file passes, a wrong one fails with the numbers, junk is refused."""
+    (folder / "own").mkdir(exist_ok=True)
+    right, wrong, junk = (
+        run("-q", "-p", "no:cacheprovider", "--solver", folder / path, cwd=folder / "own", program="pytest")
+        for path in ("anna/Exercise.js", "ben/Exercise.js", "dora/solver.py")
+    )
+
+    assert (right.returncode, wrong.returncode, junk.returncode) == (0, 1, 4)
+    assert "passed" in right.stdout
+    assert "likely:   it divides by (mA + mB) instead of (1/mA + 1/mB)" in wrong.stdout
+    assert "is not text" in junk.stderr + junk.stdout
+
+
+@pytest.fixture(scope="module")
+def smallest(folder: Path) -> Smallest:
+    """The smallest scene that shows the wrong file's fault."""
+    with SolverProcess(folder / "ben" / "Exercise.js") as process:
+        found = smallest_scene(process, 0.9)
+    assert found is not None
+    return found
+
+
+def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smallest):
+    """A fault of the impulse needs two; yours and the exact answer part."""
+    assert smallest.scenario.scene.n == 2
+    assert "m/s after it, not" in smallest.fault
+    assert smallest.truth is not None
+    assert abs(smallest.yours.position[-1] - smallest.truth.position[-1]).max() > 0.005
+
+
+def test_a_right_solver_has_no_failing_scene():
+    """The negative control of the search: nothing is found in what is right."""
+    with SolverProcess(RIGHT) as process:
+        assert smallest_scene(process, 0.9) is None
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+@pytest.mark.parametrize("width", [1280, 400])
+def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(folder: Path, smallest: Smallest, width: int):
+    """Opened from the file, at two widths: both layers move, nothing overflows, no error, no request."""
+    from reports.check.page import write_page
+
+    page_path = folder / "page.html"
+    write_page(page_path, check_file(folder / "ben" / "Exercise.js"), smallest)
+    with sync_playwright() as playwright:
+        try:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        except Error as error:
+            pytest.skip(f"Chromium does not start: {error}")
+        page: Page = browser.new_page(viewport={"width": width, "height": 800})
+        heard: list[str] = []
+        page.on("console", lambda message: heard.append(message.text))
+        page.on("pageerror", lambda error: heard.append(str(error)))
+        page.on("request", lambda request: heard.append(request.url) if request.url.startswith("http") else None)
+        page.goto(page_path.as_uri())
+        page.wait_for_function("players.smallest")
+        at_end = "name => { players.smallest.seek(1); return players.smallest.positions(name); }"
+        shown = {name: page.evaluate(at_end, name) for name in ("Exercise.js:own", "truth")}
+        fits = page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        title = page.locator("h1").inner_text()
+        browser.close()
+
+    assert heard == []
+    assert fits
+    assert title == "Exercise.js: what is wrong, and where"
+    assert shown["truth"] is not None
+    assert abs(shown["Exercise.js:own"][0][1] - shown["truth"][0][1]) > 0.004
+
+
+def test_text_of_a_file_is_inert_on_its_page(tmp_path: Path):
+    """A message that holds markup is shown as it is."""
+    from reports.check.page import write_page
+
+    path = tmp_path / "evil.js"
+    path.write_text("throw new Error('<script>alert(1)</script>')")
+    write_page(tmp_path / "check.html", check_file(path), None)
+
+    assert "<script>alert" not in (tmp_path / "check.html").read_text()
+
+
+@pytest.mark.parametrize("name", ["plain.js", "plain.py", "arrays.py"])
+def test_a_file_plays_as_an_engine(name: str):
+    """A right file makes of the ship's flight what the reference makes of it, to rounding, in every language."""
+    flight = scenario("ship_thrust")
+    runs = {}
+    for row in (engine_file(RIGHT.parent / name), engine_file(RIGHT)):
+        engine = row.make()
+        runs[row.summary] = play(engine, "x:own", flight, flight.dt(4))
+        engine.close()
+    first, *others = runs.values()
+
+    assert all(one.status == "ok" for one in runs.values())
+    assert all(abs(one.trajectory.position - first.trajectory.position).max() < 1e-12 for one in others)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("scene", "reason"),
+    [
+        ("head_on_equal_e1", "the file has e = 0.9, the scene needs 1"),
+        ("wall_to_wall", "the exercise has no walls"),
+    ],
+)
+def test_a_scene_that_the_file_cannot_play_is_refused(scene: str, reason: str):
+    """Its restitution is written into it, and it has no walls."""
+    engine = engine_file(RIGHT).make()
+    question = scenario(scene)
+    played = play(engine, "x:own", question, question.dt(question.substeps[0]))
+    engine.close()
+
+    assert played.status == "unsupported"
+    assert reason in played.reason
+
+
+@pytest.mark.slow
+def test_run_takes_a_file_as_an_engine(folder: Path):
+    """It stands in the tables beside the others, under its own path."""
+    words = ["run", "head_on_equal_e09", "--dt", str(1 / 60), "--engine", "reference:exercise"]
+    done = run(*words, "--engine", "anna/Exercise.js", "--out", "run", cwd=folder)
+    bad = run(*words, "--engine", "dora/solver.py", "--out", "bad", cwd=folder)
+
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((folder / "run" / "runs.csv").read_text().splitlines()))
+    assert [(row["engine"], row["profile"], row["status"]) for row in rows] == [
+        ("reference", "exercise", "ok"), ("anna/Exercise.js", "own", "ok")
+    ]  # fmt: skip
+    assert bad.returncode == 2
+    assert "is not text" in bad.stderr
