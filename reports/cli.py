@@ -81,6 +81,23 @@ def truth(
     show_truth(scene, seed, events, as_json)
 
 
+Port = Annotated[int, typer.Option(min=1, max=65535, help="Where to serve, on this machine only.")]
+Opens = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
+
+
+@app.command()
+def play(
+    flight: Annotated[Path | None, typer.Argument(metavar="[FLIGHT.toml]", help="Fly a saved flight again.")] = None,
+    engine: Engines = None,
+    port: Port = 8000,
+    opens: Opens = False,
+) -> None:
+    """Fly the exercise's spaceship through several engines at once, in a browser."""
+    from reports.game.command import play_game
+
+    play_game(flight, engine or [], port, opens)
+
+
 @app.command(name="list")
 def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
     """Explain every engine, scenario and metric in a line."""
