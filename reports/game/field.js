@@ -20,7 +20,7 @@ class Field {
   }
 
   begin(field) {
-    this.field = field;
+    Object.assign(this, { field, last: null });
     const [left, bottom, right, top] = field.wrap ?? this.around(field);
     this.view = { left, bottom, right, top };
     this.canvas.style.aspectRatio = `${right - left} / ${top - bottom}`;
