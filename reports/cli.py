@@ -98,6 +98,19 @@ def play(
     play_game(flight, engine or [], port, opens)
 
 
+@app.command()
+def lesson(
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Begin with this one.")] = "",
+    port: Port = 8000,
+    opens: Opens = False,
+    export: Annotated[Path | None, typer.Option(help="Write lesson NAME as one page that needs no server.")] = None,
+) -> None:
+    """Learn why engines differ: short pages with scenes that run and the exact answer beside them."""
+    from reports.lessons.command import open_lesson
+
+    open_lesson(name, port, opens, export)
+
+
 @app.command(name="list")
 def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
     """Explain every engine, scenario and metric in a line."""

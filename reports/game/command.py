@@ -7,6 +7,7 @@ from pathlib import Path
 
 from reports.commands import checked_engines, refuse
 from reports.game.server import Game, application, serve
+from reports.lessons.pages import ROUTES
 from scenarios.files import SceneFileError, read_scene_file
 from scenarios.model import Scenario
 
@@ -17,7 +18,7 @@ def play_game(flight: Path | None, engines: Sequence[str], port: int, opens: boo
     """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is none."""
     game = Game(checked_engines(engines) if engines else list(FIRST), read_flight(flight) if flight else None)
     try:
-        serve(application(game), port, "/", opens)
+        serve(application(game, ROUTES), port, "/", opens)
     except OSError as fault:
         refuse([f"--port {port}: {fault}; name another"])
 
