@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
-from reports.comparison import Comparison, answered
+from reports.comparison import Comparison, answered, cut
+from reports.laws import deviation
 from reports.replay import pack, played, ratio_of
 from reports.style import TRUTH, number
 from scenarios.model import Array, Scenario, Trajectory
@@ -175,13 +176,12 @@ class Played:
     def errors(self) -> list[Curve]:
         """m, the largest distance of any disk from the truth over time, while there is one."""
         assert self.truth is not None
-        exact = self.truth.position
         curves = []
         for run in self.runs:
             if run.trajectory is not None:
-                k = min(len(run.trajectory), len(exact))
-                apart = np.linalg.norm(run.trajectory.position[:k] - exact[:k], axis=2).max(axis=1)
-                curves.append(Curve(run.name, self.truth.t[:k], apart))
+                k = min(len(run.trajectory), len(self.truth))
+                apart = deviation(cut(run.trajectory, k), cut(self.truth, k), self.scenario.scene)
+                curves.append(Curve(run.name, self.truth.t[:k], apart.max(axis=1)))
         return curves
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from adapters.play import Run, play
 from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
 from reports.lessons.switches import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, Switched, Switches
-from reports.style import number
+from reports.style import TRUTH, number
 from scenarios.lesson import free_fall
 from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.placing import lay_out
@@ -50,8 +51,8 @@ def told(runs: Sequence[Run], setting: str) -> list[tuple[str, str]]:
 
 
 def filmed(scenario: Scenario, runs: Sequence[Run]) -> Any:
-    """For the player of the page."""
-    return Played(scenario, runs, None).film
+    """For the player of the page, which shows the runs at the step of the scenario."""
+    return Played(replace(scenario, substeps=(round(scenario.sample_interval / runs[0].dt),)), runs, None).film
 
 
 def pairs(closing: Array, restitution: float) -> Scene:
@@ -131,6 +132,8 @@ def show_gravity(settings: Settings) -> Shown:
     runs = runs_of(names, Switches(order=ORDERS[settings["order"]]), scenario, settings["k"])
     curves = over_time(runs, lambda each: each.position[:, 0, 1])
     facts = [distance(curves, name, "m") for name in names]
+    assert scenario.truth is not None
+    curves.append(Curve(TRUTH, scenario.times, scenario.truth(scenario.times).position[:, 0, 1]))
     return Shown([Chart("Height of the centre", "time in s", "m", curves)], filmed(scenario, runs), facts)
 
 
@@ -193,7 +196,8 @@ def page(
     *sliders: Slider,
 ) -> Lesson:  # fmt: skip
     """A page of this lesson."""
-    return Lesson(name, f"6.{part}", title, asks, (text,), sliders, (*names, PLAIN, SWITCHED), show)
+    exact = (TRUTH,) if name == "gravity" else ()
+    return Lesson(name, f"6.{part}", title, asks, (text,), sliders, (*names, PLAIN, SWITCHED, *exact), show)
 
 
 MECHANISMS = (
