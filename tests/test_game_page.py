@@ -180,6 +180,34 @@ def test_a_saved_flight_is_shown_again_to_the_same_bits(browser: Browser, page: 
     assert heard == []
 
 
+def test_any_scene_file_can_be_flown(browser: Browser):
+    """Walls, static disks and no wrap: drawn and played to its end, with no earth to win."""
+    scenario = read_scene_file(Path(__file__).parent / "scenes" / "bumper.toml")
+    with served(application(Game(["reference:exercise", "event_driven:float64"], scenario))) as url:
+        page, heard = opened(browser, url)
+        page.wait_for_function("() => game.now && game.now.over", timeout=30_000)
+        left, t = page.evaluate("[game.now.flyers.map((flyer) => flyer.left), game.now.t]")
+        page.context.close()
+
+    assert left == ["", ""]
+    assert t == pytest.approx(scenario.duration)
+    assert heard == []
+
+
+def test_a_finger_steers_too(page: Page):
+    """The button pushes as long as it is held."""
+    wish(page, asteroids=0)
+    box = page.locator("[data-key=w]").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    page.mouse.down()
+    fly(page, 20)
+    page.mouse.up()
+    fly(page, 10)
+
+    assert page.evaluate("game.now.ship[2]") == pytest.approx(0.25 * 20 * FRAME, abs=1e-14)
+
+
 def test_a_lost_connection_is_told_and_mended(page: Page):
     """The page says so, and begins anew when the server is there again."""
     fly(page, 3)

@@ -11,6 +11,7 @@ from reports.lessons.pages import ROUTES
 from scenarios.files import SceneFileError, read_scene_file
 from scenarios.model import Scenario
 
+MOST_DISKS = 200  # of a scene file: more are no longer drawn sixty times a second
 FIRST = ("reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:float64")
 
 
@@ -26,6 +27,9 @@ def play_game(flight: Path | None, engines: Sequence[str], port: int, opens: boo
 def read_flight(path: Path) -> Scenario:
     """The scenario in a scene file; exits 2 with a line a fault."""
     try:
-        return read_scene_file(path)
+        scenario = read_scene_file(path)
     except SceneFileError as error:
         refuse(error.faults)
+    if scenario.scene.n > MOST_DISKS:
+        refuse([f"{path}: {scenario.scene.n} disks; the page shows at most {MOST_DISKS}"])
+    return scenario

@@ -10,7 +10,7 @@ import numpy as np
 
 from adapters.engine import Engine
 from adapters.engines import ENGINES
-from adapters.play import RUNAWAY, advance, fault_of, first_hits, weight_impulse
+from adapters.play import RUNAWAY, advance, fault_of, first_hits, reach, weight_impulse
 from reports.game.parting import Parting, Touches, parting
 from reports.game.pilot import SHIP, Pilot
 from scenarios.exercise import SOURCE, asteroid_field
@@ -21,7 +21,6 @@ SUBSTEPS = (2, 4, 8, 16, 32)  # steps in a frame; 16 is the nearest to the exerc
 LONGEST = 600.0  # s, of a flight
 EARTH, EARTH_SIZE = (3.5, 1.5), 0.5
 CALM, SLOW_SPIN = 0.1, 0.1  # squared speed and angular velocity below which the exercise says "You won"
-LOST = 100.0  # m/s: nothing in a field gets as fast but by a fault
 
 
 def field_scenario(seed: int = 0, asteroids: int = 20, restitution: float = 0.9, substeps: int = 16) -> Scenario:
@@ -77,6 +76,7 @@ class Flight:
         self.scenario, self.replayed = scenario, replayed
         self.substeps = scenario.substeps[len(scenario.substeps) // 2]
         self.dt = scenario.dt(self.substeps)
+        self.farthest = RUNAWAY * reach(scenario)
         self.pilot = Pilot(scenario.scene, scenario.sample_interval)
         self.frame, self.left_at, self.won_at = 0, -1, -1
         self.flyers = [self.boarded(name) for name in names]
@@ -130,7 +130,7 @@ class Flight:
         except Exception as error:  # a refusal, or whatever an engine raises
             flyer.left = str(error) or type(error).__name__
             return
-        if fault := fault_of(flyer.state, RUNAWAY * LOST):
+        if fault := fault_of(flyer.state, self.farthest):
             flyer.state, flyer.left = before, fault
             return
         if len(hits) > flyer.seen:

@@ -1,10 +1,10 @@
-"""What a page may ask of the game: five kinds of message, everything in them checked."""
+"""What a page may ask of the game: four kinds of message, everything in them checked."""
 
 from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from adapters.engines import ENGINES
 from reports.game.flight import SUBSTEPS
@@ -12,6 +12,14 @@ from reports.game.pilot import KEYS
 
 MOST_BYTES = 4096  # of a message
 MOST_FRAMES = 4  # that one message may ask for
+MOST_ENGINES = 16  # in a flight
+
+
+def known(name: str) -> str:
+    """A name that is a row of `ENGINES` by now."""
+    if name not in ENGINES:
+        raise ValueError(f"{name!r} is no engine")
+    return name
 
 
 class _Message(BaseModel):
@@ -22,7 +30,7 @@ class Fly(_Message):
     """Begin a flight: through a new field, or, where there is a file, that flight again."""
 
     do: Literal["fly"]
-    engines: list[Literal[tuple(ENGINES)]] = Field(min_length=1, max_length=len(ENGINES))  # type: ignore[valid-type]
+    engines: list[Annotated[str, AfterValidator(known)]] = Field(min_length=1, max_length=MOST_ENGINES)
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     asteroids: Annotated[int, Field(ge=0, le=40)] = 20
     restitution: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.9

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from reports.game.flight import EARTH, EARTH_SIZE, FRAME, Flight, Flyer, field_scenario
+from reports.game.flight import EARTH, EARTH_SIZE, Flight, Flyer, field_scenario
 from reports.game.messages import Fly, Frames, Key, Message, read_message
 from reports.game.pilot import SHIP
 from scenarios.files import scene_text
@@ -61,7 +61,7 @@ class Session:
             "walls": scene.walls.reshape(-1, 4).tolist(), "earth": [*EARTH, EARTH_SIZE] if game else None,
             "interval": flight.scenario.sample_interval, "dt": flight.dt, "replayed": flight.replayed,
             "engines": [flyer.name for flyer in flight.flyers], "duration": flight.scenario.duration,
-            "real": flight.scenario.sample_interval == FRAME, "first": self.now(),
+            "first": self.now(),
         }  # fmt: skip
 
     def now(self) -> dict[str, Any]:

@@ -148,7 +148,7 @@ def show_push_out(settings: Settings) -> Shown:
     runs = runs_of(["box2d:matched"], on, scenario, 1)
     curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
     facts = [*told(runs, "linear slop in m"), distance(curves, "box2d:matched", "mm")]
-    return Shown([Chart("Overlap", "time in s", "mm", curves, "y")], filmed(scenario, runs), facts)
+    return Shown([Chart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")], filmed(scenario, runs), facts)
 
 
 def show_digits(settings: Settings) -> Shown:
@@ -159,7 +159,7 @@ def show_digits(settings: Settings) -> Shown:
     exact = start + scenario.times[:, None] * v
     curves = over_time(runs, lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16))
     facts = [*told(runs, "float32 rounding of the start in m"), distance(curves, "box2d:shipped", "m")]
-    return Shown([Chart("Distance from x + v t", "time in s", "m", curves, "y")], None, facts)
+    return Shown([Chart("Distance from x + v t", "time in s", "m, 0 drawn as 10⁻¹⁶", curves, "y")], None, facts)
 
 
 def show_cap(settings: Settings) -> Shown:
