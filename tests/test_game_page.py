@@ -226,12 +226,13 @@ def test_another_engine_can_be_solid(page: Page):
     assert page.evaluate("game.field.engines") == ["pymunk:shipped", "reference:exercise", "event_driven:float64"]
 
 
-@pytest.mark.parametrize("width", [400, 1280])
-def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str, width: int):
+def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
     """Nothing scrolls sideways but the table; Tab comes to every control, with a visible outline."""
-    page, heard = opened(browser, url, viewport={"width": width, "height": 800}, color_scheme="dark")
+    page, heard = opened(browser, url, viewport={"width": 400, "height": 800}, color_scheme="dark")
     page.wait_for_function("() => game.field && game.now.frame > 10", timeout=20_000)
     too_wide = overhang(page)
+    page.set_viewport_size({"width": 1280, "height": 800})
+    too_wide = max(too_wide, overhang(page))
     reached = []
     for _ in range(40):
         page.keyboard.press("Tab")

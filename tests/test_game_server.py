@@ -19,6 +19,7 @@ import uvicorn
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from reports.game.command import play_game
 from reports.game.server import MOST_A_SECOND, MOST_FAULTS, MOST_TABS, Game, application, config_of, taken_socket
 
 ENGINES = ["reference:exercise", "pymunk:shipped"]
@@ -195,12 +196,25 @@ def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_told(served: Served, tmp_pa
     assert out.splitlines()[-1] == "Stopped."
 
 
-def test_bad_input_is_told_and_nothing_is_served(tmp_path: Path):
-    """One line a fault, exit 2."""
-    (tmp_path / "bad.toml").write_text('name = "a"\nduration = 1.0\nsample_interval = 0.5\nrestitution = 2.0\n')
-    program = Path(sys.executable).parent / "crosscheck"
-    done = subprocess.run([program, "play", "bad.toml"], capture_output=True, text=True, timeout=60, cwd=tmp_path)
+@pytest.mark.parametrize(
+    ("flight", "engines", "said"),
+    [
+        ("nowhere.toml", [], "nowhere.toml: no such file"),
+        ("bad.toml", [], "bad.toml: restitution = 2.0"),
+        ("crowd.toml", [], "201 disks; the page shows at most 200"),
+        (None, ["boxed2d"], "did you mean box2d"),
+    ],
+)
+def test_bad_input_is_told_and_nothing_is_served(
+    flight: str | None, engines: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """A line a fault, exit 2."""
+    top = 'name = "a"\nduration = 1.0\nsample_interval = 0.5\nrestitution = {}\n'
+    disk = "[[disk]]\nposition = [{}, 0.0]\nvelocity = [0.0, 0.0]\nradius = 0.1\nmass = 1.0\n"
+    (tmp_path / "bad.toml").write_text(top.format(2.0) + disk.format(0.0))
+    (tmp_path / "crowd.toml").write_text(top.format(1.0) + "".join(disk.format(x) for x in range(201)))
+    with pytest.raises(SystemExit) as exit:
+        play_game(tmp_path / flight if flight else None, engines, 8000, False)
 
-    assert done.returncode == 2
-    assert "bad.toml: restitution = 2.0" in done.stderr
-    assert "Traceback" not in done.stderr
+    assert exit.value.code == 2
+    assert said in capsys.readouterr().err
