@@ -43,6 +43,8 @@ Timings = Annotated[
 Resume = Annotated[
     Path | None, typer.Option(metavar="OUT", help="Play what is missing or changed in a run, as it was asked for.")
 ]
+Port = Annotated[int, typer.Option(min=1, max=65535, help="Where to serve, on this machine only.")]
+Opens = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
 
 
 @app.callback(invoke_without_command=True)
@@ -120,10 +122,6 @@ def truth(
     from reports.truth_command import show_truth
 
     show_truth(scene, seed, events, as_json)
-
-
-Port = Annotated[int, typer.Option(min=1, max=65535, help="Where to serve, on this machine only.")]
-Opens = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
 
 
 @app.command()
