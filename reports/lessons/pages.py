@@ -19,20 +19,21 @@ from reports.cells import versions
 from reports.documents import looks_as_json, render
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
+from reports.lessons.crowd import EVERY_PAIR
 from reports.lessons.lesson import Lesson
 from reports.lessons.mechanisms import SWITCHED
 from reports.style import Look, look
 
 STYLES = ["lessons/lesson.css"]
-DASH = (7.0, 5.0)
+OWN = {  # who plays in lessons only
+    SWITCHED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
+    EVERY_PAIR: look("reference")._replace(dash=(7, 5)),
+}
 
 
 def looks_of(lesson: Lesson) -> dict[str, Look]:
-    """How each name of a lesson is drawn; the reference with a mechanism on is dashed, so that what it covers shows."""
-    looks = {name: look(*name.split(":", 1)) for name in lesson.names}
-    if SWITCHED in looks:
-        looks[SWITCHED] = look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=DASH)  # type: ignore[arg-type]
-    return looks
+    """How each name of a lesson is drawn; what lies on another curve is dashed, so that what it covers shows."""
+    return {name: OWN.get(name) or look(*name.split(":", 1)) for name in lesson.names}
 
 
 def about() -> dict[str, str]:
