@@ -1,28 +1,83 @@
-"""Takes the README's picture from a page: uv run python .ci/picture.py reports/out/latest/report.html"""
+"""Takes the README's pictures: of a page, of the game, of a lesson.
 
-import shutil
+uv run python .ci/picture.py reports/out/latest/report.html | game | lesson
+"""
+
 import sys
 from pathlib import Path
 
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Browser, Page
 
-PICTURE = Path(__file__).parent.parent / "reports" / "page.png"
-QUIET = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
+sys.path.insert(0, str(Path(__file__).parent.parent))  # the tests are not installed
+
+from reports.game.command import FIRST
+from reports.game.server import Game, application
+from reports.lessons.pages import ROUTES
+from tests.browsing import chromium, served
+
+REPORTS = Path(__file__).parent.parent / "reports"
+PAD = 14  # pixels, so that nothing touches the edge
+STEER = """async ([key, down, frames]) => {
+  game.key(key, down);
+  const until = game.now.frame + frames;
+  while (game.now.frame < until) {
+    game.ask(1);
+    while (game.waiting) await new Promise((done) => setTimeout(done));
+  }
+}"""
+FLIGHT = [("a", True, 8), ("a", False, 1), ("d", True, 8), ("d", False, 1), ("w", True, 150), ("a", True, 30)]
 
 
-def main(page: Path) -> None:
+def report_map(browser: Browser, page: str) -> None:
     """The map of position errors, without the index beside it."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=QUIET)
-        tab = browser.new_page(viewport={"width": 1320, "height": 1400}, device_scale_factor=1.5)
-        tab.goto(page.resolve().as_uri())
-        box = tab.locator("#map").bounding_box()
-        assert box is not None
-        pad = 14  # pixels, so that nothing touches the edge
-        clip = {"x": box["x"] - pad, "y": box["y"], "width": box["width"] + 2 * pad, "height": box["height"] + pad}
-        tab.screenshot(path=PICTURE, clip=clip, full_page=True)
-        browser.close()
+    tab = browser.new_page(viewport={"width": 1320, "height": 1400}, device_scale_factor=1.5)
+    tab.goto(Path(page).resolve().as_uri())
+    clip(tab, "page.png", "#map", "#map")
+
+
+def game(browser: Browser, url: str) -> None:
+    """The field after some seconds of a flight that is the same every time."""
+    tab = browser.new_page(viewport={"width": 980, "height": 900}, reduced_motion="reduce")
+    tab.goto(url)
+    tab.wait_for_function("() => game.field")
+    for keys in FLIGHT:
+        tab.evaluate(STEER, list(keys))
+    tab.evaluate("game.say('')")
+    tab.add_style_tag(content="#banner,.touch,.wishes,#pace{display:none!important}")
+    tab.wait_for_timeout(500)
+    clip(tab, "game.png", ".cockpit", ".engines")
+
+
+def lesson(browser: Browser, url: str) -> None:
+    """The ball that bounces ever higher, with the mechanism switched on."""
+    tab = browser.new_page(viewport={"width": 980, "height": 900})
+    tab.goto(f"{url}/lesson/gravity")
+    tab.wait_for_function("() => window.lesson")
+    tab.locator(".sliders [name=order]").fill("2")
+    tab.evaluate("lesson.ready")
+    tab.add_style_tag(content=".stage-lesson .player{display:none!important}:focus{outline:none!important}")
+    clip(tab, "lesson.png", "h1", ".facts-table")
+
+
+def clip(tab: Page, name: str, first: str, last: str) -> None:
+    """From the top of one element to the foot of another, as wide as the first."""
+    top, foot = (tab.locator(each).bounding_box() for each in (first, last))
+    assert top is not None
+    assert foot is not None
+    box = {"x": top["x"] - PAD, "y": top["y"] - PAD * (first != "#map"), "width": top["width"] + 2 * PAD}
+    box["height"] = foot["y"] + foot["height"] - box["y"] + PAD
+    tab.screenshot(path=REPORTS / name, clip=box, full_page=True)
+
+
+def main(what: str) -> None:
+    """One picture."""
+    with chromium() as browser:
+        if what in ("game", "lesson"):
+            with served(application(Game(FIRST), ROUTES)) as url:
+                {"game": game, "lesson": lesson}[what](browser, url)
+        else:
+            report_map(browser, what)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(sys.argv[1])

@@ -39,11 +39,11 @@ class EventDriven:
         """Let the events of `count` steps happen; a push is an acceleration from the first one's start to its end."""
         if self.pushed and count:
             turning = self.torque / self.scene.inertia
+            self.settle()  # it turned freely up to here
             self.accelerate(self.scene.gravity + self.force / self.scene.mass[:, None])
             self.advance(1)
             self.accelerate(np.broadcast_to(self.scene.gravity, (self.scene.n, 2)))
-            self.angle, self.spin = self.turn(turning)
-            self.turned_at = self.steps
+            self.settle(turning)
             self.force[:], self.torque[:] = 0.0, 0.0
             self.pushed.clear()
             count -= 1
@@ -62,8 +62,13 @@ class EventDriven:
         except NoTruth as refusal:
             raise Unsupported(str(refusal)) from refusal
 
+    def settle(self, turning: Array | float = 0.0) -> None:
+        """Keep angle and spin as they are now, under an angular acceleration since they were kept last."""
+        self.angle, self.spin = self.turn(turning)
+        self.turned_at = self.steps
+
     def turn(self, turning: Array | float = 0.0) -> tuple[Array, Array]:
-        """Angle rad and angular velocity rad/s (n,) now, under an angular acceleration since the last torque ended."""
+        """Angle rad and angular velocity rad/s (n,) now, under an angular acceleration since they were kept."""
         since = (self.steps - self.turned_at) * self.dt
         return self.angle + (self.spin + turning * since / 2) * since, self.spin + turning * since
 

@@ -43,6 +43,8 @@ Timings = Annotated[
 Resume = Annotated[
     Path | None, typer.Option(metavar="OUT", help="Play what is missing or changed in a run, as it was asked for.")
 ]
+Port = Annotated[int, typer.Option(min=1, max=65535, help="Where to serve, on this machine only.")]
+Opens = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
 
 
 @app.callback(invoke_without_command=True)
@@ -133,6 +135,32 @@ def check(
     from reports.check.command import check as check_and_say
 
     check_and_say(path, as_json, junit, page)
+
+
+@app.command()
+def play(
+    flight: Annotated[Path | None, typer.Argument(metavar="[FLIGHT.toml]", help="Fly a saved flight again.")] = None,
+    engine: Engines = None,
+    port: Port = 8000,
+    opens: Opens = False,
+) -> None:
+    """Fly the exercise's spaceship through several engines at once, in a browser."""
+    from reports.game.command import play_game
+
+    play_game(flight, engine or [], port, opens)
+
+
+@app.command()
+def lesson(
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Begin with this one.")] = "",
+    port: Port = 8000,
+    opens: Opens = False,
+    export: Annotated[Path | None, typer.Option(help="Write lesson NAME as one page that needs no server.")] = None,
+) -> None:
+    """Learn why engines differ: short pages with scenes that run and the exact answer beside them."""
+    from reports.lessons.command import open_lesson
+
+    open_lesson(name, port, opens, export)
 
 
 @app.command(name="list")

@@ -20,9 +20,10 @@ from adapters.play import Run
 from reports import overview, style
 from reports.charts import CHARTS, POINTS, Drawing
 from reports.comparison import Comparison
+from reports.documents import content_policy, css, looks_as_json
 from reports.known_answers import MEANING
+from reports.lessons.catalogue import LESSONS
 from reports.metrics import METRICS
-from reports.offline import content_policy, css, looks_as_json
 from reports.replay import frames, name_of, pack, played, ratio_of
 from scenarios.catalogue import SCENARIOS
 
@@ -92,7 +93,7 @@ def write_page(
         known_answers=records(known_answers), known_answers_text=about.get("known_answers_text", MEANING),
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
-        heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, truth_of=truth_of,
+        heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, lessons=LESSONS, truth_of=truth_of,
         common=by_name(common),
     )  # fmt: skip
     path.write_text(html, encoding="utf-8")

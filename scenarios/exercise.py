@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.closed_forms import world_pushes
-from scenarios.model import Array, Scenario, Thrust, Trajectory
+from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.oracle import with_oracle
 from scenarios.placing import lay_out, scatter
 
@@ -24,33 +24,36 @@ TURNS = ((0.60, 1.80, 1), (2.20, 3.40, -1), (4.80, 5.20, -1))  # A, D, D
 
 def asteroids(seed: int = 0) -> Scenario:
     """The ship at rest among twenty asteroids, drawn as the exercise draws them but for overlaps."""
-    rng = np.random.default_rng(seed)
-    count = 20
-    size = rng.uniform(0.08, 0.3, count)
-    radius = np.append(SHIP_RADIUS, size)
-    position = scatter(rng, LOW, HIGH, radius, first=SHIP)
-    velocity = rng.uniform(0.25, 0.5, (count, 2)) * rng.choice([-1.0, 1.0], (count, 2))
-    scene = lay_out(
-        position=position,
-        velocity=np.vstack([[0.0, 0.0], velocity]),
-        angular_velocity=np.append(0.0, rng.uniform(-0.5, 0.5, count)),
-        radius=radius,
-        mass=np.append(SHIP_MASS, 30 * np.pi * size**2),
-        inertia=np.append(SHIP_INERTIA, np.pi / 2 * size**4),
-        restitution=0.9,
-        wrap=[LOW, HIGH],
-    )
     question = Scenario(
         name="asteroids",
         asks="Do the engines agree on where a ship and twenty asteroids are after 10 s of hits?",
         source=f"{SOURCE}; overlapping draws are drawn again",
-        scene=scene,
+        scene=asteroid_field(seed),
         duration=10.0,
         sample_interval=INTERVAL,
         substeps=LADDER,
         seed=seed,
     )
     return with_oracle(question)
+
+
+def asteroid_field(seed: int, count: int = 20, restitution: float = 0.9) -> Scene:
+    """The ship, disk 0, at rest among `count` asteroids; overlapping draws are drawn again."""
+    rng = np.random.default_rng(seed)
+    size = rng.uniform(0.08, 0.3, count)
+    radius = np.append(SHIP_RADIUS, size)
+    position = scatter(rng, LOW, HIGH, radius, first=SHIP)
+    velocity = rng.uniform(0.25, 0.5, (count, 2)) * rng.choice([-1.0, 1.0], (count, 2))
+    return lay_out(
+        position=position,
+        velocity=np.vstack([[0.0, 0.0], velocity]),
+        angular_velocity=np.append(0.0, rng.uniform(-0.5, 0.5, count)),
+        radius=radius,
+        mass=np.append(SHIP_MASS, 30 * np.pi * size**2),
+        inertia=np.append(SHIP_INERTIA, np.pi / 2 * size**4),
+        restitution=restitution,
+        wrap=[LOW, HIGH],
+    )
 
 
 def ship_thrust() -> Scenario:

@@ -238,6 +238,11 @@ def write_scene_file(scenario: Scenario, path: str | Path) -> None:
     Raises:
         OSError: where the file cannot be written.
     """
+    Path(path).write_text(scene_text(scenario), encoding="utf-8", newline="\n")
+
+
+def scene_text(scenario: Scenario) -> str:
+    """What `write_scene_file` writes."""
     scene = scenario.scene
     keys = ("name", "asks", "duration", "sample_interval")
     top = {key: getattr(scenario, key) for key in keys} | {
@@ -252,7 +257,7 @@ def write_scene_file(scenario: Scenario, path: str | Path) -> None:
         blocks += [("[wrap]", dict(zip(("low", "high"), scene.wrap.tolist())))]
     blocks += [("[[thrust]]", vars(thrust) | {"force": thrust.force.tolist()}) for thrust in scenario.thrusts]
     texts = ["\n".join([head, *(f"{key} = {_toml(row[key])}" for key in row)]) for head, row in blocks]
-    Path(path).write_text("\n\n".join(texts) + "\n", encoding="utf-8", newline="\n")
+    return "\n\n".join(texts) + "\n"
 
 
 def _disk_row(scene: Scene, i: int) -> dict[str, object]:

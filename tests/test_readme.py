@@ -11,6 +11,7 @@ import pytest
 
 from adapters.conformance import PROBES
 from adapters.engines import ENGINES
+from reports.lessons.catalogue import LESSONS
 from scenarios.catalogue import SCENARIOS
 from tests.solvers.mutants import CORRECT, MUTANTS
 
@@ -95,11 +96,12 @@ def test_the_python_blocks_run_one_after_the_other(folder: Path, monkeypatch: py
 
 
 def test_the_readme_counts_as_the_tables_do():
-    """Scenes, players and probes are as many as it says."""
-    said = re.search(r"(\d+) scenes through\s+(\d+) players", TEXT), re.search(r"answers (\d+) probes", TEXT)
+    """Scenes, players, probes and lessons are as many as it says."""
+    patterns = (r"(\d+) scenes through\s+(\d+) players", r"answers (\d+) probes", r"has (\d+) lessons")
+    said = [re.search(pattern, TEXT) for pattern in patterns]
 
     assert [int(number) for one in said if one for number in one.groups()] == [
-        len(SCENARIOS), len(ENGINES), len(PROBES),
+        len(SCENARIOS), len(ENGINES), len(PROBES), len(LESSONS),
     ]  # fmt: skip
 
 

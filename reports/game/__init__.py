@@ -1,0 +1,1 @@
+"""The exercise's game through several engines at once, in a browser."""

@@ -1,0 +1,230 @@
+"""One flight of the exercise's game: the same pushes through several engines, frame by frame; no server in here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Engine
+from adapters.engines import ENGINES
+from adapters.play import RUNAWAY, advance, fault_of, first_hits, reach, weight_impulse
+from reports.game.parting import Parting, Touches, parting
+from reports.game.pilot import SHIP, Pilot
+from scenarios.exercise import SOURCE, asteroid_field
+from scenarios.model import Array, Scenario, State
+
+FRAME = 1 / 64  # s; a power of two, so that every instant of a saved flight is a whole number of steps without rounding
+SUBSTEPS = (2, 4, 8, 16, 32)  # steps in a frame; 16 is the nearest to the exercise's 0.001 s
+LONGEST = 600.0  # s, of a flight
+EARTH, EARTH_SIZE = (3.5, 1.5), 0.5
+CALM, SLOW_SPIN = 0.1, 0.1  # squared speed and angular velocity below which the exercise says "You won"
+
+
+def field_scenario(seed: int = 0, asteroids: int = 20, restitution: float = 0.9, substeps: int = 16) -> Scenario:
+    """A field that nobody has flown yet, as a scenario of the longest flight, its step in the middle of the ladder."""
+    return Scenario(
+        name=f"flight-{seed}",
+        asks=f"Do the engines carry a ship through {asteroids} asteroids as its pilot flew it?",
+        source=f"{SOURCE}: a flight of `crosscheck play`, seed {seed}",
+        scene=asteroid_field(seed, asteroids, restitution),
+        duration=LONGEST,
+        sample_interval=FRAME,
+        substeps=(substeps // 2, substeps, 2 * substeps),
+        seed=seed,
+    )
+
+
+@dataclass
+class Flyer:
+    """The ship and the field as one engine has them.
+
+    Attributes:
+        name: `engine:profile`.
+        state: at the end of the last frame.
+        left: why it flies no more, or "".
+        touches: the latest hit of every disk.
+        set_backs: how often its ship was set back to the start.
+        seen: how many of its hits since then are in `touches`.
+        earlier: how many collisions there were before.
+        collisions: how many there were since.
+        parting: where it parted from the solid one.
+    """
+
+    name: str
+    engine: Engine
+    state: State
+    touches: Touches
+    left: str = ""
+    set_backs: int = 0
+    seen: int = 0
+    earlier: int = 0
+    collisions: int = 0
+    parting: Parting | None = None
+
+
+class Flight:
+    """A scenario flown by the engines `names`, of which the first is the solid one; keys steer unless it is a replay.
+
+    The ship that leaves a field with a wrap is set back to its start, at rest, in each engine by itself: the engine
+    is loaded anew with all else as it is.
+    """
+
+    def __init__(self, scenario: Scenario, names: Sequence[str], replayed: bool = False) -> None:
+        self.scenario, self.replayed = scenario, replayed
+        self.substeps = scenario.substeps[len(scenario.substeps) // 2]
+        self.dt = scenario.dt(self.substeps)
+        self.farthest = RUNAWAY * reach(scenario)
+        self.pilot = Pilot(scenario.scene, scenario.sample_interval)
+        self.frame, self.left_at, self.won_at = 0, -1, -1
+        self.flyers = [self.boarded(name) for name in names]
+
+    def boarded(self, name: str) -> Flyer:
+        """An engine with the scene in it; one that cannot be made or refuses says why in `left`."""
+        scene = self.scenario.scene
+        flyer = Flyer(name, None, scene.state, Touches(scene))  # type: ignore[arg-type]
+        try:
+            flyer.engine = ENGINES[name].make()
+            flyer.engine.load(scene, self.dt)
+            flyer.state = flyer.engine.read()
+        except Exception as error:  # a missing library, a refusal, or whatever an engine raises
+            flyer.left = str(error) or type(error).__name__
+        return flyer
+
+    @property
+    def solid(self) -> Flyer:
+        """The first that still flies; the first of all if none does."""
+        return next((flyer for flyer in self.flyers if not flyer.left), self.flyers[0])
+
+    @property
+    def over(self) -> bool:
+        """Whether there is nothing left to fly."""
+        return self.frame >= self.scenario.samples or all(flyer.left for flyer in self.flyers)
+
+    def key(self, key: str, down: bool) -> None:
+        """A key event, which acts from the next frame on; a replay has its own."""
+        if not self.replayed:
+            self.pilot.key(key, down, self.frame, float(self.solid.state.angle[SHIP]))
+
+    def advance(self, count: int = 1) -> None:
+        """Fly so many frames, or what is left of them."""
+        for _ in range(count):
+            if self.over:
+                return
+            pushed = self.scenario if self.replayed else replace(self.scenario, thrusts=self.pilot.now)
+            for flyer in self.flyers:
+                if not flyer.left:
+                    self.fly(flyer, pushed)
+            self.frame += 1
+            self.compare()
+
+    def fly(self, flyer: Flyer, pushed: Scenario) -> None:
+        """One frame of one engine, by the same steps as `play` makes them."""
+        before = flyer.state
+        try:
+            advance(flyer.engine, pushed, self.frame * self.substeps, self.substeps, self.dt)
+            flyer.state = flyer.engine.read()
+            hits = flyer.engine.hits()
+        except Exception as error:  # a refusal, or whatever an engine raises
+            flyer.left = str(error) or type(error).__name__
+            return
+        if fault := fault_of(flyer.state, self.farthest):
+            flyer.state, flyer.left = before, fault
+            return
+        if len(hits) > flyer.seen:
+            flyer.touches.note(hits[flyer.seen :], self.frame, flyer.state)
+            flyer.seen = len(hits)
+            flyer.collisions = len(first_hits(hits, self.dt, weight_impulse(self.scenario.scene, self.dt)))
+        if self.ship_left(before, flyer.state):
+            self.set_back(flyer)
+
+    def ship_left(self, before: State, after: State) -> bool:
+        """Whether the ship was set onto the opposite edge."""
+        if self.scenario.scene.wrap is None:
+            return False
+        low, high = self.scenario.scene.wrap
+        return bool((np.abs(after.position[SHIP] - before.position[SHIP]) > (high - low) / 2).any())
+
+    def set_back(self, flyer: Flyer) -> None:
+        """The ship to its start, all else as it is."""
+        if flyer is self.solid and self.left_at < 0:
+            self.left_at = self.frame
+        arrays: dict[str, Any] = {name: np.array(array) for name, array in vars(flyer.state).items()}
+        for name, array in arrays.items():
+            array[SHIP] = getattr(self.scenario.scene, name)[SHIP]
+        flyer.earlier, flyer.collisions, flyer.seen = flyer.earlier + flyer.collisions, 0, 0
+        flyer.set_backs += 1
+        try:
+            flyer.engine.load(replace(self.scenario.scene, **arrays), self.dt)
+            flyer.state = flyer.engine.read()
+        except Exception as error:  # say, an event engine, where the start is taken by an asteroid
+            flyer.left = f"the ship cannot be set back: {error}"
+
+    def compare(self) -> None:
+        """Note who parts from the solid one at the end of this frame, and whether the game is won."""
+        solid = self.solid
+        for ghost in self.flyers:
+            watched = not (ghost is solid or ghost.left or ghost.parting or solid.set_backs or ghost.set_backs)
+            if watched:
+                velocities = solid.state.velocity, ghost.state.velocity
+                ghost.parting = parting(solid.touches, ghost.touches, *velocities, self.frame)
+        if self.won and self.won_at < 0:
+            self.won_at = self.frame
+
+    @property
+    def won(self) -> bool:
+        """The exercise's rule as written: a squared distance below a size, no absolute value of the spin."""
+        ship = self.solid.state
+        apart, speed = ship.position[SHIP] - np.array(EARTH), ship.velocity[SHIP]
+        near = float(apart @ apart) < EARTH_SIZE and float(speed @ speed) < CALM
+        return self.scenario.scene.wrap is not None and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
+
+    def measures(self, flyer: Flyer) -> dict[str, Any]:
+        """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid one's m, hits."""
+        scene, state = self.scenario.scene, flyer.state
+        apart = self.distances(self.solid.state.position, state.position)
+        moving = ~scene.static
+        mass, inertia = scene.mass[moving], scene.inertia[moving]
+        speed2 = (state.velocity[moving] ** 2).sum(axis=1)
+        return {
+            "momentum": (mass @ state.velocity[moving]).tolist(),
+            "energy": float(mass @ speed2 + inertia @ state.angular_velocity[moving] ** 2) / 2,
+            "ship_apart": float(apart[SHIP]),
+            "apart": float(apart.max()),
+            "hits": flyer.earlier + flyer.collisions,
+        }
+
+    def distances(self, here: Array, there: Array) -> Array:
+        """(n,) m between the same disks, across the edge of the field where that is shorter."""
+        gap = here - there
+        if self.scenario.scene.wrap is not None:
+            span = self.scenario.scene.wrap[1] - self.scenario.scene.wrap[0]
+            gap = gap - span * np.round(gap / span)
+        return np.hypot(*gap.T)
+
+    def saved(self) -> Scenario:
+        """The flight so far as a scenario, up to the frame before the ship first left: a scene has no way back.
+
+        Raises:
+            ValueError: if there is no frame to save.
+        """
+        if self.replayed:
+            return self.scenario
+        frames = self.frame if self.left_at < 0 else self.left_at
+        if not frames:
+            raise ValueError("nothing has been flown yet: fly first")
+        interval = self.scenario.sample_interval
+        thrusts = [
+            replace(thrust, stop=min(thrust.stop, frames * interval))
+            for thrust in self.pilot.thrusts(self.frame)
+            if thrust.start < frames * interval
+        ]
+        return replace(self.scenario, duration=frames * interval, thrusts=thrusts)
+
+    def close(self) -> None:
+        """Give every engine back."""
+        for flyer in self.flyers:
+            if flyer.engine is not None:
+                flyer.engine.close()

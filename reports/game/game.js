@@ -1,0 +1,248 @@
+"use strict";
+// The page of the game: asks the server for every frame, sends the keys, shows what the engines have.
+
+const MOST_FRAMES = 4;  // asked for at once, as the server allows
+const KEYS = { w: "w", a: "a", s: "s", d: "d", ArrowUp: "w", ArrowLeft: "a", ArrowDown: "s", ArrowRight: "d" };
+const by = (id) => document.getElementById(id);
+
+class Game {
+  constructor() {
+    this.sky = new Field(by("sky"));
+    this.rows = [...document.querySelectorAll("tr[data-engine]")];
+    Object.assign(this, { field: null, frames: [], waiting: 0, owed: 0, paused: calm.matches, down: new Set(), stopped: new Set(), pace: [] });
+    this.listen();
+    this.connect();
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  connect() {
+    this.socket = new WebSocket(`ws://${location.host}/fly`);
+    this.socket.onopen = () => { this.say(""); if (this.field) this.begin(); };
+    this.socket.onmessage = (event) => this.hear(JSON.parse(event.data));
+    this.socket.onclose = (event) => {
+      this.say(`${event.reason || "The server is not there"}. Trying again …`);
+      this.waiting = 0;
+      setTimeout(() => this.connect(), 2000);
+    };
+  }
+
+  send(message) {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+
+  hear(message) {
+    if (message.kind === "field") this.open(message);
+    else if (message.kind === "frame") this.arrive(message);
+    else if (message.kind === "file") this.download(message);
+    else { this.waiting = 0; this.say(message.text); }
+  }
+
+  open(field) {
+    Object.assign(this, { field, frames: [field.first, field.first], waiting: 0, owed: 0, told: "" });
+    this.stopped.clear();
+    this.sky.begin(field);
+    this.showPaused();
+    this.show();
+  }
+
+  arrive(frame) {
+    this.frames = [this.frames[1], frame];
+    this.arrived = performance.now();
+    this.span = (frame.frame - this.frames[0].frame) * this.field.interval * 1000;
+    this.pace.push([this.arrived, frame.ms]);
+    while (this.pace[0][0] < this.arrived - 1000) this.pace.shift();
+    this.waiting = 0;
+    this.stopWhereTheyPart(frame);
+    this.show();
+  }
+
+  stopWhereTheyPart(frame) {
+    const parted = this.field.engines.filter((name, k) => frame.flyers[k].parted && !this.stopped.has(name));
+    parted.forEach((name) => this.stopped.add(name));
+    if (parted.length && by("stop").checked) this.pause(true);
+  }
+
+  tick(now) {
+    const passed = Math.min(now - (this.before ?? now), 100);
+    this.before = now;
+    if (this.field && !this.paused && !this.now.over) {
+      this.owed += passed / 1000 / this.field.interval;
+      if (!this.waiting && this.owed >= 1) {
+        const count = Math.min(MOST_FRAMES, Math.floor(this.owed));
+        this.owed = Math.min(this.owed - count, MOST_FRAMES);
+        this.ask(count);
+      }
+    }
+    if (this.field && this.sky.size) this.draw(now);
+    requestAnimationFrame((later) => this.tick(later));
+  }
+
+  get now() { return this.frames[1]; }
+
+  ask(count) { this.waiting = count; this.send({ do: "frames", count }); }
+
+  // Between the last two frames that came, as far as time has gone on since: motion is smooth at any rate of the screen.
+  draw(now) {
+    const share = this.span ? Math.min(1, (now - this.arrived) / this.span) : 1;
+    const [before, after] = this.frames;
+    const flyers = after.flyers.map((flyer, k) => ({
+      name: this.field.engines[k], gone: flyer.left,
+      at: this.field.radius.map((_, disk) => this.between(before.flyers[k], flyer, disk, this.paused ? 1 : share)),
+    }));
+    const marks = after.flyers.flatMap((flyer, k) => flyer.parted ? [this.mark(flyer.parted, this.field.engines[k])] : []);
+    this.sky.draw(flyers, after.solid, after.push, marks);
+  }
+
+  between(before, after, disk, share) {
+    const mix = (a, b, span) => Math.abs(b - a) > span / 2 ? b : a + share * (b - a);  // half the field in a frame: it wrapped
+    const [left, bottom, right, top] = this.field.wrap ?? [-Infinity, -Infinity, Infinity, Infinity];
+    return [
+      mix(before.x[2 * disk], after.x[2 * disk], right - left),
+      mix(before.x[2 * disk + 1], after.x[2 * disk + 1], top - bottom),
+      mix(before.angle[disk], after.angle[disk], Infinity),
+    ];
+  }
+
+  mark({ x, y, i, j }, name) { return { x, y, name, text: `${name} ${pairOf(i, j)}` }; }
+
+  show() {
+    const frame = this.now;
+    by("clock").textContent = `${frame.t.toFixed(2)} s`;
+    for (const row of this.rows) {
+      const k = this.field.engines.indexOf(row.dataset.engine);
+      row.classList.toggle("off", k < 0);
+      row.classList.toggle("solid", k === frame.solid);
+      this.fill(row, frame.flyers[k], k === frame.solid);
+    }
+    const banner = by("banner");
+    banner.classList.toggle("won", frame.won);
+    if (frame.won) this.tell("You won");
+    else if (frame.over) this.tell(this.field.replayed ? "The flight ends here" : "The flight is over");
+    else if (frame.left_at >= 0 && frame.t - frame.left_at * this.field.interval < 3) this.tell("The ship left the field: back to the start");
+    else if (this.paused) this.tell(frame.frame ? "Paused" : "P starts the flight");
+    else this.tell("");
+    this.showPace(frame);
+  }
+
+  fill(row, flyer, solid) {
+    const cell = (name) => row.querySelector(`[data-cell=${name}]`);
+    const put = (name, text) => { if (cell(name).textContent !== text) cell(name).textContent = text; };
+    put("momentum", flyer ? flyer.momentum.map((p) => p.toFixed(2)).join(", ") : "");
+    put("energy", flyer ? flyer.energy.toFixed(3) : "");
+    put("ship_apart", flyer && !solid ? short(flyer.ship_apart) : "");
+    put("apart", flyer && !solid ? short(flyer.apart) : "");
+    put("hits", flyer ? String(flyer.hits) : "");
+    put("parted", flyer ? this.story(flyer, row.dataset.engine) : "");
+    cell("parted").classList.toggle("gone", Boolean(flyer?.left));
+  }
+
+  story(flyer, name) {
+    if (flyer.left) return `left: ${flyer.left}`;
+    if (!flyer.parted) return "";
+    const { t, i, j, shared, solid_only: mine } = flyer.parted;
+    const solid = this.field.engines[this.now.solid];
+    const whose = shared ? "both hit, and part differently" : `only ${mine ? solid : name} hits`;
+    return `${t.toFixed(2)} s, ${pairOf(i, j)}: ${whose}`;
+  }
+
+  showPace(frame) {
+    if (!frame.ms || this.pace.length < 2) return;
+    const seconds = (this.pace.at(-1)[0] - this.pace[0][0]) / 1000;
+    const mean = this.pace.reduce((sum, [, ms]) => sum + ms, 0) / this.pace.length;
+    by("pace").textContent = `${((this.pace.length - 1) / seconds).toFixed(0)} frames a second; the engines take ${mean.toFixed(1)} ms of a frame's ${(this.field.interval * 1000).toFixed(1)} ms`;
+  }
+
+  say(text) { this.message = text; this.tell(""); }
+
+  tell(text) {
+    const shown = this.message || text;
+    if (by("banner").textContent !== shown) by("banner").textContent = shown;
+  }
+
+  pause(on) { this.paused = on; this.owed = 0; this.showPaused(); if (this.field) this.show(); }
+
+  showPaused() {
+    by("pause").firstElementChild.textContent = this.paused ? "▶" : "❚❚";
+    by("pause").setAttribute("aria-label", this.paused ? "fly on (P)" : "pause (P)");
+  }
+
+  step() { this.pause(true); if (!this.waiting && !this.now.over) this.ask(1); }
+
+  begin() {
+    const chosen = this.rows.map((row) => row.dataset.engine).filter((name) => this.box(name).checked);
+    const solid = document.querySelector("[name=solid]:checked").value;
+    const engines = [solid, ...chosen.filter((name) => name !== solid)];
+    const wishes = by("wishes") ? new FormData(by("wishes")) : new Map();
+    if (by("wishes") && !by("wishes").reportValidity()) return;
+    const numbers = Object.fromEntries([...wishes.entries()].map(([key, value]) => [key, Number(value)]));
+    this.release();
+    this.waiting = 1;
+    this.send({ do: "fly", engines, ...numbers });
+  }
+
+  box(name) { return document.querySelector(`[name=flies][value="${name}"]`); }
+
+  key(key, down) {
+    if (down) this.down.add(key); else this.down.delete(key);
+    document.querySelector(`[data-key=${key}]`)?.classList.toggle("on", down);
+    this.send({ do: "key", key, down });
+  }
+
+  release() { [...this.down].forEach((key) => this.key(key, false)); }
+
+  download({ name, text, cut, seconds }) {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([text], { type: "application/toml" }));
+    link.download = name;
+    link.click();
+    URL.revokeObjectURL(link.href);
+    const until = cut ? `, up to ${seconds.toFixed(2)} s, where the ship first left the field` : "";
+    this.say(`Saved ${name}${until}: crosscheck run ${name}`);
+    setTimeout(() => { this.message = ""; this.show(); }, 6000);
+  }
+
+  listen() {
+    window.addEventListener("keydown", (event) => this.pressed(event));
+    window.addEventListener("keyup", (event) => { const key = keyOf(event); if (key && this.down.has(key)) this.key(key, false); });
+    window.addEventListener("blur", () => this.release());  // a key that goes up elsewhere is not heard here
+    by("pause").onclick = () => this.pause(!this.paused);
+    by("step").onclick = () => this.step();
+    by("again").onclick = () => this.begin();
+    if (by("save")) by("save").onclick = () => this.send({ do: "save" });
+    for (const button of document.querySelectorAll("[data-key]")) {
+      button.addEventListener("pointerdown", (event) => { button.setPointerCapture(event.pointerId); this.key(button.dataset.key, true); });
+      for (const end of ["pointerup", "pointercancel"]) button.addEventListener(end, () => this.key(button.dataset.key, false));
+    }
+    for (const box of document.querySelectorAll("[name=flies], [name=solid]")) box.onchange = () => this.choose(box);
+    by("wishes")?.addEventListener("input", (event) => { const shown = event.target.parentElement.querySelector("output"); if (shown) shown.textContent = event.target.value; });
+    by("wishes")?.addEventListener("change", () => this.begin());
+    by("wishes")?.addEventListener("submit", (event) => { event.preventDefault(); this.begin(); });
+  }
+
+  // The solid one always flies.
+  choose(box) {
+    const solid = document.querySelector("[name=solid]:checked").value;
+    this.box(solid).checked = true;
+    box.blur();  // so that the keys steer again
+    this.begin();
+  }
+
+  pressed(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const writes = event.target.matches?.("input[type=number], select, input[type=range]");
+    const key = keyOf(event);
+    if (key && !(writes && event.key.length > 1) && by("wishes") && !event.target.matches?.("input[type=radio]")) {
+      event.preventDefault();
+      if (!event.repeat || key === "w" || key === "s") this.key(key, true);  // a repeated push aims anew, as in the exercise
+    } else if (!writes) {
+      const act = { p: () => this.pause(!this.paused), ".": () => this.step(), n: () => this.begin() }[event.key.toLowerCase()];
+      if (act && !event.repeat) { event.preventDefault(); act(); }
+    }
+  }
+}
+
+const keyOf = (event) => KEYS[event.key] ?? KEYS[event.key.toLowerCase()];
+const pairOf = (i, j) => `${i === SHIP ? "ship" : i} × ${j < 0 ? `wall ${-1 - j}` : j === SHIP ? "ship" : j}`;
+const short = (metres) => metres === 0 ? "0" : metres < 1e-3 ? metres.toExponential(0) : metres.toFixed(3);
+
+window.game = new Game();

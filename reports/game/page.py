@@ -1,0 +1,22 @@
+"""The page of the game as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from adapters.engines import ENGINES
+from reports.documents import looks_as_json, render
+from reports.game.flight import FRAME, SUBSTEPS
+from reports.game.parting import APART
+from reports.style import look
+from scenarios.model import Scenario
+
+
+def game_page(engines: Sequence[str], file: Scenario | None) -> str:
+    """The page, which begins with these engines; `file`: the flight it shows again."""
+    looks = {name: look(*name.split(":", 1)) for name in ENGINES}
+    return render(
+        "game/game.html.j2", ["game/field.js", "game/game.js"], ["game/game.css"], connects=True,
+        rows=ENGINES, flown=list(engines), steps={k: FRAME / k for k in SUBSTEPS}, file=file, looks=looks,
+        apart=APART, looks_json=looks_as_json(looks),
+    )  # fmt: skip

@@ -1,0 +1,162 @@
+"""Serves the game and the lessons to browsers on this machine, and to nobody else."""
+
+from __future__ import annotations
+
+import socket
+import sys
+import webbrowser
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from time import monotonic
+from urllib.parse import urlsplit
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import HTMLResponse
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from reports.game.messages import MOST_BYTES
+from reports.game.page import game_page
+from reports.game.session import Session, as_json
+from scenarios.model import Scenario
+
+HOST, NAMES = "127.0.0.1", ("127.0.0.1", "localhost")
+PORTS = 20  # tried in a row
+MOST_TABS = 16
+MOST_A_SECOND, MOST_FAULTS = 240, 50  # messages: a page sends 60 a second and the keys; and faulty ones in all
+POLICY, LATER = 1008, 1013  # WebSocket close codes: it breaks the rules; try again later
+
+
+@dataclass
+class Allowance:
+    """So many messages a second, and as many at once."""
+
+    rate: float
+    left: float = 0.0
+    since: float = field(default_factory=monotonic)
+
+    def __post_init__(self) -> None:
+        self.left = self.rate
+
+    def spend(self) -> bool:
+        """Whether one more is allowed now."""
+        now = monotonic()
+        self.left = min(self.rate, self.left + (now - self.since) * self.rate) - 1
+        self.since = now
+        return self.left >= 0
+
+
+@dataclass
+class Game:
+    """What every tab begins with, and how many are open."""
+
+    engines: Sequence[str]
+    file: Scenario | None = None
+    tabs: int = 0
+
+    async def page(self, _: Request) -> HTMLResponse:
+        """The page."""
+        return HTMLResponse(game_page(self.engines, self.file))
+
+    async def fly(self, socket: WebSocket) -> None:
+        """A tab, as long as it keeps the rules."""
+        if not same_origin(socket):
+            await socket.close(POLICY)  # before it is accepted: the browser is told 403
+            return
+        await socket.accept()
+        if self.tabs >= MOST_TABS:
+            await socket.close(LATER, f"{MOST_TABS} pages are open already: close one")
+            return
+        self.tabs += 1
+        session = Session(self.engines, self.file)
+        try:
+            with suppress(WebSocketDisconnect):
+                await converse(socket, session)
+        finally:
+            session.close()
+            self.tabs -= 1
+
+
+def same_origin(socket: WebSocket) -> bool:
+    """Whether the page that opens the socket comes from this very server: no other may drive it."""
+    origin = urlsplit(socket.headers.get("origin", ""))
+    return origin.hostname in NAMES and origin.netloc == socket.headers.get("host")
+
+
+async def converse(socket: WebSocket, session: Session) -> None:
+    """Answer message by message; the page asks for every frame, so that a slow one is never ahead of itself."""
+    allowance, faults = Allowance(MOST_A_SECOND), 0
+    await socket.send_text(as_json(session.field()))
+    while True:
+        event = await socket.receive()
+        if event["type"] == "websocket.disconnect":
+            return
+        if not allowance.spend():
+            await socket.close(POLICY, f"more than {MOST_A_SECOND} messages a second")
+            return
+        try:
+            answer = session.answer(event.get("text") or event.get("bytes") or "")
+        except ValueError as fault:
+            faults += 1
+            answer = {"kind": "fault", "text": str(fault)}
+        if faults > MOST_FAULTS:
+            await socket.close(POLICY, f"more than {MOST_FAULTS} faulty messages")
+            return
+        if answer is not None:
+            await socket.send_text(as_json(answer))
+
+
+def application(game: Game, lessons: Sequence[BaseRoute] = ()) -> Starlette:
+    """The web application: the game at /, the lessons below /lesson."""
+    routes = [Route("/", game.page), WebSocketRoute("/fly", game.fly), *lessons]
+    hosts = Middleware(TrustedHostMiddleware, allowed_hosts=list(NAMES), www_redirect=False)
+    return Starlette(routes=routes, middleware=[hosts])
+
+
+def taken_socket(port: int) -> socket.socket:
+    """A socket on the loopback address at the first free port from `port` on.
+
+    Raises:
+        OSError: if none of the next few is free.
+    """
+    for each in range(port, min(port + PORTS, 65536)):
+        try:
+            taken = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+            taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            taken.bind((HOST, each))
+            taken.listen(64)
+            return taken
+        except OSError:
+            taken.close()
+    raise OSError(f"none of the ports {port} to {min(port + PORTS, 65536) - 1} is free")
+
+
+def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
+    """Serve until Ctrl-C; say where, and open a browser there if asked.
+
+    Raises:
+        OSError: if there is no port.
+    """
+    listening = taken_socket(port)
+    found = listening.getsockname()[1]
+    if found != port:
+        print(f"Port {port} is taken: this is on {found}.", file=sys.stderr)
+    url = f"http://localhost:{found}{path}"
+    print(f"{url}  (Ctrl-C stops it)", flush=True)
+    if opens:
+        webbrowser.open(url)
+    with suppress(KeyboardInterrupt):
+        uvicorn.Server(config_of(app)).run(sockets=[listening])
+    print("Stopped.")
+
+
+config_of = partial(
+    uvicorn.Config, log_level="warning", ws="websockets-sansio", ws_max_size=MOST_BYTES,
+    ws_ping_interval=10, ws_ping_timeout=10, timeout_graceful_shutdown=1, lifespan="off",
+)  # fmt: skip

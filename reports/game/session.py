@@ -1,0 +1,114 @@
+"""One open page of the game: answers its messages, one by one; no server in here."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from reports.game.flight import EARTH, EARTH_SIZE, Flight, Flyer, field_scenario
+from reports.game.messages import Fly, Frames, Key, Message, read_message
+from reports.game.pilot import SHIP
+from scenarios.files import scene_text
+from scenarios.model import Array, Scenario
+
+
+class Session:
+    """A page and its flight. `file`: the flight that is flown again, instead of one that is steered."""
+
+    def __init__(self, engines: Sequence[str], file: Scenario | None = None) -> None:
+        self.file = file
+        self.flight = self.begun(Fly(do="fly", engines=list(engines)))
+
+    def begun(self, wish: Fly) -> Flight:
+        """A new flight as wished; a file's own field and step are kept."""
+        if self.file is not None:
+            return Flight(self.file, wish.engines, replayed=True)
+        scenario = field_scenario(wish.seed, wish.asteroids, wish.restitution, wish.substeps)
+        return Flight(scenario, wish.engines)
+
+    def answer(self, text: str | bytes) -> dict[str, Any] | None:
+        """The answer to a message, for JSON; None where there is nothing to say. Raises ValueError if it is faulty."""
+        message: Message = read_message(text)
+        if isinstance(message, Fly):
+            self.flight.close()
+            self.flight = self.begun(message)
+            return self.field()
+        if isinstance(message, Frames):
+            started = perf_counter()
+            self.flight.advance(message.count)
+            return self.now() | {"ms": (perf_counter() - started) * 1e3 / message.count}
+        if isinstance(message, Key):
+            self.flight.key(message.key, message.down)
+            return None
+        scenario = self.flight.saved()
+        return {
+            "kind": "file", "name": f"{scenario.name}.toml", "text": scene_text(scenario),
+            "seconds": scenario.duration, "cut": self.flight.left_at >= 0,
+        }  # fmt: skip
+
+    def field(self) -> dict[str, Any]:
+        """What stays as it is during a flight, and its first frame."""
+        flight = self.flight
+        scene = flight.scenario.scene
+        game = scene.wrap is not None
+        return {
+            "kind": "field", "name": flight.scenario.name, "radius": scene.radius.tolist(),
+            "wrap": scene.wrap.ravel().tolist() if scene.wrap is not None else None,
+            "walls": scene.walls.reshape(-1, 4).tolist(), "earth": [*EARTH, EARTH_SIZE] if game else None,
+            "interval": flight.scenario.sample_interval, "dt": flight.dt, "replayed": flight.replayed,
+            "engines": [flyer.name for flyer in flight.flyers], "duration": flight.scenario.duration,
+            "first": self.now(),
+        }  # fmt: skip
+
+    def now(self) -> dict[str, Any]:
+        """Where everything is at the end of the last frame."""
+        flight = self.flight
+        ship = flight.solid.state
+        return {
+            "kind": "frame", "frame": flight.frame, "t": flight.frame * flight.scenario.sample_interval,
+            "solid": flight.flyers.index(flight.solid), "flyers": [self.told(flyer) for flyer in flight.flyers],
+            "ship": [*ship.position[SHIP].tolist(), *ship.velocity[SHIP].tolist(),
+                     float(ship.angle[SHIP]), float(ship.angular_velocity[SHIP])],
+            "push": self.push(), "won": flight.won, "over": flight.over, "left_at": flight.left_at,
+        }  # fmt: skip
+
+    def push(self) -> list[float]:
+        """What drives the ship: force N, torque N m."""
+        flight = self.flight
+        time = flight.frame * flight.scenario.sample_interval
+        thrusts = flight.scenario.thrusts if flight.replayed else flight.pilot.now
+        on = [thrust for thrust in thrusts if thrust.disk == SHIP and thrust.start <= time < thrust.stop]
+        force = sum((thrust.force for thrust in on), np.zeros(2))
+        return [*force.tolist(), float(sum(thrust.torque for thrust in on))]
+
+    def told(self, flyer: Flyer) -> dict[str, Any]:
+        """One engine's disks, its measures, and where it parted or why it left."""
+        parted = None
+        if flyer.parting is not None:
+            hit = flyer.parting.hit
+            parted = hit._asdict() | {
+                "t": (hit.frame + 1) * self.flight.scenario.sample_interval,
+                "shared": flyer.parting.shared, "solid_only": flyer.parting.solid_only,
+            }  # fmt: skip
+        return self.flight.measures(flyer) | {
+            "x": rounded(flyer.state.position.ravel()), "angle": rounded(flyer.state.angle),
+            "left": flyer.left, "parted": parted, "set_backs": flyer.set_backs,
+        }  # fmt: skip
+
+    def close(self) -> None:
+        """Give the engines back."""
+        self.flight.close()
+
+
+def rounded(values: Array) -> list[float]:
+    """To 0.1 mm or 0.1 mrad, finer than a pixel."""
+    return [round(value, 4) for value in values.tolist()]
+
+
+def as_json(answer: dict[str, Any]) -> str:
+    """Compact; what is not finite was found out before."""
+    return json.dumps(answer, separators=(",", ":"))

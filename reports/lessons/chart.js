@@ -1,0 +1,95 @@
+"use strict";
+// Line charts as SVG: two axes, a grid, and the curves of the players in their colours.
+
+const SIZE = { width: 520, height: 290, left: 62, right: 12, top: 10, bottom: 42 };
+const EMPTY = 1e-16;  // what is 0 stands at the foot of a logarithmic axis
+const svg = (name, attributes, text) => {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (text !== undefined) element.textContent = text;
+  return element;
+};
+
+class Axis {
+  constructor(values, log, from, to) {
+    Object.assign(this, { log, from, to });
+    const finite = values.filter((v) => Number.isFinite(v) && (!log || v > EMPTY));
+    let low = Math.min(...finite), high = Math.max(...finite);
+    if (!finite.length) [low, high] = log ? [EMPTY, 1] : [0, 1];
+    if (log) [low, high] = [Math.log10(low), Math.log10(high)];
+    if (high - low < 1e-12 * Math.max(Math.abs(high), 1)) [low, high] = [low - 0.5, high + 0.5];
+    const room = log ? 0.05 * (high - low) : 0.06 * (high - low);
+    Object.assign(this, { low: low - room, high: high + room });
+  }
+
+  place(value) {
+    const v = this.log ? Math.log10(Math.max(value, EMPTY)) : value;
+    const share = (v - this.low) / (this.high - this.low);
+    return this.from + Math.max(-0.02, Math.min(1.02, share)) * (this.to - this.from);
+  }
+
+  ticks() {
+    const span = this.high - this.low;
+    const step = this.log ? Math.max(1, Math.ceil(span / 6)) : niceStep(span / 5);
+    const first = Math.ceil(this.low / step - 1e-9) * step;
+    const found = [];
+    for (let v = first; v <= this.high + 1e-9 * span; v += step) found.push(Math.abs(v) < 1e-9 * step ? 0 : v);
+    if (this.log && found.length < 2) return [this.low, this.high].map((v) => [10 ** v, short(10 ** v)]);
+    return found.map((v) => this.log ? [10 ** v, power(v)] : [v, short(v)]);
+  }
+}
+
+function niceStep(wanted) {
+  const unit = 10 ** Math.floor(Math.log10(wanted));
+  return unit * [1, 2, 5, 10].find((k) => k * unit >= wanted);
+}
+
+const power = (v) => v >= -3 && v <= 3 ? short(10 ** v) : `10${String(Math.round(v)).replace(/[-\d]/g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)])}`;
+const short = (v) => (v !== 0 && (Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5) ? v.toExponential(1) : String(Number(v.toPrecision(3)))).replace("-", "−");
+
+function drawChart(chart) {
+  const figure = document.createElement("figure");
+  const caption = document.createElement("figcaption");
+  caption.textContent = chart.title;
+  const { width, height, left, right, top, bottom } = SIZE;
+  const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${chart.title}: ${chart.y} against ${chart.x}` });
+  const x = new Axis(chart.curves.flatMap((curve) => curve.x), chart.log.includes("x"), left, width - right);
+  const y = new Axis(chart.curves.flatMap((curve) => curve.y), chart.log.includes("y"), height - bottom, top);
+  drawAxes(picture, chart, x, y);
+  const clip = `clip-${Math.round(performance.now() * 1e3)}-${Math.floor(Math.random() * 1e9)}`;
+  picture.append(svg("clipPath", { id: clip }));
+  picture.lastChild.append(svg("rect", { x: left - 4, y: top - 4, width: width - left - right + 8, height: height - top - bottom + 8 }));
+  chart.curves.forEach((curve, k) => drawCurve(picture, curve, x, y, chart.curves.length - k, clip));
+  figure.append(caption, picture);
+  return figure;
+}
+
+function drawAxes(picture, chart, x, y) {
+  const { width, height, left, right, top, bottom } = SIZE;
+  for (const [value, text] of x.ticks()) {
+    picture.append(svg("line", { class: "grid", x1: x.place(value), x2: x.place(value), y1: top, y2: height - bottom }));
+    picture.append(svg("text", { class: "axis", x: x.place(value), y: height - bottom + 16, "text-anchor": "middle" }, text));
+  }
+  for (const [value, text] of y.ticks()) {
+    picture.append(svg("line", { class: "grid", x1: left, x2: width - right, y1: y.place(value), y2: y.place(value) }));
+    picture.append(svg("text", { class: "axis", x: left - 7, y: y.place(value) + 4, "text-anchor": "end" }, text));
+  }
+  picture.append(svg("text", { class: "axis", x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, chart.x));
+  picture.append(svg("text", { class: "axis", x: -(top + height - bottom) / 2, y: 13, transform: "rotate(-90)", "text-anchor": "middle" }, chart.y));
+}
+
+// The lower a curve lies, the wider it is, so that those that coincide stay visible under each other.
+function drawCurve(picture, curve, x, y, rank, clip) {
+  const look = looks[curve.name];
+  const colour = look[darkPage() ? "dark" : "light"];
+  const points = curve.x.map((each, k) => [x.place(each), y.place(curve.y[k])]);
+  const path = points.map(([px, py], k) => `${k ? "L" : "M"}${px.toFixed(1)},${py.toFixed(1)}`).join("");
+  const width = curve.name === "truth" ? 1.3 : 1.5 + 0.8 * Math.min(rank - 1, 5);
+  const line = svg("path", { class: "curve", d: path, stroke: colour, "stroke-width": width, "stroke-dasharray": look.dash.join(","), "clip-path": `url(#${clip})` });
+  line.append(svg("title", {}, curve.name));
+  picture.append(line);
+  if (!curve.dots) return;
+  for (const [px, py] of points) {
+    picture.append(svg("path", { d: look.path, transform: `translate(${px.toFixed(1)},${py.toFixed(1)})`, fill: look.filled ? colour : "var(--page)", stroke: colour }));
+  }
+}

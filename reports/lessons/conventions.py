@@ -1,0 +1,35 @@
+"""The conventions of all engines as the conformance suite measures them: nothing here is typed in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adapters.conformance import PROBES, conform
+from adapters.engines import ENGINES
+from reports.style import number
+
+ASKED = (
+    "free_flight", "restitution_0.1", "restitution_2", "restitution_wall", "friction", "slow_flight", "fast_flight",
+    "fast_spin", "spins_freely", "pair_momentum",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Convention:
+    """One probe over all engines: the question, what a scene's own physics would give, and what each gave."""
+
+    asked: str
+    expected: str
+    got: dict[str, tuple[str, str]]  # engine:profile -> reading, verdict
+
+
+def table() -> list[Convention]:
+    """The physics probes put to every engine now, in the order of `ASKED`; a few seconds."""
+    findings = {name: {each.probe: each for each in conform(name, row)} for name, row in ENGINES.items()}
+    rows = []
+    for probe in ASKED:
+        answers = {name: found[probe] for name, found in findings.items() if probe in found}
+        expected = "by its order" if probe == "free_flight" else number(next(iter(answers.values())).expected)
+        got = {name: (number(each.got), each.verdict) for name, each in answers.items()}
+        rows.append(Convention(PROBES[probe].asked, expected, got))
+    return rows

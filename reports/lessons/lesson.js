@@ -1,0 +1,81 @@
+"use strict";
+// A lesson's page: the sliders ask for an answer, from the server or from the page itself, and it is drawn.
+
+const looks = JSON.parse(document.getElementById("looks").textContent);
+const darkness = matchMedia("(prefers-color-scheme: dark)");
+const darkPage = () => darkness.matches;
+
+class Lesson {
+  constructor() {
+    this.sliders = [...document.querySelectorAll(".sliders input")];
+    this.place = JSON.parse(document.getElementById("place").textContent);
+    const packed = document.getElementById("grid").textContent;
+    this.grid = packed ? inflate(packed).then((bytes) => JSON.parse(new TextDecoder().decode(bytes))) : null;
+    for (const slider of this.sliders) slider.addEventListener("input", () => this.moved(slider));
+    document.querySelector(".sliders").addEventListener("submit", (event) => event.preventDefault());
+    darkness.addEventListener("change", () => this.show(this.shown));
+    this.ready = this.show(JSON.parse(document.getElementById("first").textContent));
+  }
+
+  get at() { return this.sliders.map((slider) => slider.value).join(","); }
+
+  moved(slider) {
+    const texts = JSON.parse(slider.dataset.shown);
+    slider.parentElement.querySelector("output").textContent = texts[slider.value];
+    slider.setAttribute("aria-valuetext", texts[slider.value]);
+    this.ready = this.ask(this.at);
+  }
+
+  // A slider that moves on before its answer is there leaves it unused.
+  async ask(at) {
+    document.querySelector(".stage-lesson").classList.add("busy");
+    const fault = document.querySelector(".fault");
+    try {
+      const shown = this.grid ? (await this.grid)[at] : await (await fetch(`${this.place}?at=${at}`)).json();
+      if (at !== this.at) return;
+      fault.textContent = shown.fault ?? "";
+      if (!shown.fault) await this.show(shown);
+    } catch {
+      fault.textContent = "The server is not there: start it again with crosscheck lesson.";
+    }
+    document.querySelector(".stage-lesson").classList.remove("busy");
+  }
+
+  async show(shown) {
+    this.shown = shown;
+    document.querySelector(".curves").replaceChildren(...shown.charts.map(drawChart));
+    document.querySelector(".worked").replaceChildren(...shown.steps.map(([what, text]) => row("li", ["b", what], ["span", text])));
+    document.querySelector(".facts-table tbody").replaceChildren(...shown.facts.map(([what, text]) => row("tr", ["th", what], ["td", text])));
+    if (shown.film) await this.replay(shown.film);
+  }
+
+  async replay(film) {
+    const pack = readPack(await inflate(film.pack));
+    const element = document.querySelector(".player");
+    element.querySelector(".picture").style.setProperty("--ratio", film.ratio);
+    if (!this.player) {
+      this.player = players.lesson = new Player(element, pack, looks);
+      this.player.seek(0);
+      return;
+    }
+    const time = this.player.time;
+    Object.assign(this.player, { pack });
+    this.player.slider.max = pack.duration;
+    this.player.slider.step = pack.duration / 1000;
+    this.player.fit();
+    this.player.seek(time);
+  }
+}
+
+function row(kind, ...cells) {
+  const element = document.createElement(kind);
+  for (const [name, text] of cells) {
+    const cell = document.createElement(name);
+    cell.textContent = text;
+    if (name === "th") cell.scope = "row";
+    element.append(cell);
+  }
+  return element;
+}
+
+window.lesson = new Lesson();

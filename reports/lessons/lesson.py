@@ -1,0 +1,199 @@
+"""The nouns of a lesson: its sliders, and what it shows for a setting of them: curves, a replay, numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from adapters.engines import ENGINES
+from adapters.play import Run, play
+from reports.comparison import Comparison, answered, cut
+from reports.laws import deviation
+from reports.replay import pack, played, ratio_of
+from reports.style import TRUTH, number
+from scenarios.model import Array, Scenario, Trajectory
+
+POINTS = 400  # of a curve, at most: more than a chart has pixels for
+Settings = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Slider:
+    """One thing that can be changed. values: what it goes through; start: the index it begins with."""
+
+    key: str
+    label: str
+    values: Sequence[Any]
+    start: int = 0
+    unit: str = ""
+
+    @property
+    def shown(self) -> list[str]:
+        """The values as they are read."""
+        return [value if isinstance(value, str) else f"{number(value)} {self.unit}".strip() for value in self.values]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """name: whose (a player, `truth`, or `reference:switched` for the reference with a mechanism on); x, y: (k,)."""
+
+    name: str
+    x: ArrayLike
+    y: ArrayLike
+    dots: bool = False
+
+    def told(self) -> dict[str, Any]:
+        """For JSON: thinned out and rounded to what can be seen; what is not finite is left out."""
+        x, y = np.asarray(self.x, float), np.asarray(self.y, float)
+        kept = np.linspace(0, len(x) - 1, min(POINTS, len(x))).round().astype(int)
+        kept = kept[np.isfinite(x[kept]) & np.isfinite(y[kept])]
+        return {"name": self.name, "x": rounded(x[kept]), "y": rounded(y[kept]), "dots": self.dots}
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Curves over one pair of axes; `log`: which of them, of "xy", are logarithmic."""
+
+    title: str
+    x: str
+    y: str
+    curves: Sequence[Curve]
+    log: str = ""
+
+    def told(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "title": self.title, "x": self.x, "y": self.y, "log": self.log,
+            "curves": [curve.told() for curve in self.curves],
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a lesson shows for one setting of its sliders.
+
+    Attributes:
+        charts: at least one.
+        film: what is replayed, or None.
+        facts: (what, number and unit) of this run.
+        steps: paragraphs with the numbers of this run filled in.
+    """
+
+    charts: Sequence[Chart]
+    film: Comparison | None = None
+    facts: Sequence[tuple[str, str]] = ()
+    steps: Sequence[tuple[str, str]] = ()
+
+    def told(self) -> dict[str, Any]:
+        """For JSON."""
+        film = None
+        if self.film is not None:
+            film = {"pack": pack(self.film), "ratio": ratio_of(self.film.scenario, played(self.film))}
+        return {
+            "charts": [chart.told() for chart in self.charts], "film": film,
+            "facts": list(self.facts), "steps": list(self.steps),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """One page.
+
+    Attributes:
+        name: for address and file.
+        number: "1", "6.3".
+        title, asks: the heading, and the question it answers.
+        text: paragraphs, HTML written here and nowhere else.
+        sliders: what can be changed.
+        names: who is drawn, in order.
+        show: settings (key -> value) -> what is shown.
+    """
+
+    name: str
+    number: str
+    title: str
+    asks: str
+    text: Sequence[str]
+    sliders: Sequence[Slider]
+    names: Sequence[str]
+    show: Callable[[Settings], Shown]
+
+    def at(self, places: Sequence[int]) -> Shown:
+        """What is shown with the sliders at these indices.
+
+        Raises:
+            ValueError: if there are not as many as sliders, or one is beyond its values.
+        """
+        if len(places) != len(self.sliders):
+            raise ValueError(f"{len(places)} places for {len(self.sliders)} sliders")
+        for slider, place in zip(self.sliders, places):
+            if not 0 <= place < len(slider.values):
+                raise ValueError(f"{slider.key} = {place}: must be from 0 to {len(slider.values) - 1}")
+        return self.show({slider.key: slider.values[place] for slider, place in zip(self.sliders, places)})
+
+    @property
+    def start(self) -> tuple[int, ...]:
+        """Where the sliders begin."""
+        return tuple(slider.start for slider in self.sliders)
+
+    @property
+    def grid(self) -> list[tuple[int, ...]]:
+        """Every setting of the sliders."""
+        return list(product(*(range(len(slider.values)) for slider in self.sliders)))
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """A scenario played by some engines in one step size, and its truth where it has one."""
+
+    scenario: Scenario
+    runs: Sequence[Run]
+    truth: Trajectory | None
+
+    @staticmethod
+    def by(scenario: Scenario, names: Sequence[str], substeps: int) -> Played:
+        """Play it; the ladder of the scenario that is kept has this step only."""
+        scenario, truth = answered(replace(scenario, substeps=(substeps,)))
+        return Played(scenario, [play_once(name, scenario, substeps) for name in names], truth)
+
+    @cached_property
+    def film(self) -> Comparison:
+        """For the player of the page."""
+        return Comparison(self.scenario, self.truth, self.runs, pd.DataFrame())
+
+    def curves(self, read: Callable[[Trajectory], Array]) -> list[Curve]:
+        """`read` of every trajectory over time; the truth last, so that it lies on top."""
+        found = [Curve(run.name, run.trajectory.t, read(run.trajectory)) for run in self.runs if run.trajectory]
+        return found + ([Curve(TRUTH, self.truth.t, read(self.truth))] if self.truth is not None else [])
+
+    def errors(self) -> list[Curve]:
+        """m, the largest distance of any disk from the truth over time, while there is one."""
+        assert self.truth is not None
+        curves = []
+        for run in self.runs:
+            if run.trajectory is not None:
+                k = min(len(run.trajectory), len(self.truth))
+                apart = deviation(cut(run.trajectory, k), cut(self.truth, k), self.scenario.scene)
+                curves.append(Curve(run.name, self.truth.t[:k], apart.max(axis=1)))
+        return curves
+
+
+def play_once(name: str, scenario: Scenario, substeps: int) -> Run:
+    """One run of one engine, which is closed again."""
+    engine = ENGINES[name].make()
+    try:
+        return play(engine, name, scenario, scenario.dt(substeps))
+    finally:
+        engine.close()
+
+
+def rounded(values: Array) -> list[float]:
+    """To six digits, more than a chart can show."""
+    return [float(f"{value:.6g}") for value in values.tolist()]

@@ -1,0 +1,73 @@
+"""A Chromium that reaches nothing but this machine, and a server in a thread for it; for the tests of served pages."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+import uvicorn
+from playwright.sync_api import Browser, Page, sync_playwright
+from starlette.applications import Starlette
+
+from reports.game.server import HOST, config_of, taken_socket
+
+FLAGS = [
+    "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
+    "--disable-sync", "--no-first-run",
+]  # fmt: skip
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """Debian's Chromium; where it is missing the tests are skipped, in CI they fail."""
+    program = shutil.which("chromium")
+    if program is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("chromium is not installed: apt-get install chromium")
+        pytest.skip("chromium is not installed")
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=program, args=FLAGS)
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+@contextmanager
+def served(app: Starlette) -> Iterator[str]:
+    """The address of `app`, served in a thread."""
+    listening = taken_socket(0)
+    server = uvicorn.Server(config_of(app))
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
+    thread.start()
+    try:
+        yield f"http://{HOST}:{listening.getsockname()[1]}"
+    finally:
+        server.should_exit = True
+        thread.join()
+
+
+def opened(browser: Browser, url: str, **context: Any) -> tuple[Page, list[str]]:
+    """The page at `url`, and what it complained of or asked of other machines."""
+    page = browser.new_context(**context).new_page()
+    heard: list[str] = []
+    own = (urlsplit(url).hostname,)
+    page.route(
+        lambda each: urlsplit(each).hostname not in own,
+        lambda route: (heard.append(route.request.url), route.abort())[1],
+    )
+    page.on("console", lambda message: heard.append(message.text) if message.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: heard.append(str(error)))
+    page.goto(url)
+    return page, heard
+
+
+def overhang(page: Page) -> int:
+    """By how many pixels the page is wider than the window."""
+    return page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")

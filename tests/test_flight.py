@@ -1,0 +1,248 @@
+"""A flight without a server: keys push as the exercise says, the same keys give the same bits, a saved flight too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import pi, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters.engines import ENGINES, Row
+from adapters.play import play
+from reports.game.flight import EARTH, FRAME, Flight, field_scenario
+from reports.game.messages import read_message
+from reports.game.pilot import SHIP
+from reports.game.session import Session
+from scenarios.closed_forms import world_pushes
+from scenarios.exercise import SHIP as START
+from scenarios.files import read_scene_file, scene_text
+
+EVENTS = [  # frame, key, down: a turn, a push across it, a renewed push, both keys of a pair
+    (8, "a", True), (24, "w", True), (40, "w", True), (56, "a", False), (72, "w", False), (80, "s", True),
+    (88, "d", True), (96, "w", True), (110, "d", False), (120, "s", False), (130, "w", False),
+]  # fmt: skip
+
+
+def flown(
+    names: Sequence[str], frames: int, events: Iterable[tuple[int, str, bool]] = EVENTS, **field: float
+) -> Flight:
+    """A flight steered by `events` (frame, key, down)."""
+    flight = Flight(field_scenario(**field), names)  # type: ignore[arg-type]
+    for frame, key, down in events:
+        flight.advance(frame - flight.frame)
+        flight.key(key, down)
+    flight.advance(frames - flight.frame)
+    return flight
+
+
+def bits(flight: Flight) -> list[dict[str, bytes]]:
+    """The state of every engine."""
+    return [{name: array.tobytes() for name, array in vars(flyer.state).items()} for flyer in flight.flyers]
+
+
+@pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64"])
+def test_keys_move_the_ship_as_the_exercise_says(name: str):
+    """Against x + v t + F t2 / 2m, pushes of 0.25 m/s2 along the heading at the key event and turns of 1 rad/s2."""
+    flight = flown([name], 160, asteroids=0)
+    scenario = flight.saved()
+    truth = world_pushes(scenario.scene, scenario.thrusts, scenario.times).at(-1)
+    # Each push of T s puts the ship (alpha - 1/2) a dt T off, which it keeps; alpha is the order of the updates.
+    pushed = sum(thrust.stop - thrust.start for thrust in scenario.thrusts if thrust.force.any())
+    offset = abs(ENGINES[name].alpha - 0.5) * 0.25 * flight.dt * pushed
+    rounding = ENGINES[name].rounding * 160 * 16 * 4  # one a step, of coordinates up to 4 m
+    apart = np.abs(flight.solid.state.position[SHIP] - truth.position[SHIP]).max()
+
+    assert apart <= offset + rounding
+    assert abs(flight.solid.state.angle[SHIP] - truth.angle[SHIP]) <= 160 * FRAME * flight.dt + rounding
+    assert np.hypot(*(truth.position[SHIP] - START)) > 0.2
+
+
+def test_a_push_keeps_its_direction_while_the_ship_turns():
+    """W aims once when it goes down, and anew when its event is repeated; the force's size is mass times 0.25."""
+    flight = flown(["reference:exercise"], 60, EVENTS[:4], asteroids=0)
+    pushes = [thrust for thrust in flight.saved().thrusts if thrust.force.any()]
+    size = flight.scenario.scene.mass[SHIP] * 0.25
+    headings = [np.arctan2(*thrust.force[::-1]) for thrust in pushes]
+
+    assert [(thrust.start / FRAME, thrust.stop / FRAME) for thrust in pushes] == [(24, 40), (40, 60)]
+    assert np.allclose([np.hypot(*thrust.force) for thrust in pushes], size, rtol=1e-15)
+    # alpha'' = 1 rad/s2 since frame 8; symplectic Euler turns dt t / 2 further, and rounds.
+    expected = [((frame - 8) * FRAME) ** 2 / 2 for frame in (24, 40)]
+    assert np.allclose(headings, expected, atol=flight.dt * 32 * FRAME / 2 + 1e-12)
+
+
+def test_releasing_either_key_of_a_pair_ends_the_push():
+    """As in the exercise: S takes over from W, and when S is released nothing pushes, though W is still held."""
+    flight = flown(["reference:exercise"], 40, [(0, "w", True), (10, "s", True), (20, "s", False)], asteroids=0)
+    first, second = flight.saved().thrusts
+
+    assert (first.force == -second.force).all()
+    assert [first.stop / FRAME, second.stop / FRAME] == [10, 20]
+
+
+def test_the_same_keys_give_the_same_flight():
+    """Bit for bit; another seed gives another."""
+    one, two, other = (flown(list(ENGINES)[:3], 200, seed=seed) for seed in (3, 3, 4))
+
+    assert bits(one) == bits(two)
+    assert bits(one) != bits(other)
+
+
+@pytest.mark.parametrize("substeps", [2, 16])
+def test_a_saved_flight_replays_to_the_same_bits(tmp_path: Path, substeps: int):
+    """Flown again, and played by `crosscheck run`'s own loop: every engine ends in the same state."""
+    names = list(ENGINES)
+    flight = flown(names, 150, substeps=substeps)
+    path = tmp_path / "flight.toml"
+    path.write_text(scene_text(flight.saved()))
+    scenario = read_scene_file(path)
+    again = Flight(scenario, names, replayed=True)
+    again.advance(1000)
+    runs = [play(ENGINES[name].make(), name, scenario, again.dt) for name in names]
+
+    assert again.frame == 150
+    assert [flyer.left for flyer in flight.flyers] == [""] * len(names)
+    assert bits(again) == bits(flight)
+    for run, state in zip(runs, bits(flight)):
+        assert run.trajectory is not None
+        assert {name: array.tobytes() for name, array in vars(run.trajectory.at(-1)).items()} == state
+
+
+def steered_home() -> list[tuple[int, str, bool]]:
+    """Keys that bring the ship from its start to rest at the earth: half a turn in, half out, thrust, coast, brake."""
+    dx, dy = np.array(EARTH) - START
+    turn = round(sqrt(np.arctan2(dy, dx)) / FRAME)  # t2 = angle: turned up for t, down for t, at 1 rad/s2
+    burn = 256  # frames: 4 s at 0.25 m/s2, to 1 m/s and 2 m on
+    coast = round((np.hypot(dx, dy) - 4.0) / FRAME)
+    keys = [("a", turn), ("d", turn), ("w", burn), ("", coast), ("s", burn)]
+    events, frame = [], 0
+    for key, frames in keys:
+        if key:
+            events += [(frame, key, True), (frame + frames, key, False)]
+        frame += frames
+    return events
+
+
+def test_a_scripted_flight_wins():
+    """Not on the way: only next to the earth, slow, and without spin."""
+    events = steered_home()
+    flight = flown(["reference:exercise"], events[-1][0] - 200, events[:-1], asteroids=0)
+    on_the_way = flight.won
+    flight.advance(200)
+    flight.key("s", False)
+
+    assert not on_the_way
+    assert flight.won
+    assert flight.frame - flight.won_at < 200
+
+
+def test_winning_is_the_exercises_rule_as_written():
+    """A squared distance below 0.5, so from 0.707 m on; spin may be as negative as it likes."""
+    flight = Flight(field_scenario(asteroids=0), ["reference:exercise"])
+    state = flight.solid.state
+    verdicts = []
+    for away, speed, spin in ((0.70, 0.0, -5.0), (0.71, 0.0, 0.0), (0.0, 0.31, 0.0), (0.0, 0.32, 0.0), (0.0, 0.0, 0.1)):
+        state.position[SHIP] = [EARTH[0] + away, EARTH[1]]
+        state.velocity[SHIP], state.angular_velocity[SHIP] = [speed, 0.0], spin
+        verdicts.append(flight.won)
+
+    assert verdicts == [True, False, True, False, False]
+
+
+def test_a_ship_that_leaves_is_set_back_to_its_start():
+    """At rest, in each engine by itself; what is saved ends before, for a scene has no way back."""
+    # Backwards: 1.5 m at 0.25 m/s2 take sqrt(12) s = 222 frames.
+    flight = flown(["reference:exercise", "box2d:matched"], 240, [(0, "s", True), (225, "s", False)], asteroids=0)
+
+    assert [flyer.set_backs for flyer in flight.flyers] == [1, 1]
+    assert 220 <= flight.left_at <= 223
+    assert flight.solid.state.position[SHIP, 0] == pytest.approx(START[0], abs=0.05)
+    assert flight.saved().duration == flight.left_at * FRAME
+    assert not flight.saved().thrusts[-1].stop > flight.left_at * FRAME
+
+
+def test_the_marker_names_the_first_hit():
+    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it parts at the first hit; the oracle names it."""
+    flight = flown(["reference:exercise", "pymunk:shipped", "pymunk:matched"], 64, [])
+    scenario = flight.saved()
+    ghost, matched = flight.flyers[1:]
+    truth = read_truth(scenario)
+    t, i, j = truth.collisions.t[0], truth.collisions.i[0], truth.collisions.j[0]
+
+    assert ghost.parting is not None
+    assert (ghost.parting.hit.i, ghost.parting.hit.j) in ((i, j), (j, i))
+    assert ghost.parting.hit.frame == int(t / FRAME)
+    assert ghost.parting.shared
+    assert matched.parting is None or matched.parting.hit.frame > ghost.parting.hit.frame
+
+
+def read_truth(scenario):  # type: ignore[no-untyped-def]
+    """The oracle's answer to a flight."""
+    from scenarios.oracle import with_oracle
+
+    return with_oracle(scenario).truth(scenario.times)
+
+
+class Failing:
+    """An engine that raises in its third frame."""
+
+    def __init__(self, row: Row) -> None:
+        self.inner, self.frames = row.make(), 0
+
+    def __getattr__(self, name: str):  # type: ignore[no-untyped-def]
+        return getattr(self.inner, name)
+
+    def step(self, count: int = 1) -> None:
+        self.frames += 1
+        if self.frames == 3:
+            raise RuntimeError("out of fuel")
+        self.inner.step(count)
+
+
+def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.MonkeyPatch):
+    """With its reason; where it was the solid one, the next takes over."""
+    row = ENGINES["pymunk:matched"]
+    monkeypatch.setitem(ENGINES, "pymunk:matched", Row(lambda: Failing(row), "fails", 0.0, 0.0))  # type: ignore[arg-type,return-value]
+    flight = Flight(field_scenario(), ["pymunk:matched", "reference:exercise"])
+    flight.advance(10)
+
+    assert flight.flyers[0].left == "out of fuel"
+    assert flight.solid.name == "reference:exercise"
+    assert flight.frame == 10
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "null", "[]", "1e999", '{"do": "fly"}', '{"do": "jump"}', '{"do": "frames", "count": 5}',
+     '{"do": "frames", "count": 1.5}', '{"do": "frames", "count": "1"}', '{"do": "frames", "count": 1, "more": 2}',
+     '{"do": "key", "key": "q", "down": true}', '{"do": "key", "key": "w", "down": 1}',
+     '{"do": "fly", "engines": []}', '{"do": "fly", "engines": ["nobody"]}',
+     '{"do": "fly", "engines": ["reference:exercise"], "restitution": 1.5}',
+     '{"do": "fly", "engines": ["reference:exercise"], "asteroids": 1000000}',
+     '{"do": "fly", "engines": ["reference:exercise"], "seed": -1}', '{"do": "save"' + " " * 5000 + "}",
+     b"\xff\xfe\x00", "[" * 3000],
+)  # fmt: skip
+def test_a_malformed_message_is_told_in_a_sentence(text: str | bytes):
+    """ValueError and nothing else, whatever the text is."""
+    with pytest.raises(ValueError, match=r"\w{3,}"):
+        read_message(text)
+
+
+def test_saving_before_flying_is_told():
+    """There is nothing to save."""
+    with pytest.raises(ValueError, match="nothing has been flown"):
+        Session(["reference:exercise"]).answer('{"do": "save"}')
+
+
+def test_spin_is_part_of_the_energy():
+    """m v2 / 2 + I w2 / 2, and momentum m v, of all disks."""
+    flight = Flight(field_scenario(), ["reference:exercise"])
+    scene, told = flight.scenario.scene, flight.measures(flight.solid)
+    each = [m * (v @ v) / 2 + i * w * w / 2 for m, v, i, w in zip(
+        scene.mass, scene.velocity, scene.inertia, scene.angular_velocity)]  # fmt: skip
+
+    assert told["energy"] == pytest.approx(sum(each), rel=1e-14)
+    assert told["momentum"] == pytest.approx((scene.mass @ scene.velocity).tolist(), rel=1e-13)
+    assert 0 < pi / 4 * 0.3**4 * scene.angular_velocity[1] ** 2 < told["energy"]
