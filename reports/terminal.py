@@ -41,6 +41,10 @@ class Progress:
         """From now on count to `total`."""
         self.bar.update(self.task, total=total, description="starting workers (the first run compiles: some 20 s more)")
 
+    def more(self, count: int) -> None:
+        """Count so many more."""
+        self.bar.update(self.task, total=(self.bar.tasks[0].total or 0) + count)
+
     def done(self, what: str, status: str = "ok") -> None:
         """One more is done."""
         if status != "ok":
