@@ -17,6 +17,7 @@ from rich.table import Table
 from reports import style
 from reports.commands import DONE, FAILED, INTERRUPTED, checked_engines, checked_scenes, refuse, say
 from reports.machine import about
+from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
 from reports.speed.measure import Plan, measure
 from reports.speed.page import write_page
@@ -33,9 +34,9 @@ def run_speed(
 ) -> NoReturn:
     """Measure and report into `out`; exits 0, 1 (nothing could be measured), 2 or 130."""
     effort = FULL if full else QUICK
-    named = checked_scenes(scenes, [], False, seed)
+    named = checked_scenes(scenes, [], False, seed)  # none named: all that the effort has, sizes and features besides
     effort = replace(effort, scenes=tuple(named)) if named else effort
-    plan = Plan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1)
+    plan = Plan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
     out = out.resolve()
     part = out.with_name(f"{out.name}.part-{os.getpid()}")
     try:
@@ -89,29 +90,38 @@ def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None
     """Tables first, then the page, so that what was measured is kept whatever happens to the page."""
     (folder / "machine.json").write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
     results.write(folder)
+    if results.plan.whole:
+        figures.write(folder / "speed_figures.csv", results, header)
     write_page(folder / PAGE, results, header)
 
 
 def print_summary(results: Results, page: str) -> None:
     """What each accuracy costs, pooled, the noise floor, and where the page is."""
     console = Console()
-    title = (
-        f"µs per simulated second for an accuracy, in radii: median over {len(results.scenes)} scenes; lower is better"
-    )
-    table = Table("engine", title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
+    title = f"µs per simulated second for so small an error, of a radius; median of {len(results.scenes)} scenes"
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table.add_column("engine", no_wrap=True)
     for accuracy in ACCURACIES:
         table.add_column(accuracy, justify="right", no_wrap=True)
     for (engine, profile), group in results.pooled_reached.groupby(["engine", "profile"], sort=False):
         costs = zip(group.cost.tolist(), group.why.tolist())
         table.add_row(f"{engine}:{profile}", *(style.number(cost) if isfinite(cost) else why for cost, why in costs))
     console.print(table)
-    noise = results.noise_summary()
-    if noise["pairs"]:
-        console.print(
-            f"Noise floor: an engine against itself reads {noise['median']:.3f}, half of {noise['pairs']} pairs from "
-            f"{noise['low']:.3f} to {noise['high']:.3f}" + ("." if noise["quiet"] else ": too loud, it must stay within "
-            "0.95 and 1.05. Run it alone on the machine before you quote a time."), highlight=False,
-        )  # fmt: skip
+    console.print(said_of_noise(results), highlight=False)
     for what, why in results.left_out:
         console.print(f"left out: {what}: {why}", highlight=False)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
+
+
+def said_of_noise(results: Results) -> str:
+    """The noise floor in a sentence, and what to do where it is too loud."""
+    noise = results.noise_summary()
+    if not noise["pairs"]:
+        return "Nobody was timed against itself, so the noise floor is not known."
+    said = (
+        f"Noise floor: an engine against itself reads {noise['median']:.3f}, half of {noise['pairs']} pairs from "
+        f"{noise['low']:.3f} to {noise['high']:.3f}."
+    )
+    if noise["quiet"]:
+        return said
+    return f"{said} That is too loud: it must stay within 0.95 and 1.05. Measure alone on the machine to quote a time."

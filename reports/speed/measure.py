@@ -25,18 +25,22 @@ PLAIN = ""  # the change of an engine that is not changed
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked for: scenes and engines by name, how much, from which seed, with how many workers."""
+    """What is asked for: scenes and engines by name, how much, from which seed, with how many workers.
+
+    whole: not only these scenes, but the changed engines and the numbers of disks, too.
+    """
 
     scenes: Sequence[str]
     engines: Sequence[str]
     effort: Effort
     seed: int
     workers: int
+    whole: bool = True
 
     @property
     def features(self) -> list[Feature]:
         """The rows of `FEATURES` for the engines that are asked for."""
-        return [feature for feature in FEATURES if feature.engine in self.engines]
+        return [feature for feature in FEATURES if self.whole and feature.engine in self.engines]
 
 
 @dataclass
@@ -147,7 +151,8 @@ def measure_times(plan: Plan, scenes: Sequence[str], measured: Measured, progres
             if at == scene and len(of_change(played, scene, name, change))
         }
         tasks[FEATURE, scene] = partial(ladder.times_of, scene, seed, players, **often)
-    tasks[(SIZE,)] = partial(sizes.costs, makes, effort.sizes, patience=effort.patience, seed=seed, **often)
+    if plan.whole:
+        tasks[(SIZE,)] = partial(sizes.costs, makes, effort.sizes, patience=effort.patience, seed=seed, **often)
     tasks[(IDLE,)] = partial(sizes.driving, makes, seed=seed, **often)
     rows_of_samples: list[dict[str, Any]] = []
     truths = []

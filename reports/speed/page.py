@@ -118,8 +118,10 @@ def section_of(results: Results, scene: str) -> Section:
     return section(scene, scene, results.asks[scene], drawings, results.order_table(scene))
 
 
-def sizes_section(results: Results) -> Section:
+def sizes_section(results: Results) -> Section | None:
     """Cost against the number of disks."""
+    if results.sizes.empty:
+        return None
     drawing = Drawing(
         "Cost of a step against the number of disks",
         "A gas that covers 0.3 of its box, e = 1, dt = 1/240 s. Bars are quartiles.",
