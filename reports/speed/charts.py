@@ -17,6 +17,7 @@ from scenarios.model import Array
 FRONT = "Pareto front"
 COST, ERROR = "engine time (µs per simulated second)", "error (radii)"
 EDGE = 0.55  # decades between the last gridline and what is drawn at the edge
+LOWEST = 1e-7  # radii: what is smaller stands there, as a tenth of the finest accuracy asked for is as good as exact
 TALL, TALLEST, PER_ROW = 400, 520, 19  # px
 
 
@@ -24,15 +25,16 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
     """Error against cost, a line a player over its ladder; `points` of one scene, or pooled and then `tall`."""
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis(COST, drawn.cost.to_numpy(float))
-    y_axis = log_axis(ERROR, drawn.error.to_numpy(float))
+    y_axis = error_axis(drawn.error.to_numpy(float))
     traces = [front_of(drawn)]
     for engine, profile, group in by_player(points):
         fine = group[group.cost.notna() & np.isfinite(group.error)]
         spreads = {} if tall else {
             "error_x": bars(fine.cost, fine.low, fine.high),
-            "error_y": bars(fine.error, fine.error_low, fine.error_high),
+            "error_y": bars(*(fine[name].clip(lower=LOWEST) for name in ("error", "error_low", "error_high"))),
         }  # fmt: skip
-        traces.append(line(engine, profile, fine.cost, fine.error, [told(row) for row in records(fine)], spreads))
+        text = [told(row) for row in records(fine)]
+        traces.append(line(engine, profile, fine.cost, fine.error.clip(lower=LOWEST), text, spreads))
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
     traces += at_the_edge(lost, drawn, x_axis, y_axis)
     return figure(traces, x_axis, y_axis, TALLEST if tall else TALL)
@@ -57,13 +59,14 @@ def at_the_edge(
 
 
 def front_of(drawn: pd.DataFrame) -> dict[str, Any]:
-    """The points nobody beats, joined by a broad line behind everybody."""
-    best = front(drawn.cost.to_numpy(float), drawn.error.to_numpy(float))
-    x, y = drawn.cost.to_numpy(float)[best], drawn.error.to_numpy(float)[best]
-    ink = {"color": style.look(style.TRUTH).light, "width": 9, "shape": "hv"}
+    """The points nobody beats, joined by a broad line behind everybody; what stands at `LOWEST` counts as equal."""
+    cost, error = drawn.cost.to_numpy(float), np.maximum(drawn.error.to_numpy(float), LOWEST)
+    best = front(cost, error)
+    colour = style.look(style.TRUTH).light
     return {
-        "type": "scatter", "x": shortened(x), "y": shortened(np.maximum(y, ZERO)), "name": FRONT, "mode": "lines",
-        "line": ink, "opacity": 0.16, "hoverinfo": "skip",
+        "type": "scatter", "x": shortened(cost[best]), "y": shortened(error[best]), "name": FRONT,
+        "mode": "lines+markers", "line": {"color": colour, "width": 9, "shape": "hv"},
+        "marker": {"color": colour, "size": 20, "symbol": "circle"}, "opacity": 0.16, "hoverinfo": "skip",
     }  # fmt: skip
 
 
@@ -208,6 +211,16 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
 def log_axis(title: str, values: Array) -> dict[str, Any]:
     """A log axis with a tick a decade or so."""
     return {"title": title} | decades(np.append(values, 1.0) if not len(values) else values)
+
+
+def error_axis(errors: Array) -> dict[str, Any]:
+    """A log axis for errors that ends at `LOWEST`, with a tick that says so if any is smaller."""
+    axis = log_axis(ERROR, np.maximum(errors, LOWEST))
+    if not (errors < LOWEST).any():
+        return axis
+    ticks = [(at, text) for at, text in zip(axis["tickvals"], axis["ticktext"]) if at > 9 * LOWEST]
+    lowest = f"≤ 10<sup>{np.log10(LOWEST):.0f}</sup>".replace("-", "−")
+    return axis | {"tickvals": [*(at for at, _ in ticks), LOWEST], "ticktext": [*(text for _, text in ticks), lowest]}
 
 
 def edge(axis: dict[str, Any], label: str) -> float:

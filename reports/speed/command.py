@@ -21,12 +21,13 @@ from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
 from reports.speed.measure import Plan, measure
 from reports.speed.page import write_page
-from reports.speed.pareto import ACCURACIES
+from reports.speed.pareto import ACCURACIES, UNREACHABLE
 from reports.speed.results import Results
 from reports.suite import replace_folder
 from reports.terminal import Progress
 
 PAGE = "speed.html"
+SHORT = {UNREACHABLE: "never"}
 
 
 def run_speed(
@@ -99,13 +100,15 @@ def print_summary(results: Results, page: str) -> None:
     """What each accuracy costs, pooled, the noise floor, and where the page is."""
     console = Console()
     title = f"µs per simulated second for so small an error, of a radius; median of {len(results.scenes)} scenes"
+    title += "\n(k of n: so accurate in k scenes only; never: at no dt in half of them or more)"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine", no_wrap=True)
     for accuracy in ACCURACIES:
         table.add_column(accuracy, justify="right", no_wrap=True)
     for (engine, profile), group in results.pooled_reached.groupby(["engine", "profile"], sort=False):
         costs = zip(group.cost.tolist(), group.why.tolist())
-        table.add_row(f"{engine}:{profile}", *(style.number(cost) if isfinite(cost) else why for cost, why in costs))
+        cells = (style.number(cost) if isfinite(cost) else SHORT.get(why, why) for cost, why in costs)
+        table.add_row(f"{engine}:{profile}", *cells)
     console.print(table)
     console.print(said_of_noise(results), highlight=False)
     for what, why in results.left_out:

@@ -8,8 +8,6 @@ from scenarios.catalogue import DRAWN, SCENARIOS
 from scenarios.model import Scenario
 
 FEWEST_RUNGS, MOST_RUNGS = 3, 9
-FEATURE_SCENES = ("disk_between_static_disks", "slow_hit", "bouncing_ball_e1", "line_gas", "column_of_ten")
-"""Three disks, a hit that thresholds matter to, one disk under gravity, many hits, and a stack at rest."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +22,8 @@ class Effort:
         budget: s of timing for one engine at one dt in one scene, beyond the first rounds.
         sizes: numbers of disks.
         patience: s a step may take before an engine drops out of the sizes.
+        feature_scenes: what changed engines are measured in: three disks, a hit that thresholds matter to, one disk
+            under gravity, many hits, and a stack at rest.
     """
 
     scenes: tuple[str, ...]
@@ -33,6 +33,9 @@ class Effort:
     budget: float
     sizes: tuple[int, ...]
     patience: float
+    feature_scenes: tuple[str, ...] = (
+        "disk_between_static_disks", "slow_hit", "bouncing_ball_e1", "line_gas", "column_of_ten",
+    )  # fmt: skip
 
     def seeds_of(self, scene: str, seed: int) -> list[int]:
         """The seeds a scene is drawn from; one where it is not drawn."""

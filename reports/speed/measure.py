@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import pandas as pd
@@ -14,9 +15,10 @@ from adapters.features import FEATURES, Feature
 from reports.machine import busy_cores
 from reports.runner import Failure, run_all
 from reports.speed import ladder, models, sizes
-from reports.speed.effort import FEATURE_SCENES, Effort
+from reports.speed.effort import Effort
 from reports.speed.timing import Sample
 from reports.terminal import Progress
+from scenarios.catalogue import DRAWN
 
 HANGS, ALL_ROUNDS = 600.0, 3600.0  # s a ladder and a timing may take: against what hangs, no limit of what is measured
 SCENE, FEATURE, SIZE, IDLE = "scene", "feature", "size", "idle"
@@ -41,6 +43,11 @@ class Plan:
     def features(self) -> list[Feature]:
         """The rows of `FEATURES` for the engines that are asked for."""
         return [feature for feature in FEATURES if self.whole and feature.engine in self.engines]
+
+    @property
+    def feature_scenes(self) -> tuple[str, ...]:
+        """Where the changed engines are measured, if any are."""
+        return self.effort.feature_scenes if self.features else ()
 
 
 @dataclass
@@ -78,11 +85,12 @@ def measure(plan: Plan, progress: Progress) -> Measured:
 
 def reach(plan: Plan, measured: Measured, progress: Progress) -> dict[tuple[str, int], int]:
     """(scene, seed) -> how many sample intervals have an exact answer; those that have none are told of."""
-    wanted = dict.fromkeys((*plan.scenes, *(FEATURE_SCENES if plan.features else ())))
+    wanted = dict.fromkeys((*plan.scenes, *plan.feature_scenes))
     draws = [(scene, seed) for scene in wanted for seed in plan.effort.seeds_of(scene, plan.seed)]
     found = {}
-    tasks = {draw: partial(ladder.reach_of, *draw) for draw in draws}
-    for (scene, seed), result in done(tasks, plan.workers, progress, "exact answer"):
+    drawn = {draw: partial(ladder.reach_of, *draw) for draw in draws if draw[0] in DRAWN}  # these may take seconds each
+    answers = [(draw, ladder.reach_of(*draw)) for draw in draws if draw not in drawn]
+    for (scene, seed), result in chain(answers, done(drawn, plan.workers, progress, "exact answer")):
         found[scene, seed], why = (0, result.reason) if isinstance(result, Failure) else result
         if why:
             measured.left_out.append((f"{scene}, seed {seed}", f"no exact answer: {why}"))
@@ -144,7 +152,7 @@ def measure_times(plan: Plan, scenes: Sequence[str], measured: Measured, progres
         rows = played[(played.kind == SCENE) & (played.scenario == name)]
         tasks[SCENE, scene] = partial(ladder.times_of, scene, seed, copies(rows, makes), **often)
         tasks["truth", scene] = partial(models.closed_form, scene, seed)
-    for scene in FEATURE_SCENES if plan.features else ():
+    for scene in plan.feature_scenes:
         players = {
             ((name, change), middle(scene), 0): make
             for at, name, change, make in changed(plan)
@@ -182,7 +190,7 @@ def copies(rows: pd.DataFrame, makes: Mapping[str, Callable]) -> dict[tuple[str,
 
 def changed(plan: Plan) -> Iterable[tuple[str, str, str, Callable]]:
     """(scene, engine, change, make) of every feature and of the engines they are set against, the plain ones first."""
-    for scene in FEATURE_SCENES:
+    for scene in plan.feature_scenes:
         for name in dict.fromkeys(feature.engine for feature in plan.features):
             yield scene, name, PLAIN, ENGINES[name].make
         for feature in plan.features:
@@ -228,6 +236,8 @@ def done(
     tasks: Mapping, workers: int, progress: Progress, what: str, patience: float = HANGS
 ) -> Iterable[tuple[Any, Any]]:
     """Run the tasks and say so; results as they come."""
+    if not tasks:
+        return
     progress.more(len(tasks))
     for key, result in run_all(tasks, workers, patience):
         failed = result.status if isinstance(result, Failure) else "ok"

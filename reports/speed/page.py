@@ -16,7 +16,6 @@ from reports import style
 from reports.charts import Drawing
 from reports.page import SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
 from reports.speed import charts
-from reports.speed.effort import FEATURE_SCENES
 from reports.speed.order import ELSEWHERE, UNSTEADY
 from reports.speed.pareto import ACCURACIES
 from reports.speed.results import Results
@@ -50,7 +49,8 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         features=features_section(results), sections=[section_of(results, name) for name in results.scenes],
         noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
         driving=charts.records(results.driving), feature_rows=charts.records(results.features),
-        left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED, feature_scenes=FEATURE_SCENES,
+        left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
+        feature_scenes=results.plan.feature_scenes,
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
     )  # fmt: skip
@@ -74,15 +74,15 @@ def pooled_section(results: Results) -> Section:
         "speed": Drawing(
             "Error against cost",
             f"A point is one rung of the dt ladder, each of its coordinates the median over {count} scenes. "
-            "Down and left is better; on the broad line, nobody is both faster and better. "
+            "Down and left is better; nobody is both faster and better than the broad grey line. "
             "A scene that a player failed counts as infinitely wrong.",
             charts.speed(results.pooled, tall=True),
         ),
         "matched": Drawing(
             "Cost at matched accuracy",
-            "The median over the scenes of the cheapest measured dt whose error, and that of every finer one, is no "
-            "larger. never: half of the scenes or more cannot be had so well at any dt, or failed; not yet: half or "
-            "more are not had so well down to the finest dt measured.",
+            "The median over the scenes of what the cheapest measured dt costs whose error, and that of every finer "
+            "one, is no larger. never: half of the scenes or more are unreachable at any dt, or failed. not yet: half "
+            "or more are not reached down to the finest dt measured.",
             charts.matched(results.pooled_reached, tall=True),
         ),
     }

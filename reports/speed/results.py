@@ -72,7 +72,7 @@ class Results:
             count, got = len(group), int(group.cost.notna().sum())
             never = int(group.why.isin([UNREACHABLE, FAILED]).sum())
             median = float(np.median(group.cost.fillna(np.inf)))
-            said = f"in {got} of {count} scenes only"
+            said = f"{got} of {count}"
             why = said if np.isfinite(median) else (UNREACHABLE if 2 * never >= count else said)
             rows.append({
                 "scenario": tables.POOLED, "engine": engine, "profile": profile, "accuracy": accuracy,
