@@ -12,6 +12,7 @@ from reports.speed.order import (
     ELSEWHERE,
     EXACT,
     ORDER,
+    UNCLEAR,
     UNKNOWN,
     UNSTEADY,
     bootstrap,
@@ -69,6 +70,13 @@ def test_an_error_that_rises_with_a_finer_step_is_not_monotone():
     assert verdict_of(np.array([1e-1, 1e-2, 3e-2, 1e-3]), changes) == UNSTEADY
     assert verdict_of(np.array([1e-1, 1e-2, 1.05e-2, 1e-3]), changes) == ORDER
     assert verdict_of(np.array([1e-1, 1e-7, 5e-7, 1e-8]), changes) == ORDER
+
+
+def test_a_scatter_as_wide_as_its_fall_is_no_order():
+    """The error falls from step to step, but once by 0.1 % and once by a thousandfold: the slope may be anything."""
+    errors = np.array([[1.0, 0.999, 0.998, 0.001]])
+
+    assert order_of(DT[:4], errors, np.ones((1, 4))).verdict == UNCLEAR
 
 
 def test_too_few_points_are_no_order():

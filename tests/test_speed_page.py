@@ -90,7 +90,8 @@ def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Result
     assert all(max(trace.y) > top / 10 for trace in edges.values())
     assert "failed" in figure.layout.yaxis.ticktext
     assert "SIGSEGV" in edges["pymunk:matched"].text[0]
-    assert max(edges["pymunk:shipped"].x) == pytest.approx(10 ** figure.layout.xaxis.range[1], rel=1e-3)
+    assert 10 ** (figure.layout.xaxis.range[1] - 0.1) < max(edges["pymunk:shipped"].x)
+    assert max(edges["pymunk:shipped"].x) < 10 ** figure.layout.xaxis.range[1]
     assert max(edges["pymunk:matched"].x) < max(edges["pymunk:shipped"].x)
 
 

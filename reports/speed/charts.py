@@ -52,7 +52,8 @@ def at_the_edge(
         others = drawn[(drawn.engine == engine) & (drawn.profile == profile)]
         per_rung = float((others.cost / 2.0**others.rung).median()) if len(others) else np.nan
         cost = group.cost.where(group.cost.notna(), per_rung * 2.0**group.rung)
-        x = cost.fillna(10 ** x_axis["range"][1]).clip(upper=10 ** x_axis["range"][1])
+        corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside: what is outside is not drawn
+        x = cost.fillna(corner).clip(upper=corner)
         trace = line(engine, profile, x, np.full(len(group), top), [told(row) for row in records(group)])
         traces.append(trace | {"mode": "markers", "cliponaxis": False})
     return traces
@@ -193,6 +194,8 @@ def told(row: dict[str, Any]) -> str:
         lines.append(f"{spread(row)} µs/s")
     if np.isfinite(row["best"]):
         lines.append(f"fastest {style.number(row['best'])} µs/s")
+    if np.isfinite(row["idle"]):
+        lines.append(f"as many steps without anything to do {style.number(row['idle'])} µs/s")
     if row["wrapping"] > 0:
         lines.append(f"besides, {style.number(row['wrapping'])} µs/s of wrapping in Python")
     return "<br>".join(lines)

@@ -53,7 +53,7 @@ QUICK = Effort(
         "free_fall", "head_on_equal_e09", "oblique_e1", "bouncing_ball_e1", "line_gas", "cradle_with_gaps",
         "ship_thrust", "asteroids",
     ),
-    seeds=16, most_steps=5_000, rounds=5, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000), patience=0.01,
+    seeds=16, most_steps=5_000, rounds=5, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000), patience=0.1,
 )  # fmt: skip
 FULL = Effort(
     scenes=tuple(SCENARIOS), seeds=16, most_steps=64_000, rounds=15, budget=0.5,

@@ -14,8 +14,8 @@ RISE = 1.1  # an error that grows by more than this from a step to a finer one i
 STANDSTILL = 0.25  # of the error that is left: of order p the last halving of dt moves 2^p - 1 times that
 RESAMPLES = 1000
 
-ORDER, EXACT, UNSTEADY, ELSEWHERE, UNKNOWN = (
-    "falls", "exact", "not monotone", "converges to something else", "too few points",
+ORDER, UNCLEAR, EXACT, UNSTEADY, ELSEWHERE, UNKNOWN = (
+    "falls", "no clear order", "exact", "not monotone", "converges to something else", "too few points",
 )  # fmt: skip
 
 # Two-sided 95 % of Student's t for 1, 2, 3, ... degrees of freedom; past the end 2.
@@ -44,10 +44,16 @@ def order_of(dt: Array, errors: Array, changes: Array, seed: int = 0) -> Order:
         return Order(np.nan, np.nan, np.nan, verdict if verdict != ORDER else UNKNOWN)
     x = np.log(dt[used])
     if len(errors) == 1:
-        return Order(*line_interval(x, np.log(middle[used])), verdict)
+        fitted, low, high = line_interval(x, np.log(middle[used]))
+        return Order(fitted, low, high, seen(verdict, low))
     logs = np.log(np.maximum(errors[:, used], FINEST))
     low, high = bootstrap(logs, lambda drawn: slope(x, np.median(drawn, axis=0)), seed)
-    return Order(slope(x, np.log(middle[used])), low, high, verdict)
+    return Order(slope(x, np.log(middle[used])), low, high, seen(verdict, low))
+
+
+def seen(verdict: str, low: float) -> str:
+    """The verdict, unless it says that the error falls and the slope may as well be 0."""
+    return UNCLEAR if verdict == ORDER and not low > 0 else verdict
 
 
 def verdict_of(errors: Array, changes: Array) -> str:

@@ -46,8 +46,11 @@ class Results:
 
     @cached_property
     def points(self) -> pd.DataFrame:
-        """See `tables.points`."""
-        return tables.points(self.measured, self.plan.seed)
+        """See `tables.points`; and idle, what as many steps cost where there is nothing to do, µs per simulated s."""
+        points = tables.points(self.measured, self.plan.seed)
+        each = {(row.engine, row.profile): row.step_us for row in self.driving.itertuples()}
+        steps = [each.get(who, np.nan) for who in zip(points.engine, points.profile)]
+        return points.assign(idle=np.array(steps, float) / points.dt_s)
 
     @cached_property
     def orders(self) -> pd.DataFrame:

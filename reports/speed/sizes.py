@@ -16,7 +16,7 @@ from scenarios.placing import box, lay_out
 
 Make = Callable[[], Engine]
 DT, RADIUS, COVERED = 1 / 240, 0.5, 0.3
-WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 0.01  # of one sample: as many steps as fill 10 ms
+WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3  # of one sample: as many steps as fill 2 ms, less than a time slice
 FIT_FROM = 100  # disks: below it the fixed cost of a step hides how it grows
 IDLE_STEPS = 1000
 STOPPED = "stopped: a step would take longer than {:g} s"

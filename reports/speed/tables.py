@@ -112,6 +112,7 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
             "error": quartiles[1], "error_low": quartiles[0], "error_high": quartiles[2],
             "cost": prices[1], "low": prices[0], "high": prices[2], "seeds": len(group),
             "failed": int((group.failed > 0).sum()), "status": "ok", "reason": "", "best": np.nan, "wrapping": np.nan,
+            "idle": np.nan,
         })  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -130,16 +131,23 @@ def driving(measured: Measured) -> pd.DataFrame:
     idle = measured.samples[measured.samples.kind == IDLE]
     if idle.empty:
         return pd.DataFrame(columns=[*WHO, "step_us", "call_us"])
-    wide = in_us(summed_up(idle, [*WHO, "singly"])).pivot(index=WHO, columns="singly", values="cost")
-    return pd.DataFrame({"step_us": wide[False], "call_us": wide[True] - wide[False]}).reset_index()
+    # The fastest: a difference of medians of a busy machine may be of either sign.
+    wide = in_us(summed_up(idle, [*WHO, "singly"])).pivot(index=WHO, columns="singly", values="best")
+    return in_order(pd.DataFrame({"step_us": wide[False], "call_us": wide[True] - wide[False]}).reset_index())
+
+
+def in_order(table: pd.DataFrame) -> pd.DataFrame:
+    """Its rows in the order of `ENGINES`, otherwise as they were."""
+    ranks = {name: rank for rank, name in enumerate(ENGINES)}
+    names = table.engine + ":" + table.profile
+    return table.loc[names.map(ranks).sort_values(kind="stable").index]
 
 
 def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
     """(engine, profile, n, cost in µs a step and so on) and (engine, profile, exponent, low, high, stopped)."""
     samples = measured.samples[measured.samples.kind == SIZE]
     costs = in_us(summed_up(samples, [*WHO, "n"])).sort_values("n", kind="stable")
-    ranks = {name: rank for rank, name in enumerate(ENGINES)}
-    costs = costs.sort_values("engine", key=lambda _: (costs.engine + ":" + costs.profile).map(ranks), kind="stable")
+    costs = in_order(costs.reset_index(drop=True))
     rows = []
     for (engine, profile), group in costs.groupby(WHO, sort=False):
         fitted = exponent(group.n.to_numpy(float), group.cost.to_numpy(float))
