@@ -66,11 +66,11 @@ class Box2DV3:
             self.world.set_contact_tuning(HERTZ, DAMPING_RATIO, PUSH_SPEED)
         self.world.hit_event_threshold = 0.0  # listening only: report every hit
         self.bodies = [self._disk(i) for i in range(scene.n)]
+        self.every = pyb2d3.Bodies()
+        for body in self.bodies:
+            self.every.append(body)
         for w in range(len(scene.walls)):
             self._wall(w)
-        self.ids, self.at = pyb2d3.Bodies(), np.zeros((scene.n, 2), np.float32)  # a shorter array than that crashes
-        for body in self.bodies:
-            self.ids.append(body)
         self.angle, self.spin, self.seen = np.array(scene.angle), np.array(scene.angular_velocity), 0
 
     def _options(self) -> dict[str, float]:
@@ -141,24 +141,25 @@ class Box2DV3:
     def _wrap(self) -> None:
         assert self.scene.wrap is not None
         low, high = self.scene.wrap
-        self.ids.get_positions(self.at)
-        for i in np.flatnonzero(((self.at < low) | (self.at > high)).any(axis=1)):
-            over = np.where(self.at[i] < low, high, np.where(self.at[i] > high, low, self.at[i]))
+        at = self.every.get_positions(np.empty((self.scene.n, 2), np.float32))
+        for i in np.flatnonzero(((at < low) | (at > high)).any(axis=1)):
+            over = np.where(at[i] < low, high, np.where(at[i] > high, low, at[i]))
             self.bodies[i].set_transform(vector(over), self.bodies[i].rotation)
 
     def read(self) -> State:
-        """Attribute by attribute; the engine keeps (cos, sin), so the angle is unwound from read to read."""
-        n, bodies = self.scene.n, self.bodies
-        position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2)
-        velocity = np.array([tuple(b.linear_velocity) for b in bodies], float).reshape(n, 2)
-        angular_velocity = np.array([b.angular_velocity for b in bodies], float)
+        """All bodies at once, as float32; the engine keeps (cos, sin), so the angle is unwound from read to read."""
+        n, every = self.scene.n, self.every
+        position = every.get_positions(np.empty((n, 2), np.float32)).astype(float)
+        velocity = every.get_linear_velocities(np.empty((n, 2), np.float32)).astype(float)
+        angular_velocity = every.get_angular_velocities(np.empty(n, np.float32)).astype(float)
         if self.matched:
             must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
         return State(position, velocity, self._unwound(angular_velocity), angular_velocity)
 
     def _unwound(self, spin: Array) -> Array:
         """The angles nearest to where the mean spin since the last read would have brought them."""
-        raw = np.array([atan2(body.rotation.s, body.rotation.c) for body in self.bodies])
+        turn = self.every.get_rotations(np.empty((self.scene.n, 2), np.float32)).tolist()
+        raw = np.array([atan2(s, c) for c, s in turn])
         expected = self.angle + (self.spin + spin) / 2 * (self.steps - self.seen) * self.dt
         self.angle = raw + 2 * pi * np.round((expected - raw) / (2 * pi))
         self.spin, self.seen = spin, self.steps
@@ -195,7 +196,7 @@ class Box2DV3:
 
     def close(self) -> None:
         """Bodies before the world: using one afterwards is a segmentation fault."""
-        self.bodies, self.ids = [], None
+        self.bodies, self.every = [], None
         self.world = None
 
 

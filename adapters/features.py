@@ -31,13 +31,6 @@ class Feature:
         return ENGINES[self.engine].make
 
 
-def _reference(**changed: Any) -> Engine:
-    from adapters.reference import Reference
-    from reference_impl import exercise
-
-    return Reference(exercise, **changed)
-
-
 def _pymunk(**changed: Any) -> Engine:
     from adapters.pymunk import Pymunk
 
@@ -59,7 +52,17 @@ def _box2d_v3(**changed: Any) -> Engine:
 def _float32() -> Engine:
     import numpy as np
 
-    return _reference(precision=np.float32)
+    from adapters.reference import Reference
+    from reference_impl import crowd
+
+    return Reference(crowd, precision=np.float32)
+
+
+def _all_pairs() -> Engine:
+    from adapters.reference import Reference
+    from reference_impl import exercise
+
+    return Reference(exercise)
 
 
 def _rows(engine: str, make: Callable[..., Engine], changes: dict[str, dict[str, Any]]) -> list[Feature]:
@@ -68,6 +71,7 @@ def _rows(engine: str, make: Callable[..., Engine], changes: dict[str, dict[str,
 
 FEATURES: tuple[Feature, ...] = (
     Feature("reference:exercise", "kept in float32", _float32),
+    Feature("reference:exercise", "all pairs, never a list", _all_pairs),
     *_rows("pymunk:matched", _pymunk, {
         "10 iterations, not 50": {"iterations": 10},
         "200 iterations, not 50": {"iterations": 200},

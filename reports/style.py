@@ -69,7 +69,7 @@ OTHERS = (
     ("#5b6b7a", "#9fb0c0", "cross"), ("#a3123a", "#ff7a93", "triangle-down"),
     ("#5a3d9e", "#b7a1ff", "hexagon"), ("#3d6b1f", "#a4d67a", "pentagon"), ("#7a4a21", "#e0a878", "bowtie"),
 )  # fmt: skip
-DASHED = {"shipped": (6, 3), "lesson": (2, 3)}
+DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3)}
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep to pale on dark.
 HEAT_BOUNDS = (1e-12, 1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from reports import style
 from reports.commands import DONE, FAILED, INTERRUPTED, checked_engines, checked_scenes, refuse, say
+from reports.folders import replace_folder
 from reports.machine import about
 from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
@@ -23,7 +24,6 @@ from reports.speed.measure import Plan, measure
 from reports.speed.page import write_page
 from reports.speed.pareto import ACCURACIES, UNREACHABLE
 from reports.speed.results import Results
-from reports.suite import replace_folder
 from reports.terminal import Progress
 
 PAGE = "speed.html"

@@ -12,7 +12,7 @@ import numpy as np
 from adapters.engine import Engine
 from adapters.play import advance, play
 from reports import laws
-from reports.cells import open_scene
+from reports.scenes import open_scene
 from reports.speed.timing import Sample, Spent, Timed, interleaved
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import NoTruth

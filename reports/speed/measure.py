@@ -13,11 +13,12 @@ import pandas as pd
 from adapters.engines import ENGINES
 from adapters.features import FEATURES, Feature
 from reports.machine import busy_cores
-from reports.runner import Failure, run_all
+from reports.runner import run_all
 from reports.speed import ladder, models, sizes
 from reports.speed.effort import Effort
 from reports.speed.timing import Sample
 from reports.terminal import Progress
+from reports.worker_process import Failure
 from scenarios.catalogue import DRAWN
 
 HANGS, ALL_ROUNDS = 600.0, 3600.0  # s a ladder and a timing may take: against what hangs, no limit of what is measured
@@ -238,8 +239,8 @@ def done(
     """Run the tasks and say so; results as they come."""
     if not tasks:
         return
-    progress.more(len(tasks))
+    progress.start(len(tasks), len(tasks), what)
     for key, result in run_all(tasks, workers, patience):
-        failed = result.status if isinstance(result, Failure) else "ok"
-        progress.done(f"{what}: {' '.join(str(part) for part in key)}", failed)
+        failed = result if isinstance(result, Failure) else ("ok", "")
+        progress.done(f"{what}: {' '.join(str(part) for part in key)}", *failed[:2])
         yield key, result
