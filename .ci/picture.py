@@ -1,6 +1,6 @@
-"""Takes the README's pictures: of a page, of the game, of a lesson.
+"""Takes the README's pictures: the chart of a page, the game, a lesson.
 
-uv run python .ci/picture.py reports/out/latest/report.html | game | lesson
+uv run python .ci/picture.py reports/out/speed/speed.html | game | lesson
 """
 
 import sys
@@ -28,11 +28,12 @@ STEER = """async ([key, down, frames]) => {
 FLIGHT = [("a", True, 8), ("a", False, 1), ("d", True, 8), ("d", False, 1), ("w", True, 150), ("a", True, 30)]
 
 
-def report_map(browser: Browser, page: str) -> None:
-    """The map of position errors, without the index beside it."""
+def pooled_chart(browser: Browser, page: str) -> None:
+    """The pooled chart of error against cost with its legend, without the index beside it."""
     tab = browser.new_page(viewport={"width": 1320, "height": 1400}, device_scale_factor=1.5)
     tab.goto(Path(page).resolve().as_uri())
-    clip(tab, "page.png", "#map", "#map")
+    tab.locator("#pooled .chart .main-svg").first.wait_for()
+    clip(tab, "speed.png", "#pooled .legend", "#pooled .chart")
 
 
 def game(browser: Browser, url: str) -> None:
@@ -61,10 +62,10 @@ def lesson(browser: Browser, url: str) -> None:
 
 def clip(tab: Page, name: str, first: str, last: str) -> None:
     """From the top of one element to the foot of another, as wide as the first."""
-    top, foot = (tab.locator(each).bounding_box() for each in (first, last))
+    top, foot = (tab.locator(each).first.bounding_box() for each in (first, last))
     assert top is not None
     assert foot is not None
-    box = {"x": top["x"] - PAD, "y": top["y"] - PAD * (first != "#map"), "width": top["width"] + 2 * PAD}
+    box = {"x": top["x"] - PAD, "y": top["y"] - PAD, "width": top["width"] + 2 * PAD}
     box["height"] = foot["y"] + foot["height"] - box["y"] + PAD
     tab.screenshot(path=REPORTS / name, clip=box, full_page=True)
 
@@ -76,7 +77,7 @@ def main(what: str) -> None:
             with served(application(Game(FIRST), ROUTES)) as url:
                 {"game": game, "lesson": lesson}[what](browser, url)
         else:
-            report_map(browser, what)
+            pooled_chart(browser, what)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import version
+from time import perf_counter
 from typing import Any
 
 import Box2D
@@ -24,10 +25,30 @@ class Box2DEngine:
     step where that is more, because nothing moves by more than 2 units a step; a scene that comes
     there all the same is refused. No friction, sleep, continuous collision or wall skin; at e = 1 no
     push-out, because it adds energy.
+
+    Changed one at a time by `features.py`: `continuous` and `sleeping` (None: the profile's), `bullet` (continuous
+    collision between disks, too), `warm_starting`, `turning` (False: no inertia, so no spin), the iterations.
     """
 
-    def __init__(self, profile: str) -> None:
+    listening, wrapping = True, 0.0
+
+    def __init__(
+        self,
+        profile: str,
+        *,
+        continuous: bool | None = None,
+        sleeping: bool | None = None,
+        bullet: bool = False,
+        warm_starting: bool = True,
+        turning: bool = True,
+        velocity_iterations: int = VELOCITY_ITERATIONS,
+        position_iterations: int | None = None,
+    ) -> None:
         self.matched = profile == "matched"
+        self.continuous = not self.matched if continuous is None else continuous
+        self.sleeping = not self.matched if sleeping is None else sleeping
+        self.bullet, self.warm_starting, self.turning = bullet, warm_starting, turning
+        self.velocity_iterations, self.asked_position_iterations = velocity_iterations, position_iterations
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world in the profile's units."""
@@ -50,11 +71,15 @@ class Box2DEngine:
         self.spin_cap = Box2D.b2_maxRotation / dt
         self.listener = Listener(self)
         gravity = scene.gravity * self.speed * self.time
-        self.world = Box2D.b2World(gravity=vector(gravity), contactListener=self.listener)
-        if self.matched:
-            self.world.continuousPhysics = False
-            self.world.SetAllowSleeping(False)  # `doSleep` only sets a Python attribute that the engine never sees
-        self.position_iterations = 0 if self.matched and scene.restitution == 1 else POSITION_ITERATIONS
+        heard = {"contactListener": self.listener} if self.listening else {}
+        self.world = Box2D.b2World(gravity=vector(gravity), **heard)
+        self.world.continuousPhysics = self.continuous
+        self.world.SetAllowSleeping(self.sleeping)  # `doSleep` only sets a Python attribute that the engine never sees
+        self.world.warmStarting = self.warm_starting
+        profiles = 0 if self.matched and scene.restitution == 1 else POSITION_ITERATIONS
+        self.position_iterations = (
+            profiles if self.asked_position_iterations is None else self.asked_position_iterations
+        )
         self.bodies = [self._disk(i) for i in range(scene.n)]
         for w in range(len(scene.walls)):
             self._wall(w)
@@ -73,11 +98,12 @@ class Box2DEngine:
             **place,
             linearVelocity=vector(scene.velocity[i] * self.speed),
             angularVelocity=float(scene.angular_velocity[i]) * self.time,
-            **({"allowSleep": False} if self.matched else {}),
+            allowSleep=self.sleeping,
+            bullet=self.bullet,
         )
         body.CreateFixture(fixture)
         # After the fixture: adding one computes mass and inertia from its density.
-        inertia = float(scene.inertia[i]) * length**2
+        inertia = float(scene.inertia[i]) * length**2 if self.turning else 0.0
         body.massData = Box2D.b2MassData(mass=float(scene.mass[i]), center=(0, 0), I=inertia)
         return body
 
@@ -99,10 +125,12 @@ class Box2DEngine:
         """`count` calls of `Step`; where the scene wraps, disks that leave are set onto the opposite edge."""
         dt = self.dt / self.time
         for _ in range(count):
-            self.world.Step(dt, VELOCITY_ITERATIONS, self.position_iterations)
+            self.world.Step(dt, self.velocity_iterations, self.position_iterations)
             self.steps += 1
             if self.scene.wrap is not None:
+                started = perf_counter()
                 self._wrap()
+                self.wrapping += perf_counter() - started
 
     def _wrap(self) -> None:
         assert self.scene.wrap is not None
@@ -133,7 +161,7 @@ class Box2DEngine:
         """Resolved values are read back from the world, a fixture and the engine's constants."""
         matched, world = self.matched, self.world
         fixture = self.bodies[0].fixtures[0]
-        iterations = f"{VELOCITY_ITERATIONS}, {self.position_iterations}"
+        iterations = f"{self.velocity_iterations}, {self.position_iterations}"
         return {
             "unit of time in s": (self.time if matched else None, "kept by the adapter"),
             "unit of length in m": (1 / self.length if matched else None, "kept by the adapter"),
@@ -144,8 +172,8 @@ class Box2DEngine:
             "wall skin": (0.0 if matched else None, UNREAD),
             "friction": (0.0 if matched else None, fixture.friction),
             "restitution": (self.scene.restitution, fixture.restitution),
-            "sleeping": (False if matched else None, world.GetAllowSleeping()),
-            "continuous collision": (False if matched else None, world.continuousPhysics),
+            "sleeping": (self.sleeping if matched else None, world.GetAllowSleeping()),
+            "continuous collision": (self.continuous if matched else None, world.continuousPhysics),
             "velocity, position iterations": (iterations, iterations),
             "float32 rounding of the start in m": (None, rounding(self.scene)),
         }

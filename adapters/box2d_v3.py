@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib.metadata import version
 from math import atan2, cos, pi, sin
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -23,10 +24,27 @@ class Box2DV3:
     `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap; the length
     unit is 2 % of the smallest radius, which shrinks slop and speculative margin with it. The cap on
     spins cannot be lifted: a scene that reaches it is refused.
+
+    Changed one at a time by `features.py`: `substeps`, `continuous` and `sleeping` (None: the profile's), `bullet`
+    (continuous collision between disks, too), `turning` (False: no inertia, so no spin).
     """
 
-    def __init__(self, profile: str) -> None:
+    listening, wrapping = True, 0.0
+
+    def __init__(
+        self,
+        profile: str,
+        *,
+        substeps: int = SUBSTEPS,
+        continuous: bool | None = None,
+        sleeping: bool | None = None,
+        bullet: bool = False,
+        turning: bool = True,
+    ) -> None:
         self.matched = profile == "matched"
+        self.substeps, self.bullet, self.turning = substeps, bullet, turning
+        self.continuous = not self.matched if continuous is None else continuous
+        self.sleeping = not self.matched if sleeping is None else sleeping
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world; the length unit is global to the process, so each profile sets its own."""
@@ -42,9 +60,9 @@ class Box2DV3:
         self.spin_cap = pi / 4 / dt
         self.options = self._options()
         self.world = pyb2d3.World(gravity=vector(scene.gravity), **self.options)
+        self.world.continuous_enabled = self.continuous
+        self.world.sleeping_enabled = self.sleeping
         if self.matched:
-            self.world.continuous_enabled = False
-            self.world.sleeping_enabled = False
             self.world.set_contact_tuning(HERTZ, DAMPING_RATIO, PUSH_SPEED)
         self.world.hit_event_threshold = 0.0  # listening only: report every hit
         self.bodies = [self._disk(i) for i in range(scene.n)]
@@ -61,7 +79,7 @@ class Box2DV3:
     def _shape(self) -> Any:
         friction = {"friction": 0.0} if self.matched else {}
         material = pyb2d3.surface_material(restitution=float(self.scene.restitution), **friction)
-        return pyb2d3.shape_def(density=1.0, material=material, enable_hit_events=True)
+        return pyb2d3.shape_def(density=1.0, material=material, enable_hit_events=self.listening)
 
     def _disk(self, i: int) -> Any:
         scene = self.scene
@@ -75,13 +93,15 @@ class Box2DV3:
                 rotation=turn,
                 linear_velocity=vector(scene.velocity[i]),
                 angular_velocity=float(scene.angular_velocity[i]),
-                **({"enable_sleep": False} if self.matched else {}),
+                enable_sleep=self.sleeping,
+                is_bullet=self.bullet,
             )
         body.user_data = i
         body.create_circle_shape(self._shape(), pyb2d3.circle(radius=float(scene.radius[i])))
         if not scene.static[i]:
             mass = pyb2d3.MassData()
-            mass.mass, mass.rotational_inertia = float(scene.mass[i]), float(scene.inertia[i])
+            mass.mass = float(scene.mass[i])
+            mass.rotational_inertia = float(scene.inertia[i]) if self.turning else 0.0
             mass.center = (0.0, 0.0)
             body.mass_data = mass
         return body
@@ -101,25 +121,30 @@ class Box2DV3:
         """`count` calls of `step`; hit events live for one step, so they are collected after each."""
         pyb2d3.set_length_units_per_meter(self.unit)  # another world may have set its own since
         for _ in range(count):
-            self.world.step(self.dt, SUBSTEPS)
-            for hit in self.world.get_contact_events().hit_events():
-                i, j = hit.shape_a.body.user_data, hit.shape_b.body.user_data
-                self.log.append(Hit(self.steps, self._index(i), self._index(j), np.nan))
+            self.world.step(self.dt, self.substeps)
+            if self.listening:
+                self._listen()
             self.steps += 1
             if self.scene.wrap is not None:
+                started = perf_counter()
                 self._wrap()
+                self.wrapping += perf_counter() - started
+
+    def _listen(self) -> None:
+        for hit in self.world.get_contact_events().hit_events():
+            i, j = hit.shape_a.body.user_data, hit.shape_b.body.user_data
+            self.log.append(Hit(self.steps, self._index(i), self._index(j), np.nan))
 
     def _index(self, user_data: int) -> int:
         return user_data if user_data < self.scene.n else self.scene.n - 1 - user_data
 
     def _wrap(self) -> None:
         assert self.scene.wrap is not None
-        (x0, y0), (x1, y1) = self.scene.wrap.tolist()
-        for body in self.bodies:
-            x, y = body.position
-            if not (x0 <= x <= x1 and y0 <= y <= y1):
-                over = (x1 if x < x0 else x0 if x > x1 else x, y1 if y < y0 else y0 if y > y1 else y)
-                body.set_transform(over, body.rotation)
+        low, high = self.scene.wrap
+        at = self.every.get_positions(np.empty((self.scene.n, 2), np.float32))
+        for i in np.flatnonzero(((at < low) | (at > high)).any(axis=1)):
+            over = np.where(at[i] < low, high, np.where(at[i] > high, low, at[i]))
+            self.bodies[i].set_transform(vector(over), self.bodies[i].rotation)
 
     def read(self) -> State:
         """All bodies at once, as float32; the engine keeps (cos, sin), so the angle is unwound from read to read."""
@@ -159,9 +184,9 @@ class Box2DV3:
             ),
             "friction": (0.0 if matched else None, self.bodies[0].shapes[0].friction),
             "restitution": (self.scene.restitution, self.bodies[0].shapes[0].restitution),
-            "sleeping": (False if matched else None, world.sleeping_enabled),
-            "continuous collision": (False if matched else None, world.continuous_enabled),
-            "substeps": (SUBSTEPS, SUBSTEPS),
+            "sleeping": (self.sleeping if matched else None, world.sleeping_enabled),
+            "continuous collision": (self.continuous if matched else None, world.continuous_enabled),
+            "substeps": (self.substeps, self.substeps),
             "float32 rounding of the start in m": (None, rounding(self.scene)),
         }
 

@@ -26,7 +26,17 @@ class Hit(NamedTuple):
 
 
 class Engine(Protocol):
-    """The protocol. `read` gives all four arrays at the same instant, in the scene's order, static disks included."""
+    """The protocol. `read` gives all four arrays at the same instant, in the scene's order, static disks included.
+
+    Attributes:
+        listening: whether hits are logged; set before `load`. Off where speed is measured: hearing of every hit in
+            Python costs more than some engines' whole step.
+        wrapping: s spent since it was set to 0 on setting disks onto the opposite edge in Python, for an engine that
+            knows no such edge; part of what `step` takes, and no fault of the engine's.
+    """
+
+    listening: bool = True
+    wrapping: float = 0.0
 
     def load(self, scene: Scene, dt: float) -> None:
         """Forget everything and build the scene for steps of `dt` s; raise `Unsupported` rather than approximate."""

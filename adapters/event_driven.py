@@ -16,6 +16,11 @@ from scenarios.no_truth import NoTruth
 class EventDriven:
     """Plays exactly but for rounding; dt says when it is looked at, and for how long a push lasts."""
 
+    listening, wrapping = (
+        True,
+        0.0,
+    )  # its own list of hits is what it works with: not hearing of them would save nothing
+
     def load(self, scene: Scene, dt: float) -> None:
         """Find every disk's first event; a start without a single continuation is refused."""
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,18 @@ class Pymunk:
     `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; 50 iterations, because 10
     lose energy in a dense gas; slop 1 % of the smallest radius, because the default 0.1 is a length in
     the scene's units; at e = 1 no push-out, because it adds energy.
+
+    Changed one at a time by `features.py`: `turning` False gives every disk an infinite inertia, `spatial_hash`
+    (cell in m, count) replaces the tree of the broad phase, `settings` are attributes of the space.
     """
 
-    def __init__(self, profile: str) -> None:
+    listening, wrapping = True, 0.0
+
+    def __init__(
+        self, profile: str, *, turning: bool = True, spatial_hash: tuple[float, int] | None = None, **settings: Any
+    ) -> None:
         self.matched = profile == "matched"
+        self.turning, self.spatial_hash, self.changed = turning, spatial_hash, settings
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new space; static disks and walls are shapes on its static body."""
@@ -37,6 +46,8 @@ class Pymunk:
         for name, value in self.asked.items():
             if name != "elasticity":
                 setattr(self.space, name, value)
+        if self.spatial_hash is not None:
+            self.space.use_spatial_hash(*self.spatial_hash)
         self.bodies: list[pymunk.Body | None] = []
         self.index: dict[pymunk.Shape, int] = {}
         for i in range(scene.n):
@@ -44,19 +55,20 @@ class Pymunk:
         for w, (start, end) in enumerate(scene.walls):
             self._add_shape(pymunk.Segment(self.space.static_body, tuple(start), tuple(end), 0.0), -1 - w)
         self.moving = np.flatnonzero(~scene.static)
-        self.space.on_collision(None, None, post_solve=self._record)
+        if self.listening:
+            self.space.on_collision(None, None, post_solve=self._record)
         self.buffer = batch.Buffer()
 
     def _asked(self) -> dict[str, Any]:
         scene = self.scene
         if not self.matched:
-            return {"elasticity": float(scene.restitution)}
+            return {"elasticity": float(scene.restitution)} | self.changed
         asked: dict[str, Any] = {
             "elasticity": float(np.sqrt(scene.restitution)),
             "iterations": 50,
             "collision_slop": float(0.01 * scene.radius.min()),
         }
-        return asked | ({"collision_bias": 1.0} if scene.restitution == 1 else {})
+        return asked | ({"collision_bias": 1.0} if scene.restitution == 1 else {}) | self.changed
 
     def _add_disk(self, i: int) -> None:
         scene = self.scene
@@ -64,7 +76,7 @@ class Pymunk:
             self.bodies.append(None)
             shape = pymunk.Circle(self.space.static_body, scene.radius[i], tuple(scene.position[i]))
         else:
-            body = pymunk.Body(scene.mass[i], scene.inertia[i])
+            body = pymunk.Body(scene.mass[i], scene.inertia[i] if self.turning else np.inf)
             body.position, body.velocity = tuple(scene.position[i]), tuple(scene.velocity[i])
             body.angle, body.angular_velocity = scene.angle[i], scene.angular_velocity[i]
             self.space.add(body)
@@ -95,7 +107,9 @@ class Pymunk:
             self.space.step(self.dt)
             self.steps += 1
             if self.scene.wrap is not None:
+                started = perf_counter()
                 self._wrap()
+                self.wrapping += perf_counter() - started
 
     def _wrap(self) -> None:
         assert self.scene.wrap is not None

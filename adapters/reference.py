@@ -10,7 +10,7 @@ import numpy as np
 
 from adapters.engine import Hit
 from reference_impl import exercise
-from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
+from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, Disks, World, make_disks
 from scenarios.model import Array, Scene, State
 
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
@@ -25,20 +25,24 @@ METHODS = {  # of the variants by their module
 class Reference:
     """Plays one variant of `reference_impl`, or any module with the `advance` of `exercise`.
 
-    `options` are fields of `World` that the exercise leaves free: split, approaching_only.
+    `options` are fields of `World` that the exercise leaves free: split, approaching_only. `precision` is what the
+    disks are kept in: with numpy's float32 the same kernel is compiled once more.
     """
 
-    def __init__(self, variant: ModuleType, **options: Any) -> None:
-        self.variant, self.options = variant, options
+    listening, wrapping = True, 0.0  # its own step wraps
+
+    def __init__(self, variant: ModuleType, *, precision: type = np.float64, **options: Any) -> None:
+        self.variant, self.precision, self.options = variant, precision, options
 
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
         self.dt, self.steps = dt, 0
         self.log: list[Hit] = []
-        self.disks = make_disks(
+        disks = make_disks(
             scene.position, scene.velocity, scene.radius, scene.mass,
             scene.inertia, scene.angle, scene.angular_velocity,
         )  # fmt: skip
+        self.disks = Disks(*(array.astype(self.precision) for array in disks))
         low, high = (np.full(2, -np.inf), np.full(2, np.inf)) if scene.wrap is None else scene.wrap
         self.world = World(
             restitution=float(scene.restitution), gravity=np.array(scene.gravity),
@@ -66,13 +70,15 @@ class Reference:
     def _advance(self, count: int) -> None:
         done = self.steps
         hits = self.variant.advance(self.disks, self.world, self.dt, count)
-        self.log += [Hit(done + k, i, j, impulse) for k, i, j, impulse in hits]
+        if self.listening:
+            self.log += [Hit(done + k, i, j, impulse) for k, i, j, impulse in hits]
         self.steps += count
 
     def read(self) -> State:
         """Copies of the solver's arrays."""
         disks = self.disks
-        return State(disks.position.copy(), disks.velocity.copy(), disks.angle.copy(), disks.angular_velocity.copy())
+        kept = disks.position, disks.velocity, disks.angle, disks.angular_velocity
+        return State(*(array.astype(np.float64) for array in kept))
 
     def hits(self) -> list[Hit]:
         """As the solver returned them."""

@@ -29,6 +29,8 @@ class Student:
     move, which the exercise does not have.
     """
 
+    listening, wrapping = True, 0.0
+
     def __init__(self, path: Path) -> None:
         self.path = path
         self.started: SolverProcess | None = None

@@ -163,6 +163,20 @@ def lesson(
     open_lesson(name, port, opens, export)
 
 
+@app.command()
+def speed(
+    scenes: Scenes = None,
+    engine: Engines = None,
+    full: Annotated[bool, typer.Option("--full", help="All scenarios, finer steps, more rounds, more disks.")] = False,
+    seed: Seed = 0,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("reports/out/speed"),
+) -> None:
+    """Set error against time for every engine: leave the machine alone meanwhile."""
+    from reports.speed.command import run_speed
+
+    run_speed(scenes or [], engine or [], full, seed, out, "crosscheck " + shlex.join(sys.argv[1:]))
+
+
 @app.command(name="list")
 def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
     """Explain every engine, scenario and metric in a line."""

@@ -6,6 +6,7 @@ import os
 import platform
 from datetime import UTC, datetime
 from pathlib import Path
+from time import sleep
 from typing import Any
 
 from reports.cells import source_hash, versions
@@ -25,6 +26,24 @@ def about(command: str, seed: int) -> dict[str, Any]:
             "cores": os.cpu_count() or 1,
         },
     }
+
+
+def busy_cores(seconds: float = 0.5) -> float:
+    """How many cores others keep busy while this process sleeps so long; nan where the system does not tell."""
+    try:
+        before = _ticks()
+        sleep(seconds)
+        after = _ticks()
+    except (OSError, ValueError):
+        return float("nan")
+    passed, idle = (later - earlier for later, earlier in zip(after, before))
+    return (1 - idle / max(passed, 1)) * (os.cpu_count() or 1)
+
+
+def _ticks() -> tuple[int, int]:
+    """All ticks of all cores since the system began, and those without work (man 5 proc: idle and iowait)."""
+    ticks = [int(field) for field in Path("/proc/stat").read_text().splitlines()[0].split()[1:]]
+    return sum(ticks[:8]), ticks[3] + ticks[4]
 
 
 def processor() -> str:

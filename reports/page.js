@@ -27,7 +27,7 @@ function layoutOf(figure) {
     layout[name] = { ...layout[name], ...axis, title: { ...title, font: { size: 12 }, standoff: 8 } };
   }
   return {
-    ...layout, template: null, showlegend: false, height: 290, margin: { l: 58, r: 12, t: 26, b: 44 },
+    ...layout, template: null, showlegend: false, height: layout.height ?? 290, margin: { l: 58, r: 12, t: 26, b: 44 },
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: "system-ui, sans-serif", size: 12, color: text },
     dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",  // a finger scrolls the page

@@ -44,7 +44,7 @@ def test_a_file_fits_in_one_head(path: Path):
 def test_only_the_engine_table_names_engines():
     """An engine's library is imported by its own adapter and nowhere else."""
     libraries = {"pymunk", "Box2D", "pyb2d3"}
-    users = {f"{path.parent.name}/{path.name}": imports_of(path) & libraries for path in FILES}
+    users = {str(path.relative_to(ROOT)): imports_of(path) & libraries for path in FILES}
 
     assert {name: used for name, used in users.items() if used} == {
         "adapters/pymunk.py": {"pymunk"},

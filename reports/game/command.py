@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from reports.commands import checked_engines, refuse
+from adapters.engines import ENGINES, row_of
+from reports.commands import checked_engines
+from reports.exits import refuse
 from reports.game.server import Game, application, serve
 from reports.lessons.pages import ROUTES
 from scenarios.files import SceneFileError, read_scene_file
@@ -17,7 +19,9 @@ FIRST = ("reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:
 
 def play_game(flight: Path | None, engines: Sequence[str], port: int, opens: bool) -> None:
     """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is none."""
-    game = Game(checked_engines(engines) if engines else list(FIRST), read_flight(flight) if flight else None)
+    chosen = checked_engines(engines) if engines else list(FIRST)
+    ENGINES.update((name, row_of(name)) for name in chosen)  # a solver's file is a row like any other while it flies
+    game = Game(chosen, read_flight(flight) if flight else None)
     try:
         serve(application(game, ROUTES), port, "/", opens)
     except OSError as fault:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from reports.commands import refuse
+from reports.exits import refuse
 from reports.game.command import FIRST
 from reports.game.server import Game, application, serve
 from reports.lessons.catalogue import LESSONS

@@ -62,6 +62,8 @@ class Switches:
 class Switched:
     """A player that takes switches: load, push, step, read, as every engine; walls are not needed here, a floor is."""
 
+    listening, wrapping = True, 0.0
+
     def __init__(self, switches: Switches) -> None:
         self.on = switches
         self.kind: Any = np.float32 if switches.digits == 24 else np.float64

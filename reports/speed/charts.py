@@ -1,0 +1,241 @@
+"""The charts: error against cost, cost at matched accuracy, cost against the number of disks, features."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from reports import style
+from reports.charts import ZERO, decades, shortened
+from reports.speed.pareto import ACCURACIES, FAILED, UNREACHABLE, front
+from scenarios.model import Array
+
+FRONT = "Pareto front"
+COST, ERROR = "engine time (µs per simulated second)", "error (radii)"
+EDGE = 0.55  # decades between the last gridline and what is drawn at the edge
+LOWEST = 1e-7  # radii: what is smaller stands there, as a tenth of the finest accuracy asked for is as good as exact
+TALL, TALLEST, PER_ROW = 400, 520, 19  # px
+
+
+def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
+    """Error against cost, a line a player over its ladder; `points` of one scene, or pooled and then `tall`."""
+    drawn = points[points.cost.notna() & np.isfinite(points.error)]
+    x_axis = log_axis(COST, drawn.cost.to_numpy(float))
+    y_axis = error_axis(drawn.error.to_numpy(float))
+    traces = [front_of(drawn)]
+    for engine, profile, group in by_player(points):
+        fine = group[group.cost.notna() & np.isfinite(group.error)]
+        spreads = {} if tall else {
+            "error_x": bars(fine.cost, fine.low, fine.high),
+            "error_y": bars(*(fine[name].clip(lower=LOWEST) for name in ("error", "error_low", "error_high"))),
+        }  # fmt: skip
+        text = [told(row) for row in records(fine)]
+        traces.append(line(engine, profile, fine.cost, fine.error.clip(lower=LOWEST), text, spreads))
+    lost = points[~(points.cost.notna() & np.isfinite(points.error))]
+    traces += at_the_edge(lost, drawn, x_axis, y_axis)
+    return figure(traces, x_axis, y_axis, TALLEST if tall else TALL)
+
+
+def at_the_edge(
+    lost: pd.DataFrame, drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any]
+) -> list[dict[str, Any]]:
+    """What failed, on the upper edge at the cost it has or would have by its other dts, else in the corner."""
+    if lost.empty:
+        return []
+    top = edge(y_axis, FAILED)
+    traces = []
+    for engine, profile, group in by_player(lost):
+        others = drawn[(drawn.engine == engine) & (drawn.profile == profile)]
+        per_rung = float((others.cost / 2.0**others.rung).median()) if len(others) else np.nan
+        cost = group.cost.where(group.cost.notna(), per_rung * 2.0**group.rung)
+        corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside: what is outside is not drawn
+        x = cost.fillna(corner).clip(upper=corner)
+        trace = line(engine, profile, x, np.full(len(group), top), [told(row) for row in records(group)])
+        traces.append(trace | {"mode": "markers", "cliponaxis": False})
+    return traces
+
+
+def front_of(drawn: pd.DataFrame) -> dict[str, Any]:
+    """The points nobody beats, joined by a broad line behind everybody; what stands at `LOWEST` counts as equal."""
+    cost, error = drawn.cost.to_numpy(float), np.maximum(drawn.error.to_numpy(float), LOWEST)
+    best = front(cost, error)
+    colour = style.look(style.TRUTH).light
+    return {
+        "type": "scatter", "x": shortened(cost[best]), "y": shortened(error[best]), "name": FRONT,
+        "mode": "lines+markers", "line": {"color": colour, "width": 9, "shape": "hv"},
+        "marker": {"color": colour, "size": 20, "symbol": "circle"}, "opacity": 0.16, "hoverinfo": "skip",
+    }  # fmt: skip
+
+
+def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
+    """What each accuracy costs, a mark a player; above, who never gets there."""
+    names = list(dict.fromkeys(zip(reached.engine, reached.profile)))
+    y_axis = log_axis(COST, reached.cost.dropna().to_numpy(float))
+    not_down = edge(y_axis, "not yet")
+    never = edge(y_axis, "never")
+    traces = []
+    for k, (engine, profile) in enumerate(names):
+        group = reached[(reached.engine == engine) & (reached.profile == profile)]
+        x = np.arange(len(group)) + (k - (len(names) - 1) / 2) * 0.8 / max(len(names), 1)
+        y = group.cost.where(group.cost.notna(), np.where(group.why.isin([UNREACHABLE, FAILED]), never, not_down))
+        text = [
+            f"{row['accuracy']} of a radius: "
+            + (row["why"] if np.isnan(row["cost"]) else f"{style.number(row['cost'])} µs/s {at(row)}{row['why']}")
+            for row in records(group)
+        ]
+        traces.append(line(engine, profile, x, y, text) | {"mode": "markers"})
+    x_axis = {
+        "title": "accuracy (of a radius)", "tickvals": list(range(len(ACCURACIES))), "ticktext": list(ACCURACIES),
+        "range": [-0.5, len(ACCURACIES) - 0.5],
+    }  # fmt: skip
+    return figure(traces, x_axis, y_axis, TALL if tall else None)
+
+
+def at(row: dict[str, Any]) -> str:
+    """ "at dt ..." where there is one."""
+    return f"at dt {style.number(row['dt_s'])} s " if np.isfinite(row["dt_s"]) else ""
+
+
+def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
+    """Cost of a step against the number of disks; a cross where an engine was stopped."""
+    y_axis = log_axis("engine time (µs per step)", costs.cost.to_numpy(float))
+    x_axis = log_axis("disks", np.append(costs.n.to_numpy(float), 10.0))
+    traces = []
+    stopped = edge(y_axis, "stopped") if (growth.stopped != "").any() else 0.0
+    for engine, profile, group in by_player(costs):
+        text = [f"{row['n']:.0f} disks: {spread(row)} µs a step" for row in records(group)]
+        traces.append(line(engine, profile, group.n, group.cost, text, {
+            "error_y": bars(group.cost, group.low, group.high),
+        }))  # fmt: skip
+        ends = growth[(growth.engine == engine) & (growth.profile == profile) & (growth.stopped != "")]
+        for row in records(ends):
+            n, why = row["stopped"].split(": ", 1)
+            cross = line(engine, profile, [float(n)], [stopped], [f"{n} disks: {why}"])
+            traces.append(cross | {"mode": "markers", "cliponaxis": False})
+    return figure(traces, x_axis, y_axis, TALL)
+
+
+def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
+    """A row a change, a mark a scene: `ratio` ("cost_ratio", "error_ratio") to the unchanged engine, 1: the same."""
+    rows = list(dict.fromkeys(zip(table.engine, table.profile, table.change)))[::-1]
+    values = table[ratio].to_numpy(float)
+    known = np.append(values[np.isfinite(values) & (values > 0)], [0.9, 1.1])
+    x_axis: dict[str, Any] = {
+        "title": title, "type": "log", "range": [np.log10(known.min()) - 0.1, np.log10(known.max()) + 0.1],
+        "tickvals": TICKS, "ticktext": [style.number(tick) for tick in TICKS],
+    }  # fmt: skip
+    y_axis = {
+        "title": "", "tickvals": list(range(len(rows))), "range": [-0.7, len(rows) - 0.3],
+        "ticktext": [f"{engine}: {change}" for engine, _, change in rows],
+    }  # fmt: skip
+    traces: list[dict[str, Any]] = [{
+        "type": "scatter", "x": [1, 1], "y": [-1, len(rows)], "mode": "lines", "hoverinfo": "skip", "name": "no change",
+        "line": {"color": style.look(style.TRUTH).light, "width": 1.2, "dash": "dot"},
+    }]  # fmt: skip
+    for engine, profile, group in by_player(table):
+        y = [rows.index((engine, profile, change)) for change in group.change]
+        x = group[ratio].where(np.isfinite(group[ratio]) & (group[ratio] > 0))
+        text = [
+            f"{row['change']}, {row['scenario']}: ×{style.number(row[ratio])}<br>"
+            f"error {style.number(row['error_radii'])} radii, unchanged {style.number(row['error_radii_plain'])}<br>"
+            f"{spread(row)} µs/s, unchanged {style.number(row['cost_plain'])}"
+            for row in records(group)
+        ]
+        traces.append(line(engine, profile, x, y, text) | {"mode": "markers"})
+    return figure(traces, x_axis, y_axis, 110 + PER_ROW * len(rows))
+
+
+TICKS = sorted(a * 10.0**b for b in range(-8, 9) for a in (1, 2, 5) if a == 1 or -1 <= b <= 0)
+
+
+def line(engine: str, profile: str, x: Any, y: Any, text: Sequence[str], more: dict[str, Any] | None = None) -> dict:
+    """A trace in the look of its player, with what is said of each point."""
+    look = style.look(engine, profile)
+    return {
+        "type": "scatter", "x": shortened(np.asarray(x, float), 5),
+        "y": shortened(np.maximum(np.asarray(y, float), ZERO) if np.size(y) else [], 4),
+        "name": f"{engine}:{profile}", "mode": "lines+markers", "text": list(text), "hovertemplate": "%{text}",
+        "line": {"color": look.light, "dash": look.plotly_dash, "width": 1.7},
+        "marker": {"symbol": look.symbol, "size": 9, "color": look.light},
+    } | (more or {})  # fmt: skip
+
+
+def by_player(table: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """(engine, profile, their rows), in the order of appearance."""
+    for (engine, profile), group in table.groupby(["engine", "profile"], sort=False):
+        yield str(engine), str(profile), group
+
+
+def bars(middle: Any, low: Any, high: Any) -> dict[str, Any]:
+    """Thin bars from low to high; none where there is nothing between them."""
+    middle, low, high = (np.asarray(a, float) for a in (middle, low, high))
+    up = np.where(np.isfinite(high), high, middle) - middle
+    down = middle - np.where(np.isfinite(low), low, middle)
+    return {
+        "type": "data", "symmetric": False, "array": shortened(np.maximum(up, 0), 3),
+        "arrayminus": shortened(np.maximum(down, 0), 3), "thickness": 0.8, "width": 0,
+    }  # fmt: skip
+
+
+def told(row: dict[str, Any]) -> str:
+    """What hovering over a point says."""
+    if row["failed"] and not np.isfinite(row["error"]):
+        why = f": {row['status']}, {row['reason']}" if row["reason"] else ""
+        return f"{at(row)}failed in {row['failed']} of {row['seeds']}{why}"
+    error = style.number(row["error"])
+    if row["error_high"] != row["error_low"]:
+        error += f" ({style.number(row['error_low'])} to {style.number(row['error_high'])}, {row['seeds']} draws)"
+    lines = [f"{at(row)}error {error} radii".strip()]
+    if np.isfinite(row["cost"]):
+        lines.append(f"{spread(row)} µs/s")
+    if np.isfinite(row["best"]):
+        lines.append(f"fastest {style.number(row['best'])} µs/s")
+    if np.isfinite(row["idle"]):
+        lines.append(f"as many steps without anything to do {style.number(row['idle'])} µs/s")
+    if row["wrapping"] > 0:
+        lines.append(f"besides, {style.number(row['wrapping'])} µs/s of wrapping in Python")
+    return "<br>".join(lines)
+
+
+def spread(row: dict[str, Any]) -> str:
+    """Median and quartiles of a cost."""
+    return f"{style.number(row['cost'])} ({style.number(row['low'])} to {style.number(row['high'])})"
+
+
+def records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Its rows as dicts."""
+    return [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
+
+
+def log_axis(title: str, values: Array) -> dict[str, Any]:
+    """A log axis with a tick a decade or so."""
+    return {"title": title} | decades(np.append(values, 1.0) if not len(values) else values)
+
+
+def error_axis(errors: Array) -> dict[str, Any]:
+    """A log axis for errors that ends at `LOWEST`, with a tick that says so if any is smaller."""
+    axis = log_axis(ERROR, np.maximum(errors, LOWEST))
+    if not (errors < LOWEST).any():
+        return axis
+    ticks = [(at, text) for at, text in zip(axis["tickvals"], axis["ticktext"]) if at > 9 * LOWEST]
+    lowest = f"≤ 10<sup>{np.log10(LOWEST):.0f}</sup>".replace("-", "−")
+    return axis | {"tickvals": [*(at for at, _ in ticks), LOWEST], "ticktext": [*(text for _, text in ticks), lowest]}
+
+
+def edge(axis: dict[str, Any], label: str) -> float:
+    """Make room beyond the upper end of a log axis, with a tick `label`, and return the value there."""
+    level = axis["range"][1] + EDGE / 2
+    axis["range"] = [axis["range"][0], level + EDGE / 2]
+    axis["tickvals"] = [*axis["tickvals"], 10**level]
+    axis["ticktext"] = [*axis["ticktext"], label]
+    return float(10**level)
+
+
+def figure(traces: list[dict[str, Any]], x_axis: dict, y_axis: dict, height: int | None) -> go.Figure:
+    """The figure; page.js adds what all share."""
+    layout: dict[str, Any] = {"hovermode": "closest", "xaxis": x_axis, "yaxis": y_axis}
+    return go.Figure(traces, layout | ({"height": height} if height else {}))

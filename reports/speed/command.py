@@ -1,0 +1,131 @@
+"""`crosscheck speed`: measure, write the tables and the page, say what came out."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
+from typing import Any, NoReturn
+
+from rich.console import Console
+from rich.table import Table
+
+from reports import style
+from reports.commands import checked_engines, checked_scenes
+from reports.exits import DONE, FAILED, INTERRUPTED, refuse, say
+from reports.folders import replace_folder
+from reports.machine import about
+from reports.speed import figures
+from reports.speed.effort import FULL, QUICK
+from reports.speed.measure import Plan, measure
+from reports.speed.page import write_page
+from reports.speed.pareto import ACCURACIES, UNREACHABLE
+from reports.speed.results import Results
+from reports.terminal import Progress
+
+PAGE = "speed.html"
+SHORT = {UNREACHABLE: "never"}
+
+
+def run_speed(
+    scenes: Sequence[str], engines: Sequence[str], full: bool, seed: int, out: Path, command: str
+) -> NoReturn:
+    """Measure and report into `out`; exits 0, 1 (nothing could be measured), 2 or 130."""
+    effort = FULL if full else QUICK
+    named = checked_scenes(scenes, [], False, seed)  # none named: all that the effort has, sizes and features besides
+    effort = replace(effort, scenes=tuple(named)) if named else effort
+    plan = Plan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
+    out = out.resolve()
+    part = out.with_name(f"{out.name}.part-{os.getpid()}")
+    try:
+        must_be_ours(out)
+        part.mkdir(parents=True)
+    except OSError as fault:
+        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
+    try:
+        results, header = carry_out(plan, command)
+        if not results.measured.errors.size:
+            part.rmdir()
+            for what, why in results.left_out:
+                say(f"{what}: {why}")
+            say("no scene that was asked for has an exact answer, so there is no error to set against time")
+            sys.exit(FAILED)
+        write_all(part, results, header)
+        replace_folder(part, out)
+    except KeyboardInterrupt:
+        say("\nInterrupted. Nothing was written: times of a part of the rounds compare nothing.")
+        if not any(part.iterdir()):
+            part.rmdir()
+        sys.exit(INTERRUPTED)
+    except OSError as fault:
+        say(f"cannot write to {part}: {fault.strerror or fault}")
+        sys.exit(FAILED)
+    print_summary(results, str(out / PAGE))
+    sys.exit(DONE)
+
+
+def carry_out(plan: Plan, command: str) -> tuple[Results, dict[str, Any]]:
+    """All that was measured, and the header that tables and page carry."""
+    header = about(command, plan.seed)
+    with Progress() as progress:
+        results = Results(plan, measure(plan, progress))
+        return results, header | {"seconds": progress.seconds, "load": results.measured.busy}
+
+
+def must_be_ours(out: Path) -> None:
+    """Exit 2 unless `out` is absent, empty, or holds what this command wrote and nothing else."""
+    if out.is_file():
+        refuse([f"--out {out}: is a file; name a folder that does not exist yet"])
+    if out == Path.cwd() or out in Path.cwd().parents:
+        refuse([f"--out {out}: is where you are; name another folder, or go elsewhere"])
+    there = sorted(path.name for path in out.iterdir()) if out.exists() else []
+    strange = [name for name in there if not name.startswith("speed") and name != "machine.json"]
+    if strange:
+        refuse([f"--out {out}: holds {strange[0]}, which crosscheck speed did not make; name another folder"])
+
+
+def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:
+    """Tables first, then the page, so that what was measured is kept whatever happens to the page."""
+    (folder / "machine.json").write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
+    results.write(folder)
+    if results.plan.whole:
+        figures.write(folder / "speed_figures.csv", results, header)
+    write_page(folder / PAGE, results, header)
+
+
+def print_summary(results: Results, page: str) -> None:
+    """What each accuracy costs, pooled, the noise floor, and where the page is."""
+    console = Console()
+    title = f"µs per simulated second for so small an error, of a radius; median of {len(results.scenes)} scenes"
+    title += "\n(k of n: so accurate in k scenes only; never: at no dt in half of them or more)"
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table.add_column("engine", no_wrap=True)
+    for accuracy in ACCURACIES:
+        table.add_column(accuracy, justify="right", no_wrap=True)
+    for (engine, profile), group in results.pooled_reached.groupby(["engine", "profile"], sort=False):
+        costs = zip(group.cost.tolist(), group.why.tolist())
+        cells = (style.number(cost) if isfinite(cost) else SHORT.get(why, why) for cost, why in costs)
+        table.add_row(f"{engine}:{profile}", *cells)
+    console.print(table)
+    console.print(said_of_noise(results), highlight=False)
+    for what, why in results.left_out:
+        console.print(f"left out: {what}: {why}", highlight=False)
+    console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
+
+
+def said_of_noise(results: Results) -> str:
+    """The noise floor in a sentence, and what to do where it is too loud."""
+    noise = results.noise_summary()
+    if not noise["pairs"]:
+        return "Nobody was timed against itself, so the noise floor is not known."
+    said = (
+        f"Noise floor: an engine against itself reads {noise['median']:.3f}, half of {noise['pairs']} pairs from "
+        f"{noise['low']:.3f} to {noise['high']:.3f}."
+    )
+    if noise["quiet"]:
+        return said
+    return f"{said} That is too loud: it must stay within 0.95 and 1.05. Measure alone on the machine to quote a time."

@@ -1,0 +1,61 @@
+"""How much is measured: enough for a look, or for a figure to keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scenarios.catalogue import DRAWN, SCENARIOS
+from scenarios.model import Scenario
+
+FEWEST_RUNGS, MOST_RUNGS = 3, 9
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much.
+
+    Attributes:
+        scenes: what is measured if nothing is asked for.
+        seeds: how many draws of a drawn scene.
+        most_steps: of the finest dt of a ladder.
+        rounds: of timing, warm-up not counted.
+        budget: s of timing for one engine at one dt in one scene, beyond the first rounds.
+        sizes: numbers of disks.
+        patience: s a step may take before an engine drops out of the sizes.
+        feature_scenes: what changed engines are measured in: three disks, a hit that thresholds matter to, one disk
+            under gravity, many hits, and a stack at rest.
+    """
+
+    scenes: tuple[str, ...]
+    seeds: int
+    most_steps: int
+    rounds: int
+    budget: float
+    sizes: tuple[int, ...]
+    patience: float
+    feature_scenes: tuple[str, ...] = (
+        "disk_between_static_disks", "slow_hit", "bouncing_ball_e1", "line_gas", "column_of_ten",
+    )  # fmt: skip
+
+    def seeds_of(self, scene: str, seed: int) -> list[int]:
+        """The seeds a scene is drawn from; one where it is not drawn."""
+        return list(range(seed, seed + self.seeds)) if scene in DRAWN else [seed]
+
+    def ladder(self, scenario: Scenario) -> list[int]:
+        """Steps in a sample interval, doubling from the scenario's own coarsest."""
+        first = scenario.substeps[0]
+        rungs = [first * 2**k for k in range(MOST_RUNGS)]
+        return [k for n, k in enumerate(rungs) if n < FEWEST_RUNGS or k * scenario.samples <= self.most_steps]
+
+
+QUICK = Effort(
+    scenes=(
+        "free_fall", "head_on_equal_e09", "oblique_e1", "bouncing_ball_e1", "line_gas", "cradle_with_gaps",
+        "ship_thrust", "asteroids",
+    ),
+    seeds=16, most_steps=5_000, rounds=5, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000), patience=0.1,
+)  # fmt: skip
+FULL = Effort(
+    scenes=tuple(SCENARIOS), seeds=16, most_steps=64_000, rounds=15, budget=0.5,
+    sizes=(3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000), patience=1.0,
+)  # fmt: skip

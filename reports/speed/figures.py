@@ -1,0 +1,83 @@
+"""The few figures that are kept in the repository, with machine and versions, and whether a new measurement agrees."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from reports.speed.results import Results
+
+KEPT = Path(__file__).parent / "figures.csv"
+COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
+YARDSTICK = ("reference", "exercise")
+GATED = (10, 100, 1000)  # disks
+LOOSE = 3.0  # times as dear or as cheap as kept: compilers and processors differ by less, a lost optimisation by more
+
+
+def figures(results: Results) -> pd.DataFrame:
+    """Columns `COLUMNS`: pooled points, cost at matched accuracy, cost by number of disks and its exponent, driving."""
+    parts = [
+        results.pooled.assign(figure="pooled error", at=results.pooled.rung, value=results.pooled.error,
+                              low=results.pooled.error_low, high=results.pooled.error_high, unit="radii"),
+        results.pooled.assign(figure="pooled cost", at=results.pooled.rung, value=results.pooled.cost, unit="us/s"),
+        results.pooled_reached.assign(figure="cost at accuracy", at=results.pooled_reached.accuracy,
+                                      value=results.pooled_reached.cost, note=results.pooled_reached.why, unit="us/s"),
+        results.sizes.assign(figure="cost of a step", at=results.sizes.n, value=results.sizes.cost, unit="us"),
+        results.growth.assign(figure="exponent", at=results.growth.most, value=results.growth.exponent,
+                              note=results.growth.stopped, unit="1"),
+        results.driving.assign(figure="idle step", value=results.driving.step_us, unit="us"),
+        results.driving.assign(figure="idle call", value=results.driving.call_us, unit="us"),
+    ]  # fmt: skip
+    return pd.concat([part.reindex(columns=COLUMNS) for part in parts], ignore_index=True)
+
+
+def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
+    """The figures as CSV below comment lines that say on what machine, with what versions and how quietly."""
+    noise = results.noise_summary()
+    about = {
+        "command": header["command"], "seed": header["seed"], "started": header["started"],
+        **header["machine"], **header["versions"], "busy cores": f"{header['load']:.2f}",
+        "an engine against itself": f"{noise['median']:.3f} ({noise['low']:.3f} to {noise['high']:.3f})",
+        "scenes": len(results.scenes),
+    }  # fmt: skip
+    lines = "".join(f"# {key}: {value}\n" for key, value in about.items())
+    table = figures(results).to_csv(index=False, float_format="%.4g")
+    path.write_text(lines + table, encoding="utf-8")
+
+
+def read(path: Path = KEPT) -> pd.DataFrame:
+    """The figures without their header."""
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return pd.read_csv(io.StringIO("\n".join(lines)), dtype={"at": str, "note": str})
+
+
+def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:
+    """(`engine:profile`, disks) -> how many times as dear as `YARDSTICK` a step is, each at its fastest."""
+    rows = kept[kept.figure == "cost of a step"]
+    best = {
+        (f"{row['engine']}:{row['profile']}", int(float(row["at"]))): float(row["best"])
+        for row in rows.to_dict("records")
+    }
+    yardstick = ":".join(YARDSTICK)
+    return {
+        (name, n): cost / best[yardstick, n]
+        for (name, n), cost in best.items()
+        if n in GATED and name != yardstick and (yardstick, n) in best
+    }
+
+
+def drifted(kept: Mapping[tuple[str, int], float], fresh: Mapping[tuple[str, int], float]) -> list[str]:
+    """A sentence for every ratio that is not within `LOOSE` of the one kept, or that only one of the two has."""
+    said = [f"{name}, {n} disks: only one of the two has it" for name, n in sorted(set(kept) ^ set(fresh))]
+    for name, n in sorted(set(kept) & set(fresh)):
+        change = fresh[name, n] / kept[name, n]
+        if not 1 / LOOSE <= change <= LOOSE:
+            said.append(
+                f"{name}, {n} disks: a step costs {fresh[name, n]:.3g} times that of {':'.join(YARDSTICK)}, "
+                f"kept is {kept[name, n]:.3g}; allowed is a factor of {LOOSE:g}"
+            )
+    return said

@@ -1,0 +1,112 @@
+"""One engine through one scene over its dt ladder: how far off it is, and what it costs; two separate passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from adapters.engine import Engine
+from adapters.play import advance, play
+from reports import laws
+from reports.scenes import open_scene
+from reports.speed.timing import Sample, Spent, Timed, interleaved
+from scenarios.model import Scenario, Trajectory
+from scenarios.no_truth import NoTruth
+
+Make = Callable[[], Engine]
+
+
+class Held(NamedTuple):
+    """A scenario cut at the last sample before its truth's horizon, and its truth up to there."""
+
+    scenario: Scenario
+    truth: Trajectory
+
+
+@cache
+def held(scene: str, seed: int) -> Held:
+    """The part of a scene that has an exact answer.
+
+    Raises:
+        NoTruth: there is none, or it ends before the first sample.
+    """
+    scenario = open_scene(scene, seed)
+    if scenario.truth is None:
+        raise NoTruth(scenario.without_truth or "the scene comes without an exact answer")
+    truth = scenario.truth(scenario.times)
+    if len(truth) < 2:
+        raise NoTruth(f"its exact answer ends at {truth.valid_until:.3g} s, before the first sample")
+    return Held(replace(scenario, duration=(len(truth) - 1) * scenario.sample_interval), truth)
+
+
+def reach_of(scene: str, seed: int) -> tuple[int, str]:
+    """How many sample intervals have an exact answer, 0 with the reason if none has."""
+    try:
+        return held(scene, seed).scenario.samples, ""
+    except NoTruth as refusal:
+        return 0, str(refusal)
+
+
+def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int]) -> list[dict[str, Any]]:
+    """A row a rung of `ladder` (coarse to fine) of what engine `name` makes of the scene, up to the horizon.
+
+    error_radii is the largest distance of any disk from where it truly is, change_radii the largest from where the
+    rung before had it; inf and nan where it failed. A player that closes in on another motion changes less and less
+    while its error stays.
+    """
+    scenario, truth = held(scene, seed)
+    radius, before, rows = scenario.scene.radius, None, []
+    engine_name, profile = name.split(":")
+    for k in ladder:
+        engine = make()
+        try:
+            run = play(engine, name, scenario, scenario.dt(k))
+        finally:
+            engine.close()
+        row = {
+            "scenario": scenario.name, "seed": seed, "engine": engine_name, "profile": profile,
+            "dt_s": scenario.dt(k), "substeps": k, "status": run.status, "reason": run.reason,
+            "error_radii": np.inf, "change_radii": np.nan,
+        }  # fmt: skip
+        played = run.trajectory if run.status == "ok" else None
+        if played is not None:
+            row["error_radii"] = float((laws.deviation(played, truth, scenario.scene) / radius).max())
+            if before is not None:
+                row["change_radii"] = float((laws.deviation(played, before, scenario.scene) / radius).max())
+        before = played
+        rows.append(row)
+    return rows
+
+
+def times_of(
+    scene: str, seed: int, players: Mapping[tuple[Any, int, int], Make], rounds: int, budget: float
+) -> list[Sample]:
+    """Samples, s per simulated second, of players by (who, substeps, copy) over the whole length of the scene."""
+    scenario = held(scene, seed).scenario
+    what = [Timed(key, Stepping(make, scenario, key[1]), scenario.duration) for key, make in players.items()]
+    return interleaved(what, rounds, budget, seed)
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """A run of an engine through a scenario: building it is not timed, and nothing is read or heard of."""
+
+    make: Make
+    scenario: Scenario
+    substeps: int
+
+    def __call__(self) -> Spent:
+        """One run."""
+        scenario, dt = self.scenario, self.scenario.dt(self.substeps)
+        engine = self.make()
+        engine.listening, engine.wrapping = False, 0.0
+        try:
+            engine.load(scenario.scene, dt)
+            seconds = advance(engine, scenario, 0, scenario.samples * self.substeps, dt)
+            return Spent(seconds, engine.wrapping)
+        finally:
+            engine.close()

@@ -1,0 +1,60 @@
+"""The cheapest model that answers a scenario: a closed form, from hit to hit, or step by step."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from reports.speed.ladder import held
+from reports.speed.order import FINEST
+
+CLOSED, DIGITS = "closed form", "hit by hit, in many digits"
+KINDS = {"event_driven": "hit to hit, float64"}
+STEPS = "step by step"
+RUNS = 20
+
+
+def closed_form(scene: str, seed: int) -> dict[str, Any]:
+    """scenario, truth: what the harness takes for the truth, closed_us: µs per simulated second of a closed form.
+
+    A truth with no error bound is a closed form (see `Trajectory`); one followed in many digits is kept on disk, so
+    what it costs cannot be measured by asking again.
+    """
+    scenario, truth = held(scene, seed)
+    if truth.error_bound > 0 or scenario.truth is None:
+        return {"scenario": scenario.name, "truth": DIGITS, "closed_us": np.nan}
+    best, ends = np.inf, scenario.times[[0, -1]]  # a player is not read on the way either
+    for _ in range(RUNS):
+        started = perf_counter()
+        scenario.truth(ends)
+        best = min(best, perf_counter() - started)
+    return {"scenario": scenario.name, "truth": CLOSED, "closed_us": best / scenario.duration * 1e6}
+
+
+def cheapest(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
+    """A row a scenario: truth, closed_us, and the cheapest player that is right to `FINEST` and to 1 % of a radius.
+
+    Columns model, player, cost_us for the first and loose_player, loose_us for the second; "" and nan where none is.
+    """
+    rows = []
+    for row in truths.to_dict("records"):
+        here = points[(points.scenario == row["scenario"]) & points.cost.notna()]
+        fine, loose = (best_of(here[here.error <= bound]) for bound in (FINEST, 0.01))
+        model = KINDS.get(fine[0].split(":")[0], STEPS) if fine[0] else ""
+        if np.isfinite(row["closed_us"]) and not row["closed_us"] > fine[1]:
+            model = CLOSED
+        rows.append(row | {
+            "model": model, "player": fine[0], "cost_us": fine[1], "loose_player": loose[0], "loose_us": loose[1],
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def best_of(points: pd.DataFrame) -> tuple[str, float]:
+    """`engine:profile` and µs per simulated second of the cheapest; "" and nan of none."""
+    if points.empty:
+        return "", np.nan
+    row = points.nsmallest(1, "cost").to_dict("records")[0]
+    return f"{row['engine']}:{row['profile']}", float(row["cost"])

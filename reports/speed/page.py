@@ -1,0 +1,149 @@
+"""Writes speed.html: one file that holds everything it shows and asks nothing of anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from reports import style
+from reports.charts import Drawing
+from reports.page import SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
+from reports.speed import charts
+from reports.speed.order import ELSEWHERE, UNSTEADY
+from reports.speed.pareto import ACCURACIES
+from reports.speed.results import Results
+
+HERE = Path(__file__).parent
+FLAGGED = (ELSEWHERE, UNSTEADY)
+
+
+class Section(NamedTuple):
+    """A group of charts under one legend, and a table of what they say."""
+
+    key: str
+    title: str
+    text: str
+    drawings: dict[str, Drawing]
+    charts: str
+    orders: list[dict[str, Any]]
+    names: list[str]
+
+
+def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
+    """Write the page of `results`; `about` holds command, seed, machine, versions, started, seconds, load."""
+    plotly, scripts = get_plotlyjs(), [(HERE.parent / script).read_text() for script in SCRIPTS]
+    environment = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
+    )
+    environment.filters["number"] = style.number
+    looks = {name: style.look(*name.split(":", 1)) for name in (*results.names, style.TRUTH)}
+    html = environment.get_template("speed.html.j2").render(
+        names=results.names, looks=looks, about=about, pooled=pooled_section(results), sizes=sizes_section(results),
+        features=features_section(results), sections=[section_of(results, name) for name in results.scenes],
+        noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
+        driving=charts.records(results.driving), feature_rows=charts.records(results.features),
+        left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
+        feature_scenes=results.plan.feature_scenes,
+        css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
+        library=deflated(plotly), policy=content_policy([plotly, *scripts]),
+    )  # fmt: skip
+    path.write_text(html, encoding="utf-8")
+
+
+def section(
+    key: str, title: str, text: str, drawings: dict[str, Drawing], orders: pd.DataFrame | None = None
+) -> Section:
+    """A `Section`, its figures packed."""
+    traces = [trace.name for each in drawings.values() if each.figure is not None for trace in each.figure.data]
+    names = [name for name in dict.fromkeys(traces) if ":" in name]
+    rows = [] if orders is None else charts.records(orders)
+    return Section(key, title, text, drawings, packed_charts(drawings), rows, names)
+
+
+def pooled_section(results: Results) -> Section:
+    """All scenarios at once."""
+    count = len(results.scenes)
+    drawings = {
+        "speed": Drawing(
+            "Error against cost",
+            f"A point is one rung of the dt ladder, each of its coordinates the median over {count} scenes. "
+            "Down and left is better; nobody is both faster and better than the broad grey line. "
+            "A scene that a player failed counts as infinitely wrong.",
+            charts.speed(results.pooled, tall=True),
+        ),
+        "matched": Drawing(
+            "Cost at matched accuracy",
+            "The median over the scenes of what the cheapest measured dt costs whose error, and that of every finer "
+            "one, is no larger. never: half of the scenes or more are unreachable at any dt, or failed. not yet: half "
+            "or more are not reached down to the finest dt measured.",
+            charts.matched(results.pooled_reached, tall=True),
+        ),
+    }
+    return section("pooled", "All scenes pooled", "", drawings)
+
+
+def section_of(results: Results, scene: str) -> Section:
+    """One scenario."""
+    points = results.points[results.points.scenario == scene]
+    reached = results.reached[results.reached.scenario == scene]
+    seeds = int(points.seeds.max())
+    spread = f" The error is the median over {seeds} draws, its bar the 95 % bootstrap interval." if seeds > 1 else ""
+    wrapping = (points.wrapping > 0).any()
+    apart = (
+        " Setting disks onto the opposite edge, which an engine without such an edge leaves to Python, is not in it: "
+        "hover."
+        if wrapping
+        else ""
+    )
+    drawings = {
+        "speed": Drawing(
+            "Error against cost",
+            f"A point is one dt; halving it goes right.{spread} Time: median of the rounds, bars the quartiles.{apart}",
+            charts.speed(points),
+        ),
+        "matched": Drawing(
+            "Cost at matched accuracy",
+            "never: unreachable at any dt, as the answer closes in on another motion, or failed. not yet: not down to "
+            "the finest dt measured.",
+            charts.matched(reached),
+        ),
+    }
+    return section(scene, scene, results.asks[scene], drawings, results.order_table(scene))
+
+
+def sizes_section(results: Results) -> Section | None:
+    """Cost against the number of disks."""
+    if results.sizes.empty:
+        return None
+    drawing = Drawing(
+        "Cost of a step against the number of disks",
+        "A gas that covers 0.3 of its box, e = 1, dt = 1/240 s. Bars are quartiles.",
+        charts.sizes(results.sizes, results.growth),
+    )
+    return section("sizes", "How the cost grows", "", {"sizes": drawing})
+
+
+def features_section(results: Results) -> Section | None:
+    """What each unneeded feature costs and breaks."""
+    table = results.features
+    if table.empty:
+        return None
+    many = np.isfinite(table.cost_ratio).any()
+    drawings = {
+        "cost": Drawing(
+            "What it costs", "Time over that of the matched profile; right of the dotted line it costs more.",
+            charts.features(table, "cost_ratio", "time / time unchanged") if many else None,
+        ),
+        "error": Drawing(
+            "What it breaks, or mends", "Error over that of the matched profile; right of the dotted line it is worse.",
+            charts.features(table, "error_ratio", "error / error unchanged"),
+        ),
+    }  # fmt: skip
+    return section("features", "No more than a scene needs", "", drawings)

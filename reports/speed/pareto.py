@@ -1,0 +1,48 @@
+"""Which points nobody beats, and what an accuracy costs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from reports.speed.order import ELSEWHERE
+from scenarios.model import Array
+
+ACCURACIES = {"10 %": 0.1, "1 %": 0.01, "0.1 %": 0.001, "1e-6": 1e-6}  # of a radius
+UNREACHABLE = "unreachable at any dt"
+NOT_REACHED = "not reached"
+FAILED = "failed"
+
+
+class Reached(NamedTuple):
+    """What an accuracy costs: µs per simulated second at dt in s; or nan and why it is not reached."""
+
+    cost: float
+    dt: float
+    why: str = ""
+
+
+def front(cost: Array, error: Array) -> list[int]:
+    """Indices, cheapest first, of the points that no other beats in one of the two without being worse in the other."""
+    best, kept = np.inf, []
+    for k in np.lexsort((error, cost)):
+        if np.isfinite(cost[k]) and error[k] < best:
+            best = error[k]
+            kept.append(int(k))
+    return kept
+
+
+def cost_to_reach(accuracy: float, dt: Array, cost: Array, error: Array, verdict: str) -> Reached:
+    """The cheapest measured dt whose error, and that of every finer one, is at most `accuracy` radii.
+
+    dt, cost and error (k,) go from coarse to fine; error is inf where a run failed. Nothing is read between or
+    beyond what was measured; a lucky dt, with a larger error at a finer one, does not count.
+    """
+    if not np.isfinite(error).any():
+        return Reached(np.nan, np.nan, FAILED)
+    held = np.logical_and.accumulate((error <= accuracy)[::-1])[::-1] & np.isfinite(cost)
+    if held.any():
+        k = int(np.flatnonzero(held)[np.argmin(cost[held])])
+        return Reached(float(cost[k]), float(dt[k]))
+    return Reached(np.nan, np.nan, UNREACHABLE if verdict == ELSEWHERE else NOT_REACHED)

@@ -1,0 +1,155 @@
+"""All tables of a measurement in one place, as the page shows them and the files hold them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from reports.speed import models, tables
+from reports.speed.measure import Measured, Plan
+from reports.speed.pareto import ACCURACIES, FAILED, UNREACHABLE
+
+QUIET = 0.05  # how far from 1 an engine against itself may read
+
+
+@dataclass
+class Results:
+    """What was measured, and the tables made from it on demand."""
+
+    plan: Plan
+    measured: Measured
+
+    @property
+    def names(self) -> list[str]:
+        """`engine:profile` of every player, in the order of `ENGINES`."""
+        return list(self.plan.engines)
+
+    @property
+    def left_out(self) -> list[tuple[str, str]]:
+        """(what, why) of what could not be measured."""
+        return self.measured.left_out
+
+    @cached_property
+    def asks(self) -> dict[str, str]:
+        """scenario -> its question, of those that were measured, in the order asked for."""
+        named = dict(tables.asks_of(scene) for scene in self.plan.scenes)
+        return {name: asks for name, asks in named.items() if name in set(self.points.scenario)}
+
+    @property
+    def scenes(self) -> list[str]:
+        """Those that were measured."""
+        return list(self.asks)
+
+    @cached_property
+    def points(self) -> pd.DataFrame:
+        """See `tables.points`; and idle, what as many steps cost where there is nothing to do, µs per simulated s."""
+        points = tables.points(self.measured, self.plan.seed)
+        each = {(row.engine, row.profile): row.step_us for row in self.driving.itertuples()}
+        steps = [each.get(who, np.nan) for who in zip(points.engine, points.profile)]
+        return points.assign(idle=np.array(steps, float) / points.dt_s)
+
+    @cached_property
+    def orders(self) -> pd.DataFrame:
+        """See `tables.orders`."""
+        return tables.orders(self.measured, self.plan.seed)
+
+    @cached_property
+    def reached(self) -> pd.DataFrame:
+        """See `tables.reached`."""
+        return tables.reached(self.points, self.orders)
+
+    @cached_property
+    def pooled(self) -> pd.DataFrame:
+        """See `tables.pooled`."""
+        return tables.pooled(self.points)
+
+    @cached_property
+    def pooled_reached(self) -> pd.DataFrame:
+        """As `reached`: the median over the scenarios where more than half get there, else why they do not."""
+        rows = []
+        for (engine, profile, accuracy), group in self.reached.groupby(["engine", "profile", "accuracy"], sort=False):
+            count, got = len(group), int(group.cost.notna().sum())
+            never = int(group.why.isin([UNREACHABLE, FAILED]).sum())
+            median = float(np.median(group.cost.fillna(np.inf)))
+            said = f"{got} of {count}"
+            why = said if np.isfinite(median) else (UNREACHABLE if 2 * never >= count else said)
+            rows.append({
+                "scenario": tables.POOLED, "engine": engine, "profile": profile, "accuracy": accuracy,
+                "cost": median if np.isfinite(median) else np.nan, "dt_s": np.nan, "why": why,
+            })  # fmt: skip
+        return pd.DataFrame(rows)
+
+    @cached_property
+    def noise(self) -> pd.DataFrame:
+        """See `tables.noise`."""
+        return tables.noise(self.measured)
+
+    def noise_summary(self, scene: str = "") -> dict[str, float]:
+        """median, low, high (quartiles), least, most and pairs of an engine against itself; quiet: within `QUIET`."""
+        ratios = self.noise[self.noise.scenario == scene].ratio if scene else self.noise.ratio
+        if ratios.empty:
+            return {"pairs": 0, "quiet": False}
+        low, median, high = np.percentile(ratios, [25, 50, 75])
+        quiet = max(abs(low - 1), abs(high - 1)) <= QUIET
+        return {
+            "median": float(median), "low": float(low), "high": float(high), "least": float(ratios.min()),
+            "most": float(ratios.max()), "pairs": len(ratios), "quiet": bool(quiet),
+        }  # fmt: skip
+
+    @cached_property
+    def driving(self) -> pd.DataFrame:
+        """See `tables.driving`."""
+        return tables.driving(self.measured)
+
+    @property
+    def sizes(self) -> pd.DataFrame:
+        """Costs of `tables.grown`."""
+        return self._grown[0]
+
+    @property
+    def growth(self) -> pd.DataFrame:
+        """Exponents of `tables.grown`."""
+        return self._grown[1]
+
+    @cached_property
+    def _grown(self) -> tuple[pd.DataFrame, pd.DataFrame]:
+        return tables.grown(self.measured)
+
+    @cached_property
+    def features(self) -> pd.DataFrame:
+        """See `tables.features`."""
+        return tables.features(self.measured)
+
+    @cached_property
+    def models(self) -> pd.DataFrame:
+        """See `models.cheapest`."""
+        return models.cheapest(self.measured.truths, self.points)
+
+    def order_table(self, scene: str) -> pd.DataFrame:
+        """A row a player: order with interval and verdict, and for every accuracy (cost, dt, why) as columns."""
+        orders = self.orders[self.orders.scenario == scene]
+        reached = self.reached[self.reached.scenario == scene]
+        wide = orders.assign(**{
+            accuracy: [
+                next(reached[(reached.engine == engine) & (reached.profile == profile) & (reached.accuracy == accuracy)]
+                     [["cost", "dt_s", "why"]].itertuples(index=False, name=None))
+                for engine, profile in zip(orders.engine, orders.profile)
+            ]
+            for accuracy in ACCURACIES
+        })  # fmt: skip
+        return wide.assign(name=wide.engine + ":" + wide.profile)
+
+    def write(self, folder: Path) -> None:
+        """The tables as CSV files."""
+        files = {
+            "speed_samples": self.measured.samples, "speed_errors": self.measured.errors, "speed": self.points,
+            "speed_pooled": self.pooled, "speed_orders": self.orders, "speed_reached": self.reached,
+            "speed_sizes": self.sizes, "speed_features": self.features, "speed_driving": self.driving,
+            "speed_noise": self.noise, "speed_models": self.models,
+        }  # fmt: skip
+        for name, table in files.items():
+            table.to_csv(folder / f"{name}.csv", index=False)

@@ -1,0 +1,131 @@
+"""What a step costs against the number of disks, in a gas; and what it costs where there is nothing to do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Engine, Unsupported
+from reports.speed.order import line_interval
+from reports.speed.timing import Sample, Spent, Timed, interleaved
+from scenarios.model import Array, Scene
+from scenarios.placing import box, lay_out
+
+Make = Callable[[], Engine]
+DT, RADIUS, COVERED = 1 / 240, 0.5, 0.3
+WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3  # of one sample: as many steps as fill 2 ms, less than a time slice
+FIT_FROM = 100  # disks: below it the fixed cost of a step hides how it grows
+IDLE_STEPS = 1000
+STOPPED = "stopped: a step would take longer than {:g} s"
+
+
+def gas(n: int, seed: int) -> Scene:
+    """`n` equal disks that cover `COVERED` of a square box, on a lattice, with normal velocities; e = 1."""
+    across = int(np.ceil(np.sqrt(n)))
+    pitch = RADIUS * np.sqrt(np.pi / COVERED) * np.sqrt(n) / across  # so that an unfilled lattice covers as much
+    place = (np.stack(np.divmod(np.arange(n), across), axis=-1) + 0.5) * pitch
+    side = across * pitch
+    return lay_out(
+        position=place, velocity=np.random.default_rng(seed).normal(size=(n, 2)), radius=np.full(n, RADIUS),
+        mass=np.ones(n), walls=box([0.0, 0.0], [side, side]), restitution=1.0,
+    )  # fmt: skip
+
+
+def costs(players: Mapping[str, Make], sizes: Sequence[int], rounds: int, budget: float, patience: float,
+          seed: int) -> tuple[list[Sample], dict[tuple[str, int], str]]:  # fmt: skip
+    """Samples, s a step, by (name, n), from few disks to many; and who was not measured where, and why.
+
+    An engine that would take longer than `patience` s for a step at the next size, as its last two sizes extend,
+    stops there.
+    """
+    samples: list[Sample] = []
+    left_out: dict[tuple[str, int], str] = {}
+    course: dict[str, list[tuple[int, float]]] = {name: [] for name in players}
+    for n in sizes:
+        awake: dict[str, tuple[Engine, int]] = {}
+        for name, make in players.items():
+            if foreseen(course[name], n) > patience:
+                left_out[name, n] = STOPPED.format(patience)
+                continue
+            try:
+                awake[name] = warmed(make(), gas(n, seed))
+            except Unsupported as refusal:
+                left_out[name, n] = f"refused: {refusal}"
+        what = [Timed((name, n), _Going(engine, steps), steps) for name, (engine, steps) in awake.items()]
+        here = interleaved(what, rounds, budget, seed)
+        for name, (engine, _) in awake.items():
+            course[name].append((n, min(sample.cost for sample in here if sample.key == (name, n))))
+            engine.close()
+        samples += here
+    return samples, left_out
+
+
+class _Going:
+    """More steps of a gas that is already going: every sample goes on where the one before left off."""
+
+    def __init__(self, engine: Engine, steps: int) -> None:
+        self.engine, self.steps = engine, steps
+
+    def __call__(self) -> Spent:
+        started = perf_counter()
+        self.engine.step(self.steps)
+        return Spent(perf_counter() - started)
+
+
+def warmed(engine: Engine, scene: Scene) -> tuple[Engine, int]:
+    """The engine, loaded and a few steps on, and how many steps fill a sample."""
+    engine.listening = False
+    engine.load(scene, DT)
+    engine.step(1)
+    started = perf_counter()
+    engine.step(WARM_STEPS)
+    each = (perf_counter() - started) / WARM_STEPS
+    return engine, int(np.clip(SAMPLE / each, 1, MOST_STEPS))
+
+
+def foreseen(course: Sequence[tuple[int, float]], n: int) -> float:
+    """s a step with `n` disks, as the last two sizes extend; 0 where fewer are known."""
+    if len(course) < 2:
+        return 0.0
+    (n1, cost1), (n2, cost2) = course[-2:]
+    return cost2 * (n / n2) ** (np.log(cost2 / cost1) / np.log(n2 / n1))
+
+
+def exponent(n: Array, cost: Array) -> tuple[float, float, float]:
+    """p of cost ~ n^p from `FIT_FROM` disks on, low and high end of its 95 % interval; nan from fewer than 3 sizes."""
+    many = n >= FIT_FROM
+    if many.sum() < 3:
+        return np.nan, np.nan, np.nan
+    return line_interval(np.log(n[many]), np.log(cost[many]))
+
+
+def driving(players: Mapping[str, Make], rounds: int, budget: float, seed: int) -> list[Sample]:
+    """Samples, s a step, of a world with one static disk: by (name, True) step by step, by (name, False) in one call.
+
+    What the second costs is the loop and the engine's own fixed cost of a step; what the first costs more is the call.
+    """
+    idle = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[np.inf], restitution=1.0)
+    what: list[Timed] = []
+    for name, make in players.items():
+        what += [Timed((name, singly), _Idle(make, idle, singly), IDLE_STEPS) for singly in (True, False)]
+    return interleaved(what, rounds, budget, seed)
+
+
+class _Idle:
+    def __init__(self, make: Make, scene: Scene, singly: bool) -> None:
+        self.make, self.scene, self.singly = make, scene, singly
+
+    def __call__(self) -> Spent:
+        engine: Any = self.make()
+        engine.listening = False
+        engine.load(self.scene, DT)
+        calls, count = (IDLE_STEPS, 1) if self.singly else (1, IDLE_STEPS)
+        started = perf_counter()
+        for _ in range(calls):
+            engine.step(count)
+        seconds = perf_counter() - started
+        engine.close()
+        return Spent(seconds)

@@ -1,0 +1,181 @@
+"""What the samples and errors come to: points, orders, what an accuracy costs, sizes, features, the noise floor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from adapters.engines import ENGINES
+from reports.speed.ladder import open_scene
+from reports.speed.measure import FEATURE, IDLE, PLAIN, SCENE, SIZE, Measured
+from reports.speed.order import Order, median_interval, order_of
+from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, cost_to_reach
+from reports.speed.sizes import exponent
+from reports.speed.timing import summed_up
+
+WHO = ["engine", "profile"]
+POOLED = "pooled"
+
+
+def points(measured: Measured, seed: int) -> pd.DataFrame:
+    """A row a scenario, player and dt.
+
+    Columns: scenario, engine, profile, dt_s, rung (0: coarsest), seeds, failed (how many), status and reason (of the
+    first that failed), error (median over the seeds, radii; inf where it failed) and its 95 % interval error_low,
+    error_high; cost (median, µs per simulated second; nan where not timed), its quartiles low and high, best,
+    wrapping, rounds.
+    """
+    errors = measured.errors[measured.errors.kind == SCENE]
+    rows = []
+    for (scenario, engine, profile, dt, rung), group in errors.groupby(
+        ["scenario", *WHO, "dt_s", "substeps"], sort=False
+    ):
+        values, failed = group.error_radii.to_numpy(float), group[group.status != "ok"]
+        low, high = median_interval(values, seed)
+        rows.append({
+            "scenario": scenario, "engine": engine, "profile": profile, "dt_s": dt, "rung": rung,
+            "seeds": len(group), "failed": len(failed), "status": "ok" if failed.empty else failed.status.iloc[0],
+            "reason": "" if failed.empty else failed.reason.iloc[0],
+            "error": float(np.percentile(values, 50, method="higher" if np.isinf(values).any() else "linear")),
+            "error_low": low, "error_high": high,
+        })  # fmt: skip
+    found = pd.DataFrame(rows)
+    found["rung"] = np.log2(found.rung / found.groupby("scenario").rung.transform("min")).round().astype(int)
+    return found.merge(times(measured), on=["scenario", *WHO, "dt_s"], how="left")
+
+
+def times(measured: Measured) -> pd.DataFrame:
+    """scenario, engine, profile, dt_s, cost, low, high, best, wrapping (µs per simulated second), rounds."""
+    samples = measured.samples
+    plain = samples[(samples.kind == SCENE) & (samples.copy_of == 0)]
+    return in_us(summed_up(plain, ["scenario", *WHO, "dt_s"]))
+
+
+def in_us(table: pd.DataFrame) -> pd.DataFrame:
+    """Its times in µs."""
+    columns = ["cost", "low", "high", "best", "wrapping"]
+    return table.assign(**{column: table[column] * 1e6 for column in columns})
+
+
+def orders(measured: Measured, seed: int) -> pd.DataFrame:
+    """A row a scenario and player: slope, low, high, verdict, see `order.Order`."""
+    rows = []
+    for keys, dt, errors, changes in ladders(measured):
+        found = order_of(dt, errors, changes, seed) if errors.shape[1] >= 2 else Order(np.nan, np.nan, np.nan, "")
+        if not np.isfinite(errors).any():
+            found = Order(np.nan, np.nan, np.nan, FAILED)
+        rows.append(dict(zip(["scenario", *WHO], keys)) | found._asdict())
+    return pd.DataFrame(rows)
+
+
+def ladders(measured: Measured) -> Iterator[tuple[tuple, np.ndarray, np.ndarray, np.ndarray]]:
+    """(scenario, engine, profile), dt (k,), errors and changes (seeds, k), coarse to fine."""
+    errors = measured.errors[measured.errors.kind == SCENE]
+    for keys, group in errors.groupby(["scenario", *WHO], sort=False):
+        wide = [group.pivot(index="seed", columns="substeps", values=value) for value in
+                ("error_radii", "change_radii")]  # fmt: skip
+        dt = np.sort(group.dt_s.unique())[::-1]
+        yield tuple(keys), dt, wide[0].to_numpy(float), wide[1].to_numpy(float)
+
+
+def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
+    """A row a scenario, player and accuracy: accuracy (radii), cost (µs per simulated second), dt_s, why it is not."""
+    verdicts: dict[tuple, str] = dict(zip(zip(fitted.scenario, fitted.engine, fitted.profile), fitted.verdict))
+    rows = []
+    for keys, group in found.groupby(["scenario", *WHO], sort=False):
+        for name, accuracy in ACCURACIES.items():
+            dts, costs, errors = (group[column].to_numpy(float) for column in ("dt_s", "cost", "error"))
+            cost, dt, why = cost_to_reach(accuracy, dts, costs, errors, verdicts[tuple(keys)])
+            if why == NOT_REACHED:
+                why = f"not down to dt {group.dt_s.min():.2g} s"
+            rows.append(dict(zip(["scenario", *WHO], keys)) | {
+                "accuracy": name, "cost": cost, "dt_s": dt, "why": why,
+            })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def pooled(found: pd.DataFrame) -> pd.DataFrame:
+    """A row a player and rung: error and cost, each the median over the scenarios, with quartiles; of, failed.
+
+    A scenario that a player failed counts as infinitely wrong; its cost is then that of the others.
+    """
+    rungs = found.groupby("scenario").rung.max().min()
+    rows = []
+    for (engine, profile, rung), group in found[found.rung <= rungs].groupby([*WHO, "rung"], sort=False):
+        error, cost = group.error.to_numpy(float), group.cost.dropna().to_numpy(float)
+        quartiles = np.percentile(error, [25, 50, 75], method="nearest") if len(error) else [np.nan] * 3
+        prices = np.percentile(cost, [25, 50, 75]) if len(cost) else [np.nan] * 3
+        rows.append({
+            "scenario": POOLED, "engine": engine, "profile": profile, "rung": rung, "dt_s": np.nan,
+            "error": quartiles[1], "error_low": quartiles[0], "error_high": quartiles[2],
+            "cost": prices[1], "low": prices[0], "high": prices[2], "seeds": len(group),
+            "failed": int((group.failed > 0).sum()), "status": "ok", "reason": "", "best": np.nan, "wrapping": np.nan,
+            "idle": np.nan,
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def noise(measured: Measured) -> pd.DataFrame:
+    """A row a scenario and player: ratio of the median costs of an engine and its copy in the same rounds."""
+    samples = measured.samples[measured.samples.kind == SCENE]
+    both = summed_up(samples, ["scenario", *WHO, "dt_s", "copy_of"]).pivot(
+        index=["scenario", *WHO, "dt_s"], columns="copy_of", values="cost"
+    )
+    return (both[1] / both[0]).dropna().rename("ratio").reset_index()
+
+
+def driving(measured: Measured) -> pd.DataFrame:
+    """engine, profile, step_us and call_us: what a step and a call cost where there is nothing to do."""
+    idle = measured.samples[measured.samples.kind == IDLE]
+    if idle.empty:
+        return pd.DataFrame(columns=[*WHO, "step_us", "call_us"])
+    # The fastest: a difference of medians of a busy machine may be of either sign.
+    wide = in_us(summed_up(idle, [*WHO, "singly"])).pivot(index=WHO, columns="singly", values="best")
+    return in_order(pd.DataFrame({"step_us": wide[False], "call_us": wide[True] - wide[False]}).reset_index())
+
+
+def in_order(table: pd.DataFrame) -> pd.DataFrame:
+    """Its rows in the order of `ENGINES`, otherwise as they were."""
+    ranks = {name: rank for rank, name in enumerate(ENGINES)}
+    names = table.engine + ":" + table.profile
+    return table.loc[names.map(ranks).sort_values(kind="stable").index]
+
+
+def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """(engine, profile, n, cost in µs a step and so on) and (engine, profile, exponent, low, high, stopped)."""
+    samples = measured.samples[measured.samples.kind == SIZE]
+    costs = in_us(summed_up(samples, [*WHO, "n"])).sort_values("n", kind="stable")
+    costs = in_order(costs.reset_index(drop=True))
+    rows = []
+    for (engine, profile), group in costs.groupby(WHO, sort=False):
+        fitted = exponent(group.n.to_numpy(float), group.cost.to_numpy(float))
+        ends = [f"{n}: {why}" for (name, n), why in measured.stopped.items() if name == f"{engine}:{profile}"]
+        rows.append({"engine": engine, "profile": profile} | dict(zip(("exponent", "low", "high"), fitted)) | {
+            "most": int(group.n.max()), "stopped": ends[0] if ends else "",
+        })  # fmt: skip
+    return costs, pd.DataFrame(rows)
+
+
+def features(measured: Measured) -> pd.DataFrame:
+    """A row a scenario, engine and change: cost and error, each over the unchanged engine's; and both errors."""
+    samples = measured.samples[measured.samples.kind == FEATURE]
+    errors = measured.errors[measured.errors.kind == FEATURE]
+    if samples.empty or errors.empty:
+        return pd.DataFrame()
+    keys = ["scenario", *WHO, "change"]
+    table = errors[[*keys, "status", "reason", "error_radii"]].merge(
+        in_us(summed_up(samples, keys))[[*keys, "cost", "low", "high"]], on=keys, how="left"
+    )
+    plain = table[table.change == PLAIN][["scenario", *WHO, "error_radii", "cost"]]
+    both = table[table.change != PLAIN].merge(plain, on=["scenario", *WHO], suffixes=("", "_plain"))
+    both["cost_ratio"] = both.cost / both.cost_plain
+    both["error_ratio"] = both.error_radii / both.error_radii_plain.where(both.error_radii_plain > 0)
+    return both
+
+
+def asks_of(scene: str) -> tuple[str, str]:
+    """Name and question of a scene."""
+    scenario = open_scene(scene, 0)
+    return scenario.name, scenario.asks

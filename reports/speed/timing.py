@@ -1,0 +1,92 @@
+"""Times what is to be compared in interleaved rounds of shuffled order, and keeps every sample."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+LEAST = 1e-3  # s a sample lasts at least: some 10 000 ticks of the clock, so that reading it weighs nothing
+MOST_RUNS = 100  # in one sample, as making ready takes time, too
+FEWEST_ROUNDS = 3  # of a run so long that its time is used up earlier
+WARM_UP = -1  # the round that is stored, but not counted
+
+
+class Spent(NamedTuple):
+    """Seconds inside `step`, and the part of them that went into wrapping in Python."""
+
+    seconds: float
+    wrapping: float = 0.0
+
+
+class Timed(NamedTuple):
+    """One thing to be timed: `run` makes ready, runs once, and tells what it spent; one run is `amount` of something.
+
+    `amount` is in the unit that the cost is to be told by: simulated seconds, or steps.
+    """
+
+    key: Any
+    run: Callable[[], Spent]
+    amount: float
+
+
+class Sample(NamedTuple):
+    """One measurement: whose, in which round and place of it, s per unit of amount, and over how many runs."""
+
+    key: Any
+    round: int
+    place: int
+    cost: float
+    wrapping: float
+    runs: int
+
+
+def interleaved(what: Sequence[Timed], rounds: int, budget: float, seed: int) -> list[Sample]:
+    """Samples of all of `what`, warm-up round first; each round visits all of it, in an order drawn anew.
+
+    What has spent `budget` s of its own sits out the rounds left, but never the first `FEWEST_ROUNDS`. Slow change
+    of the machine (heat, clock, neighbours) thus meets all alike. The garbage collector is off meanwhile, as in
+    `timeit`.
+    """
+    rng = np.random.default_rng(seed)
+    spent = {one.key: 0.0 for one in what}
+    samples: list[Sample] = []
+    collecting = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        for k in range(WARM_UP, rounds):
+            for place, index in enumerate(rng.permutation(len(what))):
+                one = what[index]
+                if k < FEWEST_ROUNDS or spent[one.key] < budget:
+                    sample = sampled(one, k, place)
+                    spent[one.key] += sample.cost * one.amount * sample.runs
+                    samples.append(sample)
+    finally:
+        if collecting:
+            gc.enable()
+    return samples
+
+
+def sampled(one: Timed, k: int, place: int) -> Sample:
+    """One sample: as many runs as it takes to fill `LEAST`."""
+    seconds, wrapping, runs = 0.0, 0.0, 0
+    while runs == 0 or (seconds < LEAST and runs < MOST_RUNS):
+        spent = one.run()
+        seconds, wrapping, runs = seconds + spent.seconds, wrapping + spent.wrapping, runs + 1
+    per = runs * one.amount
+    return Sample(one.key, k, place, (seconds - wrapping) / per, wrapping / per, runs)
+
+
+def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
+    """Columns `by`, then cost (the median), low, high (quartiles), best (the minimum), wrapping, rounds; no warm-up."""
+    counted = samples[samples["round"] != WARM_UP].groupby(list(by), sort=False)
+    cost = counted["cost"]
+    table = pd.DataFrame({
+        "cost": cost.median(), "low": cost.quantile(0.25), "high": cost.quantile(0.75), "best": cost.min(),
+        "wrapping": counted["wrapping"].median(), "rounds": cost.size(),
+    })  # fmt: skip
+    return table.reset_index()

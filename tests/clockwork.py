@@ -1,0 +1,77 @@
+"""Engines whose speed or error is known beforehand."""
+
+from __future__ import annotations
+
+from time import sleep
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Hit
+from scenarios.model import Array, Scene, State
+
+
+class Sleeper:
+    """Takes a fixed time a step, and much longer to build, to read, and to hear of hits; it moves nothing."""
+
+    listening, wrapping = True, 0.0
+
+    def __init__(self, each: float, wrapping: float = 0.0) -> None:
+        self.each, self.wraps = each, wrapping
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Slow, but not timed."""
+        self.scene, self.dt = scene, dt
+        sleep(0.005)
+
+    def push(self, disk: int, force: Array, torque: float) -> None:
+        """Nothing moves."""
+
+    def step(self, count: int = 1) -> None:
+        """`count` times `each` s, a part of it spent on wrapping."""
+        sleep(count * self.each)
+        self.wrapping += count * self.wraps
+        if self.listening:
+            sleep(0.05)
+
+    def read(self) -> State:
+        """Must not be called while time is taken."""
+        raise AssertionError("read while timed")
+
+    def hits(self) -> list[Hit]:
+        """None."""
+        return []
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """None."""
+        return {}
+
+    def versions(self) -> dict[str, str]:
+        """None."""
+        return {}
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class Late(Sleeper):
+    """Flies straight, but off by `size` dt^`order` m, and by `aside` m whatever dt is."""
+
+    def __init__(self, order: int, size: float = 1.0, aside: float = 0.0) -> None:
+        super().__init__(0.0)
+        self.order, self.size, self.aside = order, size, aside
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Remember where it starts."""
+        self.scene, self.dt, self.t = scene, dt, 0.0
+
+    def step(self, count: int = 1) -> None:
+        """Only the clock moves on."""
+        self.t += count * self.dt
+
+    def read(self) -> State:
+        """The straight line, and the error grown in proportion to the time."""
+        scene = self.scene
+        off = self.t * (self.size * self.dt**self.order + self.aside)
+        return State(scene.position + scene.velocity * self.t + np.array([off, 0.0]), scene.velocity.copy(),
+                     scene.angle.copy(), scene.angular_velocity.copy())  # fmt: skip

@@ -1,0 +1,261 @@
+"""`crosscheck speed` measures, keeps every sample, says what failed, and makes a page that opens offline."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from playwright.sync_api import ConsoleMessage, Request, sync_playwright
+from typer.testing import CliRunner
+
+from adapters.features import FEATURES
+from adapters.play import play
+from reports.cli import app
+from reports.machine import about
+from reports.speed import charts, figures, tables
+from reports.speed.effort import QUICK
+from reports.speed.measure import Measured, Plan, measure
+from reports.speed.page import write_page
+from reports.speed.pareto import FAILED, UNREACHABLE
+from reports.speed.results import Results
+from reports.terminal import Progress
+from scenarios.catalogue import scenario
+
+CHROMIUM = shutil.which("chromium")
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
+SCENES = ("head_on_equal_e09", "asteroids")
+PLAYERS = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
+LITTLE = replace(QUICK, seeds=3, most_steps=1000, rounds=2, budget=0.0, sizes=(3, 10, 100, 1000), patience=1.0,
+    feature_scenes=("bouncing_ball_e1",))  # fmt: skip
+SAID = {"load": 0.0, "seconds": 1.0}
+
+
+@pytest.fixture(scope="module")
+def measured() -> Measured:
+    """A little of everything, played and timed for real, in worker processes."""
+    with Progress() as progress:
+        return measure(Plan(SCENES, PLAYERS, LITTLE, 0, 2), progress)
+
+
+@pytest.fixture(scope="module")
+def results(measured: Measured) -> Results:
+    """The same with one player that failed one rung of one scene, and one that refused all of it."""
+    errors = measured.errors.copy()
+    here = (errors.scenario == SCENES[0]) & (errors.engine == "pymunk") & (errors.kind == "scene")
+    refused = here & (errors.profile == "shipped")
+    crashed = here & (errors.profile == "matched") & (errors.substeps == 1)
+    errors.loc[refused, ["status", "reason"]] = ["unsupported", "no <b>such</b> thing"]
+    errors.loc[crashed, ["status", "reason"]] = ["crashed", "worker died: SIGSEGV"]
+    errors.loc[refused | crashed, "error_radii"] = np.inf
+    samples = measured.samples
+    timed = (samples.scenario == SCENES[0]) & (samples.engine == "pymunk") & (samples.profile == "shipped")
+    changed = replace(measured, errors=errors, samples=samples[~(timed & (samples.kind == "scene"))])
+    return Results(Plan(SCENES, PLAYERS, LITTLE, 0, 2), changed)
+
+
+def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
+    """A row a round for every player, dt and copy; a row a seed for every player and dt."""
+    results.write(tmp_path)
+    samples, errors = (pd.read_csv(tmp_path / f"speed_{name}.csv") for name in ("samples", "errors"))
+    one = samples[(samples.kind == "scene") & (samples.engine == "event_driven") & (samples.scenario == SCENES[0])]
+
+    assert sorted(one[one.copy_of == 1]["round"]) == [-1, 0, 1]
+    assert (one.groupby(["dt_s", "copy_of"]).size() == 3).all()
+    assert set(errors[errors.scenario == "asteroids"].seed) == {0, 1, 2}
+
+
+def test_errors_are_those_of_the_comparison(results: Results):
+    """The same number as `position_max_radii` of the report, from the same play."""
+    from adapters.engines import ENGINES
+    from reports.comparison import compare
+
+    row = results.points[(results.points.scenario == SCENES[0]) & (results.points.engine == "reference")].iloc[1]
+    scene = scenario(SCENES[0])
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", scene, row.dt_s)
+    table = compare(scene, [run]).table
+    assert row.error == table[(table.metric == "position_max_radii") & (table.versus == "truth")].value.iloc[0]
+
+
+def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Results):
+    """Both stand above every error that was measured; the refused one in the corner, as nobody knows its cost."""
+    figure = charts.speed(results.points[results.points.scenario == SCENES[0]])
+    top = 10 ** figure.layout.yaxis.range[1]
+    edges = {trace.name: trace for trace in figure.data if trace.mode == "markers"}
+
+    assert set(edges) == {"pymunk:shipped", "pymunk:matched"}
+    assert all(max(trace.y) > top / 10 for trace in edges.values())
+    assert "failed" in figure.layout.yaxis.ticktext
+    assert "SIGSEGV" in edges["pymunk:matched"].text[0]
+    assert 10 ** (figure.layout.xaxis.range[1] - 0.1) < max(edges["pymunk:shipped"].x)
+    assert max(edges["pymunk:shipped"].x) < 10 ** figure.layout.xaxis.range[1]
+    assert max(edges["pymunk:matched"].x) < max(edges["pymunk:shipped"].x)
+
+
+def test_the_front_of_a_chart_is_the_event_driven_player(results: Results):
+    """In a head-on hit it is both cheapest and exact, so that nobody else is on the front."""
+    points = results.points[results.points.scenario == SCENES[0]]
+    front = next(trace for trace in charts.speed(points).data if trace.name == charts.FRONT)
+    mine = points[points.engine == "event_driven"]
+
+    assert mine.error.max() < charts.LOWEST
+    assert set(front.y) == {charts.LOWEST}
+    assert min(front.x) == pytest.approx(mine.cost.min(), rel=1e-3)
+
+
+def test_what_cannot_be_reached_is_above_what_costs(results: Results):
+    """Refused: never. The reference comes to 1 % at a cost, but not to 1e-6 of a radius down to its finest dt."""
+    reached = results.reached[results.reached.scenario == SCENES[0]].set_index(["engine", "profile", "accuracy"])
+
+    assert reached.loc[("pymunk", "shipped", "10 %")].why == FAILED
+    assert np.isfinite(reached.loc[("reference", "exercise", "1 %")].cost)
+    assert reached.loc[("reference", "exercise", "1e-6")].why.startswith("not down to dt")
+    assert UNREACHABLE not in set(results.reached[results.reached.engine == "event_driven"].why)
+
+
+def test_a_random_scene_has_an_interval_over_its_draws(results: Results):
+    """The median error lies between the ends of its bootstrap interval, which are apart."""
+    row = results.points[(results.points.scenario == "asteroids") & (results.points.engine == "reference")].iloc[0]
+
+    assert row.seeds == 3
+    assert row.error_low < row.error < row.error_high
+
+
+def test_a_pooled_failure_counts_as_infinitely_wrong(results: Results):
+    """One of two scenes failed: the upper quartile is infinite, and it is counted."""
+    row = results.pooled[(results.pooled.engine == "pymunk") & (results.pooled.profile == "shipped")].iloc[0]
+
+    assert (row.failed, np.isinf(row.error_high)) == (1, True)
+
+
+def test_every_feature_of_a_player_is_set_against_it_in_every_scene(results: Results):
+    """Time and error together; an engine changed in nothing reads 1 in both, so it is not listed."""
+    expected = {feature.change for feature in FEATURES if feature.engine in PLAYERS}
+    table = results.features
+
+    assert set(table.change) == expected
+    assert (table.groupby("scenario").size() == len(expected)).all()
+    assert table[table.status == "ok"].cost_ratio.gt(0).all()
+    assert "" not in set(table.change)
+
+
+def test_float32_breaks_what_it_must(results: Results):
+    """Negative control of the feature table: in a bouncing ball 2**-24 a step shows, and is not 1."""
+    row = results.features[(results.features.scenario == "bouncing_ball_e1") & (results.features.engine == "reference")]
+
+    assert abs(row.error_ratio.iloc[0] - 1) > 1e-3
+
+
+def test_the_cheapest_model_is_named_for_every_scene(results: Results):
+    """A closed form where the truth is one; the asteroids are answered hit by hit."""
+    models = results.models.set_index("scenario")
+
+    assert models.loc[SCENES[0]].truth == "closed form"
+    assert models.loc["asteroids"].truth == "hit by hit, in many digits"
+    assert models.loc["asteroids"].player == "event_driven:float64"
+    assert set(models.model) <= {"closed form", "hit to hit, float64"}
+
+
+def test_figures_come_back_as_they_were_kept(results: Results, tmp_path: Path):
+    """With machine and versions in comment lines; their ratios are within the gate of themselves."""
+    path = tmp_path / "figures.csv"
+    figures.write(path, results, about("crosscheck speed", 0) | SAID)
+    kept = figures.ratios(figures.read(path))
+
+    assert "# processor: " in path.read_text()
+    assert "# pymunk: 7" in path.read_text()
+    assert ("pymunk:matched", 100) in kept
+    assert figures.drifted(kept, kept) == []
+
+
+def test_a_ratio_that_drifts_beyond_the_gate_is_named():
+    """Four times as dear, a fourth, or gone; twice as dear passes."""
+    kept = {("a:b", 10): 1.0, ("a:b", 100): 1.0, ("c:d", 10): 1.0, ("e:f", 10): 1.0}
+    said = figures.drifted(kept, {("a:b", 10): 4.0, ("a:b", 100): 0.25, ("c:d", 10): 2.0})
+
+    assert [line.split(":")[0] for line in said] == ["e", "a", "a"]
+    assert "allowed is a factor of 3" in said[1]
+
+
+def test_the_kept_figures_have_every_ratio_that_is_gated():
+    """All players but the yardstick, at all sizes."""
+    from adapters.engines import ENGINES
+
+    assert set(figures.ratios(figures.read())) == {
+        (name, n) for name in ENGINES if name != "reference:exercise" for n in figures.GATED
+    }
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (400, "dark")])
+def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
+    results: Results, tmp_path: Path, width: int, scheme: str
+):
+    """No request but for itself, no word on the console, nothing wider than the page, a figure in every place."""
+    if CHROMIUM is None:
+        pytest.skip("needs Debian's chromium")
+    page = tmp_path / "speed.html"
+    write_page(page, results, about("crosscheck speed", 0) | SAID)
+    asked: list[Request] = []
+    said: list[ConsoleMessage] = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        tab = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)  # type: ignore[arg-type]
+        tab.on("request", lambda request: asked.append(request))
+        tab.on("console", lambda message: said.append(message))
+        tab.goto(page.as_uri())
+        for plot in tab.locator(".plot").all():
+            plot.scroll_into_view_if_needed()
+            plot.locator(".main-svg").first.wait_for()
+        assert tab.locator(".plot").count() == 2 + 2 + 1 + 2 * len(SCENES)
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
+        browser.close()
+    assert [request.url for request in asked if not request.url.startswith(("file:", "data:", "blob:"))] == []
+    assert [message.text for message in said] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["no_such_scene"], "scenario 'no_such_scene' is not known"),
+        (["free_fall", "--engine", "pymonk"], "did you mean pymunk"),
+        (["free_fall", "--out", "README.md"], "is a file"),
+        (["free_fall", "--out", "tests"], "which crosscheck speed did not make"),
+    ],
+)
+def test_bad_input_is_one_clear_sentence(arguments: list[str], says: str, monkeypatch: pytest.MonkeyPatch):
+    """Exit 2, no traceback."""
+    monkeypatch.chdir(Path(__file__).parent.parent)
+    done = CliRunner().invoke(app, ["speed", *arguments])
+
+    assert done.exit_code == 2
+    assert says in done.stderr
+    assert "Traceback" not in done.output
+
+
+def test_a_scene_without_an_exact_answer_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Exit 1 and the reason; nothing is left behind."""
+    monkeypatch.setattr("reports.speed.ladder.reach_of", lambda *_: (0, "two outcomes"))
+    done = CliRunner().invoke(app, ["speed", "cradle_touching", "--out", str(tmp_path / "out")])
+
+    assert done.exit_code == 1
+    assert "cradle_touching" in done.stderr
+    assert "no exact answer: two outcomes" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow  # starts worker processes six times
+def test_one_scene_and_one_engine_are_measured_by_themselves(tmp_path: Path):
+    """Exit 0; tables and a page, without sizes and features; a second run may replace it."""
+    arguments = ["speed", "free_fall", "--engine", "reference", "--out", str(tmp_path / "out")]
+    for _ in range(2):
+        done = CliRunner().invoke(app, arguments)
+        assert done.exit_code == 0, done.output
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"speed.html", "speed.csv", "speed_samples.csv", "speed_errors.csv", "machine.json"} <= names
+    assert "speed_figures.csv" not in names
+    assert "Noise floor" in done.output
+    assert tables.POOLED not in set(pd.read_csv(tmp_path / "out" / "speed.csv").scenario)
