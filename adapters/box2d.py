@@ -28,6 +28,7 @@ class Box2DEngine:
 
     def __init__(self, profile: str) -> None:
         self.matched = profile == "matched"
+        self.velocity_iterations = VELOCITY_ITERATIONS
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world in the profile's units."""
@@ -99,7 +100,7 @@ class Box2DEngine:
         """`count` calls of `Step`; where the scene wraps, disks that leave are set onto the opposite edge."""
         dt = self.dt / self.time
         for _ in range(count):
-            self.world.Step(dt, VELOCITY_ITERATIONS, self.position_iterations)
+            self.world.Step(dt, self.velocity_iterations, self.position_iterations)
             self.steps += 1
             if self.scene.wrap is not None:
                 self._wrap()
@@ -133,7 +134,7 @@ class Box2DEngine:
         """Resolved values are read back from the world, a fixture and the engine's constants."""
         matched, world = self.matched, self.world
         fixture = self.bodies[0].fixtures[0]
-        iterations = f"{VELOCITY_ITERATIONS}, {self.position_iterations}"
+        iterations = f"{self.velocity_iterations}, {self.position_iterations}"
         return {
             "unit of time in s": (self.time if matched else None, "kept by the adapter"),
             "unit of length in m": (1 / self.length if matched else None, "kept by the adapter"),

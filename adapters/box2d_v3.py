@@ -27,6 +27,7 @@ class Box2DV3:
 
     def __init__(self, profile: str) -> None:
         self.matched = profile == "matched"
+        self.substeps = SUBSTEPS
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world; the length unit is global to the process, so each profile sets its own."""
@@ -98,7 +99,7 @@ class Box2DV3:
         """`count` calls of `step`; hit events live for one step, so they are collected after each."""
         pyb2d3.set_length_units_per_meter(self.unit)  # another world may have set its own since
         for _ in range(count):
-            self.world.step(self.dt, SUBSTEPS)
+            self.world.step(self.dt, self.substeps)
             for hit in self.world.get_contact_events().hit_events():
                 i, j = hit.shape_a.body.user_data, hit.shape_b.body.user_data
                 self.log.append(Hit(self.steps, self._index(i), self._index(j), np.nan))
@@ -157,7 +158,7 @@ class Box2DV3:
             "restitution": (self.scene.restitution, self.bodies[0].shapes[0].restitution),
             "sleeping": (False if matched else None, world.sleeping_enabled),
             "continuous collision": (False if matched else None, world.continuous_enabled),
-            "substeps": (SUBSTEPS, SUBSTEPS),
+            "substeps": (self.substeps, self.substeps),
             "float32 rounding of the start in m": (None, rounding(self.scene)),
         }
 
