@@ -69,7 +69,6 @@ async function openPlayer(scenario) {
   if (!element) return;
   const player = new Player(element, readPack(await unpack(`replay:${scenario.dataset.name}`)), looks);
   hiddenIn(scenario).forEach((name) => player.hidden.add(name));
-  player.seek(0);
   players[scenario.dataset.name] = player;
 }
 

@@ -32,9 +32,18 @@ def pack(comparison: Comparison) -> str:
     if not layers:
         return ""
     scenario = comparison.scenario
-    shown = frames(scenario, layers)
+    return pack_layers(scenario, layers, frames(scenario, layers), {})
+
+
+def pack_layers(
+    scenario: Scenario, layers: list[tuple[Run | None, Trajectory]], shown: NDArray[np.int64], more: dict[str, Any]
+) -> str:
+    """The layers at the samples `shown`, packed, as base64; `more` goes into the head.
+
+    more: `opens` s, where the player starts; `pace`, seconds in one at speed 1; `event`, what to mark: t s, disk.
+    """
     heads, bodies = zip(*(layer(run, trajectory, shown, scenario) for run, trajectory in layers))
-    head = json.dumps(head_of(scenario, shown, layers) | {"layers": heads}, separators=(",", ":")).encode()
+    head = json.dumps(head_of(scenario, shown, layers) | more | {"layers": heads}, separators=(",", ":")).encode()
     head += b" " * (-len(head) % 4)
     whole = len(head).to_bytes(4, "little") + head + b"".join(bodies)
     return base64.b64encode(zlib.compress(whole, 9)).decode()

@@ -156,7 +156,7 @@ GAS = (
     Case(
         "dense_gas", FAMILY, "Up to which packing does a gas of 100 disks keep its energy over 200 steps?",
         "packing", "1", PACKINGS, dense, ENERGY_DRIFTS, drawn=True, also=("pymunk:matched+ten_iterations",),
-        quick_values=(0.1, 0.3, 0.6, 0.85), quick_runs=2, ratio=1.1,
+        quick_values=(0.1, 0.3, 0.6, 0.85), quick_runs=2, ratio=1.25,
     ),
     Case(
         "fast_gas", FAMILY, "How far may the disks of a gas of packing 0.3 fly in a step, over 300 steps?",
@@ -175,7 +175,7 @@ GAS = (
     Case(
         "equipartition", FAMILY, "Do light and heavy disks of a gas keep the same temperature?",
         "m2 / m1", "1", (1.5, 3.0, 10.0, 30.0, 100.0, 1e3, 1e4), mixture, TEMPERATURES_PART, drawn=True, refines=False,
-        quick_values=(1.5, 30.0, 1e4), quick_runs=2,
+        quick_values=(1.5, 100.0, 1e4), quick_runs=2,
     ),
     Case(
         "thermometer", FAMILY, "Has a gas the speeds, the rate of hits and the wall pressure that it should have?",

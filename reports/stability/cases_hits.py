@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -29,12 +30,13 @@ def phase(run: int, of: int) -> float:
 
 
 def flyby(
-    speed: float, run: int, of: int, *, offset: float = 0.0, e: float = 1.0, mass: float = 1.0, radius: float = RADIUS
-) -> Scenario:
+    speed: float, run: int, of: int, *, offset: float = 0.0, e: float = 1.0, mass: float = 1.0,
+    radius: float = RADIUS, dt: float = DT,
+) -> Scenario:  # fmt: skip
     """Disk 0 flies at disk 1, which rests at the origin, and is there after `LEAD` steps; offset over the reach."""
     reach = radius + RADIUS
     touch = -reach * np.sqrt(max(0.0, 1 - offset**2))
-    start = touch - speed * DT * (LEAD + phase(run, of))
+    start = touch - speed * dt * (LEAD + phase(run, of))
     scene = lay_out(
         position=[[start, offset * reach], [0, 0]],
         velocity=[[speed, 0], [0, 0]],
@@ -49,7 +51,7 @@ def flyby(
         return answer(scene, t, legs.at(t), hits)
 
     asks = "Is the hit found?" if offset < 1 else "Is a hit invented?"
-    return stepped("flyby", asks, scene, truth)
+    return stepped("flyby", asks, scene, dt, truth)
 
 
 def wall_hit(speed: float, run: int, of: int) -> Scenario:
@@ -67,13 +69,13 @@ def wall_hit(speed: float, run: int, of: int) -> Scenario:
         v[..., 0] = np.where(beyond, -speed, speed)
         return answer(scene, t, (x, v), [((-RADIUS - start) / speed, 0, -1, 2 * speed)])
 
-    return stepped("wall-hit", "Is the wall found?", scene, truth)
+    return stepped("wall-hit", "Is the wall found?", scene, DT, truth)
 
 
-def stepped(name: str, asks: str, scene: Scene, truth: object) -> Scenario:
+def stepped(name: str, asks: str, scene: Scene, dt: float, truth: Callable[[Array], Trajectory]) -> Scenario:
     """A scenario of a few steps, seen at every one."""
     steps = LEAD + 1 + AFTER
-    return Scenario(name, asks, SOURCE, scene, steps * DT, DT, (1,), truth=truth)  # type: ignore[arg-type]
+    return Scenario(name, asks, SOURCE, scene, steps * dt, dt, (1,), truth=truth)
 
 
 def at_speed(x: float, run: int, of: int, offset: float = 0.0) -> Scenario:

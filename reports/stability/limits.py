@@ -12,6 +12,7 @@ from reports.stability.players import PLAYERS, play_as
 from reports.stability.predicates import Predicate, Reading, judge
 from scenarios.model import Scenario
 
+EXACT = "the exact answer"
 LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND = "limit", "does not fail", "never works", "works only beyond"
 
 
@@ -75,7 +76,7 @@ class Case:
     ratio: float = 1.0
     most_runs: int = 10**6
     quick_runs: int = 10**6
-    beside: str = "the exact answer"
+    beside: str = EXACT
 
     def scan(self, form: Form) -> tuple[float, ...]:
         """The values to scan; the last of them always."""
@@ -106,6 +107,7 @@ class Trial:
     at: float = nan
     event: str = ""
     broken: str = ""
+    disk: int = 0
 
     @property
     def works(self) -> bool:
@@ -211,7 +213,7 @@ class Search:
         if first < 0:
             return Trial(value, count, failed, worst)
         broke = readings[first]
-        return Trial(value, count, failed, worst, first, broke.at, broke.event, broke.broken)
+        return Trial(value, count, failed, worst, first, broke.at, broke.event, broke.broken, broke.disk)
 
     def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
         """The limit, with all that was tried in the order of the scan."""

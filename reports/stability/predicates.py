@@ -12,13 +12,14 @@ from scenarios.model import Array, Scenario, Trajectory
 
 
 class Reading(NamedTuple):
-    """A number in the predicate's unit, when (s) and how it broke if it did, and what broke: a predicate's name."""
+    """A number in the predicate's unit; when (s), how and at which disk (-1: all) it broke, and what: a predicate."""
 
     value: float
     at: float = np.nan
     event: str = ""
     broken: str = ""
     failed: bool = False
+    disk: int = 0
 
 
 class Predicate(NamedTuple):
@@ -44,7 +45,7 @@ def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Reading:
     if run.status != "ok" or run.trajectory is None:
         outcome = "refused" if run.status == "unsupported" else run.status
         at = float(run.trajectory.t[-1]) if run.trajectory is not None else 0.0
-        return Reading(np.nan, at, f"{outcome}: {run.reason}", outcome, True)
+        return Reading(np.nan, at, run.reason, outcome, True)
     with np.errstate(over="ignore", invalid="ignore"):  # what was thrown far enough overflows, and fails
         reading = predicate.read(scenario, run.trajectory)
     if reading.value <= predicate.bound:

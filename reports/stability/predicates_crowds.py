@@ -22,16 +22,17 @@ def _energy_drifts(scenario: Scenario, played: Trajectory) -> Reading:
     energy = laws.energy(played, scenario.scene)
     off = np.abs(energy / energy[0] - 1)
     factor = energy[-1] / energy[0]
-    return Reading(
-        float(off.max()), first_above(played.t, off, ENERGY_DRIFTS.bound), f"the energy is {factor:.4g} of what it was"
-    )
+    at = first_above(played.t, off, ENERGY_DRIFTS.bound)
+    return Reading(float(off.max()), at, f"the energy is {factor:.4g} of what it was", disk=-1)
 
 
 def _gas_parts(scenario: Scenario, played: Trajectory) -> Reading:
     apart = np.linalg.norm(played.position - truth_of(scenario).position, axis=2) / scenario.scene.radius
     off = apart.max(axis=1)
     worst = int(np.argmax(apart[-1]))
-    return Reading(float(off.max()), first_above(played.t, off, GAS_PARTS.bound), f"disk {worst} is somewhere else")
+    return Reading(
+        float(off.max()), first_above(played.t, off, GAS_PARTS.bound), f"disk {worst} is somewhere else", disk=worst
+    )
 
 
 def beyond_chance(blocks: Array, expected: float) -> float:
@@ -53,7 +54,7 @@ def _temperatures_part(scenario: Scenario, played: Trajectory) -> Reading:
     blocks = np.log2(in_blocks(heavy) / in_blocks(light))
     off = max(0.0, abs(float(blocks.mean())) - ERRORS * float(blocks.std(ddof=1)) / np.sqrt(BLOCKS))
     at = first_above(played.t, np.abs(np.log2(heavy / light)), 1.0)
-    return Reading(off, at, f"heavy disks are {2 ** blocks.mean():.3g} times as hot as light ones")
+    return Reading(off, at, f"heavy disks are {2 ** blocks.mean():.3g} times as hot as light ones", disk=-1)
 
 
 def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
@@ -72,7 +73,7 @@ def _shape(scenario: Scenario, played: Trajectory) -> Reading:
     shape = (squared**2).mean(axis=1) / squared.mean(axis=1) ** 2
     off = beyond_chance(in_blocks(shape), ought) / MOST_OFF
     at = first_above(played.t, np.abs(shape / ought - 1), 0.5)
-    return Reading(off, at, f"<v4> / <v2>2 is {shape.mean():.3g}, not {ought:.3g}", "not Maxwell")
+    return Reading(off, at, f"<v4> / <v2>2 is {shape.mean():.3g}, not {ought:.3g}", "not Maxwell", disk=-1)
 
 
 def disk_hits(one: Trajectory) -> tuple[Array, Array]:
@@ -96,7 +97,7 @@ def _beside(what: str, played: Trajectory, other: Trajectory, pick: Pick) -> Rea
     error = np.sqrt((mine.var(ddof=1) + its.var(ddof=1)) / BLOCKS) / its.mean()
     ratio = mine.mean() / its.mean()
     off = max(0.0, abs(ratio - 1) - ERRORS * error) / MOST_OFF
-    return Reading(off, float(edges[1]), f"{ratio:.3g} times the {what} of the exact gas", what)
+    return Reading(off, float(edges[1]), f"{ratio:.3g} times the {what} of the exact gas", what, disk=-1)
 
 
 def _stands(scenario: Scenario, played: Trajectory) -> Reading:
@@ -107,10 +108,14 @@ def _stands(scenario: Scenario, played: Trajectory) -> Reading:
     worst = int(np.argmax(np.linalg.norm(played.position[-1] - played.position[0], axis=1)))
     sinks = Reading(
         float(moved.max()) / MOST_SINKING, first_above(played.t, moved, MOST_SINKING),
-        f"disk {worst} has moved by {moved.max():.3g} radii", "sinks",
+        f"disk {worst} has moved by {moved.max():.3g} radii", "sinks", disk=worst,
     )  # fmt: skip
     jitters = Reading(
-        jitter / MOST_JITTER, float(played.t[len(played) // 2]), f"trembles at {jitter:.3g} sqrt(g R)", "jitters"
+        jitter / MOST_JITTER,
+        float(played.t[len(played) // 2]),
+        f"trembles at {jitter:.3g} sqrt(g R)",
+        "jitters",
+        disk=-1,
     )
     return max(sinks, jitters)
 
@@ -137,13 +142,14 @@ def _bursts(scenario: Scenario, played: Trajectory) -> Reading:
     speed = (np.linalg.norm(played.velocity, axis=2) / scene.radius).max(axis=1)
     escapes = Reading(
         2.0 * float(outside.max()), first_above(played.t, outside.astype(float), 0.5),
-        f"{outside.max()} disks are out of the box", "escape",
+        f"{outside.max()} disks are out of the box", "escape", disk=-1,
     )  # fmt: skip
     flies = Reading(
         float(speed.max()) / MOST_SPEED,
         first_above(played.t, speed, MOST_SPEED),
-        f"{speed.max():.3g} radii/s",
+        f"a disk flies at {speed.max():.3g} radii/s",
         "energy",
+        disk=-1,
     )
     return max(escapes, flies)
 
@@ -151,7 +157,9 @@ def _bursts(scenario: Scenario, played: Trajectory) -> Reading:
 def _not_at_rest(scenario: Scenario, played: Trajectory) -> Reading:
     late = played.velocity[-max(1, len(played) // 10) :]
     speed = np.sqrt((late**2).sum(axis=2).mean(axis=1)) / own_speed(scenario)
-    return Reading(float(speed.max()), float(played.t[-len(late)]), f"still moves at {speed.max():.3g} sqrt(g R)")
+    return Reading(
+        float(speed.max()), float(played.t[-len(late)]), f"still moves at {speed.max():.3g} sqrt(g R)", disk=-1
+    )
 
 
 MOST_SINKING, MOST_JITTER, MOST_SPEED = 0.1, 0.02, 10.0  # radii; sqrt(g R); radii/s

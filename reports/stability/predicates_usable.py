@@ -25,7 +25,9 @@ def _rise(scenario: Scenario, played: Trajectory) -> Reading | None:
     energy = laws.energy(played, scenario.scene)
     rise = (energy - energy[0]) / (scales.energy(scenario) or 1.0)
     at = first_above(played.t, rise, MOST_RISE)
-    return Reading(float(rise.max()) / MOST_RISE, at, f"energy grows by {rise.max():.3g} of what is at hand", "energy")
+    return Reading(
+        float(rise.max()) / MOST_RISE, at, f"energy grows by {rise.max():.3g} of what is at hand", "energy", disk=-1
+    )
 
 
 def _overlap(scenario: Scenario, played: Trajectory) -> Reading | None:
@@ -33,7 +35,9 @@ def _overlap(scenario: Scenario, played: Trajectory) -> Reading | None:
         return None
     overlap = laws.penetration(played, scenario.scene)
     at = first_above(played.t, overlap, MOST_OVERLAP)
-    return Reading(float(overlap.max()) / MOST_OVERLAP, at, f"an overlap of {overlap.max():.3g} radii", "penetration")
+    return Reading(
+        float(overlap.max()) / MOST_OVERLAP, at, f"an overlap of {overlap.max():.3g} radii", "penetration", disk=-1
+    )
 
 
 def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
@@ -41,7 +45,9 @@ def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
         return None
     through = np.flatnonzero(laws.through_walls(played, scenario.scene))
     event = f"disk {through[0]} goes through a wall" if len(through) else ""
-    return Reading(2.0 * len(through), float(played.t[-1]), event, "escape")
+    return Reading(
+        2.0 * len(through), float(played.t[-1]), event, "escape", disk=int(through[0]) if len(through) else -1
+    )
 
 
 def _wrong_hits(scenario: Scenario, played: Trajectory) -> Reading | None:
@@ -52,7 +58,13 @@ def _wrong_hits(scenario: Scenario, played: Trajectory) -> Reading | None:
     played, true = cut(played, k), cut(true, k)
     found = match(played.collisions, true.collisions, float(true.t[-1]), scenario.dt(scenario.substeps[0]))
     at, what = found.first_wrong or (np.nan, "")
-    return Reading(2.0 * (len(found.missed) + len(found.invented)), at, what, "hits")
+    return Reading(
+        2.0 * (len(found.missed) + len(found.invented)),
+        at,
+        what,
+        "hits",
+        disk=int(what.split()[1].split("-")[0]) if what else -1,
+    )
 
 
 USABLE = Predicate(

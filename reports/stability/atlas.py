@@ -1,0 +1,194 @@
+"""The atlas: every case on every player through the runner, journalled as each ends, with its table of limits."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from math import nan
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import pandas as pd
+
+from reports.archive import Archive, save_trajectory
+from reports.cells import versions
+from reports.machine import about
+from reports.runner import Failure, run_all
+from reports.stability.cases import CASES
+from reports.stability.limits import EXACT, FORMS, NEVER_WORKS, Limit, Search, Trial, players_of
+from reports.stability.maps import MAPS, MapOf, map_of
+from reports.stability.reasons import explained
+from reports.stability.vary import case_of_file
+from reports.terminal import Progress
+
+COLUMNS = (
+    "engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "seeds", "reason",
+    "verdict", "failed_fraction", "runs", "monotone", "tested", "source", "event", "form",
+)  # fmt: skip
+TIMEOUT = {"quick": 120.0, "full": 1800.0}  # s a case may take on one player
+SLOWEST_FIRST = ("long_gas", "thermometer", "dense_gas", "pile_comes_to_rest", "bounce_drift", "equipartition")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is asked for: names of `CASES` or FILE.toml:vary, names of `MAPS`, rows of `ENGINES`, a key of `FORMS`."""
+
+    cases: Sequence[str]
+    maps: Sequence[str]
+    players: Sequence[str]
+    form: str
+    workers: int
+    command: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """A case or a map on a player: independent of every other."""
+
+    kind: str
+    name: str
+    player: str
+    form: str
+
+    def __call__(self, folder: Path) -> Limit | MapOf:
+        """In the worker: do it; the first failing run at the limit is saved."""
+        if self.kind == "map":
+            return map_of(self.name, self.player)
+        return found_limit(self, folder)
+
+
+def case_named(name: str) -> Any:
+    """A case of the table, or of a scene file: FILE.toml:vary."""
+    return CASES[name] if name in CASES else case_of_file(*name.rsplit(":", 1))
+
+
+def found_limit(task: Task, folder: Path) -> Limit:
+    """Search, and save the first failing run next to the limit."""
+    started = perf_counter()
+    search = Search(case_named(task.name), task.player, FORMS[task.form])
+    limit = replace(search.limit(), case=task.name, seconds=perf_counter() - started)
+    if (failure := search.failure(limit)) is not None and failure[1].trajectory is not None:
+        scenario, run = failure
+        assert run.trajectory is not None
+        save_trajectory(folder / "trajectories" / file_of(limit), run.trajectory)
+        if search.case.beside != EXACT:  # what it is shown beside was played, too
+            assert scenario.truth is not None
+            save_trajectory(folder / "trajectories" / f"truth.{file_of(limit)}", scenario.truth(scenario.times))
+    return limit
+
+
+def file_of(limit: Limit) -> str:
+    """The name of the failing run's file."""
+    name = f"{limit.case}.{limit.player}".replace("/", "_").replace(":", "-")
+    return f"{name}.npz" if len(name) < 200 else f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.npz"
+
+
+def carry_out(plan: Plan, folder: Path, done: Mapping[Task, dict[str, Any]], progress: Progress) -> None:
+    """Do every task that is not `done`; all goes into `folder`."""
+    archive = Archive(folder)
+    archive.begin(about(plan.command, 0) | {"form": plan.form})
+    for line in done.values():
+        archive.append(line)
+    tasks: dict[Any, Callable[[], Any]] = {
+        task: partial(task, folder) for task in tasks_of(plan) if task not in done
+    }  # fmt: skip
+    progress.start(len(tasks))
+    for task, result in run_all(tasks, plan.workers, TIMEOUT[plan.form]):
+        if isinstance(result, Failure):
+            result = failed(task, result)
+        archive.append({"task": asdict(task), task.kind: asdict(result)})
+        progress.done(f"{task.name}  {task.player}", getattr(result, "status", "ok"))
+    archive.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
+
+
+def tasks_of(plan: Plan) -> list[Task]:
+    """All tasks, the slowest first, so that none is left over at the end."""
+    tasks = [Task("map", name, player, plan.form) for name in plan.maps for player in MAPS[name].players(plan.players)]
+    for name in plan.cases:
+        tasks += [
+            Task("limit", name, player, plan.form)
+            for player in players_of(case_named(name))
+            if player.split("+")[0] in plan.players
+        ]
+    rank = {name: k for k, name in enumerate(SLOWEST_FIRST)}
+    return sorted(tasks, key=lambda task: rank.get(task.name, len(rank)))
+
+
+def failed(task: Task, failure: Failure) -> Limit | MapOf:
+    """What is known of a task whose worker died or was stopped."""
+    if task.kind == "map":
+        return MapOf(task.name, task.player, (), status=failure.status)
+    event = f"{failure.status}: {failure.reason}"
+    trial = Trial(nan, 1, 1, nan, 0, nan, event, failure.status)
+    return Limit(task.name, task.player, task.form, NEVER_WORKS, nan, nan, (trial,), status=failure.status)
+
+
+def read(folder: Path) -> tuple[list[Limit], list[MapOf], dict[str, Any]]:
+    """The limits with their reasons and the maps of a folder, in reading order; and its header."""
+    archive = Archive(folder)
+    lines = list(archive.lines())
+    limits = [limit_from(line["limit"]) for line in lines if "limit" in line]
+    maps = [MapOf.from_record(line["map"]) for line in lines if "map" in line]
+    order = {name: k for k, name in enumerate(CASES)}
+    players = list(dict.fromkeys(player for case in CASES.values() for player in players_of(case)))
+    limits.sort(key=lambda limit: (order.get(limit.case, len(order)), limit.case, players.index(limit.player)))
+    maps.sort(key=lambda one: (list(MAPS).index(one.name), players.index(one.player)))
+    return explained(limits), maps, archive.header()
+
+
+def limit_from(record: dict[str, Any]) -> Limit:
+    """The limit of a line of the journal, where what is not finite is text."""
+    trials = tuple(Trial(**numbers(trial)) for trial in record["trials"])
+    return Limit(**numbers(record) | {"trials": trials})
+
+
+def numbers(record: dict[str, Any]) -> dict[str, Any]:
+    """The record with "nan", "inf" and "-inf" as numbers again."""
+    return {key: float(value) if value in ("nan", "inf", "-inf") else value for key, value in record.items()}
+
+
+def done_before(folder: Path, plan: Plan) -> dict[Task, dict[str, Any]]:
+    """The lines of the tasks that ended well in an earlier, interrupted run of the same versions."""
+    archive = Archive(folder)
+    now = about(plan.command, 0)["versions"]
+    if not archive.journal.is_file() or archive.header()["versions"] != now:
+        return {}
+    lines = [line for line in archive.lines() if "task" in line]
+    wanted = set(tasks_of(plan))
+    ended = {Task(**line["task"]): line for line in lines if line.get("limit", {}).get("status", "ok") == "ok"}
+    return {task: line for task, line in ended.items() if task in wanted}
+
+
+def table(limits: Sequence[Limit]) -> pd.DataFrame:
+    """A row a limit, columns `COLUMNS`."""
+    return pd.DataFrame([row_of(limit) for limit in limits], columns=list(COLUMNS))
+
+
+def row_of(limit: Limit) -> dict[str, Any]:
+    """The limit as a row of limits.csv."""
+    case, failing = case_named(limit.case), limit.failing or (limit.trials[0] if limit.status != "ok" else None)
+    engine, profile = limit.player.split(":")
+    reason = limit.reason if limit.tested or not limit.reason else f"likely: {limit.reason}"
+    return {
+        "engine": engine, "profile": profile, "case": limit.case, "parameter": case.parameter,
+        "works_at": shortened(limit.works_at), "fails_at": shortened(limit.fails_at), "unit": case.unit,
+        "predicate": failing.broken if failing else case.predicate.name,
+        "seeds": max(trial.runs for trial in limit.trials), "reason": reason, "verdict": limit.verdict,
+        "failed_fraction": failing.failed / failing.runs if failing else 0.0, "runs": limit.runs,
+        "monotone": limit.monotone, "tested": limit.tested, "source": limit.source,
+        "event": failing.event if failing else "", "form": limit.form,
+    }  # fmt: skip
+
+
+def shortened(value: float) -> float:
+    """To six significant digits: brackets are wider."""
+    return value if math.isnan(value) else float(f"{value:.6g}")
+
+
+def known_versions() -> str:
+    """What the limits belong to."""
+    return ", ".join(f"{name} {version}" for name, version in versions().items())

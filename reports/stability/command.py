@@ -1,0 +1,137 @@
+"""`crosscheck stability`: check what is asked for, find the limits, write limits.csv, maps.csv and stability.html."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+import pandas as pd
+from rich.console import Console
+from rich.table import Table
+
+from adapters.engines import ENGINES
+from reports.commands import DONE, FAILED, INTERRUPTED, checked_engines, refuse, say, unknown
+from reports.stability.atlas import Plan, carry_out, case_named, done_before, read, table
+from reports.stability.cases import CASES
+from reports.stability.limits import NEVER_FAILS, NEVER_WORKS, Limit
+from reports.stability.maps import MAPS, MapOf
+from reports.stability.page import write_page
+from reports.stability.vary import VARIES
+from reports.style import number
+from reports.suite import FolderTaken, may_write, replace_folder
+from reports.terminal import Progress
+from scenarios.files import SceneFileError, read_scene_file
+
+
+def find_limits(
+    names: Sequence[str], vary: Sequence[str], engines: Sequence[str], full: bool, resume: bool, out: Path,
+    workers: int, command: str,
+) -> NoReturn:  # fmt: skip
+    """Find the limits of `names`, all cases and maps if there are none, into `out`; exits 0, 1, 2 or 130."""
+    cases, maps = checked(names, vary)
+    form = "full" if full else "quick"
+    plan = Plan(cases, maps, checked_engines(engines), form, workers or os.cpu_count() or 1, command)
+    out = out.resolve()
+    try:
+        may_write(out)
+        out.parent.mkdir(parents=True, exist_ok=True)
+    except FolderTaken as fault:
+        refuse([str(fault)])
+    except OSError as fault:
+        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
+    part = out.with_name(f"{out.name}.part")
+    try:
+        with Progress() as progress:
+            play_all(plan, part, resume, progress)
+            progress.say("writing the table and the page")
+            limits, pages = read(part)[:2]
+            write_files(part)
+        replace_folder(part, out)
+    except KeyboardInterrupt:
+        say(f"\nInterrupted. What has ended is kept in {part}: ask again with --resume")
+        sys.exit(INTERRUPTED)
+    except OSError as fault:
+        say(f"cannot write to {part}: {fault.strerror or fault}")
+        sys.exit(FAILED)
+    finish(limits, pages, out)
+
+
+def play_all(plan: Plan, part: Path, resume: bool, progress: Progress) -> None:
+    """Play what is not done; without `resume` nothing is."""
+    done = done_before(part, plan) if resume else {}
+    if done:
+        (part / "journal.jsonl").unlink()
+    else:
+        shutil.rmtree(part, ignore_errors=True)
+    carry_out(plan, part, done, progress)
+
+
+def write_files(folder: Path) -> None:
+    """limits.csv, maps.csv and stability.html from the journal."""
+    limits, maps, header = read(folder)
+    rows = table(limits)
+    rows.to_csv(folder / "limits.csv", index=False)
+    cells = [(one.name, one.player, *cell) for one in maps for cell in one.cells]
+    columns = ["map", "player", "x", "y", "reading", "failed", "event"]
+    pd.DataFrame(cells, columns=columns).to_csv(folder / "maps.csv", index=False)
+    write_page(folder / "stability.html", folder, limits, maps, header)
+
+
+def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The cases and the maps that are meant; exits 2 with every fault, one line each."""
+    faults = [unknown("--vary", what, VARIES) for what in vary if what not in VARIES]
+    cases, maps = [], []
+    for name in names:
+        if name.endswith(".toml"):
+            try:
+                read_scene_file(name)
+            except SceneFileError as error:
+                faults += error.faults
+            cases += [f"{name}:{what}" for what in vary or VARIES]
+        elif name in CASES:
+            cases.append(name)
+        elif name in MAPS:
+            maps.append(name)
+        else:
+            faults.append(unknown("case", name, [*CASES, *MAPS]) + " (a scene file ends in .toml)")
+    if vary and not any(name.endswith(".toml") for name in names):
+        faults.append(f"--vary {vary[0]}: varies a scene file, and none is named; name FILE.toml")
+    if faults:
+        refuse([fault.replace("crosscheck list", "crosscheck stability --help") for fault in faults])
+    return (list(dict.fromkeys(cases)), maps) if names else (list(CASES), list(MAPS))
+
+
+def finish(limits: Sequence[Limit], maps: Sequence[MapOf], out: Path) -> NoReturn:
+    """Print a table and where the page is; exit 1 if a task ended without a result."""
+    console = Console()
+    rows = Table(title="Where they fail", title_justify="left", box=None, padding=(0, 1, 0, 0))
+    shown = list(dict.fromkeys(limit.case for limit in limits))
+    players = [name for name in ENGINES if any(limit.player == name for limit in limits)]
+    rows.add_column("case, parameter", no_wrap=True)
+    for player in players:
+        rows.add_column(player.replace(":", "\n"), justify="right", no_wrap=True)
+    found = {(limit.case, limit.player): limit for limit in limits}
+    for name in shown:
+        cells = [in_words(found[name, player]) if (name, player) in found else "" for player in players]
+        rows.add_row(f"{Path(name).name}, {case_named(name).parameter}", *cells)
+    console.print(rows)
+    console.print("A number: fails there. –: does not fail as far as was tried. never: fails everywhere.")
+    console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
+    lost = [f"{one.case} on {one.player}" for one in limits if one.status != "ok"]
+    lost += [f"{one.name} on {one.player}" for one in maps if one.status != "ok"]
+    if lost:
+        say(f"no result: {', '.join(lost)}")
+    sys.exit(FAILED if lost else DONE)
+
+
+def in_words(limit: Limit) -> str:
+    """The limit in a few letters."""
+    if limit.verdict == NEVER_FAILS:
+        return "–"
+    if limit.verdict == NEVER_WORKS:
+        return "never" if limit.status == "ok" else limit.status
+    return number(limit.fails_at) + ("" if limit.monotone else "*")
