@@ -124,7 +124,8 @@ ALONE = (
     Case(
         "bounce_drift", FAMILY, "Up to which dt does a ball at e = 1 come back to its height?",
         "dt / fall time", "1", (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2),
-        ball, APEX_DRIFTS, quick_values=(0.003, 0.007, 0.015, 0.05, 0.1, 0.2), also=("box2d_v3:matched+16_substeps", "pymunk:matched+push_out"),
+        ball, APEX_DRIFTS, quick_values=(0.003, 0.007, 0.015, 0.05, 0.1, 0.2),
+        also=("box2d_v3:matched+16_substeps", "pymunk:matched+push_out"),
     ),
     Case(
         "scale_up", FAMILY, "How much larger may a scene be made and stay the same?",
