@@ -29,7 +29,7 @@ COLUMNS = (
     "engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "seeds", "reason",
     "verdict", "failed_fraction", "runs", "monotone", "tested", "source", "event", "form",
 )  # fmt: skip
-TIMEOUT = {"quick": 120.0, "full": 1800.0}  # s a case may take on one player
+TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one player
 SLOWEST_FIRST = ("long_gas", "thermometer", "dense_gas", "pile_comes_to_rest", "bounce_drift", "equipartition")
 
 

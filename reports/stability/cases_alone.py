@@ -23,17 +23,21 @@ FALLS = 20  # the drop and nine and a half bounces
 OSCILLATION = 400  # steps
 
 
-def ball(x: float, _run: int, _of: int) -> Scenario:
-    """A ball at e = 1 dropped over a floor; x = dt over the time of the fall."""
+def ball(x: float, run: int, of: int) -> Scenario:
+    """A ball at e = 1 dropped over a floor; x = dt over the time of the fall.
+
+    The runs differ in height by up to 3 %: where a fall lasts a whole number of steps, some methods are flattered.
+    """
+    height = HEIGHT * (1 + 0.03 * (run + 0.382) / of)
     steps = round(FALLS / x)
     dt = FALLS * FALL / steps
     scene = lay_out(
-        position=[[0, RADIUS + HEIGHT]], velocity=[[0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0,
+        position=[[0, RADIUS + height]], velocity=[[0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0,
         gravity=[0, -G], walls=[[[-4, 0], [4, 0]]],
     )  # fmt: skip
 
     def truth(t: Array) -> Trajectory:
-        legs = bouncing(HEIGHT, G, 1.0, t[-1])
+        legs = bouncing(height, G, 1.0, t[-1])
         gap, speed = legs.at(t)
         position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + RADIUS, speed))
         return answer(scene, t, (position, velocity), legs.wall_hits(0, (0,), 1.0, 1.0))
@@ -124,7 +128,7 @@ ALONE = (
     Case(
         "bounce_drift", FAMILY, "Up to which dt does a ball at e = 1 come back to its height?",
         "dt / fall time", "1", (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2),
-        ball, APEX_DRIFTS, quick_values=(0.003, 0.007, 0.015, 0.05, 0.1, 0.2),
+        ball, APEX_DRIFTS, drawn=True, quick_runs=2, most_runs=8, quick_values=(0.003, 0.007, 0.015, 0.05, 0.1, 0.2),
         also=("box2d_v3:matched+16_substeps", "pymunk:matched+push_out"),
     ),
     Case(

@@ -24,6 +24,15 @@ class Cell(NamedTuple):
     failed: bool = False
 
 
+class Why(NamedTuple):
+    """A reason in words, where it stands, how it was tested, and the players it is given for."""
+
+    text: str
+    source: str
+    tested: str
+    players: list[str]
+
+
 class MapTable(NamedTuple):
     """A player's map: a row a y, from large to small, a cell an x."""
 
@@ -61,6 +70,15 @@ def why(limit: Limit) -> str:
     if not limit.reason:
         return "" if limit.verdict == NEVER_FAILS else "Not explained."
     return limit.reason[0].upper() + limit.reason[1:] + "." if limit.tested else f"Likely: {limit.reason}."
+
+
+def reasons(limits: Sequence[Limit]) -> list[Why]:
+    """Every reason once, with the players it is given for, in the order of appearance."""
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for limit in limits:
+        if limit.verdict != NEVER_FAILS:
+            found.setdefault((why(limit), limit.source, limit.tested), []).append(limit.player)
+    return [Why(*key, players) for key, players in found.items()]
 
 
 def bracket(limit: Limit) -> tuple[str, str]:

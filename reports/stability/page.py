@@ -45,6 +45,7 @@ class Section:
     case: Case
     limits: list[Limit]
     replays: list[Replay]
+    reasons: list[overview.Why]
     drawing: Drawing
     charts: str
 
@@ -90,7 +91,7 @@ def section_of(case: Case, limits: list[Limit], folder: Path) -> Section:
     """All that the page shows of one case."""
     replays = [replay for limit in limits if (replay := replay_of(case, limit, folder)) is not None]
     drawing = readings(case, limits)
-    return Section(case, limits, replays, drawing, packed_charts({"readings": drawing}))
+    return Section(case, limits, replays, overview.reasons(limits), drawing, packed_charts({"readings": drawing}))
 
 
 def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
@@ -147,6 +148,8 @@ def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, 
 def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
     """The worst reading of every player against the parameter, and the bound above which it fails."""
     predicate = case.predicate
+    if predicate.bound == 0:
+        return shares(case, limits)
     title = f"{predicate.name.capitalize()}, {predicate.unit}"
     caption = (
         f"The worst of all runs at each {case.parameter}, harsher to the right; above the dotted line it fails. "
@@ -160,12 +163,27 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
             lines.append(Line(named(limit), x, np.abs(y)))
     if not lines or not any((line.y > 0).any() for line in lines):
         return Drawing(title, "No player reads more than 0 anywhere.", None)
-    harsh_left = case.values[0] > case.values[-1]
-    x_axis = {"title": f"{case.parameter} ({case.unit})" if case.unit != "1" else case.parameter, "type": "log"}
-    x_axis |= {"autorange": "reversed"} if harsh_left else {}
     ends = [min(case.values), max(case.values)]
     guide = {
         "type": "scatter", "x": shortened(ends), "y": [predicate.bound or None] * 2, "mode": "lines", "name": "bound",
         "hoverinfo": "skip", "line": {"color": style.look(style.TRUTH).light, "dash": "dot", "width": 1.3},
     }  # fmt: skip
-    return Drawing(title, caption, figure_of(lines, x_axis, predicate.unit, markers=40, guide=[guide]))
+    return Drawing(title, caption, figure_of(lines, axis_of(case), predicate.unit, markers=40, guide=[guide]))
+
+
+def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
+    """The share of runs that failed against the parameter, where a run has nothing else to read."""
+    lines = []
+    for limit in limits:
+        x, y = (np.array(pair, float) for pair in zip(*((t.value, t.failed / t.runs) for t in limit.trials)))
+        lines.append(Line(named(limit), x, y))
+    caption = f"How many of the runs at each {case.parameter} failed; harsher to the right."
+    title = f"{case.predicate.name.capitalize()}, share of runs"
+    return Drawing(title, caption, figure_of(lines, axis_of(case), "share of runs", log=False, markers=40))
+
+
+def axis_of(case: Case) -> dict[str, Any]:
+    """The parameter's axis, logarithmic, harsher to the right."""
+    harsh_left = case.values[0] > case.values[-1]
+    title = case.parameter if case.unit == "1" else f"{case.parameter} ({case.unit})"
+    return {"title": title, "type": "log"} | ({"autorange": "reversed"} if harsh_left else {})
