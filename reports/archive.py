@@ -24,7 +24,7 @@ from reports.cells import Cell, scene_hash
 from scenarios.model import Collisions, Scenario, Trajectory, frozen
 
 FILES = ("journal.jsonl", "trajectories", "scenes", "machine.json", "deviations.csv", "runs.csv", "report.html",
-         "limits.csv", "maps.csv", "stability.html")  # fmt: skip
+         "limits.csv", "maps.csv", "laws.csv", "stability.html")  # fmt: skip
 ARRAYS = ("t", "position", "velocity", "angle", "angular_velocity")
 HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
 

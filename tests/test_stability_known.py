@@ -14,6 +14,7 @@ from reports.stability.cases_alone import ball, far, on_spring, oscillator
 from reports.stability.limits import QUICK, Limit, Search
 from reports.stability.players import play_as
 from reports.stability.predicates import apex_drift
+from reports.stability.touching import TOUCHING, law_of
 from scenarios.model import Trajectory
 
 PARTNERS = [f"{engine}:{profile}" for engine in ("box2d", "box2d_v3") for profile in ("shipped", "matched")]
@@ -168,3 +169,25 @@ def test_a_wrong_threshold_would_be_noticed():
     found = Search(faster, "box2d:shipped", QUICK).limit()
 
     assert not min(found.works_at, found.fails_at) <= 1.0 <= max(found.works_at, found.fails_at)
+
+
+@pytest.mark.parametrize(
+    ("scene", "player", "law"),
+    [
+        ("touching_row", "pymunk:matched", "pair after pair"),
+        ("touching_row", "box2d:matched", "all contacts at once"),
+        ("touching_row", "box2d_v3:matched", "none"), ("touching_break", "reference:exercise", "pair after pair"),
+        ("touching_break", "pymunk:matched", "all contacts at once"), ("touching_break", "box2d_v3:matched", "none"),
+    ],
+)  # fmt: skip
+def test_touching_disks_are_hit_after_the_law_that_the_engine_is_known_for(scene: str, player: str, law: str):
+    """engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to neither."""
+    assert law_of(scene, player).law == law
+
+
+def test_the_named_laws_keep_momentum_and_energy():
+    """Whatever is compared with is at least possible."""
+    for one in TOUCHING.values():
+        for velocity in (v for answers in one.laws.values() for v in answers):
+            assert velocity.sum(axis=0) == pytest.approx([1, 0], abs=1e-15)
+            assert (velocity**2).sum() == pytest.approx(1.0)

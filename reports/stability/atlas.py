@@ -9,19 +9,19 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import nan
 from pathlib import Path
-from time import perf_counter
-from typing import Any
+from time import process_time
+from typing import Any, NamedTuple
 
 import pandas as pd
 
 from reports.archive import Archive, save_trajectory
-from reports.cells import versions
 from reports.machine import about
 from reports.runner import Failure, run_all
 from reports.stability.cases import CASES
 from reports.stability.limits import EXACT, FORMS, NEVER_WORKS, Limit, Search, Trial, players_of
 from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.reasons import explained
+from reports.stability.touching import TOUCHING, LawOf, law_of
 from reports.stability.vary import case_of_file
 from reports.terminal import Progress
 
@@ -35,10 +35,11 @@ SLOWEST_FIRST = ("long_gas", "thermometer", "dense_gas", "pile_comes_to_rest", "
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked for: names of `CASES` or FILE.toml:vary, names of `MAPS`, rows of `ENGINES`, a key of `FORMS`."""
+    """What is asked for: names of `CASES` or FILE.toml:vary, of `MAPS`, `TOUCHING` and `ENGINES`, a key of `FORMS`."""
 
     cases: Sequence[str]
     maps: Sequence[str]
+    touching: Sequence[str]
     players: Sequence[str]
     form: str
     workers: int
@@ -47,18 +48,21 @@ class Plan:
 
 @dataclass(frozen=True)
 class Task:
-    """A case or a map on a player: independent of every other."""
+    """A case, a map or a scene of touching disks on a player: independent of every other."""
 
     kind: str
     name: str
     player: str
     form: str
 
-    def __call__(self, folder: Path) -> Limit | MapOf:
+    def __call__(self, folder: Path) -> Limit | MapOf | LawOf:
         """In the worker: do it; the first failing run at the limit is saved."""
-        if self.kind == "map":
-            return map_of(self.name, self.player)
-        return found_limit(self, folder)
+        if self.kind == "limit":
+            return found_limit(self, folder)
+        if self.kind == "law":
+            return law_of(self.name, self.player)
+        started = process_time()
+        return replace(map_of(self.name, self.player), seconds=process_time() - started)
 
 
 def case_named(name: str) -> Any:
@@ -68,9 +72,9 @@ def case_named(name: str) -> Any:
 
 def found_limit(task: Task, folder: Path) -> Limit:
     """Search, and save the first failing run next to the limit."""
-    started = perf_counter()
+    started = process_time()
     search = Search(case_named(task.name), task.player, FORMS[task.form])
-    limit = replace(search.limit(), case=task.name, seconds=perf_counter() - started)
+    limit = replace(search.limit(), case=task.name, seconds=process_time() - started)
     if (failure := search.failure(limit)) is not None and failure[1].trajectory is not None:
         scenario, run = failure
         assert run.trajectory is not None
@@ -108,6 +112,7 @@ def carry_out(plan: Plan, folder: Path, done: Mapping[Task, dict[str, Any]], pro
 def tasks_of(plan: Plan) -> list[Task]:
     """All tasks, the slowest first, so that none is left over at the end."""
     tasks = [Task("map", name, player, plan.form) for name in plan.maps for player in MAPS[name].players(plan.players)]
+    tasks += [Task("law", name, player, plan.form) for name in plan.touching for player in plan.players]
     for name in plan.cases:
         tasks += [
             Task("limit", name, player, plan.form)
@@ -118,26 +123,39 @@ def tasks_of(plan: Plan) -> list[Task]:
     return sorted(tasks, key=lambda task: rank.get(task.name, len(rank)))
 
 
-def failed(task: Task, failure: Failure) -> Limit | MapOf:
+def failed(task: Task, failure: Failure) -> Limit | MapOf | LawOf:
     """What is known of a task whose worker died or was stopped."""
     if task.kind == "map":
         return MapOf(task.name, task.player, (), status=failure.status)
+    if task.kind == "law":
+        return LawOf(task.name, task.player, failure.status, nan, (), status=failure.status)
     event = f"{failure.status}: {failure.reason}"
     trial = Trial(nan, 1, 1, nan, 0, nan, event, failure.status)
     return Limit(task.name, task.player, task.form, NEVER_WORKS, nan, nan, (trial,), status=failure.status)
 
 
-def read(folder: Path) -> tuple[list[Limit], list[MapOf], dict[str, Any]]:
-    """The limits with their reasons and the maps of a folder, in reading order; and its header."""
+class Atlas(NamedTuple):
+    """All that was found: the limits with their reasons, the maps, the laws of touching disks, and the header."""
+
+    limits: list[Limit]
+    maps: list[MapOf]
+    laws: list[LawOf]
+    header: dict[str, Any]
+
+
+def read(folder: Path) -> Atlas:
+    """The atlas in a folder, in reading order."""
     archive = Archive(folder)
     lines = list(archive.lines())
     limits = [limit_from(line["limit"]) for line in lines if "limit" in line]
     maps = [MapOf.from_record(line["map"]) for line in lines if "map" in line]
+    laws = [LawOf.from_record(line["law"]) for line in lines if "law" in line]
     order = {name: k for k, name in enumerate(CASES)}
     players = list(dict.fromkeys(player for case in CASES.values() for player in players_of(case)))
     limits.sort(key=lambda limit: (order.get(limit.case, len(order)), limit.case, players.index(limit.player)))
     maps.sort(key=lambda one: (list(MAPS).index(one.name), players.index(one.player)))
-    return explained(limits), maps, archive.header()
+    laws.sort(key=lambda one: (list(TOUCHING).index(one.name), players.index(one.player)))
+    return Atlas(explained(limits), maps, laws, archive.header())
 
 
 def limit_from(record: dict[str, Any]) -> Limit:
@@ -187,8 +205,3 @@ def row_of(limit: Limit) -> dict[str, Any]:
 def shortened(value: float) -> float:
     """To six significant digits: brackets are wider."""
     return value if math.isnan(value) else float(f"{value:.6g}")
-
-
-def known_versions() -> str:
-    """What the limits belong to."""
-    return ", ".join(f"{name} {version}" for name, version in versions().items())

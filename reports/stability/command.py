@@ -15,11 +15,12 @@ from rich.table import Table
 
 from adapters.engines import ENGINES
 from reports.commands import DONE, FAILED, INTERRUPTED, checked_engines, refuse, say, unknown
-from reports.stability.atlas import Plan, carry_out, case_named, done_before, read, table
+from reports.stability.atlas import Atlas, Plan, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, NEVER_WORKS, Limit
-from reports.stability.maps import MAPS, MapOf
+from reports.stability.maps import MAPS
 from reports.stability.page import write_page
+from reports.stability.touching import TOUCHING
 from reports.stability.vary import VARIES
 from reports.style import number
 from reports.suite import FolderTaken, may_write, replace_folder
@@ -32,9 +33,9 @@ def find_limits(
     workers: int, command: str,
 ) -> NoReturn:  # fmt: skip
     """Find the limits of `names`, all cases and maps if there are none, into `out`; exits 0, 1, 2 or 130."""
-    cases, maps = checked(names, vary)
+    cases, maps, touching = checked(names, vary)
     form = "full" if full else "quick"
-    plan = Plan(cases, maps, checked_engines(engines), form, workers or os.cpu_count() or 1, command)
+    plan = Plan(cases, maps, touching, checked_engines(engines), form, workers or os.cpu_count() or 1, command)
     out = out.resolve()
     try:
         may_write(out)
@@ -48,8 +49,7 @@ def find_limits(
         with Progress() as progress:
             play_all(plan, part, resume, progress)
             progress.say("writing the table and the page")
-            limits, pages = read(part)[:2]
-            write_files(part)
+            found = write_files(part)
         replace_folder(part, out)
     except KeyboardInterrupt:
         say(f"\nInterrupted. What has ended is kept in {part}: ask again with --resume")
@@ -57,7 +57,7 @@ def find_limits(
     except OSError as fault:
         say(f"cannot write to {part}: {fault.strerror or fault}")
         sys.exit(FAILED)
-    finish(limits, pages, out)
+    finish(found, out)
 
 
 def play_all(plan: Plan, part: Path, resume: bool, progress: Progress) -> None:
@@ -70,21 +70,24 @@ def play_all(plan: Plan, part: Path, resume: bool, progress: Progress) -> None:
     carry_out(plan, part, done, progress)
 
 
-def write_files(folder: Path) -> None:
-    """limits.csv, maps.csv and stability.html from the journal."""
-    limits, maps, header = read(folder)
-    rows = table(limits)
-    rows.to_csv(folder / "limits.csv", index=False)
-    cells = [(one.name, one.player, *cell) for one in maps for cell in one.cells]
+def write_files(folder: Path) -> Atlas:
+    """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
+    atlas = read(folder)
+    table(atlas.limits).to_csv(folder / "limits.csv", index=False)
+    laws = [(one.name, one.player, one.law, one.off) for one in atlas.laws]
+    pd.DataFrame(laws, columns=["scene", "player", "law", "off"]).to_csv(folder / "laws.csv", index=False)
+    cells = [(one.name, one.player, *cell) for one in atlas.maps for cell in one.cells]
     columns = ["map", "player", "x", "y", "reading", "failed", "event"]
     pd.DataFrame(cells, columns=columns).to_csv(folder / "maps.csv", index=False)
-    write_page(folder / "stability.html", folder, limits, maps, header)
+    write_page(folder / "stability.html", folder, atlas)
+    return atlas
 
 
-def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The cases and the maps that are meant; exits 2 with every fault, one line each."""
+def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
+    """The cases, the maps and the scenes of touching disks that are meant; exits 2 with every fault, one line each."""
     faults = [unknown("--vary", what, VARIES) for what in vary if what not in VARIES]
-    cases, maps = [], []
+    cases: list[str] = []
+    maps, touching = [name for name in names if name in MAPS], [name for name in names if name in TOUCHING]
     for name in names:
         if name.endswith(".toml"):
             try:
@@ -94,20 +97,19 @@ def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[
             cases += [f"{name}:{what}" for what in vary or VARIES]
         elif name in CASES:
             cases.append(name)
-        elif name in MAPS:
-            maps.append(name)
-        else:
-            faults.append(unknown("case", name, [*CASES, *MAPS]) + " (a scene file ends in .toml)")
+        elif name not in MAPS and name not in TOUCHING:
+            faults.append(unknown("case", name, [*CASES, *MAPS, *TOUCHING]) + " (a scene file ends in .toml)")
     if vary and not any(name.endswith(".toml") for name in names):
         faults.append(f"--vary {vary[0]}: varies a scene file, and none is named; name FILE.toml")
     if faults:
         refuse([fault.replace("crosscheck list", "crosscheck stability --help") for fault in faults])
-    return (list(dict.fromkeys(cases)), maps) if names else (list(CASES), list(MAPS))
+    return (list(dict.fromkeys(cases)), maps, touching) if names else (list(CASES), list(MAPS), list(TOUCHING))
 
 
-def finish(limits: Sequence[Limit], maps: Sequence[MapOf], out: Path) -> NoReturn:
+def finish(atlas: Atlas, out: Path) -> NoReturn:
     """Print a table and where the page is; exit 1 if a task ended without a result."""
-    console = Console()
+    console = Console(width=max(Console().width, 120))  # a row that is cut off would be no use to anybody
+    limits = atlas.limits
     rows = Table(title="Where they fail", title_justify="left", box=None, padding=(0, 1, 0, 0))
     shown = list(dict.fromkeys(limit.case for limit in limits))
     players = [name for name in ENGINES if any(limit.player == name for limit in limits)]
@@ -122,7 +124,8 @@ def finish(limits: Sequence[Limit], maps: Sequence[MapOf], out: Path) -> NoRetur
     console.print("A number: fails there. –: does not fail as far as was tried. never: fails everywhere.")
     console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
     lost = [f"{one.case} on {one.player}" for one in limits if one.status != "ok"]
-    lost += [f"{one.name} on {one.player}" for one in maps if one.status != "ok"]
+    lost += [f"{one.name} on {one.player}" for one in atlas.maps if one.status != "ok"]
+    lost += [f"{one.name} on {one.player}" for one in atlas.laws if one.status != "ok"]
     if lost:
         say(f"no result: {', '.join(lost)}")
     sys.exit(FAILED if lost else DONE)

@@ -127,6 +127,7 @@ class Limit:
         fails_at: the value next to it at which some run failed; nan: none.
         trials: every value tried, from gentle to harsh.
         monotone: False if it works again beyond a value at which it fails.
+        seconds: of processor time that the search took.
         reason, source, tested: why, where that stands, and how it was tested: "" is a likely reason.
     """
 

@@ -53,12 +53,13 @@ class Map:
 
 @dataclass(frozen=True)
 class MapOf:
-    """A map on a player: rows (x, y, worst reading, whether a run failed, what broke)."""
+    """A map on a player: rows (x, y, worst reading, whether a run failed, what broke); s of processor time it took."""
 
     name: str
     player: str
     cells: tuple[tuple[float, float, float, bool, str], ...]
     status: str = "ok"
+    seconds: float = nan
 
     @staticmethod
     def from_record(record: dict[str, Any]) -> MapOf:

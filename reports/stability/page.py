@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,10 @@ from reports.charts import Drawing, Line, figure_of, shortened
 from reports.page import HERE, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
 from reports.replay import pack_layers, ratio_of
 from reports.stability import overview
-from reports.stability.atlas import case_named, file_of
+from reports.stability.atlas import Atlas, case_named, file_of
 from reports.stability.limits import EXACT, Case, Limit, Trial
-from reports.stability.maps import MAPS, MapOf
+from reports.stability.maps import MAPS
+from reports.stability.touching import TOUCHING
 from scenarios.model import Scenario, Trajectory
 
 FRAMES = 120  # samples that are shown before a failure, and after it
@@ -59,15 +60,15 @@ class Section:
         return next((replay for replay in self.replays if replay.player == player), None)
 
 
-def write_page(
-    path: Path, folder: Path, limits: Sequence[Limit], maps: Sequence[MapOf], about: Mapping[str, Any]
-) -> None:
-    """Write the page of these limits and maps, whose failing runs are in `folder`, to `path`."""
+def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
+    """Write the page of an atlas, whose failing runs are in `folder`, to `path`."""
+    limits, maps, laws = atlas.limits, atlas.maps, atlas.laws
     by_case: dict[str, list[Limit]] = {}
     for limit in limits:
         by_case.setdefault(limit.case, []).append(limit)
     sections = [section_of(case_named(name), found, folder) for name, found in by_case.items()]
-    names = list(dict.fromkeys([limit.player for limit in limits] + [one.player for one in maps]))
+    names = [limit.player for limit in limits] + [one.player for one in maps] + [one.player for one in laws]
+    names = list(dict.fromkeys(names))
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
     plotly, scripts = get_plotlyjs(), [(HERE / script).read_text() for script in SCRIPTS]
     scripts.append((HERE / "stability" / "stability.js").read_text())
@@ -77,9 +78,9 @@ def write_page(
     )  # fmt: skip
     environment.filters["number"] = style.number
     html = environment.get_template("stability.html.j2").render(
-        sections=sections, families=overview.families(sections), findings=overview.findings(limits), about=about,
+        sections=sections, families=overview.families(sections), findings=overview.findings(limits), about=atlas.header,
         players=[name for name in names if "+" not in name], looks=looks, cell_of=overview.cell_of,
-        maps=overview.map_tables(maps), all_maps=MAPS, words=overview, exact=EXACT,
+        maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, words=overview, exact=EXACT,
         css=Markup(css() + (HERE / "stability" / "stability.css").read_text()),
         looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
