@@ -8,6 +8,7 @@ from math import inf, nan
 from pathlib import Path
 from typing import NamedTuple
 
+from reports import style
 from reports.stability.limits import Limit
 
 FILE = Path(__file__).with_name("stability_limits.csv")
@@ -60,7 +61,6 @@ IN_README = {
     "far_from_origin": "distance from the origin, m",
     "spin": "turn in a step, rad",
     "bounce_drift": "dt over fall time, ball at e = 1",
-    "stiff_push": "w dt of a spring's push",
     "column": "disks on each other",
     "fast_gas": "way in a step over radius, gas at e = 1",
 }
@@ -81,7 +81,7 @@ def readme_table() -> str:
 
 def in_words(row: Kept) -> str:
     """Where it fails, to two digits."""
-    return {"does not fail": "–", "never works": "everywhere"}.get(row.verdict, f"{row.fails_at:.2g}")
+    return {"does not fail": "–", "never works": "everywhere"}.get(row.verdict, style.number(row.fails_at, 2))
 
 
 def keep(folder: Path) -> None:
