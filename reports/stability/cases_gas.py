@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.random import Generator, default_rng
@@ -17,27 +16,27 @@ from scenarios.placing import box, lay_out
 
 FAMILY = "A gas at e = 1"
 SOURCE = "the hard-disk gas (Alder & Wainwright, J. Chem. Phys. 31, 459, 1959)"
-DT = 1 / 240
+RADIUS, DT = 0.25, 1 / 240
 STEP = 0.04  # of a radius: how far a disk of mean energy moves in a step
 
 
 def gas(
     packing: float, seed: int, *, rows: int = 6, columns: int = 6, steps: int = 500, every: int = 10,
-    step: float = STEP, mass: Array | None = None, sizes: Array | None = None,
+    step: float = STEP, mass: Array | None = None,
 ) -> Scenario:  # fmt: skip
     """Disks of radius 0.25 m on a triangular lattice in a box that they fill to `packing`, with Maxwell's velocities.
 
-    kT is such that a disk of mass 1 flies `step` radii in a step at its root mean square speed. sizes: radii over 0.25.
+    kT is such that a disk of mass 1 flies `step` radii in a step at its root mean square speed.
     """
     n, rng = rows * columns, default_rng(seed)
-    radius = 0.25 * (np.ones(n) if sizes is None else sizes)
+    radius = np.full(n, RADIUS)
     mass = np.ones(n) if mass is None else mass
     k = np.arange(n)
     lattice = np.stack([k % columns + 0.5 * (k // columns % 2) + 0.5, np.sqrt(0.75) * (k // columns) + 0.5], -1)
     size = np.array([columns + 0.5, np.sqrt(0.75) * (rows - 1) + 1])
     spacing = np.sqrt(np.pi * (radius**2).sum() / packing / size.prod())
     scene = lay_out(
-        position=lattice * spacing, velocity=maxwell(rng, mass, step * 0.25 / DT), radius=radius, mass=mass,
+        position=lattice * spacing, velocity=maxwell(rng, mass, step * RADIUS / DT), radius=radius, mass=mass,
         restitution=1.0, walls=box([0, 0], size * spacing),
     )  # fmt: skip
     return Scenario("gas", "Does it keep its energy?", SOURCE, scene, steps * DT, every * DT, (every,), seed=seed)
@@ -193,5 +192,3 @@ GAS = (
         quick_values=(10.0, 50.0, 200.0, 1000.0), ratio=1.5,
     ),
 )  # fmt: skip
-
-BY_STEP = {step: partial(dense, step=step) for step in (0.01, 0.02, 0.04, 0.1, 0.2, 0.4)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isfinite, nan, sqrt
 
@@ -242,8 +242,3 @@ def first_edge(works: Sequence[bool]) -> int | None:
 def players_of(case: Case) -> list[str]:
     """Who plays a case: every row of `ENGINES`, and the case's own switches, in the order of `PLAYERS`."""
     return [name for name, player in PLAYERS.items() if not player.switch or name in case.also]
-
-
-def explained(limit: Limit, reason: str, source: str, tested: str) -> Limit:
-    """The limit with its reason."""
-    return replace(limit, reason=reason, source=source, tested=tested)
