@@ -13,7 +13,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from playwright.sync_api import ConsoleMessage, Page, sync_playwright
+from typer.testing import CliRunner
 
+from reports.cli import app
 from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
@@ -62,8 +64,9 @@ def test_the_first_failing_run_is_kept(atlas: Path):
     assert "slow_hit.pymunk-matched.npz" not in found
 
 
-def test_the_same_journal_gives_the_same_table(atlas: Path, tmp_path: Path):
-    """Table and page are made from what the journal holds, and from nothing else."""
+def test_the_same_journal_gives_the_same_table(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Table and page are made from what the journal holds, and from the scene file that it names."""
+    monkeypatch.chdir(ROOT / "tests")
     again = tmp_path / "again"
     shutil.copytree(atlas, again)
     write_files(again)
@@ -101,11 +104,12 @@ def test_what_has_ended_is_not_played_again(atlas: Path):
         (["--engine", "bullet"], "engine 'bullet' is not known"),
     ],
 )
-def test_bad_input_is_one_clear_sentence(words: list[str], says: str):
-    """Exit 2, no traceback."""
-    done = crosscheck("stability", *words)
+def test_bad_input_is_one_clear_sentence(words: list[str], says: str, monkeypatch: pytest.MonkeyPatch):
+    """Exit 2, no traceback, nothing played."""
+    monkeypatch.chdir(ROOT / "tests")
+    done = CliRunner().invoke(app, ["stability", *words])
 
-    assert done.returncode == 2
+    assert done.exit_code == 2
     assert says in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
 

@@ -56,11 +56,6 @@ def fly(engine: Any) -> None:
         body.bullet = bool(velocity.any())
 
 
-def one_iteration(engine: Any) -> None:
-    """pymunk: one sequential impulse a contact."""
-    engine.space.iterations = 1
-
-
 def default_bias(engine: Any) -> None:
     """pymunk: overlaps are pushed out as shipped."""
     engine.space.collision_bias = (1 - 0.1) ** 60
@@ -76,23 +71,10 @@ def substeps_16(engine: Any) -> None:
     engine.substeps = 16
 
 
-def sleepless(engine: Any) -> None:
-    """Box2D 2.3 never puts a disk to sleep."""
-    engine.world.SetAllowSleeping(False)
-
-
-def awake(engine: Any) -> None:
-    """Box2D 3.1 never puts a disk to sleep."""
-    engine.world.sleeping_enabled = False
-
-
 PLAYERS: dict[str, Player] = {name: Player(row.make) for name, row in ENGINES.items()} | {
-    "pymunk:matched+one_iteration": Player(switched("pymunk:matched", one_iteration), "1 iteration for 50"),
     "pymunk:matched+ten_iterations": Player(switched("pymunk:matched", ten_iterations), "10 iterations for 50"),
     "pymunk:matched+push_out": Player(switched("pymunk:matched", default_bias), "overlaps pushed out as shipped"),
-    "box2d:shipped+awake": Player(switched("box2d:shipped", sleepless), "no sleep"),
     "box2d:matched+bullets": Player(switched("box2d:matched", bullets), "continuous collision, what moves is a bullet"),
-    "box2d_v3:shipped+awake": Player(switched("box2d_v3:shipped", awake), "no sleep"),
     "box2d_v3:matched+bullets": Player(
         switched("box2d_v3:matched", bullets_v3), "continuous collision, what moves is a bullet"
     ),
