@@ -83,9 +83,14 @@ PLAYERS: dict[str, Player] = {name: Player(row.make) for name, row in ENGINES.it
 
 
 def play_as(player: str, scenario: Scenario) -> Run:
-    """Play a scenario at its only step size; the engine is closed again."""
-    engine = PLAYERS[player].make()
+    """Play a scenario at its only step size; the engine is closed again. A library that is missing is a refusal."""
+    dt = scenario.dt(scenario.substeps[0])
     try:
-        return play(engine, player, scenario, scenario.dt(scenario.substeps[0]))
+        engine = PLAYERS[player].make()
+    except ImportError as missing:
+        name, profile = player.split(":")
+        return Run(name, profile, scenario.name, dt, "unsupported", f"{missing.name or missing} cannot be imported")
+    try:
+        return play(engine, player, scenario, dt)
     finally:
         engine.close()
