@@ -49,6 +49,9 @@ class Box2DV3:
             self.world.set_contact_tuning(HERTZ, DAMPING_RATIO, PUSH_SPEED)
         self.world.hit_event_threshold = 0.0  # listening only: report every hit
         self.bodies = [self._disk(i) for i in range(scene.n)]
+        self.every = pyb2d3.Bodies()
+        for body in self.bodies:
+            self.every.append(body)
         for w in range(len(scene.walls)):
             self._wall(w)
         self.angle, self.spin, self.seen = np.array(scene.angle), np.array(scene.angular_velocity), 0
@@ -120,18 +123,19 @@ class Box2DV3:
                 body.set_transform(over, body.rotation)
 
     def read(self) -> State:
-        """Attribute by attribute; the engine keeps (cos, sin), so the angle is unwound from read to read."""
-        n, bodies = self.scene.n, self.bodies
-        position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2)
-        velocity = np.array([tuple(b.linear_velocity) for b in bodies], float).reshape(n, 2)
-        angular_velocity = np.array([b.angular_velocity for b in bodies], float)
+        """All bodies at once, as float32; the engine keeps (cos, sin), so the angle is unwound from read to read."""
+        n, every = self.scene.n, self.every
+        position = every.get_positions(np.empty((n, 2), np.float32)).astype(float)
+        velocity = every.get_linear_velocities(np.empty((n, 2), np.float32)).astype(float)
+        angular_velocity = every.get_angular_velocities(np.empty(n, np.float32)).astype(float)
         if self.matched:
             must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
         return State(position, velocity, self._unwound(angular_velocity), angular_velocity)
 
     def _unwound(self, spin: Array) -> Array:
         """The angles nearest to where the mean spin since the last read would have brought them."""
-        raw = np.array([atan2(body.rotation.s, body.rotation.c) for body in self.bodies])
+        turn = self.every.get_rotations(np.empty((self.scene.n, 2), np.float32)).tolist()
+        raw = np.array([atan2(s, c) for c, s in turn])
         expected = self.angle + (self.spin + spin) / 2 * (self.steps - self.seen) * self.dt
         self.angle = raw + 2 * pi * np.round((expected - raw) / (2 * pi))
         self.spin, self.seen = spin, self.steps
@@ -168,7 +172,7 @@ class Box2DV3:
 
     def close(self) -> None:
         """Bodies before the world: using one afterwards is a segmentation fault."""
-        self.bodies = []
+        self.bodies, self.every = [], None
         self.world = None
 
 

@@ -19,19 +19,22 @@ class Row:
         alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t is
             (alpha - 1/2) a dt t. A property of the order of updates, not an error of the adapter.
         rounding: the relative rounding of the numbers the engine keeps.
+        leaves_state: what it played before changes what it plays next, so that each cell needs a process of its own;
+            true of none below (a test plays each after others, bit for bit).
     """
 
     make: Callable[[], Engine]
     summary: str
     alpha: float
     rounding: float
+    leaves_state: bool = False
 
 
 def _exercise() -> Engine:
     from adapters.reference import Reference
-    from reference_impl import exercise
+    from reference_impl import crowd
 
-    return Reference(exercise)
+    return Reference(crowd)
 
 
 def _lesson() -> Engine:
@@ -39,6 +42,13 @@ def _lesson() -> Engine:
     from reference_impl import lesson
 
     return Reference(lesson)
+
+
+def _ordered() -> Engine:
+    from adapters.reference import Reference
+    from reference_impl import ordered
+
+    return Reference(ordered)
 
 
 def _pymunk(profile: str) -> Engine:
@@ -73,6 +83,9 @@ ENGINES: dict[str, Row] = {
     ),
     "reference:lesson": Row(
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
+    ),
+    "reference:ordered": Row(
+        _ordered, "hand-written: exact flight, hits in the order in which they happen within a step", 0.5, FLOAT64
     ),
     "pymunk:shipped": Row(
         partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64

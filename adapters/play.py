@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import cos, sin
 from time import perf_counter
@@ -50,10 +50,16 @@ class Run:
         return f"{self.engine}:{self.profile}"
 
 
-def play(engine: Engine, name: str, scenario: Scenario, dt: float) -> Run:
+def unwatched(state: State) -> None:
+    """Nobody looks on."""
+
+
+def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callable[[State], None] = unwatched) -> Run:
     """Play `scenario` in steps of `dt` s, which must divide its sample interval; `name` is `engine:profile`.
 
-    Refusals, exceptions and runaways become the run's status; only a dt that does not fit raises `ValueError`.
+    `watch` is shown every good sample as soon as it is there, the start first: a crash leaves no other trace.
+    Refusals, exceptions and runaways become the run's status; only a dt that does not fit raises `ValueError`, and
+    want of memory `MemoryError`.
     """
     engine_name, profile = name.split(":")
     substeps = round(scenario.sample_interval / dt)
@@ -69,6 +75,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float) -> Run:
         engine.load(scenario.scene, dt)
         settings, versions = engine.settings(), engine.versions()
         states.append(engine.read())
+        watch(states[0])
         for k in range(scenario.samples):
             seconds += advance(engine, scenario, k * substeps, substeps, dt)
             state = engine.read()
@@ -76,8 +83,11 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float) -> Run:
                 status, reason = "diverged", f"{fault} at {(k + 1) * scenario.sample_interval:g} s"
                 break
             states.append(state)
+            watch(state)
     except Unsupported as refusal:
         status, reason = "unsupported", str(refusal)
+    except MemoryError:  # the limit is not the engine's: left to whoever set it
+        raise
     except Exception as error:  # an engine may raise anything; the run says what
         status, reason = "error", f"{type(error).__name__}: {error}"
     if states:
@@ -149,6 +159,10 @@ def reach(scenario: Scenario) -> float:
 
 def fault_of(state: State, farthest: float) -> str:
     """What is wrong with a state that cannot be gone on from, or ""; `farthest` in m from the origin."""
+    # Asked after every sample, so all is asked at once first: the largest of numbers is NaN if one of them is.
+    others = np.concatenate([state.velocity.ravel(), state.angle, state.angular_velocity])
+    if np.abs(state.position).max(initial=0.0) <= farthest and np.abs(others).max(initial=0.0) < np.inf:
+        return ""
     for name in ("position", "velocity", "angle", "angular_velocity"):
         values = getattr(state, name)
         if not np.isfinite(values).all():

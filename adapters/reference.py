@@ -13,10 +13,16 @@ from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_
 from scenarios.model import Array, Scene, State
 
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
+METHODS = {  # of the variants by their module
+    "exercise": {"integrator": "symplectic Euler"},
+    "crowd": {"integrator": "symplectic Euler"},
+    "lesson": {"integrator": "explicit Euler"},
+    "ordered": {"integrator": "parabolas", "hits": "in order, each where and when it happens", "projection": "none"},
+}
 
 
 class Reference:
-    """Plays one variant, `reference_impl.exercise` or `reference_impl.lesson`, or any module with their `advance`.
+    """Plays one variant of `reference_impl`, or any module with the `advance` of `exercise`.
 
     `options` are fields of `World` that the exercise leaves free: split, approaching_only.
     """
@@ -72,9 +78,12 @@ class Reference:
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """What the two variants leave free; the rest is the scene."""
-        return {
-            "integrator": (None, "symplectic Euler" if "exercise" in self.variant.__name__ else "explicit Euler"),
+        """The variant's method, and what it leaves free; the rest is the scene."""
+        name = self.variant.__name__.split(".")[-1]
+        method = {setting: (None, value) for setting, value in METHODS.get(name, {}).items()}
+        if name == "ordered":
+            return method
+        return method | {
             "projection split": (self.options.get("split"), SPLITS[self.world.split]),
             "approaching pairs only": (self.options.get("approaching_only"), self.world.approaching_only),
         }

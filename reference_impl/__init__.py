@@ -1,1 +1,1 @@
-"""The exercise's disk solver, by hand: `exercise` (symplectic Euler) and `lesson` (explicit Euler), on plain arrays."""
+"""The disk solver by hand: `exercise`, `lesson`, `ordered`; `crowd` and `neighbours` make the first fast for many."""

@@ -39,13 +39,17 @@ def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
 @njit(cache=True, error_model="numpy")
 def integrate(disks: Disks, world: World, dt: float) -> None:
     """Task 1, symplectic Euler: velocities from force and torque, then positions from the NEW velocities."""
-    x, v, g = disks.position, disks.velocity, world.gravity
+    x, v, g, force, torque = disks.position, disks.velocity, world.gravity, disks.force, disks.torque
     for i in range(len(disks.mass)):
         if disks.mass[i] == inf:
             continue
-        v[i, 0] += (g[0] + disks.force[i, 0] / disks.mass[i]) * dt
-        v[i, 1] += (g[1] + disks.force[i, 1] / disks.mass[i]) * dt
-        disks.angular_velocity[i] += disks.torque[i] / disks.inertia[i] * dt
+        if force[i, 0] == 0.0 and force[i, 1] == 0.0 and torque[i] == 0.0:  # as most are: spare the divisions
+            v[i, 0] += g[0] * dt
+            v[i, 1] += g[1] * dt
+        else:
+            v[i, 0] += (g[0] + force[i, 0] / disks.mass[i]) * dt
+            v[i, 1] += (g[1] + force[i, 1] / disks.mass[i]) * dt
+            disks.angular_velocity[i] += torque[i] / disks.inertia[i] * dt
 
         x[i, 0] += v[i, 0] * dt
         x[i, 1] += v[i, 1] * dt
@@ -82,22 +86,31 @@ def collide(disks: Disks, a: int, b: int, world: World) -> float:
 
 @njit(cache=True, error_model="numpy")
 def collide_walls(disks: Disks, world: World, k: int, hits: list) -> None:
-    """The same four parts for every disk against the nearest point of every wall, which acts as a static disk would."""
-    x, v, mass = disks.position, disks.velocity, disks.mass
-    for i in range(len(mass)):
+    """Every disk against every wall, in order."""
+    for i in range(len(disks.radius)):
         for w in range(len(world.walls)):
-            px, py = nearest_point(world.walls, w, x[i, 0], x[i, 1])
-            distance, nx, ny = direction(x[i, 0] - px, x[i, 1] - py)
-            if distance >= disks.radius[i] or mass[i] == inf:
-                continue
-            move(x, i, nx, ny, disks.radius[i] - distance)
-            speed = v[i, 0] * nx + v[i, 1] * ny
-            if world.approaching_only and speed >= 0.0:
-                continue
-            J = -(1.0 + world.restitution) * speed / ((nx * nx + ny * ny) / mass[i])
-            move(v, i, nx, ny, J / mass[i])
-            if J != 0.0:
-                hits.append((k, i, -1 - w, J))
+            # As for the pairs: asked here first, to spare the call.
+            if touching_wall(disks.position, disks.radius, i, world.walls, w):
+                impulse = collide_wall(disks, i, w, world)
+                if impulse != 0.0:
+                    hits.append((k, i, -1 - w, impulse))
+
+
+@njit(cache=True, error_model="numpy")
+def collide_wall(disks: Disks, i: int, w: int, world: World) -> float:
+    """The same four parts for a disk and the nearest point of a wall, which acts as a static disk would."""
+    x, v, mass = disks.position, disks.velocity, disks.mass
+    if not touching_wall(x, disks.radius, i, world.walls, w) or mass[i] == inf:
+        return 0.0
+    px, py = nearest_point(world.walls, w, x[i, 0], x[i, 1])
+    distance, nx, ny = direction(x[i, 0] - px, x[i, 1] - py)
+    move(x, i, nx, ny, disks.radius[i] - distance)
+    speed = v[i, 0] * nx + v[i, 1] * ny
+    if world.approaching_only and speed >= 0.0:
+        return 0.0
+    J = -(1.0 + world.restitution) * speed / ((nx * nx + ny * ny) / mass[i])
+    move(v, i, nx, ny, J / mass[i])
+    return J
 
 
 @njit(cache=True, error_model="numpy")
@@ -106,6 +119,14 @@ def touching(x, radius, a: int, b: int) -> bool:  # type: ignore[no-untyped-def]
     dx, dy = x[a, 0] - x[b, 0], x[a, 1] - x[b, 1]
     reach = radius[a] + radius[b]
     return dx * dx + dy * dy < reach * reach
+
+
+@njit(cache=True, error_model="numpy")
+def touching_wall(x, radius, i: int, walls, w: int) -> bool:  # type: ignore[no-untyped-def]
+    """Whether the nearest point of wall `w` is closer than the radius (both sides squared)."""
+    px, py = nearest_point(walls, w, x[i, 0], x[i, 1])
+    dx, dy = x[i, 0] - px, x[i, 1] - py
+    return dx * dx + dy * dy < radius[i] * radius[i]
 
 
 @njit(cache=True, error_model="numpy")
@@ -144,8 +165,10 @@ def move(rows, i: int, nx: float, ny: float, by: float) -> None:  # type: ignore
 @njit(cache=True, error_model="numpy")
 def wrap(x, world: World) -> None:  # type: ignore[no-untyped-def]
     """As `projectObjects`: a centre beyond an edge of the box is set onto the opposite edge; its velocity stays."""
-    for i in range(len(x)):
-        for axis in range(2):
+    for axis in range(2):
+        if world.low[axis] == -inf and world.high[axis] == inf:
+            continue
+        for i in range(len(x)):
             if x[i, axis] < world.low[axis]:
                 x[i, axis] = world.high[axis]
             elif x[i, axis] > world.high[axis]:

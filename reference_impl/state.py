@@ -26,6 +26,7 @@ class Disks(NamedTuple):
     radius: np.ndarray  # (n,) m
     mass: np.ndarray  # (n,) kg
     inertia: np.ndarray  # (n,) kg m2
+    remainder: np.ndarray  # (n, 2) m: what rounding has cut off the position; only `ordered` keeps account of it
 
 
 class World(NamedTuple):
@@ -54,4 +55,5 @@ def make_disks(position, velocity, radius, mass, inertia=None, angle=None, angul
         radius=radius,
         mass=mass,
         inertia=np.array(mass * radius**2 / 2 if inertia is None else inertia, dtype=float),
+        remainder=np.zeros_like(position),
     )

@@ -1,111 +1,95 @@
-"""The files of a run: journal, trajectories, scenes and tables in one folder.
+"""The files of a run, read back; everything is made from the journal and the trajectories.
 
-journal.jsonl   a header, a line a cell as it ends, a footer; everything else is made from it
-trajectories/   one .npz a cell, keys as the fields of `Trajectory`
+journal.jsonl   a header, a line a cell as it ends, a footer; after a run was resumed, another header and footer
+trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to its last good state
 scenes/         copies of the scene files
 machine.json    machine, versions, command, seed
+compared/       the scenarios' shares of deviations.csv, so that a report made again does not measure again
 deviations.csv, runs.csv, report.html
 """
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Iterator
+import io
+from collections.abc import Hashable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from zipfile import BadZipFile
 
 import numpy as np
 
 from adapters.play import Run
-from reports.cells import Cell, scene_hash
-from scenarios.model import Collisions, Scenario, Trajectory, frozen
+from reports.journal import JOURNAL, lines_of
+from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
-FILES = ("journal.jsonl", "trajectories", "scenes", "machine.json", "deviations.csv", "runs.csv", "report.html",
+FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html",
          "limits.csv", "maps.csv", "laws.csv", "stability.html")  # fmt: skip
-ARRAYS = ("t", "position", "velocity", "angle", "angular_velocity")
+STATE = ("position", "velocity", "angle", "angular_velocity")
 HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
 
 
 @dataclass(frozen=True)
 class Archive:
-    """The folder of one run."""
+    """The folder of one run, as its journal has it; of two lines on one thing the later holds.
+
+    Attributes:
+        folder: where it is.
+        header: command, seed, machine, versions, and what was asked for.
+        records: the lines of the cells that ended.
+        conformance: `engine:profile` -> its line.
+        known_answers: the lines of the known answers that were made again.
+        timings: key of a cell -> s, its timings, each taken alone.
+        seconds: that the run took, up to now; NaN if it is not complete.
+        complete: whether everything that was asked for has ended.
+    """
 
     folder: Path
+    header: dict[str, Any]
+    records: list[dict[str, Any]]
+    conformance: dict[str, dict[str, Any]]
+    known_answers: list[dict[str, Any]]
+    timings: dict[str, list[float]]
+    seconds: float
+    complete: bool
 
-    @property
-    def journal(self) -> Path:
-        """Where the lines go."""
-        return self.folder / "journal.jsonl"
+    @staticmethod
+    def read(folder: Path) -> Archive:
+        """Read the journal of a folder, once; raises `ValueError` if it cannot be used."""
+        header: dict[str, Any] = {}
+        last: dict[str, dict[Hashable, dict[str, Any]]] = {"cell": {}, "conformance": {}, "known_answer": {}}
+        timings: dict[str, list[float]] = {}
+        seconds, complete = 0.0, False
+        for line in lines_of(folder):
+            complete = "footer" in line
+            if complete:
+                seconds += line["footer"]["seconds"]
+            elif "header" in line:
+                header = line["header"]
+            elif "timing" in line:
+                timings.setdefault(line["timing"], []).append(line["seconds"])
+            elif "cell" in line:
+                last["cell"][line["scene"], line["seed"], line["engine"], line["profile"], line["substeps"]] = line
+            else:
+                kind = "conformance" if "conformance" in line else "known_answer"
+                last[kind][line["of"]] = line
+        if not header:
+            raise ValueError(f"{folder / JOURNAL}: has no header, so nothing was played")
+        records, conformance, known = ([*last[kind].values()] for kind in last)
+        by_engine = {line["of"]: line for line in conformance}
+        return Archive(
+            folder, header, records, by_engine, known, timings, seconds if complete else float("nan"), complete
+        )
 
-    def begin(self, header: dict[str, Any]) -> None:
-        """Make the folder and write the header, to the journal and to machine.json."""
-        for name in ("trajectories", "scenes"):
-            (self.folder / name).mkdir(parents=True, exist_ok=True)
-        self.append({"header": header})
-        (self.folder / "machine.json").write_text(json.dumps(plain(header), indent=2) + "\n")
-
-    def append(self, line: dict[str, Any]) -> None:
-        """Add a line to the journal and flush it."""
-        with self.journal.open("a") as journal:
-            journal.write(json.dumps(plain(line), allow_nan=False) + "\n")
-
-    def add(self, cell: Cell, scenario: Scenario, run: Run) -> None:
-        """Add the line of a cell that has ended; its trajectory is already saved."""
-        record = {
-            "cell": cell.key(scenario),
-            "scene_hash": scene_hash(scenario),
-            "scene": cell.scene,
-            "seed": cell.seed,
-            "substeps": cell.substeps,
-            "scenario": run.scenario,
-            "engine": run.engine,
-            "profile": run.profile,
-            "dt_s": run.dt,
-            "status": run.status,
-            "reason": run.reason,
-            "seconds": run.seconds,
-            "settings": run.settings,
-            "versions": run.versions,
-        }
-        self.append(record)
-
-    def lines(self) -> Iterator[dict[str, Any]]:
-        """The journal's lines; a last line that was torn by an interrupt is left out."""
-        text = self.journal.read_text()
-        for number, line in enumerate(text.splitlines()):
-            try:
-                yield json.loads(line)
-            except json.JSONDecodeError as error:
-                if number < text.count("\n"):
-                    raise ValueError(f"{self.journal}: line {number + 1} is not JSON: {error}") from error
-
-    def header(self) -> dict[str, Any]:
-        """What `begin` wrote; raises `ValueError` if there is none."""
-        header = next(self.lines(), {}).get("header")
-        if header is None:
-            raise ValueError(f"{self.journal}: has no header, so nothing was played")
-        return header
-
-    def parts(self, kind: str) -> list[Any]:
-        """What the lines of one kind hold, in the order in which they were written."""
-        return [line[kind] for line in self.lines() if kind in line]
-
-    def records(self) -> list[dict[str, Any]]:
-        """The lines of the cells that ended."""
-        return [line for line in self.lines() if "cell" in line]
-
-    def run(self, record: dict[str, Any]) -> Run:
-        """The run behind a line, its trajectory read back if it has one."""
-        path = self.folder / "trajectories" / f"{record['cell']}.npz"
+    def run(self, record: dict[str, Any], with_trajectory: bool = True) -> Run:
+        """The run behind a line, its trajectory read back if it has one and it is wanted."""
+        path = trajectory_file(self.folder, record["cell"])
         status, reason, trajectory = record["status"], record["reason"], None
         try:
-            trajectory = load_trajectory(path) if path.exists() else None
+            trajectory = load_trajectory(path) if with_trajectory and path.exists() else None
         except (OSError, ValueError, KeyError, EOFError, BadZipFile) as fault:
             status, reason = "error", f"{path.name} cannot be read: {fault}"
-        if status == "ok" and trajectory is None:
+        if status == "ok" and with_trajectory and trajectory is None:
             status, reason = "error", f"{path.name} is missing"
         return Run(
             engine=record["engine"],
@@ -121,30 +105,50 @@ class Archive:
         )
 
 
-def save_trajectory(path: Path, trajectory: Trajectory) -> None:
-    """Write an .npz with the arrays of `Trajectory`; its hits as collision_t, _i, _j, _impulse."""
-    arrays = {name: getattr(trajectory, name) for name in ARRAYS}
+def trajectory_file(folder: Path, key: str) -> Path:
+    """Where the trajectory of the cell of that key is."""
+    return folder / "trajectories" / f"{key}.npz"
+
+
+def stored_scene(folder: Path, name: str) -> Path:
+    """Where the copy of the scene file of that name is."""
+    return folder / "scenes" / f"{name}.toml"
+
+
+def packed(trajectory: Trajectory) -> bytes:
+    """An .npz with the arrays of `Trajectory`; its hits as collision_t, _i, _j, _impulse."""
+    arrays = {name: getattr(trajectory, name) for name in ("t", *STATE)}
     hits = {key: getattr(trajectory.collisions, name) for name, key in HITS.items()}
-    with path.open("wb") as file:
-        np.savez(file, **arrays, **hits)
+    file = io.BytesIO()
+    np.savez(file, **arrays, **hits)
+    return file.getvalue()
 
 
-def load_trajectory(path: Path) -> Trajectory:
-    """The inverse of `save_trajectory`."""
-    with np.load(path) as saved:
+def load_trajectory(file: Path | BinaryIO) -> Trajectory:
+    """What `packed` put into a file."""
+    with np.load(file) as saved:
         hits = Collisions(**{name: frozen(saved[key], saved[key].dtype) for name, key in HITS.items()})
-        t, position, velocity, angle, angular_velocity = (frozen(saved[name]) for name in ARRAYS)
+        t, position, velocity, angle, angular_velocity = (frozen(saved[name]) for name in ("t", *STATE))
         return Trajectory(t, position, velocity, angle, angular_velocity, hits)
 
 
-def plain(value: Any) -> Any:
-    """The value as strict JSON can hold it: numpy scalars as Python's, numbers that are not finite as text."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    return value
+def parts_of(state: State) -> list[np.ndarray]:
+    """The arrays of a state, as a trail holds them."""
+    return [np.ascontiguousarray(getattr(state, name), np.float64) for name in STATE]
+
+
+def from_trail(trail: bytes, scenario: Scenario) -> Trajectory | None:
+    """The samples whose `parts_of` a trail holds, without hits; None if it holds not even the start."""
+    n = scenario.scene.n
+    k = len(trail) // (6 * n * 8)
+    if not k:
+        return None
+    table = np.frombuffer(trail[: k * 6 * n * 8]).reshape(k, 6 * n)
+    position, velocity, angle, angular_velocity = np.split(table, [2 * n, 4 * n, 5 * n], axis=1)
+    return Trajectory(
+        t=scenario.times[:k],
+        position=frozen(position.reshape(k, n, 2)),
+        velocity=frozen(velocity.reshape(k, n, 2)),
+        angle=frozen(angle),
+        angular_velocity=frozen(angular_velocity),
+    )

@@ -3,32 +3,31 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 
-from adapters.engines import ENGINES
-from adapters.play import Run, play
-from scenarios.catalogue import scenario as from_catalogue
-from scenarios.file_tables import MOST_STEPS
-from scenarios.files import read_scene_file
 from scenarios.model import Scenario
 
+PLAYERS = (
+    "adapters/*.py", "reference_impl/*.py",
+    "scenarios/event*.py", "scenarios/contact_times.py", "scenarios/compiled.py",  # the event-driven player
+)  # fmt: skip
 DECIDING = ("pymunk", "box2d-py", "pyb2d3", "numba", "numpy", "crosscheck2d")
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What a worker needs to play it.
+    """What is played.
 
     Attributes:
         scene: a name of the catalogue, or the path of a scene file (ends in .toml).
         seed: what a drawn scene is drawn from.
-        engine: a key of `ENGINES`.
+        engine: `engine:profile`.
         substeps: steps in a sample interval.
     """
 
@@ -37,24 +36,20 @@ class Cell:
     engine: str
     substeps: int
 
-    def play(self) -> Run:
-        """Play it here and now; the engine is closed again, whatever happens."""
-        scenario = open_scene(self.scene, self.seed)
-        try:
-            engine = ENGINES[self.engine].make()
-        except ImportError as missing:
-            name, profile = self.engine.split(":")
-            reason = f"{missing.name or missing} cannot be imported: {missing}"
-            return Run(name, profile, scenario.name, scenario.dt(self.substeps), "unsupported", reason)
-        try:
-            return play(engine, self.engine, scenario, scenario.dt(self.substeps))
-        finally:
-            engine.close()
+    @property
+    def names(self) -> tuple[str, str]:
+        """Engine and profile."""
+        name, profile = self.engine.split(":")
+        return name, profile
 
-    def key(self, scenario: Scenario) -> str:
-        """16 hex digits of a hash over all that decides the numbers: scene, engine, dt, versions, our own source."""
-        deciding = (scene_hash(scenario), self.engine, self.substeps, versions(), source_hash())
-        return hashlib.sha256(repr(deciding).encode()).hexdigest()[:16]
+    def key(self, scene: str) -> str:
+        """Its `content_key`, where `scene` is the `scene_hash` of what is played."""
+        return content_key(scene, self.engine, self.substeps)
+
+
+def content_key(*what: Hashable) -> str:
+    """16 hex digits of a hash over what decides a result: `what`, the versions, the players' source."""
+    return hashlib.sha256(repr((*what, versions(), source_hash())).encode()).hexdigest()[:16]
 
 
 def scene_hash(scenario: Scenario) -> str:
@@ -69,36 +64,6 @@ def scene_hash(scenario: Scenario) -> str:
     for t in scenario.thrusts:
         digest.update(repr((t.disk, t.start, t.stop, t.force.tolist(), t.torque, t.frame)).encode())
     return digest.hexdigest()[:16]
-
-
-def open_scene(scene: str, seed: int) -> Scenario:
-    """A scenario by catalogue name or file path; raises `KeyError` or `SceneFileError`."""
-    return read_scene_file(Path(scene)) if scene.endswith(".toml") else from_catalogue(scene, seed)
-
-
-def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario:
-    """The scenario with the dt ladder asked for: `dts` in s instead of its own, two finer steps if `full`.
-
-    Raises:
-        ValueError: naming the scenario and the dt that does not divide its sample interval, or is too small.
-    """
-    ladder = tuple(scenario.substeps)
-    most = MOST_STEPS // scenario.samples
-    for dt in dts:
-        if 0 < dt < scenario.sample_interval / most:
-            raise ValueError(f"--dt {dt:g} gives {scenario.name} more than {MOST_STEPS} steps: allowed is "
-                             f"{scenario.sample_interval / most:.4g} s or more")  # fmt: skip
-        k = round(scenario.sample_interval / dt) if dt > 0 else 0
-        if k < 1 or abs(k * dt / scenario.sample_interval - 1) > 1e-9:
-            raise ValueError(
-                f"--dt {dt:g} does not fit {scenario.name}: allowed is its sample interval "
-                f"{scenario.sample_interval:g} s divided by a whole number, e.g. {scenario.dt(ladder[-1]):g}"
-            )
-    if dts:
-        ladder = tuple(sorted({round(scenario.sample_interval / dt) for dt in dts}))
-    if full:
-        ladder += (ladder[-1] * 2, ladder[-1] * 4)
-    return replace(scenario, substeps=ladder)
 
 
 @cache
@@ -117,5 +82,5 @@ def versions() -> dict[str, str]:
 def source_hash() -> str:
     """A hash over the players' source, so that a changed adapter is a changed cell."""
     root = Path(__file__).parent.parent
-    files = sorted(path for folder in ("adapters", "reference_impl") for path in (root / folder).glob("*.py"))
+    files = sorted(path for pattern in PLAYERS for path in root.glob(pattern))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]

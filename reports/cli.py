@@ -32,15 +32,24 @@ Out = Annotated[
     Path, typer.Option(help="Folder for the results; an earlier run there is replaced when this one is done.")
 ]
 Workers = Annotated[int, typer.Option(min=0, help="Processes that play at once; 0: one a core.")]
+Timeout = Annotated[float, typer.Option(min=0.1, metavar="S", help="After which a cell is stopped, in C code too.")]
+Memory = Annotated[
+    int, typer.Option(min=0, metavar="MB", help="That a process may take; 0: its share of this machine's.")
+]
+Scheduler = Annotated[str, typer.Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")]
+Timings = Annotated[
+    int, typer.Option(min=0, metavar="N", help="Rounds of timings after all is played, nothing beside them.")
+]
+Resume = Annotated[
+    Path | None, typer.Option(metavar="OUT", help="Play what is missing or changed in a run, as it was asked for.")
+]
 
 
 @app.callback(invoke_without_command=True)
 def default(context: typer.Context) -> None:
     """Without a command: the main job, all scenarios through all engines, to reports/out/latest/."""
     if context.invoked_subcommand is None:
-        from reports.commands import run_plan
-
-        run_plan([], [], [], False, 0, DEFAULT_OUT, 0, "crosscheck")
+        run()
 
 
 @app.command()
@@ -51,13 +60,22 @@ def run(
     full: Full = False,
     seed: Seed = 0,
     out: Out = DEFAULT_OUT,
+    timings: Timings = 0,
     workers: Workers = 0,
+    timeout: Timeout = 60.0,
+    memory: Memory = 0,
+    scheduler: Scheduler = "",
+    resume: Resume = None,
 ) -> None:
     """Play some scenarios or scene files through some engines, compare, and report."""
-    from reports.commands import run_plan
+    from reports import run_command
 
-    command = "crosscheck " + shlex.join(sys.argv[1:])
-    run_plan(scenes or [], engine or [], dt or [], full, seed, out, workers, command)
+    means = run_command.means_of(workers, timeout, memory, scheduler)
+    if resume is None:
+        command = shlex.join(["crosscheck", *sys.argv[1:]])
+        run_command.run_plan(scenes or [], engine or [], dt or [], full, seed, timings, out, means, command)
+    asked = [scenes, engine, dt, full, seed, timings, out != DEFAULT_OUT]
+    run_command.resume(resume, means, alone=not any(asked))
 
 
 @app.command()
@@ -66,6 +84,29 @@ def report(out: Annotated[Path, typer.Argument(help="The folder of a run, finish
     from reports.commands import report_again
 
     report_again(out)
+
+
+@app.command()
+def replay(
+    cell: Annotated[str, typer.Argument(help="As in the column cell of runs.csv, or how it begins.")],
+    out: Annotated[Path, typer.Option(help="The folder of the run.")] = DEFAULT_OUT,
+    timeout: Timeout = 60.0,
+) -> None:
+    """Play one cell again, step by step: one that failed from its last good state, any other from the start."""
+    from reports import replay_command
+
+    replay_command.replay(cell, out, timeout)
+
+
+@app.command()
+def diff(
+    before: Annotated[Path, typer.Argument(metavar="OUT_A", help="The folder of a run.")],
+    after: Annotated[Path, typer.Argument(metavar="OUT_B", help="The folder of a later one.")],
+) -> None:
+    """What changed between two runs: statuses, numbers, timings; exit 1 if something got worse."""
+    from reports import diff_command
+
+    diff_command.show_difference(before, after)
 
 
 @app.command()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,65 +12,15 @@ from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import ENGINES
-from reports.cells import open_scene, with_steps
+from reports.folders import FolderTaken, found
 from reports.metrics import METRICS
 from reports.report import Report, make_report
-from reports.suite import FolderTaken, Plan, carry_out, may_write, replace_folder
+from reports.scenes import open_scene, with_steps
 from reports.terminal import Progress, print_summary
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 from scenarios.files import SceneFileError
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-
-
-def run_plan(
-    scenes: Sequence[str],
-    engines: Sequence[str],
-    dts: Sequence[float],
-    full: bool,
-    seed: int,
-    out: Path,
-    workers: int,
-    command: str,
-) -> NoReturn:
-    """Play, compare, report into `out`; exits 0, 1 (an engine could not be compared at all), 2 or 130."""
-    plan = Plan(
-        scenes=checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
-        engines=checked_engines(engines),
-        seed=seed,
-        dts=dts,
-        full=full,
-        workers=workers or os.cpu_count() or 1,
-        command=command,
-    )
-    out = out.resolve()
-    try:
-        may_write(out)
-        out.parent.mkdir(parents=True, exist_ok=True)
-    except FolderTaken as fault:
-        refuse([str(fault)])
-    except OSError as fault:
-        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
-    part = out.with_name(f"{out.name}.part-{os.getpid()}")
-    try:
-        with Progress() as progress:
-            carry_out(plan, part, progress)
-            report = make_report(part, progress.say)
-        replace_folder(part, out)
-    except KeyboardInterrupt:
-        say(f"\nInterrupted. {what_is_kept(part)}")
-        sys.exit(INTERRUPTED)
-    except OSError as fault:
-        say(f"cannot write to {part}: {fault.strerror or fault}. {what_is_kept(part)}")
-        sys.exit(FAILED)
-    finish(report, out)
-
-
-def what_is_kept(part: Path) -> str:
-    """A sentence on what a run that was broken off has left."""
-    if not (part / "journal.jsonl").exists():
-        return "Nothing was played yet."
-    return f"What was played is kept: crosscheck report {part}"
 
 
 def finish(report: Report, out: Path) -> NoReturn:
@@ -86,16 +35,17 @@ def finish(report: Report, out: Path) -> NoReturn:
 
 def report_again(out: Path) -> NoReturn:
     """Tables and page from the journal in `out`."""
-    if not (out / "journal.jsonl").is_file():
-        refuse([f"{out}: has no journal.jsonl, so it is not the folder of a run"])
     try:
+        folder = found(out)
         with Progress() as progress:
-            report = make_report(out, progress.say)
+            report = make_report(folder, progress.say)
+    except FolderTaken as fault:
+        refuse([str(fault)])
     except OSError as fault:
         refuse([f"{out}: {fault.filename or ''}: {fault.strerror or fault}"])
     except (ValueError, KeyError) as fault:
         refuse([f"{out}: the journal cannot be used: {fault}"])
-    finish(report, out)
+    finish(report, folder)
 
 
 def explain(what: str) -> None:

@@ -1,81 +1,109 @@
-"""Runs tasks in worker processes that may abort or hang without taking the others along."""
+"""Runs tasks in worker processes, here or on other machines, so that what aborts or hangs takes nothing along."""
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Callable, Hashable, Iterator, Mapping
-from concurrent.futures import Future, TimeoutError, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
-from typing import Any, NamedTuple
+import logging
+import pickle
+import re
+from collections.abc import Callable, Collection, Generator, Hashable, Iterator, Mapping
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from typing import Any
 
-from pebble import ProcessExpired, ProcessPool
+from reports.worker import ATTEMPTS, CREW, in_worker
+from reports.worker_process import Failure
 
 TIMEOUT = 60.0  # s a task may take
-RESTARTS = 5  # of the whole pool, which breaks if a worker is killed while it takes or returns a task
 
 
-class Failure(NamedTuple):
-    """A task without a result: "crashed", "timeout" or "error" as in `STATUSES` of play.py, and why."""
-
-    status: str
-    reason: str
+class NoScheduler(Exception):
+    """There is no cluster where one was said to be, or it has gone."""
 
 
 def run_all(
-    tasks: Mapping[Hashable, Callable[[], Any]], workers: int, timeout: float = TIMEOUT
-) -> Iterator[tuple[Any, Any | Failure]]:
-    """Run picklable tasks, `workers` at once; yield (key, result or `Failure`) as each ends.
+    tasks: Mapping[Hashable, Callable[[], Any]],
+    workers: int,
+    timeout: float = TIMEOUT,
+    memory: int = 0,
+    scheduler: str = "",
+    alone: Collection[Hashable] = frozenset(),
+) -> Generator[tuple[Any, Any | Failure], None, None]:
+    """Run picklable tasks, `workers` at once; yield (key, result or `Failure`) as each ends, every key once.
 
-    One that takes longer than `timeout` s is stopped, in C code too; a worker that dies is replaced.
+    A task may take `timeout` s and `memory` bytes (0: no limit); one that is in `alone` gets a process of its own.
+    With the address of a dask `scheduler` they run on its workers, as many at once as those have threads. Timings
+    are never taken beside anything else: for them `workers` is 1.
+
+    Raises:
+        NoScheduler: nothing answers at `scheduler`, or not any more.
     """
     left = dict(tasks)
-    for _ in range(RESTARTS):
-        for key, result in run_in_pool(left, workers, timeout):
-            del left[key]
-            yield key, result
-        if not left:
-            return
-    yield from ((key, Failure("crashed", f"the workers died {RESTARTS} times")) for key in left)
+    with executor_of(workers, scheduler) as executor:
+        for attempt in range(ATTEMPTS):
+            for key, result in run_once(executor, left, timeout, memory, alone, last=attempt == ATTEMPTS - 1):
+                del left[key]
+                yield key, result
 
 
-def run_in_pool(
-    tasks: Mapping[Any, Callable[[], Any]], workers: int, timeout: float
-) -> Iterator[tuple[Any, Any | Failure]]:
-    """As `run_all`, until all is done or the pool itself breaks: then the rest is left out."""
-    # Spawned, not forked: an engine's threads and global settings must not come along from the parent.
-    pool = ProcessPool(max_workers=workers, initializer=leave_interrupts_to_parent, context=get_context("spawn"))
+def run_once(
+    executor: Executor,
+    tasks: Mapping[Any, Callable[[], Any]],
+    timeout: float,
+    memory: int,
+    alone: Collection[Hashable],
+    last: bool,
+) -> Generator[tuple[Any, Any | Failure], None, None]:
+    """As `run_all`; what was lost with the machine it ran on is left out, unless this is the last attempt."""
+    futures: dict[Future, Any] = {
+        executor.submit(in_worker, task, timeout, memory, key in alone): key for key, task in tasks.items()
+    }
+    for future in as_completed(futures):
+        try:
+            outcome = future.result()
+        except CancelledError as gone:
+            raise NoScheduler("the scheduler has gone") from gone
+        except Exception as error:  # not the task, whose faults are outcomes, but what carried it
+            if last:
+                yield futures[future], Failure("crashed", f"no machine could carry it out: {error}")
+            continue
+        yield futures[future], pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
+
+
+@contextmanager
+def executor_of(workers: int, scheduler: str) -> Iterator[Executor]:
+    """Threads of this machine, each with a worker process of its own, or those of a cluster; left, all are stopped."""
+    if scheduler:
+        with cluster(scheduler) as client, client.get_executor(pure=False) as executor:
+            try:
+                yield executor
+            finally:
+                executor.shutdown(wait=False)  # which with dask cancels what is left
+        return
+    CREW.dismissed = False
+    executor = ThreadPoolExecutor(workers)
     try:
-        futures: dict[Future, Any] = {pool.schedule(task, timeout=timeout): key for key, task in tasks.items()}
-        for future in as_completed(futures):
-            if isinstance(future.exception(), BrokenProcessPool):
-                return
-            yield futures[future], result_of(future, timeout)
-        pool.close()
+        yield executor
     finally:
-        pool.stop()
-        pool.join()
+        executor.shutdown(wait=False, cancel_futures=True)
+        CREW.dismiss()
 
 
-def result_of(future: Future, timeout: float) -> Any | Failure:
-    """What a task that has ended gave; raises `OSError` if it could not write, which is not the engine's fault."""
+def cluster(scheduler: str) -> Any:
+    """A client of a dask scheduler that has workers; raises `NoScheduler` naming what is missing."""
     try:
-        return future.result()
-    except TimeoutError:
-        return Failure("timeout", f"stopped after {timeout:g} s")
-    except ProcessExpired as death:
-        return Failure("crashed", f"worker died: {name_of_exit(death.exitcode)}")
-    except OSError:
-        raise
-    except Exception as error:
-        return Failure("error", f"{type(error).__name__}: {error}")
-
-
-def leave_interrupts_to_parent() -> None:
-    """Ctrl-C goes to the whole group of processes; the parent alone decides what it means."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def name_of_exit(code: int) -> str:
-    """The signal behind a negative exit code, or the code."""
-    return signal.Signals(-code).name if code < 0 else f"exit status {code}"
+        from distributed import Client
+    except ImportError as missing:
+        raise NoScheduler(f"--scheduler needs {missing.name}: uv sync --extra cluster") from missing
+    if not re.fullmatch(r"(tcp|tls)://.+:\d+", scheduler):
+        raise NoScheduler(f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786")
+    for name in logging.root.manager.loggerDict:  # what matters is raised; each of distributed's has its own level
+        if name.startswith("distributed"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        client = Client(scheduler, timeout="5s", set_as_default=False)
+    except (OSError, ValueError) as fault:
+        raise NoScheduler(f"--scheduler {scheduler}: no scheduler answers there: {fault}") from fault
+    if not client.scheduler_info()["workers"]:
+        client.close()
+        raise NoScheduler(f"--scheduler {scheduler}: has no workers; start some: dask worker {scheduler}")
+    return client

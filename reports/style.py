@@ -69,7 +69,7 @@ OTHERS = (
     ("#5b6b7a", "#9fb0c0", "cross"), ("#a3123a", "#ff7a93", "triangle-down"),
     ("#5a3d9e", "#b7a1ff", "hexagon"), ("#3d6b1f", "#a4d67a", "pentagon"), ("#7a4a21", "#e0a878", "bowtie"),
 )  # fmt: skip
-DASHED = {"shipped": (6, 3), "lesson": (2, 3)}
+DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3)}
 SWITCHED = (1, 2)  # a profile with one thing switched, `matched+...`
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep to pale on dark.

@@ -1,131 +1,237 @@
-"""The main job: play scenarios through engines into a folder, then make the tables and the page from it."""
+"""The main job: play scenarios through engines into a folder, each cell once, and keep every result as it comes."""
 
 from __future__ import annotations
 
-import os
-import shutil
+import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from adapters.conformance import conform, no_answer
-from adapters.engines import ENGINES
+from adapters.engines import Row
 from adapters.play import Run
-from reports.archive import FILES, Archive, save_trajectory
-from reports.cells import Cell, open_scene, with_steps
+from reports.archive import Archive, from_trail, packed, stored_scene, trajectory_file
+from reports.cells import Cell, content_key, scene_hash
+from reports.journal import Journal, plain
 from reports.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.machine import about
-from reports.runner import Failure, run_all
+from reports.playing import Played, play_here, player, time_here
+from reports.runner import TIMEOUT, run_all
+from reports.scenes import open_scene, with_steps
 from reports.terminal import Progress
+from reports.worker_process import Failure
 from scenarios.files import write_scene_file
 from scenarios.model import Scenario
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked for.
+    """What is asked for: all that decides which numbers come out.
 
     Attributes:
         scenes: names of the catalogue or paths of scene files, in reading order.
-        engines: keys of `ENGINES`, in reading order.
+        engines: `engine:profile` -> its row, in reading order.
         seed: what drawn scenes are drawn from.
         dts: step sizes in s instead of each scenario's own; empty: its own.
         full: two finer steps for every scenario.
-        workers: processes that play at once.
+        timings: rounds of timings after all is played.
         command: how to ask for the same again.
     """
 
     scenes: Sequence[str]
-    engines: Sequence[str]
+    engines: Mapping[str, Row]
     seed: int
     dts: Sequence[float]
     full: bool
-    workers: int
+    timings: int
     command: str
 
     def scenario(self, scene: str) -> Scenario:
         """The scenario behind one of `scenes`, with the steps asked for."""
         return with_steps(open_scene(scene, self.seed), self.dts, self.full)
 
+    def header(self) -> dict[str, Any]:
+        """What the journal begins with, and `Plan` is made from again when a run is resumed."""
+        asked = {name: list(getattr(self, name)) for name in ("scenes", "engines", "dts")}
+        return about(self.command, self.seed) | asked | {"full": self.full, "timings": self.timings}
 
-def carry_out(plan: Plan, folder: Path, progress: Progress) -> None:
-    """Put the probes to every engine and play every cell; all goes into `folder`, which must not exist or be empty."""
+
+@dataclass(frozen=True)
+class Means:
+    """With what a plan is carried out; decides no number.
+
+    Attributes:
+        workers: processes that play at once.
+        timeout: s a cell may take.
+        memory: bytes a worker may take; 0: no limit.
+        scheduler: address of the dask scheduler whose workers play; "": this machine.
+    """
+
+    workers: int
+    timeout: float = TIMEOUT
+    memory: int = 0
+    scheduler: str = ""
+
+
+class OtherVersions(Exception):
+    """Workers on another machine do not play by the same source and versions."""
+
+
+def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) -> None:
+    """Put the probes to every engine and play every cell that the journal does not have; all goes into its folder."""
+    folder = journal.path.parent
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
-    archive = Archive(folder)
-    archive.begin(about(plan.command, plan.seed) | {"scenes": list(plan.scenes)})
+    tasks = tasks_of(plan, scenarios)
+    begin(plan, journal, scenarios, len(tasks))
+    missing = {task: tasks[task] for task in tasks.keys() - had(Archive.read(folder), means, scenarios)}
+    ordered = {task: missing[task] for task in tasks if task in missing}
+    alone = {task for task in ordered if isinstance(task, Cell) and plan.engines[task.engine].leaves_state}
+    progress.start(len(ordered), len(tasks))
+    limits = means.timeout, means.memory
+    with closing(run_all(ordered, means.workers, *limits, means.scheduler, alone)) as results:
+        for task, result in results:
+            progress.done(*keep(journal, scenarios, means, task, result))
+    take_timings(plan, means, journal, scenarios, progress)
+    sweep(Archive.read(folder))
+    journal.append({"footer": {"tasks": len(tasks), "played": len(ordered), "seconds": progress.seconds}})
+
+
+def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
+    """Make the folders, copy the scene files, write the header to the journal and to machine.json."""
+    folder, header = journal.path.parent, plan.header() | {"tasks": tasks}
+    for name in ("trajectories", "scenes"):
+        (folder / name).mkdir(exist_ok=True)
     for scene in plan.scenes:
         if scene.endswith(".toml"):
-            write_scene_file(scenarios[scene], folder / "scenes" / f"{scenarios[scene].name}.toml")
-    tasks = tasks_of(plan, scenarios, folder)
-    progress.start(len(tasks))
-    for task, result in run_all(tasks, plan.workers):
-        progress.done(*keep(archive, scenarios, task, result))
-    archive.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
+            write_scene_file(scenarios[scene], stored_scene(folder, scenarios[scene].name))
+    journal.append({"header": header})
+    (folder / "machine.json").write_text(json.dumps(plain(header), indent=2) + "\n")
 
 
-def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario], folder: Path) -> dict[Any, Callable[[], Any]]:
+def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
     """What is to be done, by what it is: an engine's name (its probes), a `KnownAnswer`, or a `Cell`."""
-    tasks: dict[Any, Callable[[], Any]] = {engine: partial(conform, engine, ENGINES[engine]) for engine in plan.engines}
+    tasks: dict[Any, Callable[[], Any]] = {name: partial(conform, name, row) for name, row in plan.engines.items()}
     if KNOWN_SCENE in plan.scenes:
         tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
     for scene, scenario in scenarios.items():
-        for engine in plan.engines:
-            for cell in (Cell(scene, plan.seed, engine, k) for k in scenario.substeps):
-                tasks[cell] = partial(play_and_save, cell, folder / "trajectories" / f"{cell.key(scenario)}.npz")
+        question = replace(scenario, truth=None)  # the answer stays with the judge
+        for name, row in plan.engines.items():
+            for cell in (Cell(scene, plan.seed, name, k) for k in scenario.substeps):
+                tasks[cell] = partial(play_here, cell, row, question)
     return tasks
 
 
-def keep(archive: Archive, scenarios: Mapping[str, Scenario], task: Any, result: Any) -> tuple[str, str]:
-    """Write what a task gave into the journal; returns what to say of it, and its status."""
+def had(archive: Archive, means: Means, scenarios: Mapping[str, Scenario]) -> set[Any]:
+    """The tasks of which the journal has the result, by the same scene, settings and versions.
+
+    What was stopped for time is had only if it would be stopped now.
+    """
+    done: set[Any] = {name for name, line in archive.conformance.items() if line["key"] == content_key(name)}
+    known = {line["of"]: line["key"] for line in archive.known_answers}
+    done |= {answer for answer in KNOWN_ANSWERS if known.get(repr(answer)) == content_key(repr(answer))}
+    hashes = {scene: scene_hash(scenario) for scene, scenario in scenarios.items()}
+    for record in archive.records:
+        cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", record["substeps"])
+        stopped = record["status"] == "timeout" and record["timeout_s"] < means.timeout
+        if cell.scene in hashes and record["cell"] == cell.key(hashes[cell.scene]) and not stopped:
+            done.add(cell)
+    return done
+
+
+def keep(
+    journal: Journal, scenarios: Mapping[str, Scenario], means: Means, task: Any, result: Any
+) -> tuple[str, str, str]:
+    """Write what a task gave into the folder; returns what to say of it, its status, and why."""
     failure = result if isinstance(result, Failure) else None
+    status, reason = (failure.status, failure.reason) if failure else ("ok", "")
     if isinstance(task, Cell):
-        scenario = scenarios[task.scene]
-        run = failed_run(task, scenario, failure) if failure else result
-        archive.add(task, scenario, run)
-        return f"{run.scenario}  {run.name}  dt {run.dt:.4g} s", run.status
+        run = keep_cell(journal, scenarios[task.scene], means, task, result)
+        return f"{run.scenario}  {run.name}  dt {run.dt:.4g} s", run.status, run.reason
     if isinstance(task, KnownAnswer):
-        archive.append({"known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}})
-        return f"known answer: {task.column} at dt {task.dt_s:g} s", failure.status if failure else "ok"
-    findings = [no_answer(task, *failure)] if failure else result
-    archive.append({"conformance": [asdict(finding) for finding in findings]})
-    return f"conformance of {task}", failure.status if failure else "ok"
+        line = {"known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}, "of": repr(task)}
+        said = f"known answer: {task.column} at dt {task.dt_s:g} s"
+    else:
+        findings = [no_answer(task, status, reason)] if failure else result
+        line = {"conformance": [asdict(finding) for finding in findings], "of": task}
+        said = f"conformance of {task}"
+    journal.append(line | {"key": content_key(str(line["of"]))})
+    return said, status, reason
 
 
-def play_and_save(cell: Cell, path: Path) -> Run:
-    """In the worker: play, save the trajectory, and send back the rest."""
-    run = cell.play()
-    if run.trajectory is not None:
-        save_trajectory(path, run.trajectory)
-    return replace(run, trajectory=None)
+def keep_cell(journal: Journal, scenario: Scenario, means: Means, cell: Cell, result: Played | Failure) -> Run:
+    """Write the trajectory of a cell, then its line; returns its run."""
+    played = failed(cell, scenario, result) if isinstance(result, Failure) else result
+    run, samples = played.run, played.samples
+    if played.played_by != player():
+        raise OtherVersions("a worker has other versions or other source of the players than this machine")
+    scene = scene_hash(scenario)
+    path = trajectory_file(journal.path.parent, cell.key(scene))
+    if played.file:
+        path.write_bytes(played.file)
+    record = {
+        "cell": cell.key(scene),
+        "scene_hash": scene,
+        "scene": cell.scene,
+        "seed": cell.seed,
+        "substeps": cell.substeps,
+        "scenario": run.scenario,
+        "engine": run.engine,
+        "profile": run.profile,
+        "dt_s": run.dt,
+        "status": run.status,
+        "reason": run.reason,
+        "step": (samples - 1) * cell.substeps if samples else -1,
+        "until_s": float(scenario.times[samples - 1]) if samples else float("nan"),
+        "seconds": run.seconds,
+        "timeout_s": means.timeout,
+        "settings": run.settings,
+        "versions": run.versions,
+    }
+    journal.append(record)
+    return run
 
 
-def failed_run(cell: Cell, scenario: Scenario, failure: Failure) -> Run:
-    """The run of a cell whose worker died or was stopped."""
-    engine, profile = cell.engine.split(":")
-    return Run(engine, profile, scenario.name, scenario.dt(cell.substeps), failure.status, failure.reason)
+def failed(cell: Cell, scenario: Scenario, failure: Failure) -> Played:
+    """What is left of a cell whose worker died or was stopped: the states up to then."""
+    trajectory = from_trail(failure.trail, scenario)
+    samples = len(trajectory) if trajectory else 0
+    last = (
+        f"; last good state: step {(samples - 1) * cell.substeps}, {scenario.times[samples - 1]:g} s" if samples else ""
+    )
+    run = Run(*cell.names, scenario.name, scenario.dt(cell.substeps), failure.status, failure.reason + last)
+    return Played(run, samples, packed(trajectory) if trajectory else b"", player())
 
 
-class FolderTaken(Exception):
-    """An output folder that holds something that is not a run of ours."""
+def take_timings(
+    plan: Plan, means: Means, journal: Journal, scenarios: Mapping[str, Scenario], progress: Progress
+) -> None:
+    """Time the middle step of every scenario on every engine that played it, round by round, nothing beside it."""
+    archive = Archive.read(journal.path.parent)
+    tasks: dict[Any, Callable[[], Any]] = {}
+    for turn in range(plan.timings):
+        for record in archive.records:
+            scenario = scenarios[record["scene"]]
+            middle = scenario.substeps[len(scenario.substeps) // 2]
+            name = f"{record['engine']}:{record['profile']}"
+            timed = len(archive.timings.get(record["cell"], []))
+            if record["status"] == "ok" and record["substeps"] == middle and turn >= timed:
+                cell = Cell(record["scene"], record["seed"], name, middle)
+                tasks[turn, record["cell"]] = partial(
+                    time_here, cell, plan.engines[name], replace(scenario, truth=None)
+                )
+    progress.start(len(tasks), len(tasks), "taking timings, one after the other")
+    with closing(run_all(tasks, 1, means.timeout, means.memory)) as results:
+        for (turn, key), seconds in results:
+            if not isinstance(seconds, Failure):
+                journal.append({"timing": key, "round": turn, "seconds": seconds})
+            progress.done(f"timings, round {turn + 1} of {plan.timings}")
 
 
-def replace_folder(made: Path, target: Path) -> None:
-    """Put the finished folder `made` in the place of `target` in two renames; `target` is a run of ours or absent."""
-    old = target.with_name(f".{target.name}.old-{os.getpid()}")
-    if target.exists():
-        target.rename(old)
-    made.rename(target)
-    shutil.rmtree(old, ignore_errors=True)
-
-
-def may_write(target: Path) -> None:
-    """Raise `FolderTaken` unless `target` is absent, empty, or holds an earlier run and nothing else."""
-    if target == Path.cwd() or target in Path.cwd().parents:
-        raise FolderTaken(f"--out {target}: is where you are; name another folder, or go elsewhere")
-    if target.is_file():
-        raise FolderTaken(f"--out {target}: is a file; name a folder that does not exist yet")
-    strange = sorted(path.name for path in target.iterdir() if path.name not in FILES) if target.exists() else []
-    if strange:
-        raise FolderTaken(f"--out {target}: holds {strange[0]}, which no run of crosscheck made; name another folder")
+def sweep(archive: Archive) -> None:
+    """Delete the trajectories that no line of the journal speaks of any more."""
+    spoken_of = {record["cell"] for record in archive.records}
+    for path in (archive.folder / "trajectories").iterdir():
+        if path.stem not in spoken_of:
+            path.unlink()

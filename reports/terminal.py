@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from time import perf_counter
 from types import TracebackType
 
@@ -10,23 +11,23 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 from rich.table import Table
 
+from adapters.play import STATUSES
 from reports import overview
 from reports.report import Report
 
 
 class Progress:
-    """A bar that says what runs and how long it will take."""
+    """A bar that says what runs, how long one takes and how long all will."""
 
     def __init__(self) -> None:
         self.bar = Bar(
             TextColumn("{task.description:<44.44}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-            TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True),
+            TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[each]}"), console=Console(stderr=True),
         )  # fmt: skip
-        self.failed = 0
 
     def __enter__(self) -> Progress:
         self.began = perf_counter()
-        self.task = self.bar.add_task("starting", total=None)
+        self.task = self.bar.add_task("starting", total=None, each="")
         self.bar.start()
         return self
 
@@ -37,15 +38,20 @@ class Progress:
         """Say what is being done."""
         self.bar.update(self.task, description=what)
 
-    def start(self, total: int) -> None:
-        """From now on count to `total`."""
-        self.bar.update(self.task, total=total, description="starting workers (the first run compiles: some 20 s more)")
+    def start(self, missing: int, total: int, what: str = "") -> None:
+        """From now on count to `total`, of which some may be `missing` only."""
+        self.counted, self.since = 0, perf_counter()
+        what = what or "starting workers (the first run compiles: some 20 s more)"
+        self.bar.reset(self.task, total=total, completed=total - missing, description=what, each="")
 
-    def done(self, what: str, status: str = "ok") -> None:
+    def done(self, what: str, status: str = "ok", reason: str = "") -> None:
         """One more is done."""
         if status != "ok":
-            self.bar.console.print(f"  {what}: {status}", style="yellow", highlight=False)
-        self.bar.update(self.task, description=what, advance=1)
+            why = f" ({reason})" if status not in ("unsupported", "ok") else ""
+            self.bar.console.print(f"  {what}: {status}{why}", style="yellow", highlight=False, markup=False)
+        self.counted += 1
+        each = (perf_counter() - self.since) / self.counted
+        self.bar.update(self.task, description=what, advance=1, each=f"{each:.2g} s each")
 
     @property
     def seconds(self) -> float:
@@ -67,4 +73,26 @@ def print_summary(report: Report, page: str) -> None:
     console.print(table)
     for sentence in report.findings:
         console.print(sentence, highlight=False)
+    console.print(statuses(report), highlight=False)
+    if failed := failures(report, Path(page).parent):
+        console.print(failed, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
+
+
+def statuses(report: Report) -> str:
+    """How many cells ended how, and whether all of them did."""
+    counts = report.runs.status.value_counts()
+    said = ", ".join(f"{counts[status]} {status}" for status in STATUSES if status in counts)
+    if report.archive.complete:
+        return f"All {len(report.runs)} cells have ended: {said}."
+    return f"Not finished: {len(report.runs)} cells have ended so far: {said}."
+
+
+def failures(report: Report, out: Path) -> str:
+    """How to look into the first cell that failed; "" if none did."""
+    runs = report.runs[~report.runs.status.isin(["ok", "unsupported"])]
+    if runs.empty:
+        return ""
+    first = runs.iloc[0]
+    what = f"{first.scenario} on {first.engine}:{first.profile}"
+    return f"To look into one, e.g. {what}: crosscheck replay {first.cell} --out {out}"

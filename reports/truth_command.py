@@ -9,9 +9,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from reports.archive import plain
-from reports.cells import open_scene
 from reports.commands import DONE, FAILED, checked_scenes, say
+from reports.journal import plain
+from reports.scenes import open_scene
 from reports.style import number
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
@@ -50,7 +50,7 @@ def record_of(scenario: Scenario) -> TruthRecord:
     hits = truth.collisions
     angles = np.full(len(hits), np.nan)  # a closed form does not need them
     return TruthRecord(
-        legs=np.zeros((0, 8)),
+        legs=np.zeros((0, 12)),
         events=np.stack([hits.t, hits.i, hits.j, hits.impulse, angles], axis=-1),
         valid_until=truth.valid_until,
         error_bound=truth.error_bound,
@@ -63,7 +63,13 @@ def record_of(scenario: Scenario) -> TruthRecord:
 def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
     """The record for programs; numbers that are not finite are text or null, as JSON has none."""
     hits = [
-        {"t_s": t, "i": int(i), "j": int(j), "impulse_Ns": impulse, "cosine": None if np.isnan(cosine) else cosine}
+        {
+            "t_s": t,
+            "i": int(i),
+            "j": int(j),
+            "impulse_Ns": impulse,
+            "cosine": cosine if impulse and cosine > 0 else None,
+        }
         for t, i, j, impulse, cosine in record.events.tolist()
     ]
     return plain(
@@ -71,9 +77,21 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
             "scenario": scenario.name, "method": record.method, "bits": record.bits, "duration_s": scenario.duration,
             "valid_until_s": min(record.valid_until, scenario.duration),
             "followed_until_s": min(record.followed_until, scenario.duration), "reason": record.reason,
-            "error_bound_m": record.error_bound, "hits": hits,
+            "error_bound_m": record.error_bound, "hits": hits, "outcomes": outcomes(record),
+            "still_known": list(record.remains),
         }
     )  # fmt: skip
+
+
+def outcomes(record: TruthRecord) -> list[dict]:
+    """How a simultaneous hit may end: the velocity (m/s) of each disk, and the hits in one order that leads there."""
+    return [
+        {
+            "velocities_m_s": {str(int(i)): [vx, vy] for _, i, vx, vy in record.outcomes[record.outcomes[:, 0] == k]},
+            "order": [[int(i), int(j)] for _, i, j in record.orders[record.orders[:, 0] == k]],
+        }
+        for k in sorted({*record.outcomes[:, 0]})
+    ]
 
 
 def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
@@ -83,12 +101,13 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
     lines = {
         "scenario": f"{scenario.name}: {scenario.asks}",
         "method": record.method,
-        "precision": "float64" if record.bits == 53 else f"{record.bits} bits, checked against {record.bits // 2}",
+        "precision": precision(record),
         "horizon": ends,
         "ends because": record.reason or "it is asked for no longer" * (record.valid_until >= scenario.duration),
         "players held to it": f"up to {number(min(record.followed_until, record.valid_until, scenario.duration), 6)} s",
         "error bound": f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64",
-        "hits": str(len(record.events)),
+        "still known": "\n".join(record.remains),
+        "hits": str(int((record.events[:, 3] != 0).sum())),
     }
     grid = Table.grid(padding=(0, 2))
     for name, text in lines.items():
@@ -97,6 +116,15 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
     console.print(grid)
     if len(record.events):
         console.print(table_of_hits(record, every))
+    if len(record.outcomes):
+        console.print(table_of_outcomes(record))
+
+
+def precision(record: TruthRecord) -> str:
+    """What the record was computed with."""
+    if record.bits == 53:
+        return "float64"
+    return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (record.method == "two-precision")
 
 
 def table_of_hits(record: TruthRecord, every: bool) -> Table:
@@ -108,6 +136,22 @@ def table_of_hits(record: TruthRecord, every: bool) -> Table:
             table.add_row("...", "", "", f"{skipped} more: --events", "")
         if skipped and SHOWN <= k < len(rows) - SHOWN:
             continue
-        other = f"disk {int(j)}" if j >= 0 else f"wall {-1 - int(j)}"
-        table.add_row(f"{t:.12g}", str(int(i)), other, f"{impulse:.6g}", "" if np.isnan(cosine) else f"{cosine:.6g}")
+        other, angle = name(j), "" if np.isnan(cosine) else f"{cosine:.6g}"
+        kick, angle = (f"{impulse:.6g}", angle) if impulse else ("comes to rest", "")
+        table.add_row(f"{t:.12g}", str(int(i)), other, kick, angle)
     return table
+
+
+def table_of_outcomes(record: TruthRecord) -> Table:
+    """All ends a simultaneous contact may have; none of them is the truth."""
+    found = outcomes(record)
+    table = Table("outcome", "velocities, m/s", "one order of hits", title=f"{len(found)} outcomes; none is the truth")
+    for k, end in enumerate(found, 1):
+        velocities = (f"{disk}: ({vx:.6g}, {vy:.6g})" for disk, (vx, vy) in end["velocities_m_s"].items())
+        table.add_row(str(k), "\n".join(velocities), ", ".join(f"{i} on {name(j)}" for i, j in end["order"]))
+    return table
+
+
+def name(j: float) -> str:
+    """The other side of a hit."""
+    return f"disk {int(j)}" if j >= 0 else f"wall {-1 - int(j)}"

@@ -43,7 +43,7 @@ def answer(
         velocity=frozen(motion[1][kept]),
         angle=frozen(angle[kept]),
         angular_velocity=frozen(angular_velocity[kept]),
-        collisions=Collisions.of([hit for hit in hits if hit[0] <= t[kept][-1]]),
+        collisions=Collisions.of([hit for hit in hits if kept.any() and hit[0] <= t[kept][-1]]),
         valid_until=valid_until,
         error_bound=error_bound,
         reason=reason,

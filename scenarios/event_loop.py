@@ -7,246 +7,286 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.compiled import inlined, kernel
-from scenarios.event_impacts import collide, collide_wall
-from scenarios.event_kernels import (
-    ACCUMULATION,
-    AX,
-    AY,
-    COUNT,
-    CX,
-    CY,
-    DONE,
+from scenarios.compiled import inlined, kernel, pasted
+from scenarios.event_disks import (
     EDGE,
-    EPOCH,
-    HITS,
-    LAST,
-    LOG_FULL,
-    MARK_HITS,
-    MARK_TIME,
+    END,
     NOBODY,
-    OWN_CODE,
-    OWN_TIME,
-    OX,
-    PAIR_TIME,
-    PARTNER,
-    PARTNER_COUNT,
-    RADIUS,
-    REENTRY,
-    ULPS,
-    VX,
-    VY,
+    NONE,
     WALL,
-    WEIGHT,
     WRAP,
+    Arena,
     Disks,
     Grid,
     Ints,
-    Rules,
-    T,
-    X,
-    Y,
-    find_own,
-    find_pair,
+    Links,
+    Scenery,
+    cross,
     fly,
-    link,
     settle,
     unlink,
 )
-from scenarios.event_queue import put
+from scenarios.event_impacts import across, collide, collide_wall, jolt, lie_down, take_off
+from scenarios.event_queue import Tree, put
+from scenarios.event_search import ALL, ROUNDING, find_own, find_pair
 from scenarios.model import Array
 
-BASE, END = 0, 1  # clock: s at which the present epoch began, s at which the answer ends
-LOGGED, WHO, WHOM = 0, 1, 2  # told: rows in the log; the disks of the end
+DONE, GOES_ON, LOG_FULL, ACCUMULATION, REENTRY, ROUND_END = range(6)
+BASE, STOP = 0, 1  # columns of Arena.clock
+LOGGED, WHO, WHOM = 0, 1, 2  # and of Arena.told
+HITS = 64  # so many of one disk within Rules.crowd: they accumulate
+EPOCH = 256.0  # s; the clock starts again after as many, so that its last place stays small
 
 
 @kernel
-def advance(d: Disks, g: Grid, rules: Rules, clock: Array, until: float, log: Array, told: Ints) -> int:
-    """Let everything up to `until` s happen; log (h, 4) gets t, i, j or -1 - wall, impulse of every hit.
+def advance(arena: Arena, scenery: Scenery, until: float) -> int:
+    """Let everything up to `until` s happen.
 
-    Returns DONE; LOG_FULL, to be called again with told[LOGGED] = 0; or ACCUMULATION or REENTRY, with clock[END],
-    told[WHO] and told[WHOM] when and for whom the answer ends.
+    Returns DONE; LOG_FULL, to be called again with told[LOGGED] = 0; or ACCUMULATION, REENTRY or ROUND_END, with
+    clock[STOP], told[WHO] and told[WHOM] when and for whom the answer ends.
     """
+    disks, clock = arena.disks, arena.clock
     while True:
-        i: Any = np.int64(d.tree[1])
-        now = d.key[i]
+        now = arena.tree[1].time
+        i: Any = np.int64(arena.tree[1].who)
         if clock[BASE] + now > until:
             return DONE
-        if told[LOGGED] == len(log):
+        if arena.told[LOGGED] == len(arena.log):
             return LOG_FULL
         if now > EPOCH:
-            begin_epoch(d, clock)
+            begin_epoch(disks, arena.tree, clock)
             continue
-        j, fresh = -1, True
-        x0, x1, y0, y1 = -1, 1, -1, 1
-        fly(d, i, now, rules.falling)
-        if d.row[i, PAIR_TIME] <= d.row[i, OWN_TIME]:
-            if d.tag[d.tag[i, PARTNER], COUNT] == d.tag[i, PARTNER_COUNT]:
-                j = d.tag[i, PARTNER]
-                fly(d, j, now, rules.falling)
-                impulse = collide(d, g, i, j, rules.restitution)
-                if note(d, clock, log, told, i, j, impulse):
-                    return ACCUMULATION
-        else:
-            code = d.tag[i, OWN_CODE]
-            if code >= WALL:
-                w, part = (code - WALL) // 3, (code - WALL) % 3
-                impulse = collide_wall(d, rules, i, w, part)
-                if note(d, clock, log, told, i, -1 - w, impulse):
-                    return ACCUMULATION
-            elif code >= WRAP:
-                side = code - WRAP
-                d.row[i, side // 2] = rules.wrap[1 - side % 2, side // 2]
-                change(d, i)
-                unlink(d, g, i)
-                settle(d, g, i)
-                told[WHO], told[WHOM], clock[END] = i, covered(d, i), clock[BASE] + now
-                if told[WHOM] >= 0:
-                    return REENTRY
-            else:
-                side, fresh = code - EDGE, rules.mixed
-                cross(d, g, i, side // 2, side % 2)
-                if not fresh:  # the contact in the record still holds: only three cells are new
-                    x0, x1 = (-1, 1) if side > 1 else (2 * side - 1, 2 * side - 1)
-                    y0, y1 = (-1, 1) if side < 2 else (2 * side - 5, 2 * side - 5)
-        for k in (i, j):
-            if k >= 0 and (d.row[k, WEIGHT] > 0.0):
-                renew(d, g, rules, k, fresh, x0, x1, y0, y1)
+        a = disks[i]
+        j: Any = np.int64(-1)
+        beyond: Any = np.int64(ALL)
+        fresh, status = True, GOES_ON
+        fly(a, now, scenery)
+        if a.pair_time <= a.own_time:
+            b = disks[a.partner]
+            if b.count == a.partner_count:
+                j = np.int64(a.partner)
+                fly(b, now, scenery)
+                status = hit(arena, scenery, i, j)
+        elif a.own_code < WRAP:
+            side = a.own_code - EDGE
+            cross(disks, arena.head, arena.grid, i, side)
+            if not (len(scenery) and arena.rules.mixed):  # the contact in the record still holds: three cells are new
+                fresh, beyond = False, np.int64(side)
+        elif len(scenery):
+            status = alone(arena, i)
+        if status != GOES_ON:
+            return status
+        while i >= 0:  # one place from which to search, for one copy of the search in the machine code
+            if disks[i].weight > 0.0:
+                renew(arena, scenery, i, fresh, beyond)
+            i, j = j, np.int64(-1)
+    return DONE
+
+
+@pasted
+def renew(arena: Arena, scenery: Scenery, i: int, fresh: bool, beyond: int) -> None:
+    """A new record of disk `i`, which is at the present; fresh: without the contact in the old one."""
+    a = arena.disks[i]
+    if fresh:
+        a.pair_time = inf
+    find_own(arena, scenery, a)
+    find_pair(arena, scenery, i, beyond)
+    put(arena.tree, i, min(a.pair_time, a.own_time))
+
+
+@pasted
+def hit(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
+    """Disks i and j hit each other."""
+    a, b = arena.disks[i], arena.disks[j]
+    impulse, cosine = collide(a, b, i, j, arena.grid.shift, arena.rules.restitution)
+    if len(scenery) and arena.rules.falling:
+        jolt(arena.walls, a)
+        jolt(arena.walls, b)
+    if b.weight > 0.0:
+        b.count += 1
+    return ACCUMULATION if note(arena, a, i, j, impulse, cosine) else GOES_ON
+
+
+@kernel
+def alone(arena: Arena, i: int) -> int:
+    """What disk `i` does by itself but for changing its cell: it meets a wall, the wrap, the end of its wall."""
+    code = arena.disks[i].own_code
+    if code >= WALL:
+        return hit_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
+    return leave(arena, i) if code == END else wrap(arena, i, code - WRAP)
+
+
+@kernel
+def hit_wall(arena: Arena, i: int, w: int, part: int) -> int:
+    """Disk `i` bounces off a wall, or comes to rest on its face.
+
+    It does where it has no normal speed left, and where its bounces accumulate: what they would still sweep then is
+    less high than a unit in the last place, so that nothing can come between them and their limit.
+    """
+    a, walls = arena.disks[i], arena.walls
+    impulse, cosine = collide_wall(walls, a, w, part, arena.rules.restitution)
+    jolt(walls, a)
+    crowded = note(arena, a, i, -1 - w, impulse, cosine)
+    over = a.bounces >= HITS if crowded else abs(across(walls, a, w, a.vx, a.vy)) <= a.noise
+    if over and part == 0 and a.wall < 0 and arena.rules.mixed and across(walls, a, w, a.pull_x, a.pull_y) < 0.0:
+        lie_down(walls, a, w)
+        if impulse == 0.0:  # a contact that begins to push without a hit
+            tell(arena, a.t, i, -1 - w, 0.0, 1.0)
+        return GOES_ON
+    return ACCUMULATION if crowded else GOES_ON
+
+
+@kernel
+def leave(arena: Arena, i: int) -> int:
+    """Disk `i` reaches the end of the wall it lies on: it flies off, unless it is too slow and would turn about it."""
+    a, w = arena.disks[i], int(arena.disks[i].wall)
+    speed2, press = a.vx * a.vx + a.vy * a.vy, -across(arena.walls, a, w, a.pull_x, a.pull_y)
+    take_off(a)
+    a.wall, a.count = -2 - w, a.count + 1
+    a.last, a.noise = -1 - w, ROUNDING * (abs(a.vx) + abs(a.vy))
+    stop(arena, a.t, i, -1 - w)
+    return GOES_ON if speed2 >= press * a.radius else ROUND_END
+
+
+@kernel
+def wrap(arena: Arena, i: int, side: int) -> int:
+    """Disk `i` leaves the wrap box over a side and comes in over the opposite one."""
+    a = arena.disks[i]
+    if side < 2:
+        a.x = arena.walls.wrap[1 - side, 0]
+    else:
+        a.y = arena.walls.wrap[3 - side, 1]
+    change(a)
+    unlink(arena.disks, arena.head, arena.grid, i)
+    settle(arena.disks, arena.head, arena.grid, i)
+    stop(arena, a.t, i, covered(arena.disks, i))
+    return REENTRY if arena.told[WHOM] >= 0 else GOES_ON
 
 
 @inlined
-def renew(d: Disks, g: Grid, rules: Rules, i: int, fresh: bool, x0: int, x1: int, y0: int, y1: int) -> None:
-    """A new record of disk `i`, which is at the present; fresh: without the contact in the old one."""
-    if fresh:
-        d.row[i, PAIR_TIME] = inf
-    find_own(d, g, rules, i)
-    find_pair(d, g, rules, i, x0, x1, y0, y1)
-    put(d.key, d.tree, i, min(d.row[i, PAIR_TIME], d.row[i, OWN_TIME]))
+def stop(arena: Arena, now: float, i: int, j: int) -> None:
+    """Tell when and for whom the answer ends, should it."""
+    arena.clock[STOP], arena.told[WHO], arena.told[WHOM] = arena.clock[BASE] + now, i, j
 
 
-@kernel
-def change(d: Disks, i: int) -> None:
-    """Make void what others know of disk `i`, and forget what it hit last."""
-    d.tag[i, COUNT] += 1
-    d.tag[i, LAST] = NOBODY
+@inlined
+def change(a: Any) -> None:
+    """Make void what others know of a disk, and forget what it hit last."""
+    a.count += 1
+    a.last = NOBODY
 
 
-@kernel
-def note(d: Disks, clock: Array, log: Array, told: Ints, i: int, j: int, impulse: float) -> bool:
+@inlined
+def tell(arena: Arena, now: float, i: int, j: int, impulse: float, cosine: float) -> None:
+    """Write a hit into the log."""
+    log, k = arena.log, arena.told[LOGGED]
+    log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = arena.clock[BASE] + now, i, j, impulse, cosine
+    arena.told[LOGGED] += 1
+
+
+@inlined
+def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) -> bool:
     """Count and log a hit; True if hits of disk `i` follow each other faster than float64 tells times apart."""
-    now = d.row[i, T]
-    d.tag[i, COUNT] += 1
-    if j >= 0 and d.row[j, WEIGHT] > 0.0:
-        d.tag[j, COUNT] += 1
+    a.count += 1
     if impulse > 0.0:
-        k = told[LOGGED]
-        log[k, 0], log[k, 1], log[k, 2], log[k, 3] = clock[BASE] + now, i, j, impulse
-        told[LOGGED] += 1
-    d.tag[i, MARK_HITS] += 1
-    if d.tag[i, MARK_HITS] < HITS:
+        tell(arena, a.t, i, j, impulse, cosine)
+    a.mark_hits += 1
+    if a.mark_hits < HITS:
         return False
-    since, d.tag[i, MARK_HITS], d.row[i, MARK_TIME] = now - d.row[i, MARK_TIME], 0, now
-    if since > ULPS * np.spacing(clock[BASE] + now):
+    since, a.mark_hits, a.mark_time = a.t - a.mark_time, 0, a.t
+    if since > arena.rules.crowd * np.spacing(arena.clock[BASE] + a.t):
         return False
-    clock[END], told[WHO], told[WHOM] = clock[BASE] + now - since, i, j
+    stop(arena, a.t - since, i, j)
     return True
 
 
 @kernel
-def cross(d: Disks, g: Grid, i: int, axis: int, high: int) -> None:
-    """Move disk `i` to the next cell; over the end of the grid, shift the disk (torus) or the grid under it."""
-    unlink(d, g, i)
-    k = d.tag[i, CX + axis] + 2 * high - 1
-    laps = -1 if k < 0 else (1 if k == g.shape[axis] else 0)
-    d.tag[i, CX + axis] = k - laps * g.shape[axis]
-    if g.torus:
-        d.row[i, axis] -= laps * g.span[axis]
-    else:
-        d.row[i, OX + axis] += laps * g.span[axis]
-    link(d, g, i)
-
-
-@kernel
-def covered(d: Disks, i: int) -> int:
+def covered(disks: Disks, i: int) -> int:
     """A disk that overlaps disk `i`, -1 if there is none."""
-    now = d.row[i, T]
-    for j in range(len(d.row)):
-        row, t = d.row[j], now - d.row[j, T]
-        dx = row[X] + (row[VX] + d.row[j, AX] * t / 2) * t - d.row[i, X]
-        dy = row[Y] + (row[VY] + d.row[j, AY] * t / 2) * t - d.row[i, Y]
-        reach = row[RADIUS] + d.row[i, RADIUS]
+    a = disks[i]
+    for j in range(len(disks)):
+        b = disks[j]
+        t = a.t - b.t
+        dx = b.x + (b.vx + b.ax * t / 2) * t - a.x
+        dy = b.y + (b.vy + b.ay * t / 2) * t - a.y
+        reach = b.radius + a.radius
         if j != i and dx * dx + dy * dy < reach * reach:
             return j
     return -1
 
 
 @kernel
-def begin_epoch(d: Disks, clock: Array) -> None:
+def begin_epoch(disks: Disks, tree: Tree, clock: Array) -> None:
     """Count all times from EPOCH s later."""
     clock[BASE] += EPOCH
-    for i in range(len(d.row)):
-        d.row[i, T] -= EPOCH
-        d.row[i, PAIR_TIME] -= EPOCH
-        d.row[i, OWN_TIME] -= EPOCH
-        d.row[i, MARK_TIME] -= EPOCH
-        d.key[i] -= EPOCH
+    for i in range(len(disks)):
+        a = disks[i]
+        a.t -= EPOCH
+        a.pair_time -= EPOCH
+        a.own_time -= EPOCH
+        a.mark_time -= EPOCH
+    for k in range(len(tree)):
+        tree[k].time -= EPOCH
 
 
 @kernel
-def begin(d: Disks, g: Grid) -> None:
+def begin(disks: Disks, head: Links, tree: Tree, g: Grid) -> None:
     """Link all disks to their cells; their first records are made as the first events."""
-    for i in range(len(d.row)):
-        settle(d, g, i)
-        ask_again(d, i, 0.0)
+    for i in range(len(disks)):
+        settle(disks, head, g, i)
+        ask_again(disks[i], tree, i, 0.0)
 
 
-@kernel
-def ask_again(d: Disks, i: int, now: float) -> None:
+@inlined
+def ask_again(a: Any, tree: Tree, i: int, now: float) -> None:
     """Give disk `i` a void contact at `now`: when its time comes, a new record is made."""
-    if d.row[i, WEIGHT] > 0.0:
-        d.tag[i, PARTNER], d.tag[i, PARTNER_COUNT] = i, -1
-        d.row[i, PAIR_TIME] = now
-        put(d.key, d.tree, i, now)
+    if a.weight > 0.0:
+        a.partner, a.partner_count, a.pair_time = i, -1, now
+        put(tree, i, now)
 
 
 @kernel
-def pull(d: Disks, clock: Array, i: int, at: float, ax: float, ay: float) -> None:
+def pull(arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float) -> None:
     """From `at` s on, which must not lie before the last event, let disk `i` accelerate by (ax, ay)."""
-    fly(d, i, at - clock[BASE], True)
-    d.row[i, AX], d.row[i, AY] = ax, ay
-    change(d, i)
-    ask_again(d, i, at - clock[BASE])
+    a, now = arena.disks[i], at - arena.clock[BASE]
+    fly(a, now, scenery)
+    a.pull_x, a.pull_y = ax, ay
+    if a.wall >= 0 and across(arena.walls, a, a.wall, ax, ay) < 0.0:
+        lie_down(arena.walls, a, a.wall)
+    else:
+        take_off(a)
+    change(a)
+    ask_again(a, arena.tree, i, now)
 
 
 @kernel
-def look(d: Disks, clock: Array, at: float, out: Array) -> None:
+def look(disks: Disks, base: float, at: float, out: Array) -> None:
     """Position and velocity of all disks at `at` s, not before the last event, into out (n, 4); changes nothing."""
-    for i in range(len(d.row)):
-        t = at - clock[BASE] - d.row[i, T]
-        for axis in range(2):
-            v, a = d.row[i, VX + axis], d.row[i, AX + axis]
-            out[i, axis] = d.row[i, axis] + (v + a * t / 2) * t
-            out[i, 2 + axis] = v + a * t
+    for i in range(len(disks)):
+        a = disks[i]
+        t = at - base - a.t
+        out[i, 0], out[i, 1] = a.x + (a.vx + a.ax * t / 2) * t, a.y + (a.vy + a.ay * t / 2) * t
+        out[i, 2], out[i, 3] = a.vx + a.ax * t, a.vy + a.ay * t
 
 
 @kernel
-def near_pairs(d: Disks, g: Grid, slack: float, found: Ints) -> int:
+def near_pairs(disks: Disks, head: Links, g: Grid, slack: float, found: Ints) -> int:
     """Pairs of disks that overlap, or nearly: rows (i, j) of found, as many as fit; their number."""
     count = 0
-    for i in range(len(d.row)):
-        for ox in range(-1, 2):
-            for oy in range(-1, 2):
-                cx, cy = (d.tag[i, CX] + ox) % g.shape[0], (d.tag[i, CY] + oy) % g.shape[1]
-                j = g.head[cx * g.shape[1] + cy]
-                while j >= 0:
-                    dx = d.row[j, X] - d.row[i, X]
-                    dy = d.row[j, Y] - d.row[i, Y]
-                    if g.torus:
-                        dx -= g.span[0] * np.round(dx / g.span[0])
-                        dy -= g.span[1] * np.round(dy / g.span[1])
-                    reach = (d.row[i, RADIUS] + d.row[j, RADIUS]) * (1.0 + slack)
-                    if i < j and count < len(found) and dx * dx + dy * dy <= reach * reach:
-                        found[count, 0], found[count, 1] = i, j
-                        count += 1
-                    j = d.next[j]
+    for i in range(len(disks)):
+        a = disks[i]
+        for around in range(9):
+            cx, cy = (a.cx + around // 3 - 1) % g.shape[0], (a.cy + around % 3 - 1) % g.shape[1]
+            j = head[cx * g.shape[1] + cy]
+            while j != NONE:
+                b = disks[j]
+                dx, dy = b.x - a.x, b.y - a.y
+                if g.torus:
+                    dx -= g.span[0] * np.rint(dx / g.span[0])
+                    dy -= g.span[1] * np.rint(dy / g.span[1])
+                reach = (a.radius + b.radius) * (1.0 + slack)
+                if i < j and count < len(found) and dx * dx + dy * dy <= reach * reach:
+                    found[count, 0], found[count, 1] = i, j
+                    count += 1
+                j = b.next
     return count

@@ -13,23 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenarios import event_loop
-from scenarios.event_kernels import (
-    ACCUMULATION,
-    AX,
-    HITS,
-    LAST,
-    LOG_FULL,
-    NOBODY,
-    OWN_TIME,
-    OX,
-    PAIR_TIME,
-    RADIUS,
-    REENTRY,
-    WEIGHT,
-    Disks,
-    Grid,
-    Rules,
-)
+from scenarios.event_disks import DISK, NOBODY, NONE, Arena, Grid, Rules, Scenery, Walls
 from scenarios.event_queue import empty_queue
 from scenarios.model import Array, Scene
 from scenarios.no_truth import NoTruth
@@ -51,71 +35,80 @@ class EventEngine:
         refuse_box(scene, box)
         refuse_walls(scene)
         self.scene = scene
-        self.rules = rules_of(scene)
-        self.grid, low = grid_of(scene, box, cell)
+        (grid, low), rules = grid_of(scene, box, cell), rules_of(scene)
         position = scene.position if box is None else low + np.mod(scene.position - low, box[1] - low)
-        self.disks = disks_of(scene, position, low)
-        self.clock, self.told = np.zeros(2), np.zeros(3, np.int64)
-        self.log = np.zeros((LOG_ROWS, 4))
+        self.arena = Arena(
+            disks_of(scene, position, low), empty_queue(scene.n), head=np.full(np.prod(grid.shape), NONE),
+            near=np.full(scene.n + 9, NONE), grid=grid, rules=rules, walls=walls_of(scene, grid, low),
+            clock=np.zeros(2), log=np.zeros((LOG_ROWS, 5)), told=np.zeros(3, np.int64),
+        )  # fmt: skip
         self.kept: list[Array] = []
-        event_loop.begin(self.disks, self.grid)
+        self.scenery: Scenery = (True,) if rules.falling or rules.wrapped or len(scene.walls) else ()
+        event_loop.begin(self.arena.disks, self.arena.head, self.arena.tree, grid)
         self.refuse_pairs()
 
     def advance(self, until: float) -> None:
         """Let all events up to `until` s happen; `NoTruth` if the answer ends before."""
-        status = LOG_FULL
-        while status == LOG_FULL:
+        status = event_loop.LOG_FULL
+        while status == event_loop.LOG_FULL:
             self.drain()
-            status = event_loop.advance(
-                self.disks, self.grid, self.rules, self.clock, until, self.log, self.told
-            )  # fmt: skip
+            status = event_loop.advance(self.arena, self.scenery, until)
         self.drain()
-        at, i, j = self.clock[event_loop.END], self.told[event_loop.WHO], self.told[event_loop.WHOM]
-        if status == ACCUMULATION:
+        at, i, j = self.arena.clock[event_loop.STOP], self.arena.told[event_loop.WHO], self.arena.told[event_loop.WHOM]
+        if status == event_loop.ACCUMULATION:
             other = f"disk {j}" if j >= 0 else f"wall {-1 - j}"
-            reason = f"{HITS} hits of disk {i}, the last with {other}, come at once at {at:.9g} s: they accumulate"
-            raise NoTruth(reason, at)
-        if status == REENTRY:
+            hits = f"{event_loop.HITS} hits of disk {i}, the last with {other}"
+            raise NoTruth(f"{hits}, come at once at {at:.9g} s: they accumulate", at)
+        if status == event_loop.REENTRY:
             raise NoTruth(f"disk {i} re-enters on top of disk {j} at {at:.9g} s", at)
+        if status == event_loop.ROUND_END:
+            raise NoTruth(f"disk {i} slides round the end of wall {-1 - j} at {at:.9g} s: no parabola goes there", at)
 
     def drain(self) -> None:
         """Keep what is in the log and empty it."""
-        if self.told[event_loop.LOGGED]:
-            self.kept.append(self.log[: self.told[event_loop.LOGGED]].copy())
-            self.told[event_loop.LOGGED] = 0
+        told = self.arena.told
+        if told[event_loop.LOGGED]:
+            self.kept.append(self.arena.log[: told[event_loop.LOGGED]].copy())
+            told[event_loop.LOGGED] = 0
 
     def pull(self, disk: int, at: float, acceleration: Array) -> None:
         """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so, (2,) m/s2."""
-        self.rules = self.rules._replace(falling=True, mixed=True)
-        event_loop.pull(self.disks, self.clock, disk, at, acceleration[0], acceleration[1])
+        self.arena = self.arena._replace(rules=self.arena.rules._replace(falling=True, mixed=True))
+        self.scenery = (True,)
+        event_loop.pull(self.arena, self.scenery, disk, at, acceleration[0], acceleration[1])
 
     def look(self, at: float) -> tuple[Array, Array]:
         """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; nothing changes by looking."""
         out = np.empty((self.scene.n, 4))
-        event_loop.look(self.disks, self.clock, at, out)
+        event_loop.look(self.arena.disks, self.arena.clock[event_loop.BASE], at, out)
         return out[:, :2], out[:, 2:]
 
     @property
     def hits(self) -> Array:
         """(h, 4): t s, disk, other disk or -1 - wall, impulse N s, of all hits so far."""
-        return np.concatenate([np.empty((0, 4)), *self.kept])
+        return np.concatenate([np.empty((0, 5)), *self.kept])[:, :4]
+
+    @property
+    def cosines(self) -> Array:
+        """(h,) of the impact angle of each of the hits, normal over whole speed: the smaller, the more a graze."""
+        return np.concatenate([np.empty((0, 5)), *self.kept])[:, 4]
 
     def refuse_pairs(self) -> None:
         """`NoTruth` if two disks overlap, or touch and close in, judged in rationals: floats cannot tell."""
-        found = np.empty((8 * self.scene.n, 2), np.int64)
-        count = event_loop.near_pairs(self.disks, self.grid, WIDER - 1, found)
+        disks, found = self.arena.disks, np.empty((8 * self.scene.n, 2), np.int64)
+        count = event_loop.near_pairs(disks, self.arena.head, self.arena.grid, WIDER - 1, found)
         for i, j in found[:count]:
-            refuse_pair(self.disks.row, self.grid, int(i), int(j))
+            refuse_pair(disks[i], disks[j], self.arena.grid, int(i), int(j))
 
 
-def refuse_pair(row: Array, grid: Grid, i: int, j: int) -> None:
+def refuse_pair(a: Any, b: Any, grid: Grid, i: int, j: int) -> None:
     """`NoTruth` if disks i and j overlap, or touch and close in."""
-    apart = [Fraction(row[j, axis]) - Fraction(row[i, axis]) for axis in range(2)]
+    apart = [Fraction(b.x) - Fraction(a.x), Fraction(b.y) - Fraction(a.y)]
     if grid.torus:
         apart = [d - Fraction(span) * round(d / Fraction(span)) for d, span in zip(apart, grid.span)]
-    reach = Fraction(row[i, RADIUS]) + Fraction(row[j, RADIUS])
+    reach = Fraction(a.radius) + Fraction(b.radius)
     gap = sum(d * d for d in apart) - reach * reach
-    closing = sum(d * (Fraction(row[j, 2 + axis]) - Fraction(row[i, 2 + axis])) for axis, d in enumerate(apart))
+    closing = apart[0] * (Fraction(b.vx) - Fraction(a.vx)) + apart[1] * (Fraction(b.vy) - Fraction(a.vy))
     if gap < 0:
         overlap = -float(gap) / (float(reach) + np.hypot(float(apart[0]), float(apart[1])))
         raise NoTruth(f"disks {i} and {j} overlap by {overlap:.3g} m at the start: move one {overlap:.3g} m away")
@@ -166,15 +159,21 @@ def refuse_box(scene: Scene, torus: Array | None) -> None:
 
 def rules_of(scene: Scene) -> Rules:
     """The scene's physics as the kernels take it."""
+    falling, walled = bool(scene.gravity.any()), len(scene.walls) > 0
+    # What lies on a wall does not fall with the others; at e = 1 nothing comes to rest.
+    mixed = falling and ((walled and scene.restitution < 1) or bool(scene.static.any()))
+    # Where a bounce takes less than 1 / (1 - e) units in the last place, rounding the time gives back what it loses.
+    crowd = 1e3 / (1 - min(scene.restitution, 0.9999)) if scene.restitution < 1 else 1e3
+    return Rules(float(scene.restitution), falling, mixed, scene.wrap is not None, crowd)
+
+
+def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
+    """What stands around, as the kernels take it."""
     along = scene.walls[:, 1] - scene.walls[:, 0]
     length = np.hypot(*along.T) if len(along) else np.zeros(0)
-    falling = bool(scene.gravity.any())
+    segment = np.column_stack([scene.walls[:, 0], along / length[:, None], length])
     wrap = np.zeros((2, 2)) if scene.wrap is None else np.array(scene.wrap)
-    return Rules(
-        restitution=float(scene.restitution), falling=falling, mixed=falling and bool(scene.static.any()),
-        wrapped=scene.wrap is not None, wrap=wrap,
-        walls=np.column_stack([scene.walls[:, 0], along / length[:, None], length]),
-    )  # fmt: skip
+    return Walls(wrap, segment, *walls_by_cell(scene, low, np.array(grid.side), np.array(grid.shape)))
 
 
 def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array]:
@@ -188,14 +187,11 @@ def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array
     side = np.full(2, max(least, np.sqrt(extent.prod() / (4 * scene.n)), extent.max() / (4 * scene.n)))
     if torus is None:
         low, shape = low - side, np.ceil(extent / side).astype(np.int64) + 3
+        span, shift = side * shape, np.zeros(2)
     else:
         shape = np.maximum(np.floor(extent / side), 3).astype(np.int64)
-        side = extent / shape
-    first, walls = walls_by_cell(scene, low, side, shape)
-    head = np.full(shape.prod(), -1, np.int64)
-    span = side * shape if torus is None else extent
-    grid = Grid(pair(side), pair(shape), pair(span), torus is not None, head, first, walls)
-    return grid, low
+        side, span, shift = extent / shape, extent, extent
+    return Grid(pair(side), pair(shape), pair(span), pair(shift), torus is not None), low
 
 
 def pair(array: NDArray) -> Any:
@@ -215,16 +211,18 @@ def walls_by_cell(scene: Scene, low: Array, side: Array, shape: NDArray[np.int64
     return np.append(0, near.sum(axis=1).cumsum()).astype(np.int64), np.nonzero(near)[1].astype(np.int64)
 
 
-def disks_of(scene: Scene, position: Array, low: Array) -> Disks:
+def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:
     """The disks at t = 0, in no cell yet and without records."""
-    n = scene.n
-    room = np.zeros(16 * n + 8)
-    skip = -room.ctypes.data % 64 // 8  # what a contact needs of a disk then fills one line of the cache, not two
-    row, tag = room[skip : skip + 16 * n].reshape(n, 16), np.zeros((n, 9), np.int64)
-    row[:, :2], row[:, 2:4] = position, scene.velocity
-    row[:, RADIUS], row[:, WEIGHT] = scene.radius, 1 / scene.mass
-    row[:, [PAIR_TIME, OWN_TIME]] = np.inf
-    row[:, AX:OX] = np.where(scene.static[:, None], 0.0, scene.gravity)
-    row[:, OX : OX + 2] = low
-    tag[:, LAST] = NOBODY
-    return Disks(row, tag, np.full(n, -1), *empty_queue(n))
+    n, size = scene.n, DISK.itemsize
+    room = np.zeros(size * n + 64, np.uint8)
+    skip = -room.ctypes.data % 64  # each then begins a line of the cache
+    disks = room[skip : skip + size * n].view(DISK)
+    disks["x"], disks["y"] = position.T
+    disks["vx"], disks["vy"] = scene.velocity.T
+    disks["ox"], disks["oy"] = low
+    pull = np.where(scene.static[:, None], 0.0, scene.gravity)
+    disks["ax"], disks["ay"] = disks["pull_x"], disks["pull_y"] = pull.T
+    disks["radius"], disks["weight"] = scene.radius, 1 / scene.mass
+    disks["pair_time"] = disks["own_time"] = np.inf
+    disks["last"], disks["wall"] = NOBODY, -1
+    return disks.view(np.recarray)

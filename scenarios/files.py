@@ -68,9 +68,7 @@ def _parsed(path: Path) -> dict[str, Any]:
         text = data[:MOST_BYTES].decode()
         if len(data) > MOST_BYTES:
             raise SceneFileError([f"larger than {MOST_BYTES} bytes; must be smaller"])
-        if text.startswith("\ufeff"):
-            raise SceneFileError(["begins with a byte order mark; must be UTF-8 without one"])
-        return tomllib.loads(text)
+        return tomllib.loads(text.removeprefix("\ufeff"))  # some editors begin every file with a byte order mark
     except SceneFileError:
         raise
     except OSError as error:

@@ -174,7 +174,7 @@ class Scenario:
         sample_interval: s; every player is sampled at i * sample_interval.
         substeps: the dt ladder, dt = sample_interval / k, coarse to fine; the middle one is the page's.
         thrusts: piecewise-constant pushes.
-        truth: times (k,) s -> the exact `Trajectory` there, cut at its horizon, or it raises `NoTruth`; or None.
+        truth: times (k,) s -> the exact `Trajectory` there, up to its horizon, or `NoTruth` (see `truth_at`); or None.
         without_truth: why there is no exact answer, in one sentence, where `truth` is None.
         seed: what the scene was drawn from, or None.
     """

@@ -1,6 +1,8 @@
-"""The one refusal of everything that answers exactly."""
+"""The one refusal of everything that answers exactly, and the verb that asks for an answer at all the times given."""
 
 from __future__ import annotations
+
+from scenarios.model import Array, Scenario, Trajectory
 
 
 class NoTruth(ValueError):
@@ -9,3 +11,21 @@ class NoTruth(ValueError):
     def __init__(self, reason: str, at: float = 0.0) -> None:
         super().__init__(reason)
         self.at = at
+
+
+def truth_at(scenario: Scenario, t: Array) -> Trajectory:
+    """The exact `Trajectory` at all the times t (k,) s, increasing; `scenario.truth(t)` gives as many as are known.
+
+    Raises:
+        NoTruth: there is none, or none at a time beyond its horizon; says where that is and why.
+    """
+    if scenario.truth is None:
+        raise NoTruth(scenario.without_truth)
+    truth = scenario.truth(t)
+    if len(truth) < len(t):
+        late, until = t[len(truth)], truth.valid_until
+        why = f": {truth.reason}" if truth.reason else ""
+        raise NoTruth(
+            f"t = {late:.9g} s: the truth of {scenario.name} ends at its horizon at {until:.9g} s{why}", until
+        )
+    return truth

@@ -20,7 +20,11 @@ Number = Any
 
 
 class Undecided(ArithmeticError):
-    """A ball holds zero, so its sign is not proven."""
+    """A ball holds zero, so its sign is not proven; at `t` s of a motion."""
+
+    def __init__(self, t: float = 0.0) -> None:
+        super().__init__(t)
+        self.t = t
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,10 @@ class Numbers:
         sqrt: number -> its root.
         sign: number -> -1, 0 or 1; 0 where it is below `tie`.
         precise: makes the context within which all arithmetic is done.
+        between: two float64 -> a number between them; a ball, that holds both.
+        spread: number -> how far the right one may be from it; 0 where that is not known.
         tie: number; what is smaller counts as zero. s, m, m/s: scenes are of the order of 1.
+        proves: whether these are balls.
     """
 
     name: str
@@ -44,6 +51,9 @@ class Numbers:
     sign: Callable[[Number], int]
     precise: Callable[[], AbstractContextManager[Any]]
     tie: Number
+    between: Callable[[float, float], Number]
+    spread: Callable[[Number], float]
+    proves: bool = False
 
 
 def mpfr(bits: int) -> Numbers:
@@ -58,8 +68,11 @@ def mpfr(bits: int) -> Numbers:
     def precise() -> AbstractContextManager[Any]:
         return gmpy2.context(gmpy2.get_context(), precision=bits)
 
-    # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.
-    return Numbers("mpfr", bits, lambda x: gmpy2.mpfr(x, 53), gmpy2.sqrt, sign, precise, tie)
+    def exact(x: float) -> Number:
+        # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.
+        return gmpy2.mpfr(x, 53)
+
+    return Numbers("mpfr", bits, exact, gmpy2.sqrt, sign, precise, tie, lambda a, b: exact((a + b) / 2), _nothing)
 
 
 def decimals(bits: int) -> Numbers:
@@ -70,21 +83,27 @@ def decimals(bits: int) -> Numbers:
     def sign(x: Number) -> int:
         return 1 if x > tie else -1 if x < -tie else 0
 
+    def between(a: float, b: float) -> Number:
+        return decimal.Decimal((a + b) / 2)
+
     return Numbers(
-        "decimal", bits, decimal.Decimal, lambda x: x.sqrt(context), sign, lambda: decimal.localcontext(context), tie
-    )
+        "decimal", bits, decimal.Decimal, lambda x: x.sqrt(context), sign, lambda: decimal.localcontext(context), tie,
+        between, _nothing,
+    )  # fmt: skip
 
 
 def balls(bits: int) -> Numbers:
     """Arb's real balls, which hold the right number for certain. Raises ImportError where python-flint is missing."""
     import flint
 
+    nought = flint.arb(0)
+
     def sign(x: Number) -> int:
-        if x > 0:
+        if x > nought:
             return 1
-        if x < 0:
+        if x < nought:
             return -1
-        if x == 0:
+        if x.is_zero():
             return 0
         raise Undecided
 
@@ -96,7 +115,17 @@ def balls(bits: int) -> Numbers:
         finally:
             flint.ctx.prec = before
 
-    return Numbers("arb", bits, flint.arb, lambda x: x.sqrt(), sign, precise, flint.arb(0))
+    def between(a: float, b: float) -> Number:
+        return flint.arb(a).union(flint.arb(b))
+
+    def spread(x: Number) -> float:
+        return float(x.rad())
+
+    return Numbers("arb", bits, flint.arb, lambda x: x.sqrt(), sign, precise, nought, between, spread, proves=True)
+
+
+def _nothing(_x: Number) -> float:
+    return 0.0
 
 
 def digits(bits: int) -> Numbers:

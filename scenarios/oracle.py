@@ -3,68 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
-from scenarios.closed_forms import Hit, answer, world_pushes
-from scenarios.event_truth import float64_truth
-from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
+from scenarios.event_truth import float64_truth, perturbed
+from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
 from scenarios.numbers import Numbers, Undecided, balls, digits, has_balls
 from scenarios.oracle_bodies import Leg
-from scenarios.oracle_events import Event, Path, trace
+from scenarios.oracle_events import trace
+from scenarios.oracle_path import Path
+from scenarios.oracle_record import TruthRecord, record_of
 from scenarios.truth_cache import keep, key_of, look_up
 
-FEWEST_BITS, MOST_BITS = 128, 4096
+FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be told apart
+ASTRAY, NEIGHBOURS = 1e-10, 2  # m, for so many starts near by: a tenth of what players are held to
+LEAST_GAIN = 1.05  # times as far must half as many bits again reach, or more will not help
+SPARE, LEFT = 1.3, 64  # times as many bits as the rate so far asks for, and so many to be left for the accuracy
 MOST_DISKS = 200
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 ACCURACY = 1e-12  # m; two precisions that differ by more have parted
-CERTIFIED_BITS = 4  # times as many for balls, which lose 2.6 times as many as the motion does
-EPS = float(np.finfo(float).eps)
-
-
-@dataclass(frozen=True, eq=False)
-class TruthRecord:
-    """An exact motion as its flights, and how far it can be trusted.
-
-    Attributes:
-        legs: (l, 8) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2: flights, disk by disk in order of time.
-        events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle |v_n| / |v|.
-        valid_until: s; nothing is said of what comes later.
-        error_bound: m.
-        bits: of the numbers it was computed with; and before that with half as many.
-        method: "closed form", "two-precision" or "certified" (also by interval arithmetic).
-        reason: why it ends where it does.
-        followed_until: s; until then a player with nothing but the rounding of float64 stays within 1e-9 m of it.
-    """
-
-    legs: Array = field(repr=False)
-    events: Array = field(repr=False)
-    valid_until: float
-    error_bound: float
-    bits: int
-    method: str
-    reason: str
-    followed_until: float = np.inf
-
-    def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
-        """The motion at the times t (k,) s up to where it is known and can be followed; later times are left out."""
-        t = np.asarray(t, float)
-        position, velocity = np.empty((len(t), scene.n, 2)), np.empty((len(t), scene.n, 2))
-        for i in range(scene.n):
-            legs = self.legs[self.legs[:, 0] == i]
-            leg = legs[np.maximum(np.searchsorted(legs[:, 1], t, side="right") - 1, 0)]
-            since, v, a = (t - leg[:, 1])[:, None], leg[:, 4:6], leg[:, 6:8]
-            position[:, i] = leg[:, 2:4] + (v + a * since / 2) * since
-            velocity[:, i] = v + a * since
-        turning = world_pushes(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
-        hits: list[Hit] = [(float(at), int(i), int(j), float(kick)) for at, i, j, kick, _ in self.events]
-        angles = turning.angle, turning.angular_velocity
-        until, reason = self.valid_until, self.reason
-        if self.followed_until < until:
-            until, reason = self.followed_until, "from there on the rounding of float64 leads any player elsewhere"
-        return answer(scene, t, (position, velocity), hits, angles, until, self.error_bound, reason)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,21 +53,47 @@ class OracleTruth:
         key = key_of(self.scenario, has_balls())
         found = look_up(key)
         if found is None:
-            found = vars(replace(computed(self.scenario), followed_until=followed_until(self.scenario)))
+            record = computed(self.scenario)
+            found = vars(replace(record, followed_until=followed_until(self.scenario, record)))
             keep(key, found)
         return TruthRecord(**found)
 
 
-def followed_until(scenario: Scenario) -> float:
-    """s, up to when float64 events from starts a unit in the last place apart stay together; inf: to the end.
+def followed_until(scenario: Scenario, record: TruthRecord) -> float:
+    """s, up to when motions from starts a unit in the last place apart stay together; inf: to the end.
 
-    Beyond it a distance between trajectories says nothing about a solver, only about chaos.
+    Beyond it a distance between trajectories says nothing about a solver, only about chaos. float64 events tell, or,
+    where these end by themselves (what rests is not for them), the oracle.
     """
     try:
         horizon, reason = float64_truth(scenario).horizon
     except NoTruth:  # no judge in float64: the truth stands by itself
         return np.inf
-    return horizon if reason.startswith("float64") else np.inf
+    if not reason:
+        return np.inf
+    return (
+        horizon
+        if reason.startswith("float64")
+        else min(
+            (parting(scenario, record, perturbed(scenario.scene, seed)) for seed in range(NEIGHBOURS)), default=np.inf
+        )
+    )
+
+
+def parting(scenario: Scenario, record: TruthRecord, scene: Scene) -> float:
+    """s, the last sample before the motion of a scene near by is astray from the record; inf: it is not."""
+    near, k = replace(scenario, scene=scene), digits(FEWEST_BITS)
+    try:
+        path = trace(scene, [push for push in scenario.thrusts if push.force.any()], scenario.duration, k)
+    except NoTruth:  # what touches may overlap when it is moved
+        return np.inf
+    ours = record.sampled(scenario.scene, scenario.thrusts, scenario.times)
+    theirs = record_of(near, path, 0.0, k.bits, "").sampled(scene, scenario.thrusts, scenario.times)
+    both = min(len(ours), len(theirs))
+    astray = np.abs(ours.position[:both] - theirs.position[:both]).max(axis=(1, 2)) > ASTRAY
+    if not astray.any():
+        return np.inf if both == len(ours) else float(theirs.t[-1])
+    return float(ours.t[max(int(astray.argmax()) - 1, 0)])
 
 
 def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:
@@ -120,13 +106,15 @@ def with_oracle(scenario: Scenario) -> Scenario:
     return replace(scenario, truth=oracle_truth(scenario), without_truth="")
 
 
-def computed(scenario: Scenario, kind: Callable[[int], Numbers] = digits) -> TruthRecord:
-    """The record of a scenario, computed; twice the bits until two precisions agree to the end.
+def computed(scenario: Scenario, kind: Callable[[int], Numbers] | None = None) -> TruthRecord:
+    """The record of a scenario: proven by balls where they are installed and can, else the same at two precisions.
+
+    kind: numbers to compute it in, at two precisions, whatever is installed.
 
     Raises:
         NoTruth: the scene has more than the oracle can do, or bodies overlap at the start.
     """
-    scene, thrusts, until = scenario.scene, scenario.thrusts, scenario.duration
+    scene, thrusts = scenario.scene, scenario.thrusts
     if scene.n > MOST_DISKS:
         raise NoTruth(f"{scene.n} disks are more than the {MOST_DISKS} that are followed in many digits")
     if fault := _out_of_scale(scenario):
@@ -134,22 +122,61 @@ def computed(scenario: Scenario, kind: Callable[[int], Numbers] = digits) -> Tru
     if any(push.frame == "body" and push.force.any() for push in thrusts):
         raise NoTruth("a push that turns with its disk makes paths whose contacts no polynomial gives")
     pushes = [push for push in thrusts if push.force.any()]
-    bits = FEWEST_BITS
-    coarse = trace(scene, pushes, until, kind(bits))
+    record = certified(scenario, pushes) if kind is None and has_balls() else None
+    return record or two_precisions(scenario, pushes, kind or digits)
+
+
+def certified(scenario: Scenario, pushes: Sequence[Thrust]) -> TruthRecord | None:
+    """The record by interval arithmetic, which proves every comparison; None where no precision decides one.
+
+    How far the first bits reach tells how many are needed for all: a motion loses them at a steady rate.
+    """
+    bits, before, until = FEWEST_BITS, 0.0, scenario.duration
+    while bits <= MOST_BITS:
+        try:
+            path = trace(scenario.scene, pushes, until, balls(bits))
+            error, reached = spread(path, until), until
+            if error < ACCURACY:
+                return record_of(scenario, path, error, bits, "certified")
+        except Undecided as doubt:
+            reached = doubt.t
+        # Bits help against chaos, not where two things are equal.
+        if reached <= before * LEAST_GAIN and before < until:
+            return None
+        needed = LEFT + ceil(SPARE * bits * until / max(reached, until * bits / MOST_BITS))
+        before, bits = reached, max(bits + bits // 2, needed)
+    return None
+
+
+def spread(path: Path, until: float) -> float:
+    """m, how far the right motion may be from the middle of the balls, at worst."""
+    widths = [
+        [leg.x.rad(), leg.y.rad(), leg.vx.rad(), leg.vy.rad(), leg.t.rad(), abs(leg.vx), abs(leg.vy), leg.t]
+        + [x.rad() for x in leg.hop or ()]
+        for legs in path.legs for leg in legs
+    ]  # fmt: skip
+    most = 0.0
+    for x, y, u, v, late, vx, vy, t, *hop in ([float(each) for each in row] for row in widths):
+        left = max(min(path.end, until) - t, 0.0)
+        most = max(most, max(x, y) + late * max(vx, vy) + (max(u, v) + sum(hop)) * left)
+    return most
+
+
+def two_precisions(scenario: Scenario, pushes: Sequence[Thrust], kind: Callable[[int], Numbers]) -> TruthRecord:
+    """The record in numbers of one kind, up to where twice as many bits say the same."""
+    scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     while True:
-        fine = trace(scene, pushes, until, kind(2 * bits))
+        coarse, fine = (trace(scene, pushes, until, kind(each)) for each in (bits, 2 * bits))
         parted, error = difference(coarse, fine, until, kind(2 * bits))
         end = min(coarse.end, fine.end, until)
         if parted >= end or 2 * bits >= MOST_BITS:
             break
-        bits, coarse = 2 * bits, fine
-    reason = fine.reason if fine.end < until else ""
+        needed = ceil(SPARE * bits * until / max(parted, until * bits / MOST_BITS))
+        bits = min(max(2 * bits, needed), MOST_BITS // 2)
     if parted < end:
-        end, reason = parted, f"the digits of {2 * bits} bits are used up at t = {parted:.9g} s"
-    method = "two-precision"
-    if not reason and has_balls() and certified(scenario, pushes, fine, 2 * bits * CERTIFIED_BITS):
-        method = "certified"
-    return _record(scenario, fine, end, error, 2 * bits, method, reason)
+        reason = f"the digits of {2 * bits} bits are used up at t = {parted:.9g} s"
+        fine = replace(fine, end=parted, reason=reason, disks=[], outcomes=[])
+    return record_of(scenario, fine, error, 2 * bits, "two-precision")
 
 
 def _out_of_scale(scenario: Scenario) -> str:
@@ -181,7 +208,7 @@ def difference(coarse: Path, fine: Path, until: float, k: Numbers) -> tuple[floa
                     parted = min(parted, t)
                     break
                 errors.append((t, error if t < end else 0.0))
-    return parted, max(error for t, error in errors if t < parted)
+    return parted, max((error for t, error in errors if t < parted), default=0.0)
 
 
 def _apart(one: Leg, other: Leg, left: float) -> float:
@@ -189,48 +216,7 @@ def _apart(one: Leg, other: Leg, left: float) -> float:
     place = max(abs(float(one.x - other.x)), abs(float(one.y - other.y)))
     speed = max(abs(float(one.vx - other.vx)), abs(float(one.vy - other.vy)))
     late = abs(float(one.t - other.t)) * max(abs(float(one.vx)), abs(float(one.vy)))
-    return place + late + speed * left
-
-
-def certified(scenario: Scenario, pushes: Sequence[Thrust], path: Path, bits: int) -> bool:
-    """Whether interval arithmetic proves every comparison of `path`: same hits, and balls smaller than `ACCURACY`."""
-    k = balls(bits)
-    try:
-        proven = trace(scenario.scene, pushes, scenario.duration, k)
-    except Undecided:
-        return False
-    same = [(e.i, e.j) for e in proven.events] == [(e.i, e.j) for e in path.events]
-    widest = max(float(x.rad()) for legs in proven.legs for leg in legs for x in leg)
-    near = all(
-        abs(float(a) - float(b)) < ACCURACY
-        for mine, theirs in zip(proven.legs, path.legs)
-        for one, other in zip(mine, theirs)
-        for a, b in zip(one, other)
-    )
-    return same and near and widest < ACCURACY and not proven.reason
-
-
-def _record(
-    scenario: Scenario, path: Path, end: float, error: float, bits: int, method: str, reason: str
-) -> TruthRecord:
-    flights = [(i, leg) for i, legs in enumerate(path.legs) for leg in legs if float(leg.t) < end or leg is legs[0]]
-    legs = np.array([[i, *map(float, leg)] for i, leg in flights])
-    events = sorted((_row(event) for event in path.events if float(event.t) < end), key=lambda row: row[:3])
-    # The instant at which the answer is lost already belongs to what is not known.
-    horizon = float(np.nextafter(end, 0)) if reason else np.inf
-    # Legs and samples are float64: a few roundings of the largest coordinate and of the longest way since a hit.
-    reach = np.abs(legs[:, 2:4]).max() + scenario.duration * np.abs(legs[:, 4:6]).max()
-    return TruthRecord(
-        legs=frozen(legs),
-        events=frozen(np.array(events).reshape(-1, 5)),
-        valid_until=max(horizon, 0.0),
-        error_bound=error + 4 * EPS * float(reach),
-        bits=bits,
-        method=method,
-        reason=reason,
-    )
-
-
-def _row(event: Event) -> list[float]:
-    i, j = (event.i, event.j) if event.j < 0 or event.i < event.j else (event.j, event.i)
-    return [float(event.t), i, j, float(event.impulse), event.cosine]
+    if (one.hop is None) != (other.hop is None):
+        return np.inf
+    hop = sum(abs(float(a - b)) for a, b in zip(one.hop or (), other.hop or ()))
+    return place + late + (speed + hop) * left

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 from scenarios.numbers import Number, Numbers, Undecided
+from scenarios.oracle_filter import fall
 
+EPS = 2.0**-52
 HALVINGS = 12  # of a bracket, before Newton is tried: enough to leave the neighbours of a simple root
 
 
@@ -54,23 +57,54 @@ def crossing(k: Numbers, s: Number, v: Number, a: Number) -> Number | None:
     return 2 * s / (k.sqrt(under) - v) if k.sign(under) > 0 else None
 
 
-def falling_meeting(k: Numbers, gap: Sequence[Number], horizon: Number) -> Number | None:
+def falling_meeting(k: Numbers, gap: Sequence[Number], limit: float) -> Number | None:
     """s until the gap c0 + c1 t + ... + c4 t^4 (m2) of two bodies that accelerate differently closes, or None.
 
-    Only up to `horizon` s. Raises `Pressed`, and `Undecided` for balls, which cannot say where a piece changes sign.
+    Only up to `limit` s. float64 finds between which times, by margins far above its rounding; many digits find the
+    time. Raises `Pressed`, and `Undecided` for balls where float64 cannot tell: the two graze.
     """
-    if k.name == "arb":
-        raise Undecided
     touching = k.sign(gap[0]) <= 0
-    if touching and k.sign(gap[1]) < 0:
+    approach = k.sign(gap[1] / 2) if touching else 0
+    if touching and approach < 0:
         return k.exact(0.0)
     if touching:
         # The root at 0 is the contact they leave; what is left of the polynomial begins positive.
-        gap = gap[1:] if k.sign(gap[1]) else gap[2:]
+        gap = gap[1:] if approach else gap[2:]
         if k.sign(gap[0]) < 0:
             raise Pressed
-    roots = first_changes(k, gap, k.exact(0.0), horizon)
+    rough = [float(x) for x in gap] + [0.0] * (5 - len(gap))
+    low, high = fall((rough[0], rough[1], rough[2], rough[3], rough[4]), limit, 0.0)
+    # Coefficients known less well than that would not be covered by the margins.
+    vague = any(k.spread(x) * max(1.0, limit) ** 4 > EPS * rough[0] for x in gap)
+    if low == inf and not vague:
+        return None
+    if high and not vague:
+        return sharpened(k, gap, low, high)
+    if k.proves:
+        raise Undecided
+    roots = first_changes(k, gap, k.exact(0.0), k.exact(limit))
     return next((t for t in roots if _value(_slope(gap), t) <= 0), None)
+
+
+def sharpened(k: Numbers, p: Sequence[Number], low: float, high: float) -> Number:
+    """The one root of sum p[i] t^i between two times where it falls, by Newton's method.
+
+    For balls the interval Newton method (Moore, Kearfott & Cloud, Introduction to Interval Analysis, 2009, 8.1): the
+    root lies in m - p(m) / p'(T) if it lies in T and m is T's middle.
+    """
+    slope, t = _slope(p), k.between(low, high)
+    for _ in range(HALVINGS + k.bits.bit_length()):
+        steep = _value(slope, t)
+        if k.proves and not steep < 0:
+            raise Undecided
+        middle = t.mid() if k.proves else t
+        ahead = middle - _value(p, middle) / steep
+        done = not k.spread(ahead) < k.spread(t) / 2 if k.proves else abs(ahead - t) * 1024 < k.tie
+        t = ahead
+        # Newton doubles the right digits: after a step of less than half of them all are right.
+        if done:
+            break
+    return t
 
 
 def first_changes(k: Numbers, p: Sequence[Number], low: Number, high: Number) -> list[Number]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from scenarios.numbers import Number, Numbers
@@ -13,7 +14,9 @@ LONGEST = 200  # hits of one order at one instant; more do not end
 
 
 class Contact(NamedTuple):
-    """What disk `i` may touch: a disk j, or an end point (j from n on), or a side of a wall, or an edge of the wrap."""
+    """What disk `i` comes to: kind "body", a disk j or an end point (j from n on); "wall", a side of wall j; "edge" of
+    the wrap across axis j; "end" of the wall j it rests on; "rest", where its bounces on a side of wall j die out.
+    """
 
     kind: str
     i: int
@@ -47,13 +50,27 @@ Velocities = dict[int, Velocity]
 """Body -> its velocity."""
 
 
+class Outcome(NamedTuple):
+    """How a simultaneous contact may end: velocities, the hits in one order, contacts with no speed across, exactly."""
+
+    velocities: Velocities
+    blows: list[Blow]
+    still: frozenset[Contact]
+
+
 @dataclass(frozen=True)
 class Matter:
-    """What a hit needs to know of the bodies: 1 / mass (b,) 1/kg and the restitution, in numbers."""
+    """What a hit needs to know of the bodies: 1 / mass (b,) 1/kg and the restitution, in numbers; whether that is 0."""
 
     numbers: Numbers
     inverse_mass: Sequence[Number]
     restitution: Number
+    sticks: bool
+
+    @cached_property
+    def faint(self) -> Number:
+        """m2/s, what is slower is on its way to the tie."""
+        return self.numbers.sqrt(self.numbers.tie)
 
     def approach(self, touch: Touch, v: Mapping[int, Velocity]) -> Number:
         """dr.dv m2/s (m/s at a wall, where the direction has length 1); negative: the two approach."""
@@ -82,26 +99,38 @@ class Matter:
         speed2 = (px - ux) * (px - ux) + (py - uy) * (py - uy)
         return after, Blow(contact, q * root(square), -b / root(square * speed2))
 
-    def outcomes(self, touches: Sequence[Touch], v: Velocities) -> list[tuple[Velocities, list[Blow]]]:
+    def outcomes(
+        self,
+        touches: Sequence[Touch],
+        v: Velocities,
+        still: frozenset[Contact] = frozenset(),
+        upright: Callable[[Contact, Contact], bool] = lambda _one, _other: False,
+    ) -> list[Outcome]:
         """Every different end that resolving the approaching contacts in some order can have, with one such order.
 
-        The last element is ({}, []) where some order does not end.
+        still: contacts with no speed across, exactly. upright: whether a hit on one contact leaves the other so.
+        The last element has no velocities where some order does not end.
         """
-        sign, ends = self.numbers.sign, list[tuple[Velocities, list[Blow]]]()
-        waiting: list[tuple[Velocities, list[Blow]]] = [(v, [])]
+        sign, ends = self.numbers.sign, list[Outcome]()
+        waiting = [Outcome(v, [], still)]
         for _ in range(MOST_ORDERS):
             if not waiting:
                 return ends
-            now, blows = waiting.pop()
-            closing = [touch for touch in touches if sign(self.approach(touch, now)) < 0]
+            now, blows, still = waiting.pop()
             if len(blows) > LONGEST:
+                break
+            closing = [touch for touch in touches if touch.contact not in still and sign(self.approach(touch, now)) < 0]
+            # Hits that die out towards the tie do not end: with more digits there would be more of them.
+            if blows and not self.numbers.proves and any(abs(self.approach(t, now)) < self.faint for t in closing):
                 break
             for touch in closing:
                 after, blow = self.hit(touch, now)
-                waiting.append((after, [*blows, blow]))
-            if not closing and not any(self._same(now, end) for end, _ in ends):
-                ends.append((now, blows))
-        return [*ends, ({}, [])]
+                kept = {c for c in still if not c.disks & touch.contact.disks or upright(c, touch.contact)}
+                kept |= {touch.contact} if self.sticks else set()
+                waiting.append(Outcome(after, [*blows, blow], frozenset(kept)))
+            if not closing and not any(self._same(now, end.velocities) for end in ends):
+                ends.append(Outcome(now, blows, still))
+        return [*ends, Outcome({}, [], frozenset())]
 
     def _same(self, one: Mapping[int, Velocity], other: Mapping[int, Velocity]) -> bool:
         return all(self.numbers.sign(a - b) == 0 for i in one for a, b in zip(one[i], other[i]))

@@ -9,6 +9,7 @@ import numpy as np
 from scenarios.closed_forms import Motion, answer
 from scenarios.lines import galperin, galperin_hits, row, row_hits
 from scenarios.model import Array, Scenario, Scene, Trajectory
+from scenarios.oracle import with_oracle
 from scenarios.placing import lay_out
 
 EPS = float(np.finfo(float).eps)
@@ -117,16 +118,16 @@ def cradle_with_gaps() -> Scenario:
 
 
 def cradle_touching() -> Scenario:
-    """The same cradle without gaps."""
-    return Scenario(
+    """The same cradle without gaps: binary fractions, so that its disks touch exactly."""
+    question = Scenario(
         name="cradle_touching",
-        asks="What does each engine make of a cradle whose disks touch?",
-        source="the desk toy",
-        scene=_cradle(np.array([-2.3, -1.8, 0.0, 0.5, 1.0])),
+        asks="Do two disks leave a cradle when two come in, if its disks touch?",
+        source="the limit of small gaps, which is the same in whatever order the hits come",
+        scene=_cradle(np.array([-2.2587890625, -1.7587890625, 0.0, 0.5, 1.0])),
         duration=4.0,
         sample_interval=1 / 60,
-        without_truth="shown, never scored: simultaneous contacts have no answer but by a rule",
     )
+    return with_oracle(question)
 
 
 ROWS = (

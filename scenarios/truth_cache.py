@@ -18,8 +18,9 @@ import numpy as np
 from scenarios.model import Scenario, frozen
 
 HERE = Path(__file__).parent
-ARRAYS = ("legs", "events")
-NUMBERS = ("valid_until", "error_bound", "bits", "method", "reason", "followed_until")
+ARRAYS = {"legs": 12, "events": 5, "outcomes": 4, "orders": 3}
+"""The arrays of a record and how many columns each has."""
+NUMBERS = ("valid_until", "error_bound", "bits", "method", "reason", "followed_until", "remains")
 
 
 def folder() -> Path | None:
@@ -65,12 +66,12 @@ def look_up(key: str) -> dict[str, Any] | None:
         with np.load(where / f"{key}.npz", allow_pickle=False) as saved:
             arrays = {name: frozen(saved[name]) for name in ARRAYS}
             numbers = json.loads(str(saved["numbers"]))
-        if arrays["legs"].shape[1:] != (8,) or arrays["events"].shape[1:] != (5,) or set(numbers) != set(NUMBERS):
+        if any(arrays[name].shape[1:] != (width,) for name, width in ARRAYS.items()) or set(numbers) != set(NUMBERS):
             return None
     # A torn or foreign file is as good as none.
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error):
         return None
-    return arrays | numbers
+    return arrays | numbers | {"remains": tuple(numbers["remains"])}
 
 
 def keep(key: str, fields: dict[str, Any]) -> bool:

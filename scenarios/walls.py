@@ -151,7 +151,8 @@ def disk_between_static_disks() -> Scenario:
         growth = offset_growth(10 * reach, radius + static)
         bounces = int(np.log(1e-9 / (EPS * centre * 5)) / np.log(growth))
         horizon = float(legs.start[min(bounces, len(hits))])
-        return answer(scene, t, (position, velocity), hits, valid_until=horizon, error_bound=4 * EPS * centre * 5)
+        bound, reason = 4 * EPS * centre * 5, "there a rounding has grown to 1e-9 m on the unstable orbit"
+        return answer(scene, t, (position, velocity), hits, None, horizon, bound, reason)
 
     return Scenario(
         name="disk_between_static_disks",

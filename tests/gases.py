@@ -1,10 +1,13 @@
-"""Gases of equal disks on a torus, and what the literature says of them."""
+"""Gases of equal disks on a torus, what the literature says of them, and how tests ask the event engine."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from scenarios.events import EventEngine
+from scenarios.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
 from scenarios.model import Scene
+from scenarios.placing import box, scatter
 
 # B_k / B_2^(k-1) of hard disks, k = 1 .. 10 (Clisby & McCoy, J. Stat. Phys. 122, 15, 2006).
 VIRIALS = [1, 1, (16 / 3 - 4 * np.sqrt(3) / np.pi) / 4, 0.53223180, 0.33355604, 0.1988425, 0.1148728, 0.0649930,
@@ -38,3 +41,42 @@ def gas(n: int, packing: float, seed: int = 0) -> tuple[Scene, np.ndarray]:
         position=np.stack([x, y], -1), velocity=velocity, radius=np.full(n, 0.5), mass=np.ones(n), restitution=1.0
     )
     return scene, np.array([[0.0, 0.0], [side, side]])
+
+
+def boxed_gas(n: int, packing: float, seed: int = 0) -> Scene:
+    """The gas of `gas` between four walls instead, which the disks cover by `packing`, in an order drawn by `seed`."""
+    free, torus = gas(n, packing, seed)
+    side = torus[1, 0]
+    spread = free.position - free.position.min(axis=0)
+    # From wall to wall, but for a gap of a thousandth of a diameter.
+    position = 0.501 + spread / spread.max(axis=0) * (side - 1.002)
+    order = np.random.default_rng(seed).permutation(n)
+    return Scene(
+        position=position[order], velocity=free.velocity[order], radius=free.radius, mass=free.mass, restitution=1.0,
+        walls=box([0.0, 0.0], [side, side]),
+    )  # fmt: skip
+
+
+def boxed_asteroids(seed: int, restitution: float = 1.0, gravity: float = 0.0) -> Scene:
+    """The exercise's ship and twenty asteroids between walls at the edges of its world, drawn as it draws them."""
+    rng = np.random.default_rng(seed)
+    radius = np.append(SHIP_RADIUS, rng.uniform(0.08, 0.3, 20))
+    position = scatter(rng, np.array(LOW) + 0.3, np.array(HIGH) - 0.3, radius, first=SHIP)
+    velocity = rng.uniform(0.25, 0.5, (21, 2)) * rng.choice([-1.0, 1.0], (21, 2))
+    velocity[0] = 0.0
+    return Scene(
+        position=position, velocity=velocity, radius=radius, mass=np.append(SHIP_MASS, 30 * np.pi * radius[1:] ** 2),
+        restitution=restitution, gravity=np.array([0.0, gravity]), walls=box(LOW, HIGH),
+    )  # fmt: skip
+
+
+def hits_of(engine):
+    """(t, i, j) of all hits, the lower disk first."""
+    return [(t, *((i, j) if j < 0 or i < j else (j, i))) for t, i, j in engine.hits[:, :3].tolist()]
+
+
+def state_after(scene, until, torus=None, cell=0.0):
+    """The engine, and position and velocity at `until` s."""
+    engine = EventEngine(scene, torus, cell)
+    engine.advance(until)
+    return engine, *engine.look(until)

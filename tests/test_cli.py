@@ -147,11 +147,28 @@ def test_truth_prints_the_exact_answer(tmp_path: Path):
 
 
 def test_truth_says_why_there_is_none(tmp_path: Path):
-    """Exit 1: the name is known, the answer is not."""
-    done = crosscheck("truth", "cradle_touching", cwd=tmp_path)
+    """Exit 1: the scene is read, the answer is not known."""
+    turning = (
+        SCENES / "two.toml"
+    ).read_text() + '\n[[thrust]]\ndisk = 0\nstart = 0\nstop = 1\nforce = [1, 0]\nframe = "body"\n'
+    (tmp_path / "turning.toml").write_text(turning)
+    done = crosscheck("truth", "turning.toml", cwd=tmp_path)
 
     assert done.returncode == 1
-    assert "no exact answer: shown, never scored" in done.stderr
+    assert "no exact answer: a push that turns with its disk" in done.stderr
+
+
+def test_truth_tells_what_comes_to_rest_and_all_outcomes(tmp_path: Path):
+    """A rest is a line of the list; a break shot ends in a table of two outcomes, of which none is the truth."""
+    told = crosscheck("truth", str(SCENES / "settles.toml"), cwd=tmp_path).stdout
+    assert "comes to rest" in told
+    broken = crosscheck("truth", str(SCENES / "break.toml"), cwd=tmp_path).stdout
+    for words in ("2 outcomes; none is the truth", "0: (-0.125, -0.216506)", "0: (-0.125, 0.216506)", "still known"):
+        assert words in broken
+    answer = json.loads(crosscheck("truth", str(SCENES / "break.toml"), "--json", cwd=tmp_path).stdout)
+    assert len(answer["outcomes"]) == 2
+    assert answer["outcomes"][0]["order"]
+    assert any("momentum" in said for said in answer["still_known"])
 
 
 def test_all_faults_of_all_scene_files_come_at_once(tmp_path: Path):
@@ -241,7 +258,7 @@ def test_an_interrupt_keeps_what_was_played_and_says_how_to_go_on(tmp_path: Path
     """Ctrl-C: exit 130, no worker left behind, and the journal makes a report."""
     words = [CROSSCHECK, "run", "galperin_314", "slow_hit", "--engine", "pymunk", "--out", "out", "--workers", "1"]
     run = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    wait_for(lambda: any('"cell"' in path.read_text() for path in tmp_path.glob("out.part-*/journal.jsonl")))
+    wait_for(lambda: any('"cell"' in path.read_text() for path in tmp_path.glob("out.part/journal.jsonl")))
     os.killpg(run.pid, signal.SIGINT)
     _, said = run.communicate(timeout=60)
     command = said.splitlines()[-1].split("crosscheck ")[-1].split()

@@ -14,7 +14,6 @@ from test_truth import FLYING, simulate
 from scenarios import oracle_events
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Scene, Thrust
-from scenarios.no_truth import NoTruth
 from scenarios.numbers import balls, decimals, has_balls, mpfr
 from scenarios.oracle import ACCURACY, TruthRecord, computed
 from scenarios.oracle_events import Path, trace
@@ -128,7 +127,7 @@ def test_interval_arithmetic_proves_every_comparison(records: dict[str, TruthRec
 
 def last_of(path: Path) -> np.ndarray:
     """(n, 7) the last leg of each disk."""
-    return np.array([[float(x) for x in legs[-1]] for legs in path.legs])
+    return np.array([[float(x) for x in legs[-1][:7]] for legs in path.legs])
 
 
 def test_the_order_of_the_disks_does_not_matter():
@@ -170,6 +169,7 @@ def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
         walls=[[[1, -3], [2, -3]]], gravity=[0, -9.81], restitution=1.0,
     )  # fmt: skip
     one = asked(bumper, 1.5)
+    assert computed(one).method == ("certified" if has_balls() else "two-precision")
     truth = states(one, computed(one))
     t = truth.collisions.t[0]
     at = np.array([0.3 - 0.2 * t, 2 - 9.81 * t**2 / 2])
@@ -206,82 +206,6 @@ def test_an_edge_of_the_wrap_sets_the_centre_onto_the_other():
     truth = states(one, computed(one))
 
     np.testing.assert_allclose(truth.position[:, 0, 0], (one.times + 3) % 4 - 2, rtol=0, atol=1e-14)
-
-
-ROW = lay_out(position=[[-2, 0], [0, 0], [0.5, 0], [1, 0]], velocity=[[1, 0], [0, 0], [0, 0], [0, 0]],
-              radius=[0.25] * 4, mass=[1] * 4, restitution=1.0)  # fmt: skip
-
-
-def test_contacts_that_touch_are_resolved_one_after_the_other_where_only_one_approaches():
-    """The cradle whose disks touch exactly: the last flies off, the others rest."""
-    one = asked(ROW, 3.0)
-    truth = states(one, computed(one))
-
-    assert truth.collisions.t.tolist() == [1.5, 1.5, 1.5]
-    np.testing.assert_allclose(truth.velocity[-1], [[0, 0], [0, 0], [0, 0], [1, 0]], rtol=0, atol=1e-15)
-
-
-def test_a_corner_at_a_right_angle_has_one_outcome():
-    """Both walls at once, e = 0.5, either order."""
-    scene = lay_out(
-        position=[[0, 0]], velocity=[[1, 1]], radius=[0.5], mass=[1], walls=box([-2, -2], [2, 2]), restitution=0.5
-    )
-    one = asked(scene, 2.5)
-    truth = states(one, computed(one))
-
-    assert truth.collisions.t.tolist() == [1.5, 1.5]
-    assert truth.velocity[-1, 0].tolist() == [-0.5, -0.5]
-
-
-BREAK = lay_out(position=[[-2, 0], [np.sqrt(0.75), 0.5], [np.sqrt(0.75), -0.5]], velocity=[[1, 0], [0, 0], [0, 0]],
-                radius=[0.5] * 3, mass=[1] * 3, restitution=1.0)  # fmt: skip
-BALL = lay_out(position=[[0, 1]], velocity=[[0, 0]], radius=[0.25], mass=[1], walls=[[[-9, 0], [9, 0]]],
-               gravity=[0, -9.81], restitution=0.5)  # fmt: skip
-SEAM = lay_out(position=[[1.5, 0], [-1.8, 0.1]], velocity=[[1, 0], [0, 0]], radius=[0.3, 0.3], mass=[1, 1],
-               restitution=1, wrap=[[-2, -2], [2, 2]])  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("scene", "until", "reason"),
-    [
-        (BREAK, 2.0, "disks 0, 1, 2 touch at once and the outcome depends on the order of their hits (2 outcomes)"),
-        # t_1 (1 + e) / (1 - e), t_1 = sqrt(2 h / g) = 0.391 s
-        (BALL, 3 * np.sqrt(1.5 / 9.81), "disk 0 on wall 0"),
-        (SEAM, 0.5, "disk 0 re-enters over the edge of the wrap onto disk 1 at t = 0.5 s"),
-    ],
-)
-def test_the_truth_ends_where_there_is_no_more_of_it(scene: Scene, until: float, reason: str):
-    """The horizon is the instant itself, and the reason names it and the disks."""
-    one = asked(scene, 4.0)
-    record = computed(one)
-
-    # The pile of bounces is cut off when they follow within a nanosecond.
-    assert record.valid_until == pytest.approx(until, abs=2e-9)
-    assert reason in record.reason or (scene is BALL and "disk 0 is pressed onto wall 0" in record.reason)
-    assert f"at t = {until:.4g}"[:10] in record.reason
-    assert states(one, record).t[-1] <= record.valid_until
-    assert states(one, record).reason == record.reason
-
-
-BODY = [Thrust(0, 0.0, 1.0, [1.0, 0.0], frame="body")]
-CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201, 2)), radius=[0.1] * 201, mass=[1] * 201, restitution=1)  # fmt: skip # noqa: E501
-
-
-@pytest.mark.parametrize(
-    ("one", "reason"),
-    [
-        (asked(replace(ROW, position=ROW.position * [0.9, 1])), "disk 1 and disk 2 overlap by 0.05 m at the start"),
-        (asked(replace(BALL, position=[[0, 0.1]])), "disk 0 and wall 0 overlap by 0.15 m at the start"),
-        (asked(ROW, thrusts=BODY), "a push that turns with its disk"),
-        (asked(CROWD), "201 disks are more than the 200"),
-        (asked(replace(SEAM, radius=[1e-9, 1])), "a radius of 1e-09 m is below 1e-06 m"),
-        (asked(replace(BALL, velocity=[[1e9, 0]])), r"a velocity of 1e\+09 \(SI\) is above 1e\+06"),
-    ],
-)
-def test_what_it_cannot_do_is_refused(one: Scenario, reason: str):
-    """With one sentence; nothing is pushed apart."""
-    with pytest.raises(NoTruth, match=reason):
-        computed(one)
 
 
 def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):

@@ -16,7 +16,9 @@ from tests.stability_limits import readme_table
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
-COMMANDS = [line for kind, block in BLOCKS[1:] if kind == "sh" for line in block.splitlines() if line.strip()]
+LINES = [line for kind, block in BLOCKS[1:] if kind == "sh" for line in block.splitlines() if line.strip()]
+CLUSTER = [line for line in LINES if "--extra cluster" in line]
+COMMANDS = [line for line in LINES if line not in CLUSTER]
 BIN = Path(sys.executable).parent
 
 
@@ -48,6 +50,32 @@ def test_a_command_of_the_readme_succeeds(command: str, folder: Path):
         pytest.skip("runs the tests themselves")
     done = subprocess.run([BIN / program, *arguments], cwd=folder, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_the_three_commands_for_many_machines_play_a_run(tmp_path: Path):
+    """Scheduler and worker are started as they are written, but for the address: this machine."""
+    pytest.importorskip("distributed")
+    scheduler, worker, run = (shlex.split(line)[4:] for line in CLUSTER)
+    words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    started = [subprocess.Popen([BIN / scheduler[0], *scheduler[1:], *words], stderr=subprocess.PIPE, text=True)]
+    try:
+        said = iter(started[0].stderr.readline, "")
+        address = next(found[0] for line in said if (found := re.search(r"tcp://[\d.]+:\d+", line)))
+        here = [[re.sub(r"tcp://\S+", address, word) for word in words] for words in (worker, run)]
+        started.append(subprocess.Popen([BIN / here[0][0], *here[0][1:]], cwd=tmp_path, stderr=subprocess.DEVNULL))
+        next(line for line in said if "Register worker" in line)
+        done = subprocess.run(
+            [BIN / here[1][0], *here[1][1:]], cwd=tmp_path, capture_output=True, text=True, timeout=300
+        )
+    finally:
+        for process in reversed(started):
+            process.terminate()
+            process.wait()
+
+    assert [scheduler, worker[:2], run[:2]] == [["dask", "scheduler"], ["dask", "worker"], ["crosscheck", "run"]]
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "many" / "report.html").exists()
 
 
 def test_the_python_blocks_run_one_after_the_other(folder: Path, monkeypatch: pytest.MonkeyPatch):

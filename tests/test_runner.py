@@ -1,52 +1,127 @@
-"""Cells in worker processes: what aborts, hangs or raises takes nothing along."""
+"""Cells in worker processes: what aborts, hangs, raises or eats takes nothing along, and says where it was."""
 
-import ctypes
-import os
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from reports.archive import load_trajectory
+import pytest
+
+from adapters.engines import ENGINES, Row
+from reports.archive import from_trail, load_trajectory, packed
 from reports.cells import Cell
-from reports.runner import Failure, run_all
-from reports.suite import play_and_save
+from reports.playing import Played, play_cell, play_here
+from reports.runner import run_all
+from reports.worker_process import Failure
+from scenarios.catalogue import scenario
+from tests.control_engines import CONTROLS, FATAL, Controlled, Once, Remembers, row
+
+SCENE = "slow_hit"  # 240 samples of 1/60 s; at one step a sample the 100th step is due after 99 of them
+GOOD = {f"good{i}:control": row(Controlled) for i in range(24)}
 
 
-def abort() -> None:
-    """As an engine does on an assertion in C."""
-    os.abort()
+def cells(rows: dict[str, Row]) -> dict[str, partial]:
+    """A task a row: `SCENE` at its coarsest step."""
+    question = replace(scenario(SCENE), truth=None)
+    return {name: partial(play_here, Cell(SCENE, 0, name, 1), row, question) for name, row in rows.items()}
 
 
-def hang() -> None:
-    """In C, where no Python signal handler runs."""
-    ctypes.CDLL(None).sleep(1000)
+@pytest.fixture(scope="module")
+def ended() -> dict[str, Played | Failure]:
+    """How 24 good cells ended and nine bad ones among them, on two workers."""
+    mixed = {**dict(list(GOOD.items())[:12]), **CONTROLS, **dict(list(GOOD.items())[12:])}
+    tasks = cells(mixed)
+    hang = {"hangs:control": tasks.pop("hangs:control")}  # by itself, for the others may need long on a busy machine
+    results = [*run_all(tasks, workers=2, memory=500_000_000), *run_all(hang, workers=1, timeout=3.0)]
+
+    assert sorted(key for key, _ in results) == sorted(mixed)  # each once
+    return dict(results)
 
 
-def fail() -> None:
-    """As an engine does whose binding is older than its library."""
-    raise RuntimeError("no such luck")
+def test_every_good_cell_is_kept(ended):
+    """24 of 24, all of the same bits."""
+    files = {ended[name].file for name in GOOD}
+
+    assert {ended[name].run.status for name in GOOD} == {"ok"}
+    assert len(files) == 1
 
 
-def test_what_aborts_hangs_or_raises_is_named_and_every_good_task_is_kept():
-    """Six tasks on two workers, three of them bad: three results, three failures with their reasons."""
-    tasks = {0: partial(pow, 2, 3), 1: abort, 2: partial(pow, 2, 4), 3: hang, 4: fail, 5: partial(pow, 2, 5)}
-    ended = dict(run_all(tasks, workers=2, timeout=8.0))
+@pytest.mark.parametrize(
+    ("engine", "status", "said"),
+    [
+        ("raises", "error", "RuntimeError: no such luck"),
+        ("aborts", "crashed", "SIGABRT in misbehave, line "),
+        ("aborts", "crashed", 'of tests/control_engines.py; it had printed "assertion failed: mass > 0"'),
+        ("segfaults", "crashed", "SIGSEGV in string_at, line "),
+        ("hangs", "timeout", "stopped after 3 s in misbehave, line "),
+        ("devours", "error", "MemoryError: took more than 500 MB (--memory)"),
+        ("turnstonan", "diverged", f"of disk 0 is not finite at {FATAL / 60:g} s"),
+        ("prints", "ok", ""),
+        ("leaves", "crashed", "was killed 3 times"),
+        ("iskilled", "crashed", "was killed 3 times"),
+    ],
+)
+def test_a_bad_cell_says_how_it_ended_and_where(ended, engine: str, status: str, said: str):
+    """Status and reason; a crash has the signal and the line of Python, a divergence its time."""
+    outcome = ended[f"{engine}:control"]
+    run = outcome if isinstance(outcome, Failure) else outcome.run
 
-    assert {key: result for key, result in ended.items() if not isinstance(result, Failure)} == {0: 8, 2: 16, 5: 32}
-    assert [ended[key].status for key in (1, 3, 4)] == ["crashed", "timeout", "error"]
-    assert "SIGABRT" in ended[1].reason
-    assert "8 s" in ended[3].reason
-    assert "no such luck" in ended[4].reason
+    assert run.status == status
+    assert said in run.reason
+
+
+@pytest.mark.parametrize("engine", ["aborts", "segfaults", "hangs"])
+def test_what_died_leaves_every_good_state_before(ended, engine: str):
+    """The trail holds the same bits as a run that lives, up to the sample before the fatal step."""
+    trajectory = from_trail(ended[f"{engine}:control"].trail, scenario(SCENE))
+    whole = play_cell(Cell(SCENE, 0, "good:control", 1), row(Controlled), scenario(SCENE)).trajectory
+
+    assert len(trajectory) == FATAL
+    for name in ("t", "position", "velocity", "angle", "angular_velocity"):
+        assert getattr(trajectory, name).tobytes() == getattr(whole, name)[:FATAL].tobytes()
+
+
+def test_a_worker_that_is_killed_from_outside_is_no_fault_of_its_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """`kill -9` once: the cell is played again and is as good as any."""
+    monkeypatch.setenv("CONTROL_MARK", str(tmp_path / "mark"))
+    results = dict(run_all(cells({"once:control": row(Once), "good:control": row(Controlled)}), workers=1))
+
+    assert (tmp_path / "mark").exists()
+    assert results["once:control"].file == results["good:control"].file
+
+
+def test_an_engine_that_leaves_state_gets_a_process_a_cell():
+    """Declared in its row, the same cell gives the same bits again and again; not declared, it does not."""
+    tasks = cells({f"{kind}{i}:control": row(Remembers) for kind in ("alone", "together") for i in range(3)})
+    files: dict[str, set[bytes]] = {"alone": set(), "together": set()}
+    for name, played in run_all(tasks, workers=1, alone={name for name in tasks if name.startswith("alone")}):
+        files[name[:-9]].add(played.file)
+
+    assert {kind: len(different) for kind, different in files.items()} == {"alone": 1, "together": 3}
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_no_engine_remembers_what_it_played(name: str):
+    """After other scenes in the same process a cell has the bits it has as the first, so no row has `leaves_state`."""
+    first, *others = ("slow_hit", "line_gas", "falling_box")
+    tasks = {
+        key: partial(play_here, Cell(scene, 0, name, 1), ENGINES[name], replace(scenario(scene), truth=None))
+        for key, scene in (("before", first), *((other, other) for other in others), ("after", first))
+    }
+    played = dict(run_all(tasks, workers=1))
+
+    assert played["before"].file == played["after"].file
+    assert not ENGINES[name].leaves_state
 
 
 def test_a_trajectory_comes_back_from_its_file_bit_for_bit(tmp_path: Path):
     """The .npz holds every array of the trajectory and its hits."""
-    cell = Cell("line_gas", 0, "pymunk:matched", 1)
-    [(_, run)] = run_all({cell: partial(play_and_save, cell, tmp_path / "one.npz")}, workers=1)
-    here = cell.play().trajectory
+    here = play_cell(
+        Cell("line_gas", 0, "pymunk:matched", 1), ENGINES["pymunk:matched"], scenario("line_gas")
+    ).trajectory
+    (tmp_path / "one.npz").write_bytes(packed(here))
     there = load_trajectory(tmp_path / "one.npz")
 
-    assert here is not None
-    assert run.trajectory is None
+    assert len(here.collisions)
     for name in ("t", "position", "velocity", "angle", "angular_velocity"):
         assert getattr(here, name).tobytes() == getattr(there, name).tobytes()
     for name in ("t", "i", "j", "impulse"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from math import isnan
@@ -11,16 +12,22 @@ import numpy as np
 import pytest
 
 from adapters.play import Run
-from reports.runner import Failure, run_all
+from reports.runner import run_all
 from reports.stability.atlas import Task, failed, limit_from, row_of
 from reports.stability.cases import CASES
 from reports.stability.cases_hits import at_speed
 from reports.stability.limits import FULL, QUICK, Case, Limit, Search
 from reports.stability.predicates import Predicate, Reading, judge
 from reports.stability.reasons import explained
+from reports.worker_process import Failure
 from scenarios.model import Scenario, Trajectory
 from scenarios.placing import lay_out
-from tests.test_runner import abort
+
+
+def abort() -> None:
+    """As an engine does on an assertion in C."""
+    os.abort()
+
 
 SCENE = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[1.0], restitution=1.0)
 
@@ -161,7 +168,7 @@ def test_a_limit_comes_back_from_the_journal_as_it_was():
     import json
     from dataclasses import asdict
 
-    from reports.archive import plain
+    from reports.journal import plain
 
     for found in (limit_of(case(lambda x, _: x / 17, UP)), limit_of(case(lambda _x, _run: 2.0, UP))):
         again = limit_from(json.loads(json.dumps(plain(asdict(found)))))

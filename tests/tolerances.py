@@ -93,9 +93,4 @@ DEPARTURES = [
         )
         for engine in ("box2d_v3:shipped", "box2d_v3:matched")
     ),
-    Departure(
-        "event_driven:float64", "counts_are_steps", "refused", 0.0,
-        "a disk that bounces ever lower comes to rest after infinitely many hits, and these have no end for events",
-        "scenarios/event_loop.py, note",
-    ),
 ]  # fmt: skip

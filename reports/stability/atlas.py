@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import nan
@@ -14,9 +16,10 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.archive import Archive, save_trajectory
+from reports.archive import packed
+from reports.journal import JOURNAL, Journal, lines_of, plain
 from reports.machine import about
-from reports.runner import Failure, run_all
+from reports.runner import run_all
 from reports.stability.cases import CASES
 from reports.stability.limits import EXACT, FORMS, NEVER_WORKS, Limit, Search, Trial, players_of
 from reports.stability.maps import MAPS, MapOf, map_of
@@ -24,6 +27,7 @@ from reports.stability.reasons import explained
 from reports.stability.touching import TOUCHING, LawOf, law_of
 from reports.stability.vary import case_of_file
 from reports.terminal import Progress
+from reports.worker_process import Failure
 
 COLUMNS = (
     "engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "seeds", "reason",
@@ -78,10 +82,11 @@ def found_limit(task: Task, folder: Path) -> Limit:
     if (failure := search.failure(limit)) is not None and failure[1].trajectory is not None:
         scenario, run = failure
         assert run.trajectory is not None
-        save_trajectory(folder / "trajectories" / file_of(limit), run.trajectory)
+        (folder / "trajectories" / file_of(limit)).write_bytes(packed(run.trajectory))
         if search.case.beside != EXACT:  # what it is shown beside was played, too
             assert scenario.truth is not None
-            save_trajectory(folder / "trajectories" / f"truth.{file_of(limit)}", scenario.truth(scenario.times))
+            beside = scenario.truth(scenario.times)
+            (folder / "trajectories" / f"truth.{file_of(limit)}").write_bytes(packed(beside))
     return limit
 
 
@@ -91,22 +96,23 @@ def file_of(limit: Limit) -> str:
     return f"{name}.npz" if len(name) < 200 else f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.npz"
 
 
-def carry_out(plan: Plan, folder: Path, done: Mapping[Task, dict[str, Any]], progress: Progress) -> None:
-    """Do every task that is not `done`; all goes into `folder`."""
-    archive = Archive(folder)
-    archive.begin(about(plan.command, 0) | {"form": plan.form})
-    for line in done.values():
-        archive.append(line)
-    tasks: dict[Any, Callable[[], Any]] = {
-        task: partial(task, folder) for task in tasks_of(plan) if task not in done
-    }  # fmt: skip
-    progress.start(len(tasks))
-    for task, result in run_all(tasks, plan.workers, TIMEOUT[plan.form]):
-        if isinstance(result, Failure):
-            result = failed(task, result)
-        archive.append({"task": asdict(task), task.kind: asdict(result)})
-        progress.done(f"{task.name}  {task.player}", getattr(result, "status", "ok"))
-    archive.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
+def carry_out(plan: Plan, journal: Journal, done: Collection[Task], progress: Progress) -> None:
+    """Do every task that is not `done`; all goes into the journal's folder."""
+    folder = journal.path.parent
+    (folder / "trajectories").mkdir(exist_ok=True)
+    header = about(plan.command, 0) | {"form": plan.form}
+    journal.append({"header": header})
+    (folder / "machine.json").write_text(json.dumps(plain(header), indent=2) + "\n")
+    wanted = tasks_of(plan)
+    tasks: dict[Any, Callable[[], Any]] = {task: partial(task, folder) for task in wanted if task not in done}
+    progress.start(len(tasks), len(wanted))
+    with closing(run_all(tasks, plan.workers, TIMEOUT[plan.form])) as results:
+        for task, result in results:
+            reason = result.reason if isinstance(result, Failure) else ""
+            result = failed(task, result) if isinstance(result, Failure) else result
+            journal.append({"task": asdict(task), task.kind: asdict(result)})
+            progress.done(f"{task.name}  {task.player}", result.status, reason)
+    journal.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
 
 
 def tasks_of(plan: Plan) -> list[Task]:
@@ -145,8 +151,13 @@ class Atlas(NamedTuple):
 
 def read(folder: Path) -> Atlas:
     """The atlas in a folder, in reading order."""
-    archive = Archive(folder)
-    lines = list(archive.lines())
+    header: dict[str, Any] = {}
+    last: dict[Task, dict[str, Any]] = {}  # of two lines on one task the later holds
+    for line in lines_of(folder):
+        header = line.get("header", header)
+        if "task" in line:
+            last[Task(**line["task"])] = line
+    lines = list(last.values())
     limits = [limit_from(line["limit"]) for line in lines if "limit" in line]
     maps = [MapOf.from_record(line["map"]) for line in lines if "map" in line]
     laws = [LawOf.from_record(line["law"]) for line in lines if "law" in line]
@@ -155,7 +166,7 @@ def read(folder: Path) -> Atlas:
     limits.sort(key=lambda limit: (order.get(limit.case, len(order)), limit.case, players.index(limit.player)))
     maps.sort(key=lambda one: (list(MAPS).index(one.name), players.index(one.player)))
     laws.sort(key=lambda one: (list(TOUCHING).index(one.name), players.index(one.player)))
-    return Atlas(explained(limits), maps, laws, archive.header())
+    return Atlas(explained(limits), maps, laws, header)
 
 
 def limit_from(record: dict[str, Any]) -> Limit:
@@ -169,16 +180,17 @@ def numbers(record: dict[str, Any]) -> dict[str, Any]:
     return {key: float(value) if value in ("nan", "inf", "-inf") else value for key, value in record.items()}
 
 
-def done_before(folder: Path, plan: Plan) -> dict[Task, dict[str, Any]]:
-    """The lines of the tasks that ended well in an earlier, interrupted run of the same versions."""
-    archive = Archive(folder)
-    now = about(plan.command, 0)["versions"]
-    if not archive.journal.is_file() or archive.header()["versions"] != now:
-        return {}
-    lines = [line for line in archive.lines() if "task" in line]
-    wanted = set(tasks_of(plan))
-    ended = {Task(**line["task"]): line for line in lines if line.get("limit", {}).get("status", "ok") == "ok"}
-    return {task: line for task, line in ended.items() if task in wanted}
+def done_before(folder: Path, plan: Plan) -> set[Task]:
+    """The tasks that ended well in an interrupted run of the same versions; none if there is no such run."""
+    if not (folder / JOURNAL).is_file():
+        return set()
+    lines = list(lines_of(folder))
+    headers = [line["header"] for line in lines if "header" in line]
+    if not headers or any(header["versions"] != about("", 0)["versions"] for header in headers):
+        return set()
+    ended = [line for line in lines if "task" in line]
+    well = {Task(**line["task"]) for line in ended if line[line["task"]["kind"]]["status"] == "ok"}
+    return well & set(tasks_of(plan))
 
 
 def table(limits: Sequence[Limit]) -> pd.DataFrame:

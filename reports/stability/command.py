@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +14,8 @@ from rich.table import Table
 
 from adapters.engines import ENGINES
 from reports.commands import DONE, FAILED, INTERRUPTED, checked_engines, refuse, say, unknown
+from reports.folders import FolderTaken, may_write, part_of, replace_folder
+from reports.journal import Busy, Journal
 from reports.stability.atlas import Atlas, Plan, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, NEVER_WORKS, Limit
@@ -23,7 +24,6 @@ from reports.stability.page import write_page
 from reports.stability.touching import TOUCHING
 from reports.stability.vary import VARIES
 from reports.style import number
-from reports.suite import FolderTaken, may_write, replace_folder
 from reports.terminal import Progress
 from scenarios.files import SceneFileError, read_scene_file
 
@@ -44,13 +44,19 @@ def find_limits(
         refuse([str(fault)])
     except OSError as fault:
         refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
-    part = out.with_name(f"{out.name}.part")
+    part = part_of(out)
     try:
-        with Progress() as progress:
-            play_all(plan, part, resume, progress)
-            progress.say("writing the table and the page")
+        part.mkdir(parents=True, exist_ok=True)
+        with Journal(part) as journal, Progress() as progress:
+            done = done_before(part, plan) if resume else set()
+            if not done:
+                os.truncate(journal.path, 0)
+            carry_out(plan, journal, done, progress)
+            progress.say("writing the tables and the page")
             found = write_files(part)
-        replace_folder(part, out)
+            replace_folder(part, out)
+    except Busy:
+        refuse([f"{out} is being written by another crosscheck; wait for it, or name another --out"])
     except KeyboardInterrupt:
         say(f"\nInterrupted. What has ended is kept in {part}: ask again with --resume")
         sys.exit(INTERRUPTED)
@@ -58,16 +64,6 @@ def find_limits(
         say(f"cannot write to {part}: {fault.strerror or fault}")
         sys.exit(FAILED)
     finish(found, out)
-
-
-def play_all(plan: Plan, part: Path, resume: bool, progress: Progress) -> None:
-    """Play what is not done; without `resume` nothing is."""
-    done = done_before(part, plan) if resume else {}
-    if done:
-        (part / "journal.jsonl").unlink()
-    else:
-        shutil.rmtree(part, ignore_errors=True)
-    carry_out(plan, part, done, progress)
 
 
 def write_files(folder: Path) -> Atlas:

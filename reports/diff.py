@@ -1,0 +1,201 @@
+"""What changed between two runs: how cells ended, what their numbers are, how long they took."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from reports.archive import Archive
+from reports.comparison import COLUMNS
+from reports.metrics import METRICS
+
+FACTOR = 1.25  # of two runs of the same cells, taken on a machine with other work, the medians differ by up to a tenth
+CONFIDENCE = 0.99
+WHOSE = ["scenario", "engine", "profile", "dt_s", "metric", "versus"]
+MACHINE = ("system", "architecture", "processor", "cores")
+
+
+class Change(NamedTuple):
+    """One thing that is not as it was: of which engine, what, before and after, and "better", "worse" or "other"."""
+
+    engine: str
+    what: str
+    before: str
+    after: str
+    verdict: str
+    factor: float = 1.0
+
+
+class Timing(NamedTuple):
+    """How much longer an engine takes: the median of the ratios of `n` timings, and where the true one lies."""
+
+    engine: str
+    factor: float
+    low: float
+    high: float
+    n: int
+
+    @property
+    def verdict(self) -> str:
+        """ "worse" or "better" if it is both sure (the interval leaves out 1) and large (by `FACTOR`), else "same"."""
+        if self.low > 1 and self.factor > FACTOR:
+            return "worse"
+        return "better" if self.high < 1 and self.factor < 1 / FACTOR else "same"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What came out.
+
+    Attributes:
+        warnings: why the two may differ for other reasons than their engines.
+        statuses, numbers: what changed.
+        same: `engine:profile` -> how many numbers are the same, bit for bit.
+        timings: of the engines that were timed in both, if the machine is the same.
+    """
+
+    warnings: list[str]
+    statuses: list[Change]
+    numbers: list[Change]
+    same: Counter[str]
+    timings: list[Timing]
+
+    @property
+    def worse(self) -> int:
+        """How many things got worse."""
+        verdicts = [one.verdict for one in (*self.statuses, *self.numbers)] + [one.verdict for one in self.timings]
+        return verdicts.count("worse")
+
+
+def difference(before: Path, after: Path) -> Difference:
+    """Set two folders of runs against each other.
+
+    Raises:
+        ValueError: naming the folder that cannot be used, and what to do.
+    """
+    one, other = Archive.read(before), Archive.read(after)
+    warnings, like = warnings_of(one, other)
+    cells = by_name(one), by_name(other)
+    numbers, same = changed_numbers(table_of(before), table_of(after), equal_keys(*cells) if like else set())
+    return Difference(warnings, changed_statuses(*cells), numbers, same, timings_of(one, other, *cells) if like else [])
+
+
+def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
+    """What differs of machines, versions and completeness; and whether the machine is the same."""
+    before, after = one.header, other.header
+    said = [f"machine: {key}: {before['machine'][key]} before, {after['machine'][key]} after"
+            for key in MACHINE if before["machine"][key] != after["machine"][key]]  # fmt: skip
+    like = not said
+    for name in sorted({*before["versions"], *after["versions"]}):
+        versions = before["versions"].get(name, "missing"), after["versions"].get(name, "missing")
+        if versions[0] != versions[1]:
+            said.append(f"version: {name}: {versions[0]} before, {versions[1]} after")
+    if before["seed"] != after["seed"]:
+        said.append(f"seed: {before['seed']} before, {after['seed']} after")
+    said += [f"{archive.folder} is not complete" for archive in (one, other) if not archive.complete]
+    return said, like
+
+
+def by_name(archive: Archive) -> dict[tuple, dict[str, Any]]:
+    """(scenario, `engine:profile`, dt in s) -> the line of the cell."""
+    return {(r["scenario"], f"{r['engine']}:{r['profile']}", r["dt_s"]): r for r in archive.records}
+
+
+def equal_keys(before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]) -> set[tuple]:
+    """(scenario, `engine:profile`, dt in s) of the cells whose scene, settings and versions are the same."""
+    return {name for name in before if name in after and before[name]["cell"] == after[name]["cell"]}
+
+
+def changed_statuses(before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]) -> list[Change]:
+    """The cells that ended in another way, or were not played again: that is worse, too."""
+    changes = []
+    for name, record in before.items():
+        scenario, engine, dt = name
+        was, now = record["status"], after[name]["status"] if name in after else "not played"
+        if was != now:
+            verdict = "worse" if was == "ok" or now == "not played" else "better" if now == "ok" else "other"
+            changes.append(Change(engine, f"{scenario}  dt {dt:.4g} s  status", was, now, verdict))
+    return changes
+
+
+def table_of(folder: Path) -> pd.DataFrame:
+    """deviations.csv as text: what is written the same has the same bits."""
+    try:
+        table = pd.read_csv(folder / "deviations.csv", dtype=str, keep_default_na=False)
+    except (OSError, ValueError) as fault:
+        raise ValueError(f"{folder / 'deviations.csv'}: {fault}; make it: crosscheck report {folder}") from fault
+    if list(table.columns) != list(COLUMNS):
+        raise ValueError(f"{folder / 'deviations.csv'}: its columns are not those of this version; "
+                         f"make it again: crosscheck report {folder}")  # fmt: skip
+    return table
+
+
+def changed_numbers(before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]) -> tuple[list[Change], Counter[str]]:
+    """Every number that both tables have and that is not the same, and how many are, by engine.
+
+    The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric says what is better;
+    how far two engines are apart is neither.
+    """
+    both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
+    both["name"] = both.engine + ":" + both.profile
+    differs = both.value != both.value_after
+    changes = []
+    for row in both[differs].to_dict("records"):
+        was, now = (float(row[key] or "nan") for key in ("value", "value_after"))
+        must = all((row["scenario"], name, float(row["dt_s"])) in equal for name in players_of(row))
+        verdict = "worse" if must else verdict_of(row["metric"], row["versus"], was, now)
+        what = f"{row['scenario']}  dt {float(row['dt_s']):.4g} s  {row['metric']} against {row['versus']}"
+        note = " (same cell, other bits)" if must else ""
+        changes.append(Change(row["name"], what + note, row["value"], row["value_after"], verdict, ratio(was, now)))
+    return changes, Counter(both[~differs].name)
+
+
+def players_of(row: Mapping[Hashable, Any]) -> list[str]:
+    """Who played for a number: an engine, or the two that are set against each other."""
+    return [row["name"]] + ([row["versus"]] if ":" in row["versus"] else [])
+
+
+def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
+    """Whether a number of an engine got better, by the row of the metric."""
+    better = METRICS[metric].better if metric in METRICS else ""
+    if ":" in versus or better in ("", "as stated"):
+        return "other"
+    if math.isnan(was) or math.isnan(now):
+        return "worse" if math.isnan(now) else "better"
+    worse = now < was if better == "higher" else abs(now) > abs(was)
+    return "worse" if worse else "better" if abs(now) != abs(was) else "other"
+
+
+def ratio(was: float, now: float) -> float:
+    """By how much a number grew or shrank, 1 or more; `inf` where there is no saying."""
+    small, large = sorted((abs(was), abs(now)))
+    return large / small if small > 0 and math.isfinite(large) else math.inf
+
+
+def timings_of(
+    one: Archive, other: Archive, before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]
+) -> list[Timing]:
+    """Of every engine the ratio after : before, over the cells that were timed in both, round by round."""
+    ratios: dict[str, list[float]] = {}
+    for name in before.keys() & after.keys():
+        rounds = zip(one.timings.get(before[name]["cell"], []), other.timings.get(after[name]["cell"], []))
+        ratios.setdefault(name[1], []).extend(now / was for was, now in rounds if was > 0)
+    return [timing(engine, sorted(found)) for engine, found in sorted(ratios.items()) if found]
+
+
+def timing(engine: str, ratios: list[float]) -> Timing:
+    """The median of sorted ratios with its distribution-free interval, from order statistics (the sign test's)."""
+    n = len(ratios)
+    tail, k = 0.5**n, 0
+    while 2 * tail <= 1 - CONFIDENCE:
+        k += 1
+        tail += math.comb(n, k) * 0.5**n
+    low, high = (ratios[k - 1], ratios[n - k]) if k else (0.0, math.inf)
+    return Timing(engine, float(np.median(ratios)), low, high, n)

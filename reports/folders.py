@@ -1,0 +1,92 @@
+"""Where a run goes: into OUT.part while it lasts, which takes the place of OUT when all is done."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+from reports.archive import FILES, Archive
+from reports.journal import JOURNAL, Busy, Journal
+
+
+class FolderTaken(Exception):
+    """An output folder that may not be written to, and why."""
+
+
+def part_of(out: Path) -> Path:
+    """Where a run into `out` is while it lasts."""
+    return out.with_name(f"{out.name}.part")
+
+
+def open_new(out: Path) -> Journal:
+    """The journal of a new run into `out`; raises `FolderTaken`, or `OSError` where nothing can be written."""
+    may_write(out)
+    part = part_of(out)
+    may_write(part)
+    part.mkdir(parents=True, exist_ok=True)
+    journal = held(part, out)
+    if had := ended_in(part):
+        raise FolderTaken(
+            f"{part} holds an interrupted run, in which {had} cells have ended: to go on with it, crosscheck run "
+            f"--resume {out}; to begin anew, name another --out, or delete it"
+        )
+    os.truncate(journal.path, 0)
+    return journal
+
+
+def open_again(out: Path) -> Journal:
+    """The journal of a run into `out` that is to be completed; raises as `open_new`, `ValueError` if there is none."""
+    part = part_of(out)
+    if not (part / JOURNAL).is_file():
+        if not (out / JOURNAL).is_file():
+            raise FolderTaken(f"--resume {out}: no run is there, neither finished nor interrupted ({part.name})")
+        Archive.read(out)
+        may_write(out)
+        held(out, out).__exit__()
+        out.rename(part)
+    return held(part, out)
+
+
+def held(folder: Path, out: Path) -> Journal:
+    """The journal of a folder, locked; raises `FolderTaken` if another process has it."""
+    try:
+        return Journal(folder)
+    except Busy:
+        raise FolderTaken(f"{out} is being written by another crosscheck; wait for it, or name another --out") from None
+
+
+def ended_in(part: Path) -> int:
+    """How many cells have ended in an interrupted run."""
+    try:
+        return len(Archive.read(part).records)
+    except ValueError:
+        return 0
+
+
+def found(out: Path) -> Path:
+    """The folder of a run into `out`: itself, or where it is while it lasts; raises `FolderTaken` if there is none."""
+    for folder in (out, part_of(out)):
+        if (folder / JOURNAL).is_file():
+            return folder
+    raise FolderTaken(f"{out}: has no {JOURNAL}, so it is not the folder of a run")
+
+
+def replace_folder(made: Path, target: Path) -> None:
+    """Put the finished folder `made` in the place of `target` in two renames; `target` is a run of ours or absent."""
+    old = target.with_name(f".{target.name}.old-{os.getpid()}")
+    if target.exists():
+        target.rename(old)
+    made.rename(target)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def may_write(target: Path) -> None:
+    """Raise `FolderTaken` unless `target` is absent, empty, or holds a run and nothing else."""
+    if target == Path.cwd() or target in Path.cwd().parents:
+        raise FolderTaken(f"--out {target}: is where you are; name another folder, or go elsewhere")
+    if target.is_file():
+        raise FolderTaken(f"--out {target}: is a file; name a folder that does not exist yet")
+    strange = sorted(path.name for path in target.iterdir() if path.name not in FILES) if target.exists() else []
+    if strange:
+        raise FolderTaken(f"--out {target}: holds {strange[0]}, which no run of crosscheck made; name another folder")

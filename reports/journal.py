@@ -1,0 +1,88 @@
+"""The journal of a run: a line of JSON for everything that ends, written by one process at a time, read by any."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+JOURNAL = "journal.jsonl"
+
+
+class Busy(Exception):
+    """Another process is writing the journal."""
+
+
+class Journal:
+    """The journal of a folder, open for writing and locked against every other writer.
+
+    The lock is the kernel's (flock) and ends with the process that holds it, however it ends: none is ever stale.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Open or make it; a last line that was torn is cut off. Raises `Busy`, or `OSError` if it cannot be had."""
+        self.path = folder / JOURNAL
+        self.file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        try:
+            fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            moved = not self.path.exists() or not os.path.samestat(os.fstat(self.file), self.path.stat())
+        except BlockingIOError:
+            moved = True
+        if moved:  # by the one who held the lock, when it was done
+            os.close(self.file)
+            raise Busy
+        whole = self.path.read_bytes()
+        os.ftruncate(self.file, whole.rfind(b"\n") + 1)
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self.file)
+
+    def append(self, line: dict[str, Any]) -> None:
+        """Add a line, and hand it to the system; raises `OSError` and leaves no part of it if that cannot be done."""
+        text = (json.dumps(plain(line), allow_nan=False) + "\n").encode()
+        before = os.fstat(self.file).st_size
+        try:
+            while text:
+                text = text[os.write(self.file, text) :]
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self.file, before)
+            raise
+
+
+def lines_of(folder: Path) -> Iterator[dict[str, Any]]:
+    """The lines of a folder's journal; a last line that was torn is left out.
+
+    Raises:
+        ValueError: naming another line that is no JSON.
+    """
+    with (folder / JOURNAL).open("rb") as journal:
+        for number, line in enumerate(journal, start=1):
+            try:
+                yield json.loads(line)
+            except ValueError as error:
+                if line.endswith(b"\n"):
+                    raise ValueError(f"{folder / JOURNAL}: line {number} is not JSON: {error}") from error
+
+
+def plain(value: Any) -> Any:
+    """The value as strict JSON can hold it: numpy scalars as Python's, numbers that are not finite as text."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value

@@ -1,0 +1,42 @@
+"""Scenes as they are asked for: by name or as a file, with the steps asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from scenarios.catalogue import scenario as from_catalogue
+from scenarios.file_tables import MOST_STEPS
+from scenarios.files import read_scene_file
+from scenarios.model import Scenario
+
+
+def open_scene(scene: str, seed: int) -> Scenario:
+    """A scenario by catalogue name or file path; raises `KeyError` or `SceneFileError`."""
+    return read_scene_file(Path(scene)) if scene.endswith(".toml") else from_catalogue(scene, seed)
+
+
+def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario:
+    """The scenario with the dt ladder asked for: `dts` in s instead of its own, two finer steps if `full`.
+
+    Raises:
+        ValueError: naming the scenario and the dt that does not divide its sample interval, or is too small.
+    """
+    ladder = tuple(scenario.substeps)
+    most = MOST_STEPS // scenario.samples
+    for dt in dts:
+        if 0 < dt < scenario.sample_interval / most:
+            raise ValueError(f"--dt {dt:g} gives {scenario.name} more than {MOST_STEPS} steps: allowed is "
+                             f"{scenario.sample_interval / most:.4g} s or more")  # fmt: skip
+        k = round(scenario.sample_interval / dt) if dt > 0 else 0
+        if k < 1 or abs(k * dt / scenario.sample_interval - 1) > 1e-9:
+            raise ValueError(
+                f"--dt {dt:g} does not fit {scenario.name}: allowed is its sample interval "
+                f"{scenario.sample_interval:g} s divided by a whole number, e.g. {scenario.dt(ladder[-1]):g}"
+            )
+    if dts:
+        ladder = tuple(sorted({round(scenario.sample_interval / dt) for dt in dts}))
+    if full:
+        ladder += (ladder[-1] * 2, ladder[-1] * 4)
+    return replace(scenario, substeps=ladder)

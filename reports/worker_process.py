@@ -1,0 +1,88 @@
+"""What runs in a worker process: it takes tasks from the parent one at a time and sends back what they give."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import faulthandler
+import os
+import pickle
+import resource
+import signal
+import sys
+from collections.abc import Sequence
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
+
+STARTED = b"started"
+IDLE = 60.0  # s without a task after which a process leaves: workers on other machines outlive the run
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+_trail: int | None = None
+
+
+class Failure(NamedTuple):
+    """A task without a result: "crashed", "timeout" or "error" as in `STATUSES` of play.py, why, and what it left."""
+
+    status: str
+    reason: str
+    trail: bytes = b""
+
+
+def leave(parts: Sequence[Any]) -> None:
+    """Append bytes to the trail of this task, which survives the process; nothing outside a worker."""
+    if _trail is not None:
+        with contextlib.suppress(OSError):  # a trail that cannot be kept is no fault of the engine that is played
+            os.writev(_trail, list(parts))
+
+
+def serve(connection: Connection, memory: int) -> None:
+    """Carry out tasks until there are none left; whatever a task raises is a `Failure`."""
+    while connection.poll(IDLE):
+        try:
+            packed = connection.recv_bytes()
+        except EOFError:
+            return
+        try:
+            task = pickle.loads(packed)
+            connection.send_bytes(STARTED)
+            answer = pickle.dumps(task())
+        except MemoryError as error:
+            error.__traceback__ = None  # lets go of the frames, and so of what they hold
+            limit = f"more than {memory / 1e6:.0f} MB (--memory)" if memory else "more than there is"
+            connection.send_bytes(pickle.dumps(Failure("error", f"MemoryError: took {limit}")))
+            return  # what is not let go of ends with the process
+        except Exception as error:  # an engine may raise anything
+            answer = pickle.dumps(Failure("error", f"{type(error).__name__}: {error}"))
+        connection.send_bytes(answer)
+
+
+def prepare(memory: int) -> None:
+    """What a process must be before an engine is let in.
+
+    A crash prints where Python was and writes no core; Ctrl-C is left to the parent, who alone decides what it means;
+    data beyond `memory` bytes cannot be had (RLIMIT_DATA; Linux counts private mappings); it dies with its parent.
+    """
+    faulthandler.enable()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if memory:
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def main(arguments: Sequence[Any]) -> None:
+    """`python -m reports.worker_process CONNECTION TRAIL MEMORY`: two file descriptors and a number of bytes."""
+    global _trail
+    connection, trail, memory = (int(argument) for argument in arguments)
+    _trail = trail
+    prepare(memory)
+    serve(Connection(connection), memory)
+
+
+if __name__ == "__main__":
+    # As the module that tasks import, not as __main__: there is one trail.
+    from reports.worker_process import main as run
+
+    run(sys.argv[1:])

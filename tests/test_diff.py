@@ -1,0 +1,175 @@
+"""`crosscheck diff`: what got worse between two runs is found, what did not is not; scripts can tell by the exit."""
+
+import json
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from adapters.engines import ENGINES
+from reports import suite
+from reports.diff import Timing, difference, timing
+from reports.diff_command import show_difference
+from reports.journal import JOURNAL, Journal, lines_of
+from reports.report import make_report
+from reports.suite import Means, Plan, carry_out
+from reports.terminal import Progress
+
+PLAN = Plan(
+    ["slow_hit", "near_miss"], {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")},
+    seed=0, dts=[], full=False, timings=1, command="test",
+)  # fmt: skip
+
+
+def run(folder: Path, workers: int) -> Path:
+    """A run of `PLAN`, with its tables."""
+    folder.mkdir()
+    with Journal(folder) as journal, Progress() as progress:
+        carry_out(PLAN, Means(workers), journal, progress)
+        make_report(folder, progress.say)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run everything is set against."""
+    return run(tmp_path_factory.mktemp("diff") / "before", workers=2)
+
+
+@pytest.fixture
+def after(before: Path, tmp_path: Path) -> Path:
+    """A copy of it, to be changed."""
+    return Path(shutil.copytree(before, tmp_path / "after"))
+
+
+def edit(folder: Path, change: Callable[[dict], None]) -> None:
+    """Change every line of a journal."""
+    lines = list(lines_of(folder))
+    for line in lines:
+        change(line)
+    (folder / JOURNAL).write_text("".join(json.dumps(line) + "\n" for line in lines))
+
+
+def exit_of(before: Path, after: Path) -> object:
+    """What a script sees."""
+    with pytest.raises(SystemExit) as left:
+        show_difference(before, after)
+    return left.value.code
+
+
+def test_the_numbers_do_not_depend_on_workers_or_order(before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """One worker instead of two, and the cells in any order: deviations.csv is the same byte for byte."""
+    in_order = suite.tasks_of
+
+    def shuffled(*words):
+        tasks = list(in_order(*words).items())
+        random.Random(4).shuffle(tasks)
+        return dict(tasks)
+
+    monkeypatch.setattr(suite, "tasks_of", shuffled)
+    again = run(tmp_path / "again", workers=1)
+    cells = [[line["cell"] for line in lines_of(folder) if "cell" in line] for folder in (before, again)]
+
+    assert cells[0] != cells[1]
+    assert (again / "deviations.csv").read_bytes() == (before / "deviations.csv").read_bytes()
+    changed = difference(before, again)
+    assert (changed.numbers, changed.statuses) == ([], [])
+
+
+def test_the_same_run_has_not_changed(before: Path, after: Path, capsys: pytest.CaptureFixture[str]):
+    """Exit 0."""
+    assert exit_of(before, after) == 0
+    assert "Nothing got worse." in capsys.readouterr().out
+
+
+def test_one_bit_in_a_cell_that_is_the_same_is_worse(before: Path, after: Path):
+    """Same scene, settings and versions must give the same bits, even where the number got smaller."""
+    table = pd.read_csv(after / "deviations.csv", dtype=str, keep_default_na=False)
+    row = table.index[(table.metric == "position_max") & (table.versus == "truth")][0]
+    table.loc[row, "value"] = repr(float(table.loc[row, "value"]) * (1 - 2**-53))
+    table.to_csv(after / "deviations.csv", index=False)
+    [change] = difference(before, after).numbers
+
+    assert (change.verdict, "same cell, other bits" in change.what) == ("worse", True)
+    assert exit_of(before, after) == 1
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(2.0, "worse"), (0.5, "better")])
+def test_where_versions_differ_the_metric_says_what_is_worse(before: Path, after: Path, factor: float, verdict: str):
+    """A larger error is worse, a smaller better; how far two engines are apart is neither; and there is a warning."""
+
+    def other_version(line: dict) -> None:
+        if "cell" in line:
+            line["cell"] = line["cell"][::-1]
+        if "header" in line:
+            line["header"]["versions"]["pymunk"] = "8.0"
+
+    edit(after, other_version)
+    table = pd.read_csv(after / "deviations.csv")
+    table.loc[table.metric == "position_max", "value"] *= factor
+    table.to_csv(after / "deviations.csv", index=False)
+    changed = difference(before, after)
+
+    assert "version: pymunk: 7.3.1 before, 8.0 after" in changed.warnings
+    assert {one.verdict for one in changed.numbers if "against truth" in one.what} == {verdict}
+    assert {one.verdict for one in changed.numbers if "against pymunk" in one.what} <= {"other"}
+
+
+def test_a_cell_that_fails_now_or_is_gone_is_worse(before: Path, after: Path):
+    """One crashed, one missing: two changes, exit 1; the other way round they are better or nothing."""
+    cells = [line for line in lines_of(after) if "cell" in line]
+    kept = [line for line in lines_of(after) if line.get("cell") != cells[0]["cell"]]
+    (after / JOURNAL).write_text("".join(json.dumps(line) + "\n" for line in kept))
+    edit(after, lambda line: line.update(status="crashed") if line.get("cell") == cells[1]["cell"] else None)
+
+    assert sorted((one.after, one.verdict) for one in difference(before, after).statuses) == [
+        ("crashed", "worse"), ("not played", "worse"),
+    ]  # fmt: skip
+    assert exit_of(before, after) == 1
+    assert [one.verdict for one in difference(after, before).statuses] == ["better"]
+
+
+@pytest.mark.parametrize(("machine", "verdicts"), [("same", {"worse"}), ("other", set())])
+def test_timings_are_judged_on_one_machine_only(before: Path, after: Path, machine: str, verdicts: set[str]):
+    """All twice as slow: worse; on another machine there is a warning instead."""
+    edit(after, lambda line: line.update(seconds=2 * line["seconds"]) if "timing" in line else None)
+    for folder in (before, after):  # nine rounds of the same
+        timings = [line for line in lines_of(folder) if "timing" in line]
+        if len(timings) == 4:
+            with Journal(folder) as journal:
+                for line in timings * 8:
+                    journal.append(line)
+    if machine == "other":
+        edit(after, lambda line: line["header"]["machine"].update(processor="abacus") if "header" in line else None)
+    changed = difference(before, after)
+
+    assert {one.verdict for one in changed.timings} == verdicts
+    assert any("abacus" in warning for warning in changed.warnings) == (machine == "other")
+
+
+@pytest.mark.parametrize(
+    ("ratios", "verdict"),
+    [
+        ([1.5] * 20, "worse"),  # sure and large
+        ([1.1] * 20, "same"),  # sure, but not large
+        ([0.5, 2.0] * 10, "same"),  # large, but not sure
+        ([3.0] * 7, "same"),  # 7 of 7 happen by chance in 1.6 % of all cases: not 99 % sure
+        ([3.0] * 8, "worse"),
+        ([0.5] * 20, "better"),
+    ],
+)
+def test_a_timing_is_worse_only_if_it_is_sure_and_large(ratios: list[float], verdict: str):
+    """Two gates: the sign test's interval, and a factor."""
+    assert timing("any", sorted(ratios)).verdict == verdict
+
+
+def test_the_interval_holds_the_true_median_as_often_as_it_says():
+    """Of 2000 samples of 20 from a lopsided distribution of median 1, at least 98.5 % of intervals hold it."""
+    draw = random.Random(1)
+    found = [timing("any", sorted(draw.expovariate(0.6931471805599453) for _ in range(20))) for _ in range(2000)]
+
+    assert isinstance(found[0], Timing)
+    assert sum(one.low <= 1 <= one.high for one in found) / 2000 > 0.985
