@@ -91,7 +91,7 @@ def test_what_has_ended_is_not_played_again(atlas: Path):
     other = atlas.parent / "other"
     other.mkdir()
     (other / "journal.jsonl").write_text("\n".join([json.dumps(header), *journal[1:]]) + "\n")
-    assert done_before(other, plan) == {}
+    assert done_before(other, plan) == set()
 
 
 @pytest.mark.parametrize(
