@@ -137,14 +137,24 @@ REASONS = (
         "stiff_push", "box2d_v3:*", "the push is constant over four substeps: the map grows by 1 + 3/8 (w dt)2", MAP,
         growth_limit(0.375),
     ),
-    Reason(
-        "stiff_push", "event_driven:*", "the push is constant during a step: the map grows by 1 + (w dt)2 / 2", MAP,
-        growth_limit(0.5),
+    *(
+        Reason(
+            "stiff_push", player, "the push is constant during a step: the map grows by 1 + (w dt)2 / 2", MAP,
+            growth_limit(0.5),
+        )
+        for player in ("event_driven:*", "reference:ordered")
     ),
     # What every exact method refuses.
     Reason("*", "event_driven:*", "it refuses what has no single continuation: overlaps, and hits that accumulate",
            "scenarios/events.py"),
     # Stacks.
+    *(
+        Reason(case, "reference:ordered", "the hits of a step are bounded, and what is left shows as overlap",
+               "reference_impl/ordered.py")
+        for case in ("column", "heavy_on_light", "pile_comes_to_rest")
+    ),
+    Reason("overlap_recovery", "reference:ordered", "overlaps that no hit made are not pushed out",
+           "reference_impl/ordered.py"),
     Reason("column", "reference:*", "each pair is projected once a step, without regard to the others",
            "exercise 11, task 2"),
     Reason("heavy_on_light", "reference:*", "each pair is projected once a step, without regard to the others",
