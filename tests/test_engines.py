@@ -18,6 +18,7 @@ from adapters.probe import first_difference, history, loaded, one_disk, plain
 from adapters.reference import Reference
 from reference_impl import exercise
 from reports.cells import Cell
+from reports.playing import play_cell
 from scenarios.catalogue import scenario as from_catalogue
 from scenarios.model import Scenario, Scene, Thrust
 
@@ -169,7 +170,7 @@ def test_a_missing_library_is_a_refusal_with_its_name(name, library, monkeypatch
     adapter = f"adapters.{name.split(':')[0]}"
     monkeypatch.delitem(sys.modules, adapter, raising=False)
     monkeypatch.setitem(sys.modules, library, None)
-    run = Cell("free_fall", 1, name, 1).play()
+    run = play_cell(Cell("free_fall", 1, name, 1), ENGINES[name], from_catalogue("free_fall"))
     assert (run.name, run.status) == (name, "unsupported")
     assert library in run.reason
 
