@@ -23,7 +23,8 @@ from adapters.play import Run
 from reports.journal import JOURNAL, lines_of
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
-FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html")
+FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html",
+         "limits.csv", "maps.csv", "laws.csv", "stability.html")  # fmt: skip
 STATE = ("position", "velocity", "angle", "angular_velocity")
 HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
 

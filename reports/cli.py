@@ -177,6 +177,23 @@ def speed(
     run_speed(scenes or [], engine or [], full, seed, out, "crosscheck " + shlex.join(sys.argv[1:]))
 
 
+@app.command()
+def stability(
+    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE|FILE.toml]...", help="Default: all.")] = None,
+    vary: Annotated[list[str] | None, typer.Option(help="What of FILE.toml to vary; repeatable. Default: all.")] = None,
+    engine: Engines = None,
+    full: Annotated[bool, typer.Option("--full", help="16 runs a value, every value, closer brackets.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Keep what an interrupted run in --out has ended.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for the atlas.")] = Path("reports/out/stability"),
+    workers: Workers = 0,
+) -> None:
+    """Find where every player fails: limits, with the first failing run of each to look at."""
+    from reports.stability.command import find_limits
+
+    command = "crosscheck " + shlex.join(sys.argv[1:])
+    find_limits(cases or [], vary or [], engine or [], full, resume, out, workers, command)
+
+
 @app.command(name="list")
 def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
     """Explain every engine, scenario and metric in a line."""

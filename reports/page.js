@@ -67,9 +67,8 @@ async function openCharts(scenario) {
 async function openPlayer(scenario) {
   const element = scenario.querySelector(".player");
   if (!element) return;
-  const player = new Player(element, readPack(await unpack(`replay:${scenario.dataset.name}`)), looks);
+  const player = new Player(element, readPack(await unpack(scenario.dataset.replay || `replay:${scenario.dataset.name}`)), looks);
   hiddenIn(scenario).forEach((name) => player.hidden.add(name));
-  player.seek(0);
   players[scenario.dataset.name] = player;
 }
 

@@ -50,17 +50,29 @@ function readPack(bytes) {
 
 class Player {
   constructor(element, pack, looks) {
-    Object.assign(this, { element, pack, looks, time: 0, playing: false, speed: 1, hidden: new Set() });
+    Object.assign(this, { element, looks, playing: false, speed: 1, hidden: new Set() });
     this.canvas = element.querySelector("canvas");
     this.slider = element.querySelector(".scrub");
     this.clock = element.querySelector(".clock");
     this.button = element.querySelector(".play");
     this.note = element.querySelector(".ended");
-    this.slider.max = pack.duration;
-    this.slider.step = pack.duration / 1000;
     this.listen();
+    this.showPack(pack);
     new ResizeObserver(() => this.fit()).observe(this.canvas.parentElement);
+  }
+
+  // Shows a pack from where it opens; `pace` is how many of its seconds pass in one at speed 1.
+  showPack(pack) {
+    this.stop();
+    this.pack = pack;
+    this.pace = pack.pace || 1;
+    [this.from, this.until] = [pack.t[0], pack.t[pack.t.length - 1]];
+    this.slider.min = this.from;
+    this.slider.max = this.until;
+    this.slider.step = (this.until - this.from) / 1000;
+    this.time = pack.opens || this.from;
     this.fit();
+    this.seek(this.time);
   }
 
   listen() {
@@ -78,7 +90,7 @@ class Player {
     if (native && (event.key === " " || native.matches("select, input"))) return;
     const act = {
       " ": () => this.toggle(), ArrowLeft: () => this.stepBy(-1), ArrowRight: () => this.stepBy(1),
-      Home: () => this.seek(0), End: () => this.seek(this.pack.duration),
+      Home: () => this.seek(this.from), End: () => this.seek(this.until),
     }[event.key];
     if (act) { event.preventDefault(); act(); }
   }
@@ -86,15 +98,15 @@ class Player {
   toggle() { this.playing ? this.stop() : this.start(); }
 
   start() {
-    if (this.time >= this.pack.duration) this.seek(0);
+    if (this.time >= this.until) this.seek(this.from);
     this.playing = true;
     this.showPlaying();
     let before = performance.now();
     const tick = (now) => {
       if (!this.playing) return;
-      this.seek(this.time + ((now - before) / 1000) * this.speed);
+      this.seek(this.time + ((now - before) / 1000) * this.speed * this.pace);
       before = now;
-      if (this.time >= this.pack.duration) this.stop();
+      if (this.time >= this.until) this.stop();
       else requestAnimationFrame(tick);
     };
     requestAnimationFrame((now) => { before = now; tick(now); });
@@ -115,9 +127,9 @@ class Player {
   }
 
   seek(time) {
-    this.time = Math.max(0, Math.min(time, this.pack.duration));
+    this.time = Math.max(this.from, Math.min(time, this.until));
     this.slider.value = this.time;
-    this.clock.textContent = `${this.time.toFixed(3)} s of ${this.pack.duration} s`;
+    this.clock.textContent = `${this.time.toFixed(3)} s of ${Number(this.until.toPrecision(4))} s`;
     this.draw();
   }
 

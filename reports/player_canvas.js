@@ -34,6 +34,7 @@ Object.assign(Player.prototype, {
     if (few) layers.forEach((layer) => this.drawPath(pen, layer));
     layers.forEach((layer, k) => this.ended(layer) || this.drawDisks(pen, layer, few, layers.length - k));
     layers.forEach((layer) => this.drawHits(pen, layer));
+    this.drawEvent(pen, layers);
     this.drawScaleBar(pen);
     this.note.textContent = layers.filter((layer) => this.ended(layer))
       .map((layer) => `${layer.name} ends at ${layer.ends} s`).join("; ");
@@ -133,7 +134,7 @@ Object.assign(Player.prototype, {
   },
 
   drawHits(pen, layer) {
-    const lasts = HIT_LASTS * Math.max(this.speed, 0.25);
+    const lasts = HIT_LASTS * Math.max(this.speed, 0.25) * this.pace;
     for (const hit of layer.hitList) {
       const age = (this.time - hit.t) / lasts;
       if (age < 0 || age > 1 || hit.i >= this.pack.radius.length) continue;
@@ -146,6 +147,26 @@ Object.assign(Player.prototype, {
       pen.stroke();
       pen.globalAlpha = 1;
     }
+  },
+
+  // What broke: a ring around its disk of the first layer, from the instant on.
+  drawEvent(pen, layers) {
+    const event = this.pack.event;
+    if (!event || !layers.length || this.time < event.t - 1e-9) return;
+    const disks = event.disk < 0 ? [] : [event.disk];
+    pen.strokeStyle = pen.fillStyle = getComputedStyle(this.element).getPropertyValue("--bad");
+    pen.lineWidth = 2.5;
+    pen.setLineDash([5, 4]);
+    for (const disk of disks) {
+      const [x, y] = this.pixel(this.place(layers[0], disk));
+      pen.beginPath();
+      pen.arc(x, y, Math.max(6, this.pack.radius[disk] * this.scale + 6), 0, 2 * Math.PI);
+      pen.stroke();
+    }
+    pen.setLineDash([]);
+    pen.font = "600 13px system-ui, sans-serif";
+    pen.textAlign = "left";
+    pen.fillText("fails here", 12, 20);
   },
 
   drawScaleBar(pen) {

@@ -10,6 +10,8 @@ from __future__ import annotations
 import base64
 import json
 import zlib
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,13 +35,22 @@ def pack(comparison: Comparison) -> str:
     return pack_layers(comparison.scenario, played(comparison))
 
 
-def pack_layers(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> str:
-    """These layers of a scenario, packed, as base64; "" if there are none."""
+def pack_layers(
+    scenario: Scenario,
+    layers: list[tuple[Run | None, Trajectory]],
+    shown: NDArray[np.int64] | None = None,
+    more: Mapping[str, Any] = MappingProxyType({}),
+) -> str:
+    """The layers at the samples `shown` (all that are worth it), packed, as base64; "" if there are none.
+
+    more: goes into the head: `opens` s, where the player starts; `pace`, seconds in one at speed 1; `event`, what to
+    mark: t s, disk.
+    """
     if not layers:
         return ""
-    shown = frames(scenario, layers)
+    shown = frames(scenario, layers) if shown is None else shown
     heads, bodies = zip(*(layer(run, trajectory, shown, scenario) for run, trajectory in layers))
-    head = json.dumps(head_of(scenario, shown, layers) | {"layers": heads}, separators=(",", ":")).encode()
+    head = json.dumps({**head_of(scenario, shown, layers), **more, "layers": heads}, separators=(",", ":")).encode()
     head += b" " * (-len(head) % 4)
     whole = len(head).to_bytes(4, "little") + head + b"".join(bodies)
     return base64.b64encode(zlib.compress(whole, 9)).decode()

@@ -174,7 +174,7 @@ def measure_times(plan: Plan, scenes: Sequence[str], measured: Measured, progres
         else:
             if key[0] == SIZE:
                 result, measured.stopped = result
-            rows_of_samples += (row_of(key, sample) for sample in result)
+            rows_of_samples += (sample_row(key, sample) for sample in result)
     measured.samples, measured.truths = pd.DataFrame(rows_of_samples), pd.DataFrame(truths)
 
 
@@ -213,7 +213,7 @@ def middle(scene: str) -> int:
     return rungs[len(rungs) // 2]
 
 
-def row_of(key: tuple, sample: Sample) -> dict[str, Any]:
+def sample_row(key: tuple, sample: Sample) -> dict[str, Any]:
     """A sample as a row of `Measured.samples`."""
     kind, scenario, change, n, singly, copy, dt = key[0], "", PLAIN, 0, False, 0, float("nan")
     if kind in (SCENE, FEATURE):

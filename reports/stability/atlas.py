@@ -1,0 +1,219 @@
+"""The atlas: every case on every player through the runner, journalled as each ends, with its table of limits."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Collection, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from math import nan
+from pathlib import Path
+from time import process_time
+from typing import Any, NamedTuple
+
+import pandas as pd
+
+from reports.archive import packed
+from reports.journal import JOURNAL, Journal, lines_of, plain
+from reports.machine import about
+from reports.runner import run_all
+from reports.stability.cases import CASES
+from reports.stability.limits import EXACT, FORMS, NEVER_WORKS, Limit, Search, Trial, players_of
+from reports.stability.maps import MAPS, MapOf, map_of
+from reports.stability.reasons import explained
+from reports.stability.touching import TOUCHING, LawOf, law_of
+from reports.stability.vary import case_of_file
+from reports.terminal import Progress
+from reports.worker_process import Failure
+
+COLUMNS = (
+    "engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "seeds", "reason",
+    "verdict", "failed_fraction", "runs", "monotone", "tested", "source", "event", "form",
+)  # fmt: skip
+TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one player
+SLOWEST_FIRST = ("long_gas", "thermometer", "dense_gas", "pile_comes_to_rest", "bounce_drift", "equipartition")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is asked for: names of `CASES` or FILE.toml:vary, of `MAPS`, `TOUCHING` and `ENGINES`, a key of `FORMS`."""
+
+    cases: Sequence[str]
+    maps: Sequence[str]
+    touching: Sequence[str]
+    players: Sequence[str]
+    form: str
+    workers: int
+    command: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """A case, a map or a scene of touching disks on a player: independent of every other."""
+
+    kind: str
+    name: str
+    player: str
+    form: str
+
+    def __call__(self, folder: Path) -> Limit | MapOf | LawOf:
+        """In the worker: do it; the first failing run at the limit is saved."""
+        if self.kind == "limit":
+            return found_limit(self, folder)
+        if self.kind == "law":
+            return law_of(self.name, self.player)
+        started = process_time()
+        return replace(map_of(self.name, self.player), seconds=process_time() - started)
+
+
+def case_named(name: str) -> Any:
+    """A case of the table, or of a scene file: FILE.toml:vary."""
+    return CASES[name] if name in CASES else case_of_file(*name.rsplit(":", 1))
+
+
+def found_limit(task: Task, folder: Path) -> Limit:
+    """Search, and save the first failing run next to the limit."""
+    started = process_time()
+    search = Search(case_named(task.name), task.player, FORMS[task.form])
+    limit = replace(search.limit(), case=task.name, seconds=process_time() - started)
+    if (failure := search.failure(limit)) is not None and failure[1].trajectory is not None:
+        scenario, run = failure
+        assert run.trajectory is not None
+        (folder / "trajectories" / file_of(limit)).write_bytes(packed(run.trajectory))
+        if search.case.beside != EXACT:  # what it is shown beside was played, too
+            assert scenario.truth is not None
+            beside = scenario.truth(scenario.times)
+            (folder / "trajectories" / f"truth.{file_of(limit)}").write_bytes(packed(beside))
+    return limit
+
+
+def file_of(limit: Limit) -> str:
+    """The name of the failing run's file."""
+    name = f"{limit.case}.{limit.player}".replace("/", "_").replace(":", "-")
+    return f"{name}.npz" if len(name) < 200 else f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.npz"
+
+
+def carry_out(plan: Plan, journal: Journal, done: Collection[Task], progress: Progress) -> None:
+    """Do every task that is not `done`; all goes into the journal's folder."""
+    folder = journal.path.parent
+    (folder / "trajectories").mkdir(exist_ok=True)
+    header = about(plan.command, 0) | {"form": plan.form}
+    journal.append({"header": header})
+    (folder / "machine.json").write_text(json.dumps(plain(header), indent=2) + "\n")
+    wanted = tasks_of(plan)
+    tasks: dict[Any, Callable[[], Any]] = {task: partial(task, folder) for task in wanted if task not in done}
+    progress.start(len(tasks), len(wanted))
+    with closing(run_all(tasks, plan.workers, TIMEOUT[plan.form])) as results:
+        for task, result in results:
+            reason = result.reason if isinstance(result, Failure) else ""
+            result = failed(task, result) if isinstance(result, Failure) else result
+            journal.append({"task": asdict(task), task.kind: asdict(result)})
+            progress.done(f"{task.name}  {task.player}", result.status, reason)
+    journal.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
+
+
+def tasks_of(plan: Plan) -> list[Task]:
+    """All tasks, the slowest first, so that none is left over at the end."""
+    tasks = [Task("map", name, player, plan.form) for name in plan.maps for player in MAPS[name].players(plan.players)]
+    tasks += [Task("law", name, player, plan.form) for name in plan.touching for player in plan.players]
+    for name in plan.cases:
+        tasks += [
+            Task("limit", name, player, plan.form)
+            for player in players_of(case_named(name))
+            if player.split("+")[0] in plan.players
+        ]
+    rank = {name: k for k, name in enumerate(SLOWEST_FIRST)}
+    return sorted(tasks, key=lambda task: rank.get(task.name, len(rank)))
+
+
+def failed(task: Task, failure: Failure) -> Limit | MapOf | LawOf:
+    """What is known of a task whose worker died or was stopped."""
+    if task.kind == "map":
+        return MapOf(task.name, task.player, (), status=failure.status)
+    if task.kind == "law":
+        return LawOf(task.name, task.player, failure.status, nan, (), status=failure.status)
+    event = f"{failure.status}: {failure.reason}"
+    trial = Trial(nan, 1, 1, nan, 0, nan, event, failure.status)
+    return Limit(task.name, task.player, task.form, NEVER_WORKS, nan, nan, (trial,), status=failure.status)
+
+
+class Atlas(NamedTuple):
+    """All that was found: the limits with their reasons, the maps, the laws of touching disks, and the header."""
+
+    limits: list[Limit]
+    maps: list[MapOf]
+    laws: list[LawOf]
+    header: dict[str, Any]
+
+
+def read(folder: Path) -> Atlas:
+    """The atlas in a folder, in reading order."""
+    header: dict[str, Any] = {}
+    last: dict[Task, dict[str, Any]] = {}  # of two lines on one task the later holds
+    for line in lines_of(folder):
+        header = line.get("header", header)
+        if "task" in line:
+            last[Task(**line["task"])] = line
+    lines = list(last.values())
+    limits = [limit_from(line["limit"]) for line in lines if "limit" in line]
+    maps = [MapOf.from_record(line["map"]) for line in lines if "map" in line]
+    laws = [LawOf.from_record(line["law"]) for line in lines if "law" in line]
+    order = {name: k for k, name in enumerate(CASES)}
+    players = list(dict.fromkeys(player for case in CASES.values() for player in players_of(case)))
+    limits.sort(key=lambda limit: (order.get(limit.case, len(order)), limit.case, players.index(limit.player)))
+    maps.sort(key=lambda one: (list(MAPS).index(one.name), players.index(one.player)))
+    laws.sort(key=lambda one: (list(TOUCHING).index(one.name), players.index(one.player)))
+    return Atlas(explained(limits), maps, laws, header)
+
+
+def limit_from(record: dict[str, Any]) -> Limit:
+    """The limit of a line of the journal, where what is not finite is text."""
+    trials = tuple(Trial(**numbers(trial)) for trial in record["trials"])
+    return Limit(**numbers(record) | {"trials": trials})
+
+
+def numbers(record: dict[str, Any]) -> dict[str, Any]:
+    """The record with "nan", "inf" and "-inf" as numbers again."""
+    return {key: float(value) if value in ("nan", "inf", "-inf") else value for key, value in record.items()}
+
+
+def done_before(folder: Path, plan: Plan) -> set[Task]:
+    """The tasks that ended well in an interrupted run of the same versions; none if there is no such run."""
+    if not (folder / JOURNAL).is_file():
+        return set()
+    lines = list(lines_of(folder))
+    headers = [line["header"] for line in lines if "header" in line]
+    if not headers or any(header["versions"] != about("", 0)["versions"] for header in headers):
+        return set()
+    ended = [line for line in lines if "task" in line]
+    well = {Task(**line["task"]) for line in ended if line[line["task"]["kind"]]["status"] == "ok"}
+    return well & set(tasks_of(plan))
+
+
+def table(limits: Sequence[Limit]) -> pd.DataFrame:
+    """A row a limit, columns `COLUMNS`."""
+    return pd.DataFrame([row_of(limit) for limit in limits], columns=list(COLUMNS))
+
+
+def row_of(limit: Limit) -> dict[str, Any]:
+    """The limit as a row of limits.csv."""
+    case, failing = case_named(limit.case), limit.failing or (limit.trials[0] if limit.status != "ok" else None)
+    engine, profile = limit.player.split(":")
+    reason = limit.reason if limit.tested or not limit.reason else f"likely: {limit.reason}"
+    return {
+        "engine": engine, "profile": profile, "case": limit.case, "parameter": case.parameter,
+        "works_at": shortened(limit.works_at), "fails_at": shortened(limit.fails_at), "unit": case.unit,
+        "predicate": failing.broken if failing else case.predicate.name,
+        "seeds": max(trial.runs for trial in limit.trials), "reason": reason, "verdict": limit.verdict,
+        "failed_fraction": failing.failed / failing.runs if failing else 0.0, "runs": limit.runs,
+        "monotone": limit.monotone, "tested": limit.tested, "source": limit.source,
+        "event": failing.event if failing else "", "form": limit.form,
+    }  # fmt: skip
+
+
+def shortened(value: float) -> float:
+    """To six significant digits: brackets are wider."""
+    return value if math.isnan(value) else float(f"{value:.6g}")

@@ -1,0 +1,156 @@
+"""Cases of one disk and what it meets: a floor under gravity, a spring, itself; another size, another place."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from adapters.engine import Unsupported
+from adapters.play import Run, fault_of, gather
+from reports.stability.limits import Case
+from reports.stability.players import PLAYERS
+from reports.stability.predicates import ANGLE_OFF, APEX_DRIFTS, SCALED_APART, SPRING_GROWS, STRAYS
+from scenarios.closed_forms import Hit, answer, bouncing, flight, pair
+from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
+from scenarios.placing import lay_out
+
+FAMILY = "One disk, or two"
+RADIUS, G = 0.25, 10.0
+HEIGHT = 1.25  # m, so that the fall lasts 0.5 s and ends at 5 m/s
+FALL = sqrt(2 * HEIGHT / G)
+FALLS = 20  # the drop and nine and a half bounces
+OSCILLATION = 400  # steps
+
+
+def ball(x: float, run: int, of: int) -> Scenario:
+    """A ball at e = 1 dropped over a floor; x = dt over the time of the fall.
+
+    The runs differ in height by up to 3 %: where a fall lasts a whole number of steps, some methods are flattered.
+    """
+    height = HEIGHT * (1 + 0.03 * (run + 0.382) / of)
+    steps = round(FALLS / x)
+    dt = FALLS * FALL / steps
+    scene = lay_out(
+        position=[[0, RADIUS + height]], velocity=[[0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0,
+        gravity=[0, -G], walls=[[[-4, 0], [4, 0]]],
+    )  # fmt: skip
+
+    def truth(t: Array) -> Trajectory:
+        legs = bouncing(height, G, 1.0, t[-1])
+        gap, speed = legs.at(t)
+        position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + RADIUS, speed))
+        return answer(scene, t, (position, velocity), legs.wall_hits(0, (0,), 1.0, 1.0))
+
+    return Scenario(
+        "ball", "Does it come back?", "the bouncing ball in closed form", scene, steps * dt, dt, (1,), truth=truth
+    )
+
+
+def scaled(x: float, _run: int, _of: int) -> Scenario:
+    """Two disks of x / 2 m meet head-on at 4 x m/s, e = 1: at x = 1 they close at 4 m/s, in 1/60 s by 0.13 radii."""
+    radius, speed = 0.5 * x, 4.0 * x
+    scene = lay_out(
+        position=[[-2.2 * x, 0], [0, 0]], velocity=[[speed, 0], [0, 0]], radius=[radius, radius], mass=[1.0, 1.0],
+        restitution=1.0,
+    )  # fmt: skip
+
+    def truth(t: Array) -> Trajectory:
+        legs, impulse = pair(scene.position, scene.velocity, scene.radius, scene.mass, 1.0)
+        hits: list[Hit] = [(float(legs.start[1]), 0, 1, float(impulse[0]))]
+        return answer(scene, t, legs.at(t), hits)
+
+    return Scenario("scaled", "Is it the same scene?", "similarity", scene, 1.0, 1 / 60, (1,), truth=truth)
+
+
+def far(x: float, _run: int, _of: int) -> Scenario:
+    """A disk flies x m from the origin at 1 m/s, for 1 s in steps of 1/240 s."""
+    scene = lay_out(position=[[x, 0]], velocity=[[1.0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0)
+
+    def truth(t: Array) -> Trajectory:
+        return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity))
+
+    return Scenario("far", "Does it fly on?", "x + v t", scene, 1.0, 1 / 30, (8,), truth=truth)
+
+
+def spinning(x: float, _run: int, _of: int) -> Scenario:
+    """A disk turns by x rad a step."""
+    dt = 1 / 64
+    scene = lay_out(
+        position=[[0, 0]], velocity=[[1.0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0, angular_velocity=[x / dt]
+    )
+
+    def truth(t: Array) -> Trajectory:
+        return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity))
+
+    return Scenario("spinning", "Does it turn as it spins?", "theta + w t", scene, 0.5, dt, (1,), truth=truth)
+
+
+def oscillator(x: float, _run: int, _of: int) -> Scenario:
+    """A disk of 1 kg on a spring of 1 N/m, so that w = 1 rad/s; x = w dt."""
+    scene = lay_out(position=[[1.0, 0]], velocity=[[0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0)
+
+    def truth(t: Array) -> Trajectory:
+        position, velocity = np.zeros((len(t), 1, 2)), np.zeros((len(t), 1, 2))
+        position[:, 0, 0], velocity[:, 0, 0] = np.cos(t), -np.sin(t)
+        return answer(scene, t, (position, velocity))
+
+    return Scenario("oscillator", "Does it keep its swing?", "cos w t", scene, OSCILLATION * x, x, (1,), truth=truth)
+
+
+def on_spring(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
+    """Play a disk whose push -x N is read off its position before every step, as a user of an engine writes it."""
+    engine = PLAYERS[player].make()
+    states: list[State] = []
+    status, reason = "ok", ""
+    try:
+        engine.load(scenario.scene, scenario.sample_interval)
+        states.append(engine.read())
+        for _ in range(scenario.samples):
+            engine.push(0, -states[-1].position[0], 0.0)
+            engine.step()
+            states.append(engine.read())
+            if reason := fault_of(states[-1], 1e6):
+                status = "diverged"
+                break
+    except Unsupported as refusal:
+        status, reason = "unsupported", str(refusal)
+    finally:
+        engine.close()
+    name, profile = player.split(":")
+    trajectory = gather(scenario, states, NO_COLLISIONS) if states else None
+    return scenario, Run(name, profile, scenario.name, scenario.sample_interval, status, reason, trajectory)
+
+
+DECADES = (1.0, 10.0, 100.0, 1e3, 3e3, 1e4, 3e4, 1e5, 1e6, 1e7, 1e8)
+
+ALONE = (
+    Case(
+        "bounce_drift", FAMILY, "Up to which dt does a ball at e = 1 come back to its height?",
+        "dt / fall time", "1", (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2),
+        ball, APEX_DRIFTS, drawn=True, quick_runs=2, most_runs=8, quick_values=(0.003, 0.007, 0.015, 0.05, 0.1, 0.2),
+        also=("box2d_v3:matched+16_substeps", "pymunk:matched+push_out"),
+    ),
+    Case(
+        "scale_up", FAMILY, "How much larger may a scene be made and stay the same?",
+        "scale", "1", (1.0, 3.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3), scaled, SCALED_APART,
+    ),
+    Case(
+        "scale_down", FAMILY, "How much smaller may a scene be made and stay the same?",
+        "scale", "1", (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3), scaled, SCALED_APART,
+    ),
+    Case(
+        "far_from_origin", FAMILY, "How far from the origin may a disk at 1 m/s be and still fly on?",
+        "offset", "m", DECADES, far, STRAYS,
+    ),
+    Case(
+        "spin", FAMILY, "How fast may a disk spin?",
+        "w dt", "rad", (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0), spinning, ANGLE_OFF,
+        also=("box2d_v3:matched+16_substeps",),
+    ),
+    Case(
+        "stiff_push", FAMILY, "How stiff may a spring be whose push is read off the positions before each step?",
+        "w dt", "1", (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0), oscillator, SPRING_GROWS,
+        play=on_spring,
+    ),
+)  # fmt: skip

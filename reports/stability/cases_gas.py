@@ -1,0 +1,194 @@
+"""Cases of a gas in a box at e = 1: energy, temperature, pressure, collision rate, and what it remembers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.random import Generator, default_rng
+
+from adapters.play import Run
+from reports.stability.limits import Case
+from reports.stability.players import play_as
+from reports.stability.predicates_crowds import ENERGY_DRIFTS, GAS_PARTS, TEMPERATURES_PART, WRONG_GAS
+from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
+from scenarios.placing import box, lay_out
+
+FAMILY = "A gas at e = 1"
+SOURCE = "the hard-disk gas (Alder & Wainwright, J. Chem. Phys. 31, 459, 1959)"
+RADIUS, DT = 0.25, 1 / 240
+STEP = 0.04  # of a radius: how far a disk of mean energy moves in a step
+
+
+def gas(
+    packing: float, seed: int, *, rows: int = 6, columns: int = 6, steps: int = 500, every: int = 10,
+    step: float = STEP, mass: Array | None = None,
+) -> Scenario:  # fmt: skip
+    """Disks of radius 0.25 m on a triangular lattice in a box that they fill to `packing`, with Maxwell's velocities.
+
+    kT is such that a disk of mass 1 flies `step` radii in a step at its root mean square speed.
+    """
+    n, rng = rows * columns, default_rng(seed)
+    radius = np.full(n, RADIUS)
+    mass = np.ones(n) if mass is None else mass
+    k = np.arange(n)
+    lattice = np.stack([k % columns + 0.5 * (k // columns % 2) + 0.5, np.sqrt(0.75) * (k // columns) + 0.5], -1)
+    size = np.array([columns + 0.5, np.sqrt(0.75) * (rows - 1) + 1])
+    spacing = np.sqrt(np.pi * (radius**2).sum() / packing / size.prod())
+    scene = lay_out(
+        position=lattice * spacing, velocity=maxwell(rng, mass, step * RADIUS / DT), radius=radius, mass=mass,
+        restitution=1.0, walls=box([0, 0], size * spacing),
+    )  # fmt: skip
+    return Scenario("gas", "Does it keep its energy?", SOURCE, scene, steps * DT, every * DT, (every,), seed=seed)
+
+
+def maxwell(rng: Generator, mass: Array, speed: float) -> Array:
+    """(n, 2) m/s, drawn so that disks of each mass have the same temperature exactly, a mass of 1 the rms `speed`."""
+    velocity = rng.normal(size=(len(mass), 2))
+    for kind in np.unique(mass):
+        same = mass == kind
+        velocity[same] *= speed / np.sqrt(kind * (velocity[same] ** 2).sum(axis=1).mean())
+    return velocity
+
+
+def dense(x: float, run: int, _of: int, step: float = STEP) -> Scenario:
+    """x = packing."""
+    return gas(x, run, rows=10, columns=10, steps=200, step=step)
+
+
+def coarse(x: float, run: int, _of: int) -> Scenario:
+    """x = v dt / R at packing 0.3."""
+    return gas(0.3, run, step=x, steps=300)
+
+
+def long_run(x: float, run: int, _of: int) -> Scenario:
+    """x = steps of twenty disks at packing 0.3."""
+    return gas(0.3, run, rows=5, columns=4, steps=int(x), every=int(x) // 50)
+
+
+def heavy_one(x: float, run: int, _of: int) -> Scenario:
+    """One disk of mass x among 35 of mass 1."""
+    mass = np.ones(36)
+    mass[14] = x
+    return gas(0.3, run, mass=mass)
+
+
+def mixture(x: float, run: int, _of: int) -> Scenario:
+    """Every other disk has mass x."""
+    return gas(0.3, run, mass=np.where(np.arange(36) % 2, x, 1.0), steps=2000, every=4)
+
+
+def thermometer(x: float, run: int, _of: int) -> Scenario:
+    """x = packing, 4000 steps, seen at every fourth."""
+    return gas(x, run, steps=4000, every=4)
+
+
+def steps_of_gas(x: float, run: int, _of: int) -> Scenario:
+    """x = steps of 36 disks at packing 0.3, seen at fifty instants at most."""
+    every = max(1, int(x) // 50)
+    return gas(0.3, run, steps=int(x) // every * every, every=every)
+
+
+def against(other: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
+    """The scenario with another run of the same player in the place of the truth."""
+    if other.status != "ok" or other.trajectory is None:
+        return scenario, other
+    beside: Trajectory = other.trajectory
+    return replace(scenario, truth=lambda _: beside), run
+
+
+def reversed_order(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
+    """The same gas inserted in the opposite order, beside the gas in its own order."""
+    scene = scenario.scene
+    names = ("position", "velocity", "radius", "mass", "angle", "angular_velocity", "inertia")
+    turned = replace(scenario, scene=replace(scene, **{name: getattr(scene, name)[::-1] for name in names}))
+    run = play_as(player, turned)
+    if run.trajectory is not None:
+        run = replace(run, trajectory=renumbered(run.trajectory, scene.n))
+    return against(play_as(player, scenario), run, scenario)
+
+
+def renumbered(played: Trajectory, n: int) -> Trajectory:
+    """The trajectory with disk i for disk n - 1 - i."""
+    hits = played.collisions
+    i, j = n - 1 - hits.i, np.where(hits.j < 0, hits.j, n - 1 - hits.j)
+    low, high = np.where(j < 0, i, np.minimum(i, j)), np.where(j < 0, j, np.maximum(i, j))
+    return replace(
+        played,
+        position=played.position[:, ::-1], velocity=played.velocity[:, ::-1], angle=played.angle[:, ::-1],
+        angular_velocity=played.angular_velocity[:, ::-1],
+        collisions=Collisions(hits.t, frozen(low, np.int64), frozen(high, np.int64), hits.impulse),
+    )  # fmt: skip
+
+
+def restarted(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
+    """The gas stopped half way, read, and loaded into a new engine, beside the gas played through."""
+    whole = play_as(player, scenario)
+    if whole.status != "ok" or whole.trajectory is None:
+        return scenario, whole
+    half = scenario.samples // 2
+    state, scene = whole.trajectory.at(half), scenario.scene
+    fresh: Scene = replace(
+        scene, position=state.position, velocity=state.velocity, angle=state.angle,
+        angular_velocity=state.angular_velocity,
+    )  # fmt: skip
+    left = (scenario.samples - half) * scenario.sample_interval
+    rest = play_as(player, replace(scenario, scene=fresh, duration=left))
+    if rest.status != "ok" or rest.trajectory is None:
+        return scenario, rest
+    before, after = whole.trajectory, rest.trajectory
+    late = after.collisions
+    position, velocity, angle, spin = (
+        frozen(np.concatenate([getattr(before, name)[:half], getattr(after, name)]))
+        for name in ("position", "velocity", "angle", "angular_velocity")
+    )
+    hits = Collisions(frozen(late.t + half * scenario.sample_interval), late.i, late.j, late.impulse)
+    joined = Trajectory(before.t, position, velocity, angle, spin, hits)
+    return against(whole, replace(rest, trajectory=joined), scenario)
+
+
+PACKINGS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85)
+COUNTS = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
+OTHER = "in its own order of insertion"
+
+GAS = (
+    Case(
+        "dense_gas", FAMILY, "Up to which packing does a gas of 100 disks keep its energy over 200 steps?",
+        "packing", "1", PACKINGS, dense, ENERGY_DRIFTS, drawn=True, also=("pymunk:matched+ten_iterations",),
+        quick_values=(0.1, 0.3, 0.6, 0.85), quick_runs=2, ratio=1.25,
+    ),
+    Case(
+        "fast_gas", FAMILY, "How far may the disks of a gas of packing 0.3 fly in a step, over 300 steps?",
+        "v dt / R", "1", (0.01, 0.02, 0.04, 0.07, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 2.0), coarse, ENERGY_DRIFTS, drawn=True,
+        ratio=1.1,
+    ),
+    Case(
+        "long_gas", FAMILY, "For how many steps does a gas of 20 disks keep its energy?",
+        "steps", "1", (1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6), long_run, ENERGY_DRIFTS, drawn=True,
+        whole=True, quick_values=(1e3, 1e4), refines=False, most_runs=2, also=("pymunk:matched+ten_iterations",),
+    ),
+    Case(
+        "heavy_in_gas", FAMILY, "How heavy may one disk of a gas be?",
+        "m2 / m1", "1", (1.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8), heavy_one, ENERGY_DRIFTS, drawn=True, ratio=1.5,
+    ),
+    Case(
+        "equipartition", FAMILY, "Do light and heavy disks of a gas keep the same temperature?",
+        "m2 / m1", "1", (1.5, 3.0, 10.0, 30.0, 100.0, 1e3, 1e4), mixture, TEMPERATURES_PART, drawn=True, refines=False,
+        quick_values=(1.5, 100.0, 1e4), quick_runs=2,
+    ),
+    Case(
+        "thermometer", FAMILY, "Has a gas the speeds, the rate of hits and the wall pressure that it should have?",
+        "packing", "1", (0.2, 0.3, 0.4, 0.5, 0.6), thermometer, WRONG_GAS, drawn=True, refines=False,
+        quick_values=(0.2, 0.6), quick_runs=2,
+    ),
+    Case(
+        "insertion_order", FAMILY, "After how many steps does the order of insertion show?",
+        "steps", "1", COUNTS, steps_of_gas, GAS_PARTS, drawn=True, whole=True, play=reversed_order, beside=OTHER,
+        quick_values=(10.0, 50.0, 200.0, 1000.0), ratio=1.5,
+    ),
+    Case(
+        "restart", FAMILY, "After how many steps does it show that a gas was read and loaded again half way?",
+        "steps", "1", COUNTS, steps_of_gas, GAS_PARTS, drawn=True, whole=True, play=restarted, beside="played through",
+        quick_values=(10.0, 50.0, 200.0, 1000.0), ratio=1.5,
+    ),
+)  # fmt: skip

@@ -1,0 +1,137 @@
+"""`crosscheck stability`: check what is asked for, find the limits, write limits.csv, maps.csv and stability.html."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+import pandas as pd
+from rich.console import Console
+from rich.table import Table
+
+from adapters.engines import ENGINES
+from reports.commands import checked_engines, unknown
+from reports.exits import DONE, FAILED, INTERRUPTED, refuse, say
+from reports.folders import FolderTaken, may_write, part_of, replace_folder
+from reports.journal import Busy, Journal
+from reports.stability.atlas import Atlas, Plan, carry_out, case_named, done_before, read, table
+from reports.stability.cases import CASES
+from reports.stability.limits import NEVER_FAILS, NEVER_WORKS, Limit
+from reports.stability.maps import MAPS
+from reports.stability.page import write_page
+from reports.stability.touching import TOUCHING
+from reports.stability.vary import VARIES
+from reports.style import number
+from reports.terminal import Progress
+from scenarios.files import SceneFileError, read_scene_file
+
+
+def find_limits(
+    names: Sequence[str], vary: Sequence[str], engines: Sequence[str], full: bool, resume: bool, out: Path,
+    workers: int, command: str,
+) -> NoReturn:  # fmt: skip
+    """Find the limits of `names`, all cases and maps if there are none, into `out`; exits 0, 1, 2 or 130."""
+    cases, maps, touching = checked(names, vary)
+    form = "full" if full else "quick"
+    plan = Plan(cases, maps, touching, checked_engines(engines), form, workers or os.cpu_count() or 1, command)
+    out = out.resolve()
+    try:
+        may_write(out)
+        out.parent.mkdir(parents=True, exist_ok=True)
+    except FolderTaken as fault:
+        refuse([str(fault)])
+    except OSError as fault:
+        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
+    part = part_of(out)
+    try:
+        part.mkdir(parents=True, exist_ok=True)
+        with Journal(part) as journal, Progress() as progress:
+            done = done_before(part, plan) if resume else set()
+            if not done:
+                os.truncate(journal.path, 0)
+            carry_out(plan, journal, done, progress)
+            progress.say("writing the tables and the page")
+            found = write_files(part)
+            replace_folder(part, out)
+    except Busy:
+        refuse([f"{out} is being written by another crosscheck; wait for it, or name another --out"])
+    except KeyboardInterrupt:
+        say(f"\nInterrupted. What has ended is kept in {part}: ask again with --resume")
+        sys.exit(INTERRUPTED)
+    except OSError as fault:
+        say(f"cannot write to {part}: {fault.strerror or fault}")
+        sys.exit(FAILED)
+    finish(found, out)
+
+
+def write_files(folder: Path) -> Atlas:
+    """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
+    atlas = read(folder)
+    table(atlas.limits).to_csv(folder / "limits.csv", index=False)
+    laws = [(one.name, one.player, one.law, one.off) for one in atlas.laws]
+    pd.DataFrame(laws, columns=["scene", "player", "law", "off"]).to_csv(folder / "laws.csv", index=False)
+    cells = [(one.name, one.player, *cell) for one in atlas.maps for cell in one.cells]
+    columns = ["map", "player", "x", "y", "reading", "failed", "event"]
+    pd.DataFrame(cells, columns=columns).to_csv(folder / "maps.csv", index=False)
+    write_page(folder / "stability.html", folder, atlas)
+    return atlas
+
+
+def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
+    """The cases, the maps and the scenes of touching disks that are meant; exits 2 with every fault, one line each."""
+    faults = [unknown("--vary", what, VARIES) for what in vary if what not in VARIES]
+    cases: list[str] = []
+    maps, touching = [name for name in names if name in MAPS], [name for name in names if name in TOUCHING]
+    for name in names:
+        if name.endswith(".toml"):
+            try:
+                read_scene_file(name)
+            except SceneFileError as error:
+                faults += error.faults
+            cases += [f"{name}:{what}" for what in vary or VARIES]
+        elif name in CASES:
+            cases.append(name)
+        elif name not in MAPS and name not in TOUCHING:
+            faults.append(unknown("case", name, [*CASES, *MAPS, *TOUCHING]) + " (a scene file ends in .toml)")
+    if vary and not any(name.endswith(".toml") for name in names):
+        faults.append(f"--vary {vary[0]}: varies a scene file, and none is named; name FILE.toml")
+    if faults:
+        refuse([fault.replace("crosscheck list", "crosscheck stability --help") for fault in faults])
+    return (list(dict.fromkeys(cases)), maps, touching) if names else (list(CASES), list(MAPS), list(TOUCHING))
+
+
+def finish(atlas: Atlas, out: Path) -> NoReturn:
+    """Print a table and where the page is; exit 1 if a task ended without a result."""
+    console = Console(width=max(Console().width, 120))  # a row that is cut off would be no use to anybody
+    limits = atlas.limits
+    rows = Table(title="Where they fail", title_justify="left", box=None, padding=(0, 1, 0, 0))
+    shown = list(dict.fromkeys(limit.case for limit in limits))
+    players = [name for name in ENGINES if any(limit.player == name for limit in limits)]
+    rows.add_column("case, parameter", no_wrap=True)
+    for player in players:
+        rows.add_column(player.replace(":", "\n"), justify="right", no_wrap=True)
+    found = {(limit.case, limit.player): limit for limit in limits}
+    for name in shown:
+        cells = [in_words(found[name, player]) if (name, player) in found else "" for player in players]
+        rows.add_row(f"{Path(name).name}, {case_named(name).parameter}", *cells)
+    console.print(rows)
+    console.print("A number: fails there. –: does not fail as far as was tried. never: fails everywhere.")
+    console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
+    lost = [f"{one.case} on {one.player}" for one in limits if one.status != "ok"]
+    lost += [f"{one.name} on {one.player}" for one in atlas.maps if one.status != "ok"]
+    lost += [f"{one.name} on {one.player}" for one in atlas.laws if one.status != "ok"]
+    if lost:
+        say(f"no result: {', '.join(lost)}")
+    sys.exit(FAILED if lost else DONE)
+
+
+def in_words(limit: Limit) -> str:
+    """The limit in a few letters."""
+    if limit.verdict == NEVER_FAILS:
+        return "–"
+    if limit.verdict == NEVER_WORKS:
+        return "never" if limit.status == "ok" else limit.status
+    return number(limit.fails_at) + ("" if limit.monotone else "*")

@@ -1,0 +1,134 @@
+"""Two parameters at once: how a player's reading depends on both, as a grid for every player."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import isfinite, nan
+from typing import Any
+
+import numpy as np
+
+from adapters.engines import ENGINES
+from adapters.play import Run, play
+from reports.stability.cases_gas import gas
+from reports.stability.cases_hits import flyby
+from reports.stability.cases_stacks import column
+from reports.stability.players import Switched, play_as
+from reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
+from reports.stability.predicates_crowds import ENERGY_DRIFTS, STANDS
+from scenarios.model import Scenario
+
+
+@dataclass(frozen=True)
+class Map:
+    """A question with two parameters.
+
+    Attributes:
+        asks: the question in one sentence.
+        x_name, y_name, x, y: the parameters with their units, and their values.
+        scene: (x, y, number of the run) -> the scenario.
+        predicate: what is read; the worst of `runs` is shown.
+        only: players that have the parameter; empty: all.
+        play: (player, scenario, x, y) -> the run.
+    """
+
+    name: str
+    asks: str
+    x_name: str
+    y_name: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    scene: Callable[[float, float, int], Scenario]
+    predicate: Predicate
+    runs: int = 2
+    only: tuple[str, ...] = ()
+    play: Callable[[str, Scenario, float, float], Run] = lambda player, scenario, _x, _y: play_as(player, scenario)
+
+    def players(self, asked: Sequence[str]) -> list[str]:
+        """Those asked for that have both parameters."""
+        return [name for name in asked if name in (self.only or ENGINES)]
+
+
+@dataclass(frozen=True)
+class MapOf:
+    """A map on a player: rows (x, y, worst reading, whether a run failed, what broke); s of processor time it took."""
+
+    name: str
+    player: str
+    cells: tuple[tuple[float, float, float, bool, str], ...]
+    status: str = "ok"
+    seconds: float = nan
+
+    @staticmethod
+    def from_record(record: dict[str, Any]) -> MapOf:
+        """From a line of the journal."""
+        cells = tuple((x, y, float(value), failed, broken) for x, y, value, failed, broken in record["cells"])
+        return MapOf(record["name"], record["player"], cells, record["status"])
+
+
+def map_of(name: str, player: str) -> MapOf:
+    """Play a map's grid on a player."""
+    one = MAPS[name]
+    cells = []
+    for x in one.x:
+        for y in one.y:
+            scenarios = [one.scene(x, y, run) for run in range(one.runs)]
+            readings = [judge(one.predicate, scenario, one.play(player, scenario, x, y)) for scenario in scenarios]
+            worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
+            broken = next((f"{r.broken}: {r.event}" for r in readings if r.failed), "")
+            cells.append((x, y, worst, any(r.failed for r in readings), broken))
+    return MapOf(name, player, tuple(cells))
+
+
+def set_iterations(count: int, engine: Any) -> None:
+    """Give an engine so many iterations, or substeps, whichever it has."""
+    if hasattr(engine, "space"):
+        engine.space.iterations = count
+    elif hasattr(engine, "velocity_iterations"):
+        engine.velocity_iterations = count
+    else:
+        engine.substeps = count
+
+
+def with_iterations(player: str, scenario: Scenario, _ratio: float, count: float) -> Run:
+    """Play with so many iterations."""
+    engine = Switched(ENGINES[player].make(), partial(set_iterations, int(count)))
+    try:
+        return play(engine, player, scenario, scenario.dt(1))
+    finally:
+        engine.close()
+
+
+def hit_at(x: float, y: float, run: int) -> Scenario:
+    """x = dt over 1/64 s, y = closing speed in m/s: `flyby` in other units of time would be the same scene."""
+    return flyby(y, run, 2, dt=x / 64)
+
+
+HITS_X = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0)
+HITS_Y = (0.01, 0.1, 0.5, 2.0, 8.0, 32.0, 128.0, 512.0)
+
+MAPS = {
+    one.name: one
+    for one in (
+        Map(
+            "dt_and_speed", "Is a head-on hit of disks of 0.25 m at e = 1 elastic, whatever the step and the speed?",
+            "dt (1/64 s)", "closing speed (m/s)", HITS_X, HITS_Y, hit_at, RESTITUTION_OFF,
+        ),
+        Map(
+            "mass_ratio_and_iterations", "How many iterations does a heavy disk need that stands on a light one?",
+            "m2 / m1", "iterations (Box2D 3.1: substeps)", (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4),
+            (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0),
+            lambda x, _y, _run: column(2, np.array([1.0, x])), STANDS, runs=1,
+            only=tuple(name for name in ENGINES if name.split(":")[0] in ("pymunk", "box2d", "box2d_v3")),
+            play=with_iterations,
+        ),
+        Map(
+            "packing_and_dt", "How much energy does a gas of 36 disks lose or gain in 150 steps?",
+            "packing", "v dt / R", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8),
+            (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0),
+            lambda x, y, run: gas(x, run, steps=150, step=y), ENERGY_DRIFTS, runs=1,
+        ),
+    )
+}  # fmt: skip

@@ -1,0 +1,142 @@
+"""Reads off the limits what the page and the README say: cells, findings, maps as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isnan
+from typing import TYPE_CHECKING, NamedTuple
+
+from adapters.engines import ENGINES
+from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit
+from reports.stability.maps import MAPS, MapOf
+from reports.style import number
+
+if TYPE_CHECKING:
+    from reports.stability.page import Section
+
+
+class Cell(NamedTuple):
+    """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none), failed."""
+
+    text: str
+    remark: str = ""
+    heat: int = -1
+    failed: bool = False
+
+
+class Why(NamedTuple):
+    """A reason in words, where it stands, how it was tested, and the players it is given for."""
+
+    text: str
+    source: str
+    tested: str
+    players: list[str]
+
+
+class MapTable(NamedTuple):
+    """A player's map: a row a y, from large to small, a cell an x."""
+
+    player: str
+    rows: list[tuple[float, list[Cell]]]
+
+
+def families(sections: Sequence[Section]) -> dict[str, list[Section]]:
+    """The sections under their headings, both in the order of appearance."""
+    found: dict[str, list[Section]] = {}
+    for section in sections:
+        found.setdefault(section.case.family, []).append(section)
+    return found
+
+
+def cell_of(section: Section, player: str) -> Cell:
+    """A limit in the overview: the deeper its colour, the earlier on the way from gentle to harsh it fails."""
+    limit = next((limit for limit in section.limits if limit.player == player), None)
+    if limit is None:
+        return Cell("")
+    remark = f"{limit.verdict}. {why(limit)}"
+    if limit.verdict == NEVER_FAILS:
+        return Cell("–", f"does not fail up to {number(limit.works_at)}", 0)
+    if limit.status != "ok" or limit.verdict == NEVER_WORKS:
+        return Cell("never" if limit.status == "ok" else limit.status, remark, -1, True)
+    values = list(section.case.values)
+    harsher = 1 if values[-1] > values[0] else -1
+    passed = sum(harsher * value < harsher * limit.fails_at for value in values) / len(values)
+    text = number(limit.fails_at) + ("" if limit.monotone else "*")
+    return Cell(text, remark, max(1, min(9, round(9 * (1 - passed)))))
+
+
+def why(limit: Limit) -> str:
+    """The reason, called likely where nothing tested it."""
+    if not limit.reason:
+        return "" if limit.verdict == NEVER_FAILS else "Not explained."
+    return limit.reason[0].upper() + limit.reason[1:] + "." if limit.tested else f"Likely: {limit.reason}."
+
+
+def reasons(limits: Sequence[Limit]) -> list[Why]:
+    """Every reason once, with the players it is given for, in the order of appearance."""
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for limit in limits:
+        if limit.verdict != NEVER_FAILS:
+            found.setdefault((why(limit), limit.source, limit.tested), []).append(limit.player)
+    return [Why(*key, players) for key, players in found.items()]
+
+
+def bracket(limit: Limit) -> tuple[str, str]:
+    """Works at, fails at, as text."""
+    works = "nowhere" if isnan(limit.works_at) else number(limit.works_at, 4)
+    fails = "nowhere tried" if isnan(limit.fails_at) else number(limit.fails_at, 4)
+    return works, fails
+
+
+def pattern(limit: Limit) -> str:
+    """Every value tried, from gentle to harsh: how it works and fails where it does not do so once and for all."""
+    return "" if limit.monotone else "".join("o" if trial.works else "x" for trial in limit.trials)
+
+
+def findings(limits: Sequence[Limit]) -> list[str]:
+    """A few sentences, counted from the limits."""
+    mine = [limit for limit in limits if limit.player in ENGINES]
+    cases = list(dict.fromkeys(limit.case for limit in mine))
+    failing = [limit for limit in mine if limit.verdict != NEVER_FAILS]
+    found = [f"{len(mine)} searches in {len(cases)} cases: {len(mine) - len(failing)} found no failure as far as they "
+             f"went, {sum(limit.verdict == LIMIT for limit in mine)} a limit, and "
+             f"{sum(limit.verdict == NEVER_WORKS for limit in mine)} failed everywhere."]  # fmt: skip
+    fails: dict[str, list[str]] = {}
+    for limit in failing:
+        fails.setdefault(limit.player, []).append(limit.case)
+    if fails:
+        order = sorted({limit.player for limit in mine}, key=lambda player: len(fails.get(player, [])))
+        found.append(f"Of these {len(cases)} cases {order[0]} fails in the fewest, {len(fails.get(order[0], []))}, and "
+                     f"{order[-1]} in the most, {len(fails[order[-1]])}. Each fails somewhere else.")  # fmt: skip
+    tested = [limit for limit in failing if limit.tested]
+    found.append(
+        f"The reasons of {len(tested)} of the {len(failing)} limits were tested: the limit follows from the reason, "
+        "or a player that differs in that one thing gets farther. The others are called likely."
+    )
+    odd = [limit for limit in mine if not limit.monotone]
+    if odd:
+        names = ", ".join(dict.fromkeys(f"{limit.player} in {limit.case}" for limit in odd[:3]))
+        found.append(f"{len(odd)} work again beyond a value at which they fail (marked *), as {names}.")
+    return found
+
+
+def map_tables(maps: Sequence[MapOf]) -> dict[str, list[MapTable]]:
+    """Map -> a table a player."""
+    tables: dict[str, list[MapTable]] = {}
+    for one in maps:
+        bound = MAPS[one.name].predicate.bound
+        at = {(x, y): map_cell(value, failed, broken, bound) for x, y, value, failed, broken in one.cells}
+        rows = [(y, [at[x, y] for x in MAPS[one.name].x if (x, y) in at]) for y in reversed(MAPS[one.name].y)]
+        tables.setdefault(one.name, []).append(MapTable(one.player, rows))
+    return tables
+
+
+def map_cell(value: float, failed: bool, broken: str, bound: float) -> Cell:
+    """A reading as a share of its bound: pale far below, the deep half of the ramp where it fails."""
+    if isnan(value):
+        return Cell("r" if broken.startswith("refused") else "!", broken, -1, True)
+    steps = (0.01, 0.1, 0.3, 1.0, 2.0, 5.0, 20.0, 100.0, 1e3)
+    share = value / bound
+    return Cell(
+        "×" if failed else "", f"{number(value)}{'; ' + broken if broken else ''}", sum(share > s for s in steps)
+    )

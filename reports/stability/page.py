@@ -1,0 +1,190 @@
+"""Writes stability.html: the limits, the maps, and of every limit the first run that failed, to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from adapters.play import Run
+from reports import style
+from reports.archive import load_trajectory
+from reports.charts import Drawing, Line, figure_of, shortened
+from reports.page import HERE, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
+from reports.replay import pack_layers, ratio_of
+from reports.stability import overview
+from reports.stability.atlas import Atlas, case_named, file_of
+from reports.stability.limits import EXACT, Case, Limit, Trial
+from reports.stability.maps import MAPS
+from reports.stability.touching import TOUCHING
+from scenarios.model import Scenario, Trajectory
+
+FRAMES = 120  # samples that are shown before a failure, and after it
+SECONDS = 5.0  # a replay lasts
+
+
+@dataclass(frozen=True)
+class Replay:
+    """The first failing run of a player: what the page's player takes, its height over its width, and a sentence."""
+
+    player: str
+    pack: str
+    ratio: float
+    says: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """One case as the page shows it."""
+
+    case: Case
+    limits: list[Limit]
+    replays: list[Replay]
+    reasons: list[overview.Why]
+    drawing: Drawing
+    charts: str
+
+    @property
+    def anchor(self) -> str:
+        """Its name as a fragment of a URL."""
+        return "".join(c if c.isalnum() or c in "_-" else "-" for c in self.case.name)
+
+    def replay(self, player: str) -> Replay | None:
+        """The replay of a player's failure, if there is one."""
+        return next((replay for replay in self.replays if replay.player == player), None)
+
+
+def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
+    """Write the page of an atlas, whose failing runs are in `folder`, to `path`."""
+    limits, maps, laws = atlas.limits, atlas.maps, atlas.laws
+    by_case: dict[str, list[Limit]] = {}
+    for limit in limits:
+        by_case.setdefault(limit.case, []).append(limit)
+    sections = [section_of(case_named(name), found, folder) for name, found in by_case.items()]
+    names = [limit.player for limit in limits] + [one.player for one in maps] + [one.player for one in laws]
+    names = list(dict.fromkeys(names))
+    looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
+    plotly, scripts = get_plotlyjs(), [(HERE / script).read_text() for script in SCRIPTS]
+    scripts.append((HERE / "stability" / "stability.js").read_text())
+    environment = Environment(
+        loader=FileSystemLoader(HERE / "stability"), autoescape=True, trim_blocks=True, lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )  # fmt: skip
+    environment.filters["number"] = style.number
+    html = environment.get_template("stability.html.j2").render(
+        sections=sections, families=overview.families(sections), findings=overview.findings(limits), about=atlas.header,
+        players=[name for name in names if "+" not in name], looks=looks, cell_of=overview.cell_of,
+        maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, words=overview, exact=EXACT,
+        css=Markup(css() + (HERE / "stability" / "stability.css").read_text()),
+        looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
+        library=deflated(plotly), policy=content_policy([plotly, *scripts]),
+    )  # fmt: skip
+    path.write_text(html, encoding="utf-8")
+
+
+def section_of(case: Case, limits: list[Limit], folder: Path) -> Section:
+    """All that the page shows of one case."""
+    replays = [replay for limit in limits if (replay := replay_of(case, limit, folder)) is not None]
+    drawing = readings(case, limits)
+    return Section(case, limits, replays, overview.reasons(limits), drawing, packed_charts({"readings": drawing}))
+
+
+def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
+    """The first failing run at the limit, from just before the failure; None if nothing was kept."""
+    failing, path = limit.failing, folder / "trajectories" / file_of(limit)
+    if failing is None or not path.exists():
+        return None
+    scenario = case.scene(failing.value, failing.first, failing.runs)
+    played = load_trajectory(path)
+    layers: list[tuple[Run | None, Trajectory]] = [(named(limit), played)]
+    if (beside := beside_of(case, scenario, path)) is not None:
+        layers.append((None, beside))
+    shown = near(failing, scenario)
+    pack = pack_layers(scenario, layers, shown, opening(failing, scenario, shown))
+    says = f"{case.parameter} = {style.number(failing.value)}: {failing.event}"
+    return Replay(limit.player, pack, ratio_of(scenario, layers), says)
+
+
+def named(limit: Limit) -> Run:
+    """A run that carries a player's name, which decides how it is drawn."""
+    engine, profile = limit.player.split(":")
+    return Run(engine, profile, limit.case, 0.0)
+
+
+def beside_of(case: Case, scenario: Scenario, path: Path) -> Trajectory | None:
+    """What a failing run is shown beside: the truth at its samples, or the other run that was kept with it."""
+    if case.beside != EXACT:
+        return load_trajectory(path.with_name(f"truth.{path.name}"))
+    try:
+        return scenario.truth(scenario.times) if scenario.truth is not None else None
+    except ValueError:  # NoTruth: there is none
+        return None
+
+
+def near(failing: Trial, scenario: Scenario) -> np.ndarray:
+    """The samples around the failure, at most `FRAMES` on either side of it."""
+    at = failing.at if np.isfinite(failing.at) else 0.0
+    middle = int(np.clip(round(at / scenario.sample_interval), 0, scenario.samples))
+    first = max(0, min(middle - FRAMES, scenario.samples - 2 * FRAMES))
+    return np.arange(first, min(scenario.samples, first + 2 * FRAMES) + 1)
+
+
+def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, Any]:
+    """Where the player starts: a tenth of what is shown before the failure; and what it marks."""
+    first, last = float(scenario.times[shown[0]]), float(scenario.times[shown[-1]])
+    at = min(max(failing.at, first), last) if np.isfinite(failing.at) else first
+    return {
+        "opens": max(first, at - max(0.1 * (last - first), 1.5 * scenario.sample_interval)),
+        "pace": (last - first) / SECONDS,
+        "event": {"t": at, "disk": failing.disk},
+    }
+
+
+def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
+    """The worst reading of every player against the parameter, and the bound above which it fails."""
+    predicate = case.predicate
+    if predicate.bound == 0:
+        return shares(case, limits)
+    title = f"{predicate.name.capitalize()}, {predicate.unit}"
+    caption = (
+        f"The worst of all runs at each {case.parameter}, harsher to the right; above the dotted line it fails. "
+        "A line that ends has nothing to read there: refused, broken off, or not a number."
+    )
+    lines = []
+    for limit in limits:
+        trials = [trial for trial in limit.trials if np.isfinite(trial.worst) and np.isfinite(trial.value)]
+        if len(trials) > 1:
+            x, y = (np.array([getattr(trial, name) for trial in trials], float) for name in ("value", "worst"))
+            lines.append(Line(named(limit), x, np.abs(y)))
+    if not lines or not any((line.y > 0).any() for line in lines):
+        return Drawing(title, "No player reads more than 0 anywhere.", None)
+    ends = [min(case.values), max(case.values)]
+    guide = {
+        "type": "scatter", "x": shortened(ends), "y": [predicate.bound or None] * 2, "mode": "lines", "name": "bound",
+        "hoverinfo": "skip", "line": {"color": style.look(style.TRUTH).light, "dash": "dot", "width": 1.3},
+    }  # fmt: skip
+    return Drawing(title, caption, figure_of(lines, axis_of(case), predicate.unit, markers=40, guide=[guide]))
+
+
+def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
+    """The share of runs that failed against the parameter, where a run has nothing else to read."""
+    lines = []
+    for limit in limits:
+        x, y = (np.array(pair, float) for pair in zip(*((t.value, t.failed / t.runs) for t in limit.trials)))
+        lines.append(Line(named(limit), x, y))
+    caption = f"How many of the runs at each {case.parameter} failed; harsher to the right."
+    title = f"{case.predicate.name.capitalize()}, share of runs"
+    return Drawing(title, caption, figure_of(lines, axis_of(case), "share of runs", log=False, markers=40))
+
+
+def axis_of(case: Case) -> dict[str, Any]:
+    """The parameter's axis, logarithmic, harsher to the right."""
+    harsh_left = case.values[0] > case.values[-1]
+    title = case.parameter if case.unit == "1" else f"{case.parameter} ({case.unit})"
+    return {"title": title, "type": "log"} | ({"autorange": "reversed"} if harsh_left else {})

@@ -1,0 +1,185 @@
+"""What failing means: named predicates with units, each a number read off a run and the bound it must not pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from adapters.play import Run
+from scenarios.model import Array, Scenario, Trajectory
+
+
+class Reading(NamedTuple):
+    """A number in the predicate's unit; when (s), how and at which disk (-1: all) it broke, and what: a predicate."""
+
+    value: float
+    at: float = np.nan
+    event: str = ""
+    broken: str = ""
+    failed: bool = False
+    disk: int = 0
+
+
+class Predicate(NamedTuple):
+    """A run fails where the number it reads is above `bound`, or none.
+
+    Attributes:
+        name: as it stands in limits.csv.
+        unit: of the number.
+        bound: the largest that still works.
+        means: what failing is, in words.
+        read: scenario and run, played to its end -> the reading; `failed` and `broken` are filled in by `judge`.
+    """
+
+    name: str
+    unit: str
+    bound: float
+    means: str
+    read: Callable[[Scenario, Trajectory], Reading]
+
+
+def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Reading:
+    """Read a run; one that was refused, broke off or raised fails with its reason."""
+    if run.status != "ok" or run.trajectory is None:
+        outcome = "refused" if run.status == "unsupported" else run.status
+        at = float(run.trajectory.t[-1]) if run.trajectory is not None else 0.0
+        return Reading(np.nan, at, run.reason, outcome, True)
+    with np.errstate(over="ignore", invalid="ignore"):  # what was thrown far enough overflows, and fails
+        reading = predicate.read(scenario, run.trajectory)
+    if reading.value <= predicate.bound:
+        return reading
+    return reading._replace(failed=True, broken=reading.broken or predicate.name)
+
+
+def first_above(t: Array, series: Array, bound: float) -> float:
+    """s, the first sample at which the series (k,) is above its bound; the last if it never is."""
+    above = ~(series <= bound)
+    return float(t[np.argmax(above)] if above.any() else t[-1])
+
+
+def truth_of(scenario: Scenario) -> Trajectory:
+    """The exact answer at the samples; a scenario of these cases always has one."""
+    assert scenario.truth is not None
+    return scenario.truth(scenario.times)
+
+
+def gain(trajectory: Trajectory) -> Array:
+    """(n,) m/s by which each disk's velocity differs between start and end."""
+    return np.linalg.norm(trajectory.velocity[-1] - trajectory.velocity[0], axis=1)
+
+
+def _hits_missed(scenario: Scenario, played: Trajectory) -> Reading:
+    true = truth_of(scenario)
+    should, does = gain(true), gain(played)
+    missed = int(((should > 0) & (does < 0.01 * should)).any())
+    at = float(true.collisions.t[0])
+    return Reading(missed, at, "the hit is missed: the disks pass through each other")
+
+
+def _hits_invented(scenario: Scenario, played: Trajectory) -> Reading:
+    change = np.linalg.norm(played.velocity - played.velocity[0], axis=2).max(axis=1)
+    share = change / np.linalg.norm(scenario.scene.velocity, axis=1).max()
+    at = first_above(played.t, share, 1e-3)
+    return Reading(float(share.max()), at, "a hit that never was: the disks do not touch")
+
+
+def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
+    closing, parting = (float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1]))
+    e = -parting / closing
+    off = abs(e - scenario.scene.restitution)
+    return Reading(off, float(truth_of(scenario).collisions.t[0]), f"the hit is played with e = {e:.3g}")
+
+
+def _strays(scenario: Scenario, played: Trajectory) -> Reading:
+    way = np.linalg.norm(played.position[-1] - played.position[0], axis=1)
+    true = truth_of(scenario)
+    ought = np.linalg.norm(true.position[-1] - true.position[0], axis=1)
+    off = np.abs(way - ought) / ought
+    worst = int(np.nanargmax(off)) if np.isfinite(off).any() else 0
+    return Reading(
+        float(off[worst]), float(played.t[-1]), f"disk {worst} has gone {way[worst] / ought[worst]:.4g} of its way"
+    )
+
+
+def _velocity_off(scenario: Scenario, played: Trajectory) -> Reading:
+    true = truth_of(scenario)
+    off = np.linalg.norm(played.velocity[-1] - true.velocity[-1], axis=1)
+    own = np.linalg.norm(true.velocity[-1], axis=1)
+    share = off / np.where(own > 0, own, np.linalg.norm(true.velocity[0], axis=1).max())
+    worst = int(np.nanargmax(share)) if np.isfinite(share).any() else 0
+    return Reading(float(share[worst]), float(true.collisions.t[0]), f"disk {worst} leaves with another velocity")
+
+
+def _scaled_apart(scenario: Scenario, played: Trajectory) -> Reading:
+    true = truth_of(scenario)
+    off = (np.linalg.norm(played.position - true.position, axis=2) / scenario.scene.radius).max(axis=1)
+    return Reading(float(off.max()), first_above(played.t, off, 0.25), "here it leaves the path it has at scale 1")
+
+
+def _angle_off(scenario: Scenario, played: Trajectory) -> Reading:
+    turned = played.t * scenario.scene.angular_velocity[0]
+    off = np.abs(played.angle[:, 0] - turned)[1:] / turned[1:]
+    return Reading(
+        float(off[-1]), float(played.t[1]), f"turns {played.angle[-1, 0] / turned[-1]:.4g} times as far as it should"
+    )
+
+
+def _spring_grows(_: Scenario, played: Trajectory) -> Reading:
+    energy = (played.velocity**2 + played.position**2).sum(axis=(1, 2)) / 2  # of 1 kg on 1 N/m
+    quarter = len(energy) // 4
+    # Means over a quarter: a bounded method swings within a period, and comes back.
+    factor = float(energy[-quarter:].mean() / energy[:quarter].mean())
+    at = first_above(played.t, np.abs(np.log2(energy / energy[0])), SPRING_GROWS.bound)
+    return Reading(abs(float(np.log2(factor))), at, f"the energy is {factor:.3g} of what it was, after 300 steps")
+
+
+def _apex_drifts(scenario: Scenario, played: Trajectory) -> Reading:
+    drift = apex_drift(scenario, played)
+    if np.isnan(drift):
+        below = played.position[:, 0, 1] < 0
+        return Reading(np.nan, first_above(played.t, below.astype(float), 0.5), "the ball falls through the floor")
+    word = "higher" if drift > 0 else "lower"
+    return Reading(abs(drift), first_bounce(scenario), f"every bounce comes {abs(drift):.3g} of the height {word}")
+
+
+def apex_drift(scenario: Scenario, played: Trajectory) -> float:
+    """Change of a bouncing ball's apex per bounce, from the first bounce to the last, over the height of the drop.
+
+    An apex is the vertex of the parabola through the three highest samples of a flight.
+    """
+    y = played.position[:, 0, 1]
+    height = y[0] - scenario.scene.radius[0]
+    top = np.flatnonzero((y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])) + 1
+    if len(top) < 2:
+        return np.nan
+    before, at, after = y[top - 1], y[top], y[top + 1]
+    bend = before - 2 * at + after
+    apex = at - (after - before) ** 2 / (8 * bend)
+    return float((apex[-1] - apex[0]) / (len(apex) - 1) / height)
+
+
+def first_bounce(scenario: Scenario) -> float:
+    """s, when a ball dropped over y = 0 hits for the first time."""
+    scene = scenario.scene
+    return float(np.sqrt(2 * (scene.position[0, 1] - scene.radius[0]) / -scene.gravity[1]))
+
+
+HITS_MISSED = Predicate("hits missed", "hits", 0.0, "a disk passes through another that it should hit", _hits_missed)
+HITS_INVENTED = Predicate(
+    "hits invented", "of the speed", 1e-3, "a disk is deflected that touches nothing", _hits_invented
+)
+RESTITUTION_OFF = Predicate("restitution off", "1", 0.01, "the hit is not played with the scene's e", _restitution_off)
+STRAYS = Predicate("strays", "of the way", 0.01, "a free disk has not gone its way", _strays)
+VELOCITY_OFF = Predicate(
+    "velocity off", "of the speed", 1e-3, "a disk leaves the hit with another velocity", _velocity_off
+)
+SCALED_APART = Predicate(
+    "apart", "radii", 0.25, "the path, scaled back, is not the one that the scene has at scale 1", _scaled_apart
+)
+ANGLE_OFF = Predicate("angle off", "of the angle", 0.02, "a free disk does not turn as fast as it spins", _angle_off)
+APEX_DRIFTS = Predicate("apex drifts", "of the height a bounce", 0.01, "the ball does not come back", _apex_drifts)
+SPRING_GROWS = Predicate(
+    "spring grows", "doublings of energy", 1.0, "the energy of an oscillator doubles or halves", _spring_grows
+)

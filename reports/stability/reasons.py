@@ -1,0 +1,255 @@
+"""Why a player fails where it does: a sentence, its source, and how it was tested; untested ones are called likely."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fnmatch import fnmatch
+from math import atan, pi, sqrt
+from typing import NamedTuple
+
+from reports.stability.cases import CASES
+from reports.stability.limits import NEVER_FAILS, Limit
+
+NEAR = 1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a hit lost by degrees
+
+
+class Reason(NamedTuple):
+    """One row: the first that fits a limit is its reason.
+
+    Attributes:
+        cases, players: patterns of names, as of files.
+        text: the sentence.
+        source: where it is written down.
+        predicts: the limit that follows from it.
+        switch: a player that differs in this thing only, or in little else, and must get farther.
+    """
+
+    cases: str
+    players: str
+    text: str
+    source: str
+    predicts: float | None = None
+    switch: str = ""
+
+
+DISCRETE = "contacts are looked for at the ends of steps only, and lost once the centres have passed each other"
+GEOMETRY = "geometry: (v dt)2 = (2R)2 - b2 between disks, v dt = R at a thin wall"
+B2_SETTINGS = "Box2D 2.3 Common/b2Settings.h: "
+B2_TYPES = "Box2D 3.1 src/types.c: "
+THRESHOLD = "hits that close at less than 1 m/s are played as inelastic"
+EULER_OUT = (
+    "the push belongs to a place where the disk is not: with x' = x + v dt the oscillator's map grows by 1 + (w dt)2"
+)
+QUARTER = "nothing turns by more than pi/2 a step"
+MAP = "determinant of the step's map, 1 + (w dt)2 (1 - alpha); alpha of ENGINES"
+SWEEP = "restitution is one sweep after the substeps, so a disk that touches two others in a step loses energy"
+FINDS_LATE = "a hit is found up to a step late, and each one lasts about a step longer than it should"
+
+
+def growth_limit(share: float) -> float:
+    """w dt at which the mean energy doubles in 300 steps, growing by 1 + share (w dt)2 a step."""
+    return sqrt((2 ** (1 / 300) - 1) / share)
+
+
+REASONS = (
+    # One hit.
+    *(
+        Reason(case, player, DISCRETE, GEOMETRY, limit, f"{player}+bullets" if player.startswith("box2d") else "")
+        for case, limit in (
+            ("tunnelling_head_on", 2.0), ("tunnelling_offset", 2 * sqrt(1 - 0.49)), ("tunnelling_thin_wall", 1.0),
+            ("tunnelling_thick_wall", 11.0), ("grazing", 1 - sqrt(1 - 0.01)),
+        )
+        for player in ("reference:*", "pymunk:*", "box2d:matched", "box2d_v3:matched")
+        if (case, player) != ("grazing", "box2d_v3:matched")
+    ),
+    Reason("tunnelling_*", "*", DISCRETE + "; disks are not swept unless one is a bullet", "Box2D manual, bullets"),
+    Reason("grazing", "*", DISCRETE + "; the chord of a grazing hit is shorter than v dt", GEOMETRY),
+    Reason(
+        "near_miss", "box2d_v3:*", "a contact counts from a gap of four slops on, with a normal fixed before the step",
+        "Box2D 3.1 src/constants.h: B2_SPECULATIVE_DISTANCE", None, "box2d_v3:matched",
+    ),
+    Reason("slow_hit", "box2d:shipped", THRESHOLD, B2_SETTINGS + "b2_velocityThreshold", 1.0, "box2d:matched"),
+    Reason("slow_hit", "box2d_v3:shipped", THRESHOLD, B2_TYPES + "restitutionThreshold", 1.0, "box2d_v3:matched"),
+    Reason(
+        "restitution", "pymunk:shipped", "the elasticities of the two shapes are multiplied: e on every shape gives e2",
+        "Munk2D src/cpArbiter.c, cpArbiterUpdate", 1 - (1 + sqrt(1 - 0.04)) / 2, "pymunk:matched",
+    ),
+    # One disk, or two.
+    Reason("bounce_drift", "pymunk:shipped", "v dt exceeds the radius, and the floor is missed", GEOMETRY),
+    Reason(
+        "bounce_drift", "pymunk:matched+push_out", "the push out of the floor adds height",
+        "Munk2D src/cpSpaceStep.c, collision_bias", None, "pymunk:matched",
+    ),
+    Reason("bounce_drift", "pymunk:matched", "v dt exceeds the radius, and the floor is missed", GEOMETRY),
+    *(
+        Reason(
+            "bounce_drift", player, "the velocity after gravity is reflected: every bounce gains |v| dt of height",
+            "order of operations in a step: gravity, then restitution", 0.005,
+        )
+        for player in ("box2d:*", "reference:lesson")
+    ),
+    Reason(
+        "bounce_drift", "reference:exercise", "the ball is set onto the floor before its velocity is reflected",
+        "exercise 11, task 2: project, then impulse",
+    ),
+    Reason(
+        "bounce_drift", "box2d_v3:shipped", "the soft contact takes about |v| dt of height a bounce",
+        "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched",
+    ),
+    Reason(
+        "bounce_drift", "box2d_v3:matched*", "the soft contact takes about |v| dt / substeps of height a bounce",
+        "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched+16_substeps",
+    ),
+    Reason("scale_down", "box2d:shipped", THRESHOLD, B2_SETTINGS + "b2_velocityThreshold", 0.25, "box2d:matched"),
+    Reason("scale_down", "box2d_v3:shipped", THRESHOLD, B2_TYPES + "restitutionThreshold", 0.25, "box2d_v3:matched"),
+    Reason(
+        "scale_up", "box2d:shipped", "nothing moves by more than 2 units a step: the velocity is cut",
+        B2_SETTINGS + "b2_maxTranslation", 30.0, "box2d:matched",
+    ),
+    Reason(
+        "scale_up", "box2d_v3:shipped", "nothing is faster than 400 m/s: the velocity is cut",
+        B2_TYPES + "maximumLinearSpeed", 100.0, "box2d_v3:matched",
+    ),
+    Reason(
+        "far_from_origin", "box2d*", "positions are float32: beyond 4096 m a step of 1/240 m is 9 last places, not 8.5",
+        "IEEE 754", 4096.0,
+    ),
+    Reason("spin", "box2d:shipped", QUARTER, B2_SETTINGS + "b2_maxRotation", pi / 2 / 0.98),
+    Reason("spin", "box2d:matched", QUARTER + "; refused", B2_SETTINGS + "b2_maxRotation", pi / 2),
+    Reason(
+        "spin", "box2d_v3:shipped", "nothing turns by more than pi/4 a step, and a substep turns by atan(w h) only",
+        "Box2D 3.1 src/constants.h: B2_MAX_ROTATION", 4 * atan(pi / 16) / 0.98,
+    ),
+    Reason(
+        "spin", "box2d_v3:matched*", "nothing turns by more than pi/4 a step; refused",
+        "Box2D 3.1 src/constants.h: B2_MAX_ROTATION", pi / 4,
+    ),
+    Reason(
+        "stiff_push", "reference:exercise", "symplectic Euler is unstable from w dt = 2 on", "linear stability", 2.0
+    ),
+    Reason(
+        "stiff_push", "box2d:matched", "the swing reaches 2 units of length a step, where the engine cuts it; refused",
+        B2_SETTINGS + "b2_maxTranslation",
+    ),
+    *(Reason("stiff_push", player, EULER_OUT, MAP, growth_limit(1.0)) for player in ("reference:lesson", "pymunk:*")),
+    Reason(
+        "stiff_push", "box2d_v3:*", "the push is constant over four substeps: the map grows by 1 + 3/8 (w dt)2", MAP,
+        growth_limit(0.375),
+    ),
+    *(
+        Reason(
+            "stiff_push", player, "the push is constant during a step: the map grows by 1 + (w dt)2 / 2", MAP,
+            growth_limit(0.5),
+        )
+        for player in ("event_driven:*", "reference:ordered")
+    ),
+    # What every exact method refuses.
+    Reason("*", "event_driven:*", "it refuses what has no single continuation: overlaps, and hits that accumulate",
+           "scenarios/events.py"),
+    # Stacks.
+    *(
+        Reason(case, "reference:ordered", "the hits of a step are bounded, and what is left shows as overlap",
+               "reference_impl/ordered.py")
+        for case in ("column", "heavy_on_light", "pile_comes_to_rest")
+    ),
+    Reason("overlap_recovery", "reference:ordered", "overlaps that no hit made are not pushed out",
+           "reference_impl/ordered.py"),
+    Reason("column", "reference:*", "each pair is projected once a step, without regard to the others",
+           "exercise 11, task 2"),
+    Reason("heavy_on_light", "reference:*", "each pair is projected once a step, without regard to the others",
+           "exercise 11, task 2"),
+    Reason("column", "pymunk:*", "overlaps are pushed out by a share a step, down to a slop a contact",
+           "Munk2D src/cpArbiter.c, cpArbiterPreStep"),
+    Reason("heavy_on_light", "pymunk:shipped", "10 sequential impulses do not carry a heavy disk on a light one",
+           "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched"),
+    Reason("heavy_on_light", "*", "sequential impulses converge as slowly as the masses are unequal",
+           "Catto, Iterative dynamics with temporal coherence, 2005"),
+    Reason("column", "*", "every contact may keep its slop, and soft ones give way as the load grows",
+           "Box2D, b2_linearSlop; contact softness in 3.1"),
+    Reason("overlap_recovery", "pymunk:shipped", "overlaps up to a slop of 0.1 m, here 0.4 radii, are left",
+           "Munk2D src/cpSpace.c, collisionSlop", 0.02, "pymunk:matched"),
+    Reason("overlap_recovery", "box2d:shipped", "overlaps up to a slop of 5 mm, here 0.02 radii, are left",
+           B2_SETTINGS + "b2_linearSlop", 0.02, "box2d:matched"),
+    Reason("overlap_*", "*", "an overlap is pushed out by a share a step", "the engine's position correction"),
+    Reason("overfull_box", "*", "disks are pushed beyond a wall, and from there on outwards", "walls have two sides"),
+    Reason("*_comes_to_rest", "box2d:matched", "without a threshold a lying disk chatters at e g dt / (1 - e)",
+           "fixed point of v' = e (v + g dt)", None, "box2d:shipped"),
+    Reason("*_comes_to_rest", "box2d:shipped", "chatter above the threshold of 1 m/s goes on for ever",
+           "fixed point of v' = e (v + g dt)"),
+    Reason("*_comes_to_rest", "reference:*", "gravity is added before the bounce, so a lying disk chatters",
+           "fixed point of v' = e (v + g dt)"),
+    # Gases.
+    *(
+        Reason(case, player, f"{THRESHOLD}; friction", source, None, player.replace("shipped", "matched"))
+        for case in ("dense_gas", "fast_gas", "long_gas", "heavy_in_gas", "equipartition", "thermometer")
+        for player, source in (
+            ("box2d:shipped", B2_SETTINGS + "b2_velocityThreshold"),
+            ("box2d_v3:shipped", B2_TYPES + "restitutionThreshold"),
+        )
+    ),
+    *(
+        Reason(case, "box2d_v3:*", SWEEP, "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask")
+        for case in ("dense_gas", "fast_gas", "long_gas", "heavy_in_gas", "equipartition")
+    ),
+    Reason("dense_gas", "pymunk:shipped", "10 sequential impulses do not solve a cluster of contacts",
+           "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched"),
+    *(
+        Reason(case, "pymunk:*", "10 sequential impulses do not solve a cluster of contacts",
+               "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched")
+        for case in ("fast_gas", "long_gas")
+    ),
+    Reason("*_gas", "box2d:matched", "parting contacts aim at 0 and closing ones at e v in one solve",
+           "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp"),
+    Reason("*_gas", "*", "sequential impulses do not solve a cluster of contacts in a step",
+           "Catto, Iterative dynamics with temporal coherence, 2005"),
+    Reason("thermometer", "*", FINDS_LATE, "penetration and return: one dt a hit"),
+    Reason("equipartition", "*", "energy is lost at unequal rates by light and heavy disks", "e < 1 in some hits"),
+    Reason("insertion_order", "*", "sums and contacts are taken in the order of insertion, and chaos magnifies it",
+           "Lyapunov exponent of the gas"),
+    Reason("restart", "*", "the impulses and contacts of the last step are not part of the state that can be read",
+           "warm starting; contact caches"),
+    # The suite.
+    Reason("dt_*", "*", "hits are found at the ends of steps, with overlaps up to v dt", "geometry"),
+)  # fmt: skip
+
+
+def reason_of(limit: Limit) -> Reason | None:
+    """The first row that fits; None where nothing failed."""
+    if limit.verdict == NEVER_FAILS:
+        return None
+    return next((r for r in REASONS if fnmatch(limit.case, r.cases) and fnmatch(limit.player, r.players)), None)
+
+
+def explained(limits: Sequence[Limit]) -> list[Limit]:
+    """The limits with their reasons, each tested by what it predicts, or by the limit of its switch."""
+    by_name = {(limit.case, limit.player): limit for limit in limits}
+    return [with_reason(limit, by_name) for limit in limits]
+
+
+def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit:
+    """The limit with its reason and with how that was tested: "" if it was not, or did not hold."""
+    reason = reason_of(limit)
+    if reason is None:
+        return limit
+    tests = []
+    if reason.predicts is not None and brackets(limit, reason.predicts):
+        tests.append(f"predicts {reason.predicts:.4g}")
+    if reason.switch != limit.player and (other := by_name.get((limit.case, reason.switch))) and farther(other, limit):
+        tests.append(f"{reason.switch} gets farther")
+    return replace(limit, reason=reason.text, source=reason.source, tested="; ".join(tests))
+
+
+def brackets(limit: Limit, value: float) -> bool:
+    """Whether a value lies in the bracket, or outside by no more than `NEAR`."""
+    low, high = min(limit.works_at, limit.fails_at), max(limit.works_at, limit.fails_at)
+    return low / NEAR <= value <= high * NEAR
+
+
+def farther(one: Limit, other: Limit) -> bool:
+    """Whether `one` fails later on the way from gentle to harsh, or not at all."""
+    if one.verdict == NEVER_FAILS:
+        return other.verdict != NEVER_FAILS
+    values = CASES[one.case].values
+    harsher = 1 if values[-1] > values[0] else -1
+    return harsher * one.fails_at > harsher * other.fails_at

@@ -1,0 +1,99 @@
+"""A case out of a scene that nobody here wrote: a scene file, and what of it is varied."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+
+from reports.stability.cases_suite import in_steps, ladder
+from reports.stability.limits import Case
+from reports.stability.predicates_usable import USABLE
+from scenarios.files import read_scene_file
+from scenarios.model import Scenario, Scene, Thrust
+from scenarios.oracle import with_oracle
+
+FAMILY = "A scene of your own"
+
+
+def at_speed(one: Scenario, x: float) -> Scenario:
+    """All start velocities and spins times x."""
+    scene = one.scene
+    return replace(one, scene=replace(scene, velocity=scene.velocity * x, angular_velocity=scene.angular_velocity * x))
+
+
+def at_mass_ratio(one: Scenario, x: float) -> Scenario:
+    """The mass of the first disk that moves times x, and its inertia, and what pushes it."""
+    scene = one.scene
+    disk = int(np.flatnonzero(~scene.static)[0])
+    factor = np.where(np.arange(scene.n) == disk, x, 1.0)
+    thrusts = [scaled_thrust(t, x, x) if t.disk == disk else t for t in one.thrusts]
+    return replace(one, scene=replace(scene, mass=scene.mass * factor, inertia=scene.inertia * factor), thrusts=thrusts)
+
+
+def at_restitution(one: Scenario, x: float) -> Scenario:
+    """e = x."""
+    return replace(one, scene=replace(one.scene, restitution=x))
+
+
+def at_scale(one: Scenario, x: float) -> Scenario:
+    """All lengths times x, times as they are: velocities, gravity and pushes grow along."""
+    scene = one.scene
+    larger: Scene = replace(
+        scene, position=scene.position * x, velocity=scene.velocity * x, radius=scene.radius * x,
+        inertia=scene.inertia * x**2, walls=scene.walls * x, gravity=scene.gravity * x,
+        wrap=None if scene.wrap is None else scene.wrap * x,
+    )  # fmt: skip
+    return replace(one, scene=larger, thrusts=[scaled_thrust(t, x, x**2) for t in one.thrusts])
+
+
+def at_offset(one: Scenario, x: float) -> Scenario:
+    """All of it moved by x m to the right."""
+    scene, by = one.scene, np.array([x, 0.0])
+    moved = replace(
+        scene,
+        position=scene.position + by,
+        walls=scene.walls + by,
+        wrap=None if scene.wrap is None else scene.wrap + by,
+    )
+    return replace(one, scene=moved)
+
+
+def scaled_thrust(thrust: Thrust, force: float, torque: float) -> Thrust:
+    """The push times so much."""
+    return replace(thrust, force=thrust.force * force, torque=thrust.torque * torque)
+
+
+FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3)
+VARIES: dict[str, tuple[str, tuple[float, ...], Callable[[Scenario, float], Scenario]]] = {
+    "dt": ("s", (), in_steps),
+    "speed": ("times as fast", (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS), at_speed),
+    "mass_ratio": ("times as heavy", (*FACTORS, 1e4, 1e5, 1e6), at_mass_ratio),
+    "restitution": ("1", (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0), at_restitution),
+    "scale": ("times as large", (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS), at_scale),
+    "offset": ("m", (*FACTORS, 1e4, 1e5, 1e6), at_offset),
+}
+"""What is varied -> its unit, the values to scan, and how."""
+
+
+def varied(path: str, what: str, x: float, _run: int, _of: int) -> Scenario:
+    """The scene of a file at the finest step of its ladder, with one thing varied."""
+    one = read_scene_file(Path(path))
+    if what == "dt":
+        return in_steps(one, x)
+    changed = VARIES[what][2](one, x)
+    return with_oracle(replace(changed, substeps=one.substeps[-1:]))
+
+
+@cache
+def case_of_file(path: str, what: str) -> Case:
+    """The case: up to which value is the scene of this file usable?"""
+    one = read_scene_file(Path(path))
+    unit, values, _ = VARIES[what]
+    return Case(
+        f"{path}:{what}", FAMILY, f"{one.name}: {one.asks}", what, unit, values or ladder(one),
+        partial(varied, path, what), USABLE,
+    )  # fmt: skip

@@ -1,0 +1,182 @@
+"""`crosscheck stability`: its files, its page, what it says of bad input, and what a second run keeps."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from playwright.sync_api import ConsoleMessage, Page, sync_playwright
+from typer.testing import CliRunner
+
+from reports.cli import app
+from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
+from reports.stability.cases import CASES
+from reports.stability.command import write_files
+from reports.stability.maps import MAPS
+from tests.test_page import CHROMIUM, FLAGS
+
+ROOT = Path(__file__).parent.parent
+ASKED = ("slow_hit", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_row")
+
+
+def crosscheck(*words: str, cwd: Path = ROOT / "tests") -> subprocess.CompletedProcess[str]:
+    """Run the command as a user does."""
+    program = [sys.executable, "-c", "from reports.cli import main; main()", *words]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(program, cwd=cwd, env=environment, capture_output=True, text=True, timeout=500)
+
+
+@pytest.fixture(scope="module")
+def atlas(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An atlas of two cases, a scene file and a map, on two players."""
+    out = tmp_path_factory.mktemp("atlas") / "out"
+    players = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
+    done = crosscheck("stability", *ASKED, "--vary", "speed", *players, "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    assert "stability.html" in done.stdout
+    return out
+
+
+def test_the_table_of_limits_is_a_file(atlas: Path):
+    """A row a case and player, columns as documented, and the threshold of Box2D in it."""
+    table = pd.read_csv(atlas / "limits.csv")
+
+    assert list(table.columns) == list(COLUMNS)
+    assert set(table.case) == {"slow_hit", "tunnelling_thin_wall", "scenes/two.toml:speed"}
+    row = table[(table.case == "slow_hit") & (table.engine == "box2d")].iloc[0]
+    assert row.fails_at < 1.0 < row.works_at
+    assert (row.unit, row.predicate, row.seeds) == ("m/s", "restitution off", 4)
+    assert set(pd.read_csv(atlas / "maps.csv")["map"]) == {"dt_and_speed"}
+
+
+def test_the_first_failing_run_is_kept(atlas: Path):
+    """A file for each limit, none where nothing failed."""
+    found = {path.name for path in (atlas / "trajectories").iterdir()}
+
+    assert "slow_hit.box2d-shipped.npz" in found
+    assert "slow_hit.pymunk-matched.npz" not in found
+
+
+def test_the_same_journal_gives_the_same_table(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Table and page are made from what the journal holds, and from the scene file that it names."""
+    monkeypatch.chdir(ROOT / "tests")
+    again = tmp_path / "again"
+    shutil.copytree(atlas, again)
+    write_files(again)
+
+    assert (again / "limits.csv").read_bytes() == (atlas / "limits.csv").read_bytes()
+
+
+def test_what_has_ended_is_not_played_again(atlas: Path):
+    """Of an interrupted run of the same versions all is kept; of another version nothing."""
+    plan = Plan(["slow_hit", "grazing"], ["dt_and_speed"], [], ["box2d:shipped", "pymunk:matched"], "quick", 1, "")
+    done = done_before(atlas, plan)
+
+    kept = {(task.name, task.player) for task in done}
+    assert ("slow_hit", "box2d:shipped") in kept
+    assert ("dt_and_speed", "pymunk:matched") in kept
+    assert all(task.name != "grazing" for task in done)
+    assert set(done) < set(tasks_of(plan))
+    assert Task("limit", "slow_hit", "box2d:shipped", "full") not in done
+    journal = (atlas / "journal.jsonl").read_text().splitlines()
+    header = json.loads(journal[0])
+    header["header"]["versions"]["pymunk"] = "6"
+    other = atlas.parent / "other"
+    other.mkdir()
+    (other / "journal.jsonl").write_text("\n".join([json.dumps(header), *journal[1:]]) + "\n")
+    assert done_before(other, plan) == set()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["slow_hits"], "case 'slow_hits' is not known; did you mean slow_hit"),
+        (["scenes/two.toml", "--vary", "mass"], "--vary 'mass' is not known; did you mean mass_ratio?"),
+        (["--vary", "dt"], "--vary dt: varies a scene file, and none is named; name FILE.toml"),
+        (["nowhere.toml"], "nowhere.toml: no such file or directory"),
+        (["--engine", "bullet"], "engine 'bullet' is not known"),
+    ],
+)
+def test_bad_input_is_one_clear_sentence(words: list[str], says: str, monkeypatch: pytest.MonkeyPatch):
+    """Exit 2, no traceback, nothing played."""
+    monkeypatch.chdir(ROOT / "tests")
+    done = CliRunner().invoke(app, ["stability", *words])
+
+    assert done.exit_code == 2
+    assert says in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.fixture(params=[1280, 400])
+def page(request: pytest.FixtureRequest, atlas: Path):
+    """The page in a browser without a network, and what its console said."""
+    if CHROMIUM is None:
+        pytest.skip("no chromium on this machine")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        context = browser.new_context(viewport={"width": request.param, "height": 900}, offline=True)
+        opened, faults = context.new_page(), []
+
+        def hear(message: ConsoleMessage) -> None:
+            if message.type == "error":
+                faults.append(message.text)
+
+        opened.on("console", hear)
+        opened.on("pageerror", lambda error: faults.append(str(error)))
+        opened.goto((atlas / "stability.html").as_uri())
+        yield opened
+        assert faults == []
+        browser.close()
+
+
+def test_a_failure_is_one_click_away_and_opens_just_before_it(page: Page):
+    """The button shows the player's run; time stands before the event, and the event is in sight."""
+    section = page.locator("#c-tunnelling_thin_wall")
+    section.scroll_into_view_if_needed()
+    page.wait_for_function("() => window.players && window.players['tunnelling_thin_wall']")
+    section.locator("button.watch").first.click()
+    page.wait_for_function("() => players['tunnelling_thin_wall'].pack.layers[0].name === 'pymunk:matched'")
+    opens, event, end = page.evaluate(
+        "() => { const p = players['tunnelling_thin_wall']; return [p.time, p.pack.event.t, p.until]; }"
+    )
+
+    assert opens < event <= end
+    assert "the hit is missed" in section.locator(".says").inner_text()
+    page.evaluate("() => players['tunnelling_thin_wall'].seek(players['tunnelling_thin_wall'].until)")
+    truth, played = page.evaluate(
+        "() => ['truth', 'pymunk:matched'].map((name) => players['tunnelling_thin_wall'].positions(name)[0][0])"
+    )
+    assert truth < 0 < played  # it is on the wrong side of the wall
+
+
+def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, atlas: Path):
+    """No sideways scrolling, at most 8 MB, a cell for every value of a map."""
+    width, inner = page.evaluate("() => [document.documentElement.scrollWidth, innerWidth]")
+    html = (atlas / "stability.html").read_text()
+
+    assert width <= inner
+    assert len(html) < 8e6
+    assert not re.search(r"(?:src|href)=\"https?:", html)
+    one = MAPS["dt_and_speed"]
+    assert page.locator(".grid tbody td").count() == 2 * len(one.x) * len(one.y)
+
+
+def test_every_case_of_the_issue_is_there():
+    """The names under which the eighteen cases stand."""
+    wanted = {
+        "tunnelling_head_on", "tunnelling_offset", "tunnelling_thin_wall", "tunnelling_thick_wall", "near_miss",
+        "dt_gas_of_100", "bounce_drift", "slow_hit", "scale_up", "scale_down", "far_from_origin", "dense_gas",
+        "long_gas",
+        "mass_ratio", "heavy_on_light", "heavy_in_gas", "column", "overlap_energy", "overlap_recovery", "overfull_box",
+        "pile_comes_to_rest", "ball_comes_to_rest", "grazing", "spin", "stiff_push", "insertion_order", "restart",
+        "thermometer", "equipartition",
+    }  # fmt: skip
+
+    assert wanted <= set(CASES)

@@ -1,0 +1,193 @@
+"""What was known before the atlas comes out of it: thresholds, caps, closed forms, float32."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import atan, pi, sqrt
+
+import numpy as np
+import pytest
+
+from reports.stability.cases import CASES
+from reports.stability.cases_alone import ball, far, on_spring, oscillator
+from reports.stability.limits import QUICK, Limit, Search
+from reports.stability.players import play_as
+from reports.stability.predicates import apex_drift
+from reports.stability.touching import TOUCHING, law_of
+from scenarios.model import Trajectory
+
+PARTNERS = [f"{engine}:{profile}" for engine in ("box2d", "box2d_v3") for profile in ("shipped", "matched")]
+DISCRETE = ["reference:exercise", "reference:lesson", "pymunk:shipped", "pymunk:matched", "box2d:matched",
+            "box2d_v3:matched"]  # fmt: skip
+
+
+@cache
+def limit(case: str, player: str) -> Limit:
+    """The limit in the quick form."""
+    return Search(CASES[case], player, QUICK).limit()
+
+
+def assert_fails_at(case: str, player: str, value: float, slack: float = 1.0) -> None:
+    """The bracket holds the value; `slack` times further out is still called holding."""
+    found = limit(case, player)
+    low, high = sorted((found.works_at, found.fails_at))
+    assert low / slack <= value <= high * slack, f"{player} in {case}: {value} is not in {low} .. {high}"
+
+
+@pytest.mark.parametrize("player", DISCRETE)
+@pytest.mark.parametrize(
+    ("case", "value"),
+    [("tunnelling_head_on", 2.0), ("tunnelling_offset", 2 * sqrt(1 - 0.7**2)), ("tunnelling_thin_wall", 1.0)],
+)
+def test_a_hit_is_missed_from_where_a_step_may_jump_over_the_approach(case: str, value: float, player: str):
+    """v dt > 2R between disks head-on, 2R sqrt(1 - (b/2R)2) off centre, R at a thin wall."""
+    assert_fails_at(case, player, value)
+
+
+@pytest.mark.parametrize("player", ["box2d:matched+bullets", "box2d_v3:matched+bullets", "event_driven:float64"])
+@pytest.mark.parametrize("case", ["tunnelling_head_on", "tunnelling_thin_wall"])
+def test_nothing_is_missed_by_what_sweeps(case: str, player: str):
+    """The switch that shows it: the same engines with continuous collision and bullets, and no steps at all."""
+    assert limit(case, player).verdict == "does not fail"
+
+
+def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
+    """Both Box2Ds sweep moving disks against what is static, unasked."""
+    assert all(
+        limit("tunnelling_thin_wall", f"{box}:shipped").verdict == "does not fail" for box in ("box2d", "box2d_v3")
+    )
+
+
+def test_only_the_speculative_margin_invents_hits():
+    """Box2D 3.1 as shipped, within 0.02 m: 0.04 of the sum of the radii; nobody else."""
+    found = {player: limit("near_miss", player).verdict for player in (*DISCRETE, *PARTNERS)}
+
+    assert {player for player, verdict in found.items() if verdict != "does not fail"} == {"box2d_v3:shipped"}
+    assert limit("near_miss", "box2d_v3:shipped").fails_at < 0.04
+
+
+@pytest.mark.parametrize("box", ["box2d", "box2d_v3"])
+def test_the_threshold_is_1_m_per_s_and_goes_with_the_matched_profile(box: str):
+    """Closing slower than that is played as inelastic; a scene of a quarter of the size closes at it."""
+    assert_fails_at("slow_hit", f"{box}:shipped", 1.0)
+    assert_fails_at("scale_down", f"{box}:shipped", 0.25)
+    assert limit("slow_hit", f"{box}:matched").verdict == "does not fail"
+    assert limit("scale_down", f"{box}:matched").verdict == "does not fail"
+
+
+def test_the_caps_on_speed_are_2_units_a_step_and_400_m_per_s():
+    """At 4 m/s and 1/60 s they are reached at 30 and at 100 times the size; pymunk has none."""
+    assert_fails_at("scale_up", "box2d:shipped", 30.0, slack=1.01)
+    assert_fails_at("scale_up", "box2d_v3:shipped", 100.0)
+    assert limit("scale_up", "pymunk:shipped").verdict == "does not fail"
+
+
+def test_the_caps_on_spin_are_a_quarter_and_an_eighth_of_a_turn_a_step():
+    """Matched refuses there; shipped is off by 2 % a little later, and 3.1 turns by atan(w h) a substep besides."""
+    assert_fails_at("spin", "box2d:matched", pi / 2)
+    assert_fails_at("spin", "box2d_v3:matched", pi / 4)
+    assert_fails_at("spin", "box2d:shipped", pi / 2 / 0.98)
+    assert_fails_at("spin", "box2d_v3:shipped", 4 * atan(pi / 16) / 0.98)
+
+
+def drift(player: str, x: float, runs: int = 1) -> float:
+    """Gain of height per bounce over |v| dt, of balls dropped from 1.25 m and a little more; x = dt / fall time."""
+    found = []
+    for scenario in (ball(x, run, runs) for run in range(runs)):
+        played = play_as(player, scenario).trajectory
+        assert played is not None
+        height = scenario.scene.position[0, 1] - scenario.scene.radius[0]
+        found.append(apex_drift(scenario, played) * height / (sqrt(2 * 10 * height) * scenario.sample_interval))
+    return float(np.mean(found))
+
+
+def test_a_bounce_gains_what_the_order_of_operations_says():
+    """Three closed forms: pymunk 0, Box2D 2.3 +|v| dt, Box2D 3.1 about -|v| dt / substeps."""
+    assert abs(drift("pymunk:matched", 0.02)) < 1e-9  # rounding of 1000 steps
+    # Higher orders in dt: a tenth at this step.
+    assert drift("box2d:matched", 0.01) == pytest.approx(1.0, rel=0.1)
+    assert drift("reference:lesson", 0.01) == pytest.approx(1.0, rel=0.1)
+    # A soft contact gives back more or less with the phase of the hit in its step.
+    assert drift("box2d_v3:matched", 0.01, runs=6) == pytest.approx(-1 / 4, rel=0.25)
+    assert drift("box2d_v3:matched+16_substeps", 0.01, runs=6) == pytest.approx(-1 / 16, rel=0.5)
+    assert drift("box2d_v3:shipped", 0.01, runs=6) < -0.5  # its margin of 2 cm stops the ball before the floor
+
+
+@pytest.mark.parametrize("player", PARTNERS)
+def test_float32_is_off_by_6_percent_at_10_km(player: str):
+    """At 1 m/s and 1/240 s, exactly as adding up in float32 is; from 4096 m on it is more than 1 %."""
+    scenario = far(1e4, 0, 1)
+    played = play_as(player, scenario).trajectory
+    x = np.float32(1e4)
+    for _ in range(240):
+        x = np.float32(x + np.float32(1 / 240))
+    assert played is not None
+    assert played.position[-1, 0, 0] - 1e4 == float(x) - 1e4
+    assert float(x) - 1e4 == pytest.approx(1 - 0.06, abs=0.005)
+    assert_fails_at("far_from_origin", player, 4096.0)
+
+
+@pytest.mark.parametrize(
+    ("player", "factor"), [("pymunk:matched", 2.71), ("box2d:matched", 0.98), ("box2d_v3:matched", 1.44)]
+)
+def test_a_push_read_off_the_positions_makes_an_oscillator_grow_as_published(player: str, factor: float):
+    """E / E0 after 400 steps at w dt = 0.05, engine_facts section 5."""
+    played: Trajectory | None = on_spring(player, oscillator(0.05, 0, 1))[1].trajectory
+    assert played is not None
+    energy = (played.velocity**2 + played.position**2).sum(axis=(1, 2)) / 2
+
+    assert energy[400] / energy[0] == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("player", "gain"), [("reference:lesson", 1.0), ("pymunk:matched", 1.0), ("box2d_v3:matched", 0.375),
+                         ("event_driven:float64", 0.5)]
+)  # fmt: skip
+def test_it_doubles_where_the_determinant_of_the_map_says(player: str, gain: float):
+    """1 + (1 - alpha) (w dt)2 a step, over 300 steps; symplectic Euler holds until w dt = 2."""
+    assert_fails_at("stiff_push", player, sqrt((2 ** (1 / 300) - 1) / gain))
+    assert_fails_at("stiff_push", "reference:exercise", 2.0)
+
+
+def test_a_restitution_of_a_pair_is_e_squared_only_in_pymunk_as_shipped():
+    """e - e2 reaches 0.01 at 1 - e = 0.0101; at e = 0 it is right again, so the limit is not monotone."""
+    assert_fails_at("restitution", "pymunk:shipped", 1 - (1 + sqrt(1 - 0.04)) / 2)
+    assert not limit("restitution", "pymunk:shipped").monotone
+    assert limit("restitution", "pymunk:matched").verdict == "does not fail"
+
+
+def test_a_pair_keeps_its_velocities_up_to_a_mass_ratio_of_1e8():
+    """Alone, no engine has trouble with unequal masses."""
+    assert all(limit("mass_ratio", player).verdict == "does not fail" for player in (*DISCRETE, *PARTNERS))
+
+
+def test_a_wrong_threshold_would_be_noticed():
+    """The negative control: a scene that closes at twice the speed does not fail at 1 m/s."""
+    case = CASES["slow_hit"]
+    faster = replace(case, scene=lambda x, run, of: case.scene(2 * x, run, of))
+    found = Search(faster, "box2d:shipped", QUICK).limit()
+
+    assert not min(found.works_at, found.fails_at) <= 1.0 <= max(found.works_at, found.fails_at)
+
+
+@pytest.mark.parametrize(
+    ("scene", "player", "law"),
+    [
+        ("touching_row", "pymunk:matched", "pair after pair"),
+        ("touching_row", "box2d:matched", "all contacts at once"),
+        ("touching_row", "box2d_v3:matched", "none"), ("touching_break", "reference:exercise", "pair after pair"),
+        ("touching_break", "pymunk:matched", "all contacts at once"), ("touching_break", "box2d_v3:matched", "none"),
+    ],
+)  # fmt: skip
+def test_touching_disks_are_hit_after_the_law_that_the_engine_is_known_for(scene: str, player: str, law: str):
+    """engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to neither."""
+    assert law_of(scene, player).law == law
+
+
+def test_the_named_laws_keep_momentum_and_energy():
+    """Whatever is compared with is at least possible."""
+    for one in TOUCHING.values():
+        for velocity in (v for answers in one.laws.values() for v in answers):
+            assert velocity.sum(axis=0) == pytest.approx([1, 0], abs=1e-15)
+            assert (velocity**2).sum() == pytest.approx(1.0)

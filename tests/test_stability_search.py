@@ -1,0 +1,188 @@
+"""The search for a limit: brackets it, counts what failed, sees what works again, and says so when nothing fails."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from math import isnan
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adapters.play import Run
+from reports.runner import run_all
+from reports.stability.atlas import Task, failed, limit_from, row_of
+from reports.stability.cases import CASES
+from reports.stability.cases_hits import at_speed
+from reports.stability.limits import FULL, QUICK, Case, Limit, Search
+from reports.stability.predicates import Predicate, Reading, judge
+from reports.stability.reasons import explained
+from reports.worker_process import Failure
+from scenarios.model import Scenario, Trajectory
+from scenarios.placing import lay_out
+
+
+def abort() -> None:
+    """As an engine does on an assertion in C."""
+    os.abort()
+
+
+SCENE = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[1.0], restitution=1.0)
+
+
+def read_speed(_: Scenario, played: Trajectory) -> Reading:
+    """What the run was told to read."""
+    return Reading(float(played.velocity[0, 0, 0]), 0.5, "it broke")
+
+
+TOO_FAST = Predicate("too fast", "m/s", 1.0, "the reading is above 1", read_speed)
+
+
+def case(reading: Callable[[float, int], float], values: tuple[float, ...], **more: Any) -> Case:
+    """A case whose runs read what a function of the value and the number of the run gives."""
+
+    def scene(x: float, run: int, _of: int) -> Scenario:
+        return Scenario("made-up", "?", "", replace(SCENE, velocity=[[reading(x, run), 0]]), 1.0, 1.0, (1,))
+
+    def play(_: str, scenario: Scenario) -> tuple[Scenario, Run]:
+        start = scenario.scene.state
+        arrays = [np.array([a, a]) for a in (start.position, start.velocity, start.angle, start.angular_velocity)]
+        return scenario, Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
+
+    return Case("made-up", "", "?", "x", "1", values, scene, TOO_FAST, play=play, **more)
+
+
+def limit_of(one: Case, form: Any = FULL) -> Limit:
+    """The limit of a player that does not matter."""
+    return Search(one, "made:up", form).limit()
+
+
+UP, DOWN = (1.0, 3.0, 10.0, 30.0, 100.0), (100.0, 30.0, 10.0, 3.0, 1.0)
+
+
+@pytest.mark.parametrize("form", [QUICK, FULL])
+@pytest.mark.parametrize(("values", "reading"), [(UP, lambda x, _: x / 17), (DOWN, lambda x, _: 17 / x)])
+def test_the_bracket_holds_the_limit_and_is_as_close_as_the_form_says(form, values, reading):
+    """Whether gentle is small or large: it works at 17 and just not beyond."""
+    found = limit_of(case(reading, values), form)
+
+    assert found.verdict == "limit"
+    assert min(found.works_at, found.fails_at) <= 17 <= max(found.works_at, found.fails_at)
+    assert max(found.works_at / found.fails_at, found.fails_at / found.works_at) <= form.ratio
+    assert found.monotone
+
+
+def test_what_is_counted_is_bracketed_by_neighbours():
+    """Up to 17 disks: works at 17, fails at 18."""
+    found = limit_of(case(lambda x, _: x / 17.5, UP, whole=True), replace(FULL, ratio=1.0))
+
+    assert (found.works_at, found.fails_at) == (17, 18)
+
+
+def test_a_limit_that_is_not_met_is_a_result():
+    """Neither a number that was not tried, nor an exception."""
+    never_fails, never_works = (limit_of(case(lambda _x, _run, y=y: y, UP)) for y in (0.5, 2.0))
+
+    assert never_fails.verdict == "does not fail"
+    assert never_fails.works_at == 100
+    assert isnan(never_fails.fails_at)
+    assert never_works.verdict == "never works"
+    assert never_works.fails_at == 1
+    assert isnan(never_works.works_at)
+
+
+def test_what_works_again_beyond_a_failure_is_seen():
+    """The scan goes on past the first failure; the bracket is that of the first."""
+    found = limit_of(case(lambda x, _: 2.0 if 5 < x < 20 else 0.5, UP))
+
+    assert not found.monotone
+    assert found.works_at <= 5 <= found.fails_at < 10
+    assert [trial.works for trial in found.trials if trial.value in UP] == [True, True, False, True, True]
+
+
+def test_what_works_only_where_it_is_harsh_is_called_so():
+    """No value that works before the first that fails."""
+    found = limit_of(case(lambda x, _: 17 / x, UP))
+
+    assert found.verdict == "works only beyond"
+    assert found.fails_at <= 17 <= found.works_at
+
+
+def test_one_run_in_sixteen_is_enough_to_fail_and_is_the_one_that_is_kept():
+    """The fraction that failed stands beside the limit; one run alone would have seen nothing."""
+    rare = case(lambda x, run: 2.0 if run == 11 and x > 17 else 0.5, UP, drawn=True)
+    search = Search(rare, "made:up", FULL)
+    found = search.limit()
+    failing = found.failing
+
+    assert failing is not None
+    assert (failing.failed, failing.runs, failing.first) == (1, 16, 11)
+    assert found.works_at <= 17 <= found.fails_at
+    kept = search.failure(found)
+    assert kept is not None
+    assert kept[0].scene.velocity[0, 0] == 2.0
+    assert limit_of(replace(rare, drawn=False)).verdict == "does not fail"
+
+
+def test_a_number_that_is_none_fails_and_a_run_that_broke_off_fails_with_its_reason():
+    """NaN is not below a bound; a refusal is called one."""
+    refused = Run("made", "up", "made-up", 1.0, "unsupported", "no such thing")
+    scenario = Scenario("made-up", "?", "", SCENE, 1.0, 1.0, (1,))
+
+    assert limit_of(case(lambda _x, _run: 2.0, UP)).verdict == "never works"
+    reading = judge(TOO_FAST, scenario, refused)
+    assert (reading.failed, reading.broken, reading.event) == (True, "refused", "no such thing")
+    nothing = TOO_FAST._replace(read=lambda _scenario, _played: Reading(float("nan")))
+    start = scenario.scene.state
+    arrays = [np.array([a, a]) for a in (start.position, start.velocity, start.angle, start.angular_velocity)]
+    played = Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
+    assert judge(nothing, scenario, played).failed
+
+
+def test_one_phase_alone_would_overlook_the_limit():
+    """The negative control of the phases: with hits in the middle of a step alone, tunnelling begins at 4, not 2."""
+    one = CASES["tunnelling_head_on"]
+    blind = replace(one, scene=lambda x, _run, _of: at_speed(x, 0, 2), drawn=False)
+
+    assert Search(blind, "reference:exercise", QUICK).limit().works_at > 3.5
+    assert Search(one, "reference:exercise", QUICK).limit().fails_at < 2.1
+
+
+def test_a_worker_that_dies_is_a_row_of_the_table():
+    """The case is then known to have no result, and why."""
+    task = Task("limit", "slow_hit", "pymunk:matched", "quick")
+    [(_, failure)] = run_all({task: abort}, workers=1)
+    assert isinstance(failure, Failure)
+    limit = failed(task, failure)
+    assert isinstance(limit, Limit)
+    row = row_of(limit)
+
+    assert row["predicate"] == "crashed"
+    assert "SIGABRT" in row["event"]
+
+
+def test_a_limit_comes_back_from_the_journal_as_it_was():
+    """Through JSON, where what is not a number is text."""
+    import json
+    from dataclasses import asdict
+
+    from reports.journal import plain
+
+    for found in (limit_of(case(lambda x, _: x / 17, UP)), limit_of(case(lambda _x, _run: 2.0, UP))):
+        again = limit_from(json.loads(json.dumps(plain(asdict(found)))))
+        assert repr(again) == repr(found)
+
+
+def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
+    """A prediction outside the bracket, or a switch that gets no farther, tests nothing."""
+    slow = Search(CASES["slow_hit"], "box2d:shipped", QUICK).limit()
+    free = Search(CASES["slow_hit"], "box2d:matched", QUICK).limit()
+    elsewhere = replace(slow, works_at=4.0, fails_at=3.9)
+    [both, _], [alone], [wrong, _] = explained([slow, free]), explained([slow]), explained([elsewhere, slow])
+
+    assert both.tested == "predicts 1; box2d:matched gets farther"
+    assert alone.tested == "predicts 1"
+    assert wrong.tested == ""
+    assert row_of(wrong)["reason"].startswith("likely: ")
