@@ -6,7 +6,6 @@ import csv
 import json
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -21,17 +20,12 @@ from reports.check.machine import SCHEMA
 from reports.check.smallest import Smallest, smallest_scene
 from reports.check.verdict import check_file
 from scenarios.catalogue import scenario
+from tests.command_line import CROSSCHECK, crosscheck, process
 from tests.solvers.mutants import CORRECT, MUTANTS
 
-BIN = Path(sys.executable).parent
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
 WRONG = next(mutant for mutant in MUTANTS if mutant.name == "mass_sum.js")
 CHROMIUM = shutil.which("chromium")
-
-
-def run(*words: str | Path, cwd: Path, program: str = "crosscheck") -> subprocess.CompletedProcess[str]:
-    """A command in a process of its own."""
-    return subprocess.run([BIN / program, *words], cwd=cwd, capture_output=True, text=True, timeout=120)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(folder: Path):
     """The first line is the sentence to begin with; the page is where the command was given."""
-    right, wrong = (run("check", folder / who / "Exercise.js", cwd=folder) for who in ("anna", "ben"))
+    right, wrong = (process("check", folder / who / "Exercise.js", cwd=folder) for who in ("anna", "ben"))
 
     assert (right.returncode, wrong.returncode) == (0, 1)
     assert right.stdout.startswith("No fault found")
@@ -61,7 +55,7 @@ def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(folder: P
 
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
     """JSON of a folder: four files in order, as the schema says; what is no text is refused with its reason."""
-    done = run("check", folder, "--json", "--junit", folder / "class.xml", cwd=folder)
+    done = crosscheck("check", folder, "--json", "--junit", folder / "class.xml", cwd=folder)
     told = json.loads(done.stdout)
 
     jsonschema.validate(told, json.loads(SCHEMA.read_text()))
@@ -79,7 +73,7 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
 
 def test_the_table_of_a_class_fits_a_terminal(folder: Path):
     """A line a file, and how many are right."""
-    done = run("check", folder, cwd=folder)
+    done = crosscheck("check", folder, cwd=folder)
 
     assert "1 of 4 files without a fault." in done.stdout
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
@@ -101,7 +95,7 @@ def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], me
     """No traceback, whatever is asked for."""
     (folder / "class.txt").write_text("mine")
     (folder / "empty").mkdir(exist_ok=True)
-    done = run("check", *words, cwd=folder)
+    done = crosscheck("check", *words, cwd=folder)
 
     assert done.returncode == 2
     assert message in done.stderr
@@ -114,7 +108,13 @@ def test_pytest_runs_the_rows_as_tests(folder: Path):
     """In a folder without any project: a right file passes, a wrong one fails with the numbers, junk is refused."""
     (folder / "own").mkdir(exist_ok=True)
     right, wrong, junk = (
-        run("-q", "-p", "no:cacheprovider", "--solver", folder / path, cwd=folder / "own", program="pytest")
+        subprocess.run(
+            [CROSSCHECK.parent / "pytest", "-q", "-p", "no:cacheprovider", "--solver", folder / path],
+            cwd=folder / "own",
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
         for path in ("anna/Exercise.js", "ben/Exercise.js", "dora/solver.py")
     )
 
@@ -228,8 +228,8 @@ def test_a_scene_that_the_file_cannot_play_is_refused(scene: str, reason: str):
 def test_run_takes_a_file_as_an_engine(folder: Path):
     """It stands in the tables beside the others, under its own path."""
     words = ["run", "head_on_equal_e09", "--dt", str(1 / 60), "--engine", "reference:exercise"]
-    done = run(*words, "--engine", "anna/Exercise.js", "--out", "run", cwd=folder)
-    bad = run(*words, "--engine", "dora/solver.py", "--out", "bad", cwd=folder)
+    done = crosscheck(*words, "--engine", "anna/Exercise.js", "--out", "run", cwd=folder)
+    bad = crosscheck(*words, "--engine", "dora/solver.py", "--out", "bad", cwd=folder)
 
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader((folder / "run" / "runs.csv").read_text().splitlines()))

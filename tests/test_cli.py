@@ -17,22 +17,17 @@ from adapters.engines import ENGINES
 from reports.comparison import COLUMNS
 from reports.metrics import METRICS
 from scenarios.catalogue import SCENARIOS
+from tests.command_line import CROSSCHECK, crosscheck, process
 
-CROSSCHECK = Path(sys.executable).parent / "crosscheck"
 SCENES = Path(__file__).parent / "scenes"
 SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference", "--engine", "pymunk:matched", "--dt", str(1 / 60)]
-
-
-def crosscheck(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """The command in a process of its own."""
-    return subprocess.run([CROSSCHECK, *words], cwd=cwd, capture_output=True, text=True, timeout=120)
 
 
 @pytest.fixture(scope="module")
 def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a finished run of two scenarios and three players."""
     cwd = tmp_path_factory.mktemp("small")
-    done = crosscheck(*SMALL, "--out", "here", cwd=cwd)
+    done = process(*SMALL, "--out", "here", cwd=cwd)
 
     assert done.returncode == 0, done.stderr
     assert str(cwd / "here" / "report.html") in done.stdout
@@ -66,11 +61,11 @@ def test_a_run_writes_its_files(small_run: Path):
     lines = [json.loads(line) for line in (small_run / "journal.jsonl").read_text().splitlines()]
 
     assert list(deviations.columns) == list(COLUMNS)
-    assert len(runs) == 2 * 3
+    assert len(runs) == 2 * 4
     assert set(runs.status) == {"ok"}
     assert {path.stem for path in (small_run / "trajectories").iterdir()} == set(runs.cell)
     assert "header" in lines[0]
-    assert lines[-1]["footer"]["tasks"] == 6 + 3  # and the conformance of three players
+    assert lines[-1]["footer"]["tasks"] == 8 + 4  # and the conformance of four players
     assert json.loads((small_run / "machine.json").read_text())["seed"] == 0
     assert (small_run / "report.html").stat().st_size < 8e6
 

@@ -18,15 +18,22 @@ import pytest
 
 from reports.archive import Archive
 from reports.journal import Journal
+from tests.command_line import crosscheck
 
 BIN = Path(sys.executable).parent
-SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference", "--engine", "pymunk:matched"]  # 24 cells of ms
-LONG = ["run", "asteroids", "--engine", "reference", "--engine", "pymunk", "--engine", "box2d"]  # 24 cells of 0.4 s
-
-
-def crosscheck(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """The command in a process of its own."""
-    return subprocess.run([BIN / "crosscheck", *words], cwd=cwd, capture_output=True, text=True, timeout=300)
+SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference:exercise", "--engine", "pymunk"]  # 24 cells of ms
+LONG = [
+    "run",
+    "asteroids",
+    "--engine",
+    "reference:exercise",
+    "--engine",
+    "reference:lesson",
+    "--engine",
+    "pymunk",
+    "--engine",
+    "box2d",
+]  # 24 cells of 0.4 s
 
 
 @pytest.fixture(scope="module")

@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from playwright.sync_api import ConsoleMessage, Page, sync_playwright
-from typer.testing import CliRunner
 
-from reports.cli import app
 from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
 from reports.stability.maps import MAPS
+from tests.command_line import crosscheck
 from tests.test_page import CHROMIUM, FLAGS
 
 ROOT = Path(__file__).parent.parent
 ASKED = ("slow_hit", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_row")
-
-
-def crosscheck(*words: str, cwd: Path = ROOT / "tests") -> subprocess.CompletedProcess[str]:
-    """Run the command as a user does."""
-    program = [sys.executable, "-c", "from reports.cli import main; main()", *words]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(program, cwd=cwd, env=environment, capture_output=True, text=True, timeout=500)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +27,7 @@ def atlas(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An atlas of two cases, a scene file and a map, on two players."""
     out = tmp_path_factory.mktemp("atlas") / "out"
     players = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
-    done = crosscheck("stability", *ASKED, "--vary", "speed", *players, "--out", str(out))
+    done = crosscheck("stability", *ASKED, "--vary", "speed", *players, "--out", out, cwd=ROOT / "tests")
     assert done.returncode == 0, done.stderr
     assert "stability.html" in done.stdout
     return out
@@ -104,12 +93,11 @@ def test_what_has_ended_is_not_played_again(atlas: Path):
         (["--engine", "bullet"], "engine 'bullet' is not known"),
     ],
 )
-def test_bad_input_is_one_clear_sentence(words: list[str], says: str, monkeypatch: pytest.MonkeyPatch):
+def test_bad_input_is_one_clear_sentence(words: list[str], says: str):
     """Exit 2, no traceback, nothing played."""
-    monkeypatch.chdir(ROOT / "tests")
-    done = CliRunner().invoke(app, ["stability", *words])
+    done = crosscheck("stability", *words, cwd=ROOT / "tests")
 
-    assert done.exit_code == 2
+    assert done.returncode == 2
     assert says in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
 

@@ -1,0 +1,36 @@
+"""`crosscheck` as tests call it: in a process of its own, or, where that makes no difference, in this one, sooner."""
+
+import contextlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+from unittest import mock
+
+from typer.testing import CliRunner
+
+from reports.cli import app
+
+CROSSCHECK = Path(sys.executable).parent / "crosscheck"
+
+
+class Done(NamedTuple):
+    """How a command ended, in the words of `subprocess`."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def process(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The command as a person starts it."""
+    return subprocess.run([CROSSCHECK, *words], cwd=cwd, capture_output=True, text=True, timeout=300)
+
+
+def crosscheck(*words: str | Path, cwd: Path) -> Done:
+    """The command called here: a process of its own would spend seconds on loading what this one has."""
+    argv = ["crosscheck", *map(os.fspath, words)]
+    with contextlib.chdir(cwd), mock.patch.object(sys, "argv", argv):
+        done = CliRunner().invoke(app, argv[1:], catch_exceptions=False)
+    return Done(done.exit_code, done.stdout, done.stderr)
