@@ -25,6 +25,11 @@ from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
 FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html",
          "limits.csv", "maps.csv", "laws.csv", "stability.html")  # fmt: skip
+FIELDS: dict[str, type | tuple[type, ...]] = {  # of the line of a cell
+    "cell": str, "scene_hash": str, "scene": str, "seed": int, "substeps": int, "scenario": str, "engine": str,
+    "profile": str, "dt_s": (int, float), "status": str, "reason": str, "step": int,
+    "timeout_s": (int, float), "settings": dict, "versions": dict,
+}  # fmt: skip
 STATE = ("position", "velocity", "angle", "angular_velocity")
 HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
 
@@ -60,7 +65,9 @@ class Archive:
         last: dict[str, dict[Hashable, dict[str, Any]]] = {"cell": {}, "conformance": {}, "known_answer": {}}
         timings: dict[str, list[float]] = {}
         seconds, complete = 0.0, False
-        for line in lines_of(folder):
+        for number, line in enumerate(lines_of(folder), 1):
+            if fault := fault_of(line):
+                raise ValueError(f"{folder / JOURNAL}: line {number} {fault}; delete it, or play again")
             complete = "footer" in line
             if complete:
                 seconds += line["footer"]["seconds"]
@@ -76,6 +83,7 @@ class Archive:
         if not header:
             raise ValueError(f"{folder / JOURNAL}: has no header, so nothing was played")
         records, conformance, known = ([*last[kind].values()] for kind in last)
+        records = [as_found(folder, record) for record in records]
         by_engine = {line["of"]: line for line in conformance}
         return Archive(
             folder, header, records, by_engine, known, timings, seconds if complete else float("nan"), complete
@@ -89,8 +97,6 @@ class Archive:
             trajectory = load_trajectory(path) if with_trajectory and path.exists() else None
         except (OSError, ValueError, KeyError, EOFError, BadZipFile) as fault:
             status, reason = "error", f"{path.name} cannot be read: {fault}"
-        if status == "ok" and with_trajectory and trajectory is None:
-            status, reason = "error", f"{path.name} is missing"
         return Run(
             engine=record["engine"],
             profile=record["profile"],
@@ -103,6 +109,24 @@ class Archive:
             settings={name: tuple(pair) for name, pair in record["settings"].items()},
             versions=record["versions"],
         )
+
+
+def fault_of(line: Any) -> str:
+    """What is wrong with a line of the journal, as the end of a sentence; "" if it can be used."""
+    if not isinstance(line, dict):
+        return "is no table"
+    if "cell" in line:
+        wrong = [name for name, kind in FIELDS.items() if not isinstance(line.get(name), kind)]
+        return f"has no {wrong[0]} that can be used, of a cell" if wrong else ""
+    known = "header" in line or "footer" in line or "timing" in line or "of" in line
+    return "" if known else "is none of a header, a footer, a cell, a timing, an answer"
+
+
+def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
+    """The line of a cell; an error where it was played and its trajectory is gone."""
+    path = trajectory_file(folder, record["cell"])
+    lost = record["status"] == "ok" and not path.exists()
+    return record | {"status": "error", "reason": f"{path.name} is missing"} if lost else record
 
 
 def trajectory_file(folder: Path, key: str) -> Path:

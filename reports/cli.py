@@ -32,9 +32,11 @@ Out = Annotated[
     Path, typer.Option(help="Folder for the results; an earlier run there is replaced when this one is done.")
 ]
 Workers = Annotated[int, typer.Option(min=0, help="Processes that play at once; 0: one a core.")]
-Timeout = Annotated[float, typer.Option(min=0.1, metavar="S", help="After which a cell is stopped, in C code too.")]
+Timeout = Annotated[
+    float, typer.Option(min=0.1, max=1e6, metavar="S", help="After which a cell is stopped, in C code too.")
+]
 Memory = Annotated[
-    int, typer.Option(min=0, metavar="MB", help="That a process may take; 0: its share of this machine's.")
+    int, typer.Option(min=0, max=10**9, metavar="MB", help="That a process may take; 0: its share of this machine's.")
 ]
 Scheduler = Annotated[str, typer.Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")]
 Timings = Annotated[

@@ -126,7 +126,7 @@ def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callabl
 def had(archive: Archive, means: Means, scenarios: Mapping[str, Scenario]) -> set[Any]:
     """The tasks of which the journal has the result, by the same scene, settings and versions.
 
-    What was stopped for time is had only if it would be stopped now.
+    What was stopped for time is had only if it would be stopped now; not what has lost its trajectory.
     """
     done: set[Any] = {name for name, line in archive.conformance.items() if line["key"] == content_key(name)}
     known = {line["of"]: line["key"] for line in archive.known_answers}
@@ -135,7 +135,8 @@ def had(archive: Archive, means: Means, scenarios: Mapping[str, Scenario]) -> se
     for record in archive.records:
         cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", record["substeps"])
         stopped = record["status"] == "timeout" and record["timeout_s"] < means.timeout
-        if cell.scene in hashes and record["cell"] == cell.key(hashes[cell.scene]) and not stopped:
+        lost = record["step"] >= 0 and not trajectory_file(archive.folder, record["cell"]).exists()
+        if cell.scene in hashes and record["cell"] == cell.key(hashes[cell.scene]) and not (stopped or lost):
             done.add(cell)
     return done
 

@@ -189,7 +189,11 @@ def in_worker(task: Callable[[], Any], timeout: float, memory: int, alone: bool)
         if alone:
             CREW.let_go()
         worker = CREW.worker(memory)
-        outcome = worker.do(task, timeout)
+        try:
+            outcome = worker.do(task, timeout)
+        except BaseException:  # an answer that nobody read would be taken for that of the next task
+            CREW.let_go()
+            raise
         if alone or isinstance(outcome, Failure):
             CREW.let_go()
         if outcome is not None:

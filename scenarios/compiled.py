@@ -25,7 +25,7 @@ def kernel(function: Kernel) -> Kernel:
 
 def inlined(function: Kernel) -> Kernel:
     """The compiled function, pasted by LLVM where it is called: handing over arguments takes as long as its work."""
-    return njit(**OPTIONS, forceinline=True, no_cpython_wrapper=True)(function)
+    return njit(**OPTIONS | {"forceinline": True, "no_cpython_wrapper": True})(function)
 
 
 def pasted(function: Kernel) -> Kernel:

@@ -168,10 +168,12 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     start, span = scene.walls[:, 0], scene.walls[:, 1] - scene.walls[:, 0]
     share = ((x[:, None] - start) * span).sum(axis=-1) / (span**2).sum(axis=1)
     apart = np.hypot(*np.moveaxis(x[:, None] - start - np.clip(share, 0, 1)[..., None] * span, -1, 0))
-    near = span[(apart - scene.radius[ours][:, None] < TOUCH).any(axis=0)]
+    touched = apart - scene.radius[ours][:, None] < TOUCH
+    near = span[touched.any(axis=0)]
     names = f"disk {ours[0]}" if len(ours) == 1 else "disks " + ", ".join(map(str, ours))
     momentum = (mass[:, None] * v).sum(axis=0)
-    if any(scene.static[i] for i in disks if i < scene.n):
+    # Round a fixed disk, or round the end of a wall, the push turns: no direction keeps its momentum.
+    if any(scene.static[i] for i in disks if i < scene.n) or (touched & ((share <= 0) | (share >= 1))).any():
         near = np.eye(2)
     pull = " but for gravity" if scene.gravity.any() else ""
     if not len(near):

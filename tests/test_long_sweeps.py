@@ -100,6 +100,32 @@ def test_an_interrupted_run_can_be_reported_and_says_it_is_not_finished(small: P
     assert len(pd.read_csv(part / "runs.csv")) == 11
 
 
+def test_what_lost_its_trajectory_is_worse_and_is_played_again(small: Path, tmp_path: Path):
+    """`diff` sees it, `run --resume` mends it."""
+    shutil.copytree(small, tmp_path / "out")
+    gone = sorted((tmp_path / "out" / "trajectories").iterdir())[:2]
+    for path in gone:
+        path.unlink()
+
+    assert crosscheck("diff", small, "out", cwd=tmp_path).returncode == 1
+    assert crosscheck("run", "--resume", "out", cwd=tmp_path).returncode == 0
+    assert lines(tmp_path / "out")[-1]["footer"]["played"] == 2
+    assert (tmp_path / "out" / "deviations.csv").read_bytes() == (small / "deviations.csv").read_bytes()
+
+
+@pytest.mark.parametrize("line", ["[1, 2]", '{"cell": "0"}', '{"what": 1}'])
+def test_a_line_that_is_none_of_ours_is_named(small: Path, tmp_path: Path, line: str):
+    """Exit 2 with its number, no traceback."""
+    shutil.copytree(small, tmp_path / "out")
+    journal = tmp_path / "out" / "journal.jsonl"
+    header, *rest = journal.read_text().splitlines(keepends=True)
+    journal.write_text("".join([header, line + "\n", *rest]))
+    for command in (["report", "out"], ["diff", small, "out"], ["replay", "0", "--out", "out"]):
+        done = crosscheck(*command, cwd=tmp_path)
+        assert done.returncode == 2
+        assert "line 2 " in done.stderr.replace("\n", " ")
+
+
 def test_a_new_run_does_not_bury_an_interrupted_one(small: Path, tmp_path: Path):
     """Exit 2 with the command that goes on; the folder is as it was."""
     part = broken_off(small, tmp_path / "out", after=15)
@@ -128,6 +154,8 @@ def test_a_second_writer_is_refused_and_a_dead_one_is_no_hindrance(small: Path, 
     [
         (["run", "--resume", "nowhere"], "no run is there"),
         (["run", "slow_hit", "--resume", "out"], "it takes no scenarios"),
+        (["run", "slow_hit", "--timeout", "inf"], "less than or equal to 1000000"),
+        (["run", "slow_hit", "--memory", "10000000000000"], "less than or equal to 1000000000"),
         (["run", "slow_hit", "--memory", "10"], "--memory 10: a worker takes 400 MB"),
         (["run", "slow_hit", "--scheduler", "here"], "--scheduler here: is no address"),
         (["replay", "zzz", "--out", "whole"], "'zzz' is no cell of"),

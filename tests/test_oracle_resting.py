@@ -284,3 +284,16 @@ def test_a_settling_box_is_answered_far_beyond_its_first_rest():
     assert record.valid_until > 2 * first
     assert len(rests(record)) == 26
     assert "the hits of disk 9 on disk 17 and wall 1 accumulate at t = 1.57837" in record.reason
+
+
+def test_round_the_end_of_a_wall_no_momentum_is_said_to_stay():
+    """There the push of the wall turns with the disk: only its energy is known on."""
+    scene = Scene(
+        position=np.array([[0.0, 0.5]]), velocity=np.array([[2.0, 0.0]]), radius=np.array([0.5]), mass=np.ones(1),
+        restitution=0.0, gravity=np.array([0.0, -9.81]), walls=np.array([[[-10.0, 0.0], [1.0, 0.0]]]),
+    )  # fmt: skip
+    record = computed(asked(scene, 2.0))
+
+    assert record.valid_until == pytest.approx(0.5)
+    assert [said for said in record.remains if "momentum" in said] == []
+    assert any("energy" in said for said in record.remains)
