@@ -86,6 +86,8 @@ def test_the_table_of_a_class_fits_a_terminal(folder: Path):
     ("words", "message"),
     [
         (["nobody.js"], "nobody.js: is not there; name an Exercise.js, a solver.py or a folder of them"),
+        ([""], '"": is not there; name a file or a folder'),
+        (["anna/Exercise.js", "--page", ""], '"": is not there; name a file or a folder'),
         (["class.txt"], "a solver is a .js or a .py file"),
         (["empty"], "holds no .js and no .py file"),
         (["anna/Exercise.js", "--junit", "no/such/x.xml"], "--junit no/such/x.xml: No such file or directory"),
