@@ -46,13 +46,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(folder: Path):
-    """The first line is the sentence to begin with; the page is where the command was given."""
-    right, wrong = (process("check", folder / who / "Exercise.js", cwd=folder) for who in ("anna", "ben"))
+    """The first line is the sentence to begin with; the page, and it alone, is where the command was given."""
+    cwd = folder / "desk"
+    cwd.mkdir()
+    right, wrong = (process("check", folder / who / "Exercise.js", cwd=cwd) for who in ("anna", "ben"))
 
     assert (right.returncode, wrong.returncode) == (0, 1)
     assert right.stdout.startswith("No fault found")
     assert wrong.stdout.replace("\n", " ").startswith("1. Task 2c impulse, impulse: it divides by (mA + mB)")
-    assert (folder / "check.html").is_file()
+    assert [path.name for path in cwd.iterdir()] == ["check.html"]
 
 
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
