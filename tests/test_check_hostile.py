@@ -78,6 +78,7 @@ LOADING = {
     "memory_load.py": ("x = bytearray(10**10)\n", "wants more memory than it is given while it is loaded"),
     "exit.py": ("import sys\nsys.exit(3)\n", "ends the process (SystemExit: 3) (line 2, column 1)"),
     "kill.py": ("import os\nos._exit(3)\n", "ended its own process (exit status 3)"),
+    "abort.py": ("import os\nos.abort()\n", "its process was ended by SIGABRT"),
     "segfault.py": ("import ctypes\nctypes.string_at(0)\n", "ended its own process (SIGSEGV)"),
 }  # fmt: skip
 
