@@ -19,16 +19,22 @@ class SolverFailed(Exception):
 
     Attributes:
         kind: "error" (threw), "timeout", "memory" or "crashed".
-        what: what happened, as the end of the sentence "it ...".
+        what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is escaped.
         line, column: where in the solver's file, from 1; 0 where nobody can tell.
     """
 
     def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
+        what = printable(what)
         super().__init__(what)
         self.kind, self.what, self.line, self.column = kind, what, line, column
 
     def __str__(self) -> str:
         return f"{self.what} (line {self.line}, column {self.column})" if self.line else self.what
+
+
+def printable(text: str) -> str:
+    """Somebody's text on one line, its control characters as they are written in code: they would act on a terminal."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ class SolverProcess:
 
     Attributes:
         functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it replaced.
+        kind: "javascript" or "python".
         surface: "exercise" (functions on spheres) or "advance" (arrays, as in reference_impl).
         versions: library -> version.
 
@@ -37,7 +38,7 @@ class SolverProcess:
     """
 
     def __init__(self, path: Path, compiled: bool = False) -> None:
-        read_solver(path)
+        self.kind = read_solver(path).kind
         # Plain Python gives the same bits as numba, and starts 20 s sooner.
         settings = {"PYTHONDONTWRITEBYTECODE": "1"} | ({} if compiled else {"NUMBA_DISABLE_JIT": "1"})
         if (kept := folder()) is not None:
@@ -118,8 +119,11 @@ class SolverProcess:
         """Why the process is gone."""
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
-        if -code in (signal.SIGTRAP, signal.SIGABRT, signal.SIGKILL):
+        ends_v8 = self.kind == "javascript" and -code in (signal.SIGTRAP, signal.SIGABRT)  # V8's word for a full heap
+        if ends_v8 or -code == signal.SIGKILL:
             return SolverFailed("memory", "wants more memory than it is given, and its process was ended")
+        if -code == signal.SIGABRT:
+            return SolverFailed("crashed", "its process was ended by SIGABRT")
         name = signal.Signals(-code).name if code < 0 else f"exit status {code}"
         return SolverFailed("crashed", f"ended its own process ({name})")
 

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from reports.exits import refuse
+
 app = typer.Typer(
     name="crosscheck",
     help="Cross-validation of 2D disk solvers: the same scenes through every engine, each against an exact answer.",
@@ -47,6 +49,13 @@ Resume = Annotated[
 ]
 Port = Annotated[int, typer.Option(min=1, max=65535, help="Where to serve, on this machine only.")]
 Opens = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
+
+
+def place(text: str) -> Path:
+    """A path as it was given; exits 2 for an empty one, which `Path` takes for the current folder."""
+    if not text:
+        refuse(['"": is not there; name a file or a folder'])
+    return Path(text)
 
 
 @app.callback(invoke_without_command=True)
@@ -128,10 +137,17 @@ def truth(
 
 @app.command()
 def check(
-    path: Annotated[Path, typer.Argument(metavar="FILE|DIR", help="An Exercise.js, a solver.py, or a folder of them.")],
+    path: Annotated[
+        Path,
+        typer.Argument(metavar="FILE|DIR", parser=place, help="An Exercise.js, a solver.py, or a folder of them."),
+    ],
     as_json: Annotated[bool, typer.Option("--json", help="For programs: all rows as JSON.")] = False,
-    junit: Annotated[Path | None, typer.Option(help="Write the rows as JUnit XML, too.")] = None,
-    page: Annotated[Path | None, typer.Option(help="Where the page goes.  [default: check.html]")] = None,
+    junit: Annotated[
+        Path | None, typer.Option(metavar="PATH", parser=place, help="Write the rows as JUnit XML, too.")
+    ] = None,
+    page: Annotated[
+        Path | None, typer.Option(metavar="PATH", parser=place, help="Where the page goes.  [default: check.html]")
+    ] = None,
 ) -> None:
     """Check a hand-written solver of the exercise, and say what is wrong with it. The file is run as you."""
     from reports.check.command import check as check_and_say

@@ -103,6 +103,31 @@ def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):
     assert "Came:" in sentences[0]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "task", "cause"),
+    [
+        ("1 / sphereB.mass)", "1 / sphereB.Mass)", "2c", "the impulse is no number (a field that does not exist"),
+        ("if (vn >= 0) return;", "vn /= sphereB.Mass;", "2c", "the impulse is no number (a field that does not"),
+        ("if (vn >= 0) return;", "vn *= vn / vn;", "2c", "the velocities of a pair at relative rest become no numbers"),
+        ("/ (1 / sphereA.mass + 1 / sphereB.mass)", "/ 0", "2c", "the impulse is no number (a field that does not"),
+        ("-= J / sphereB.mass * nx", "-= J / sphereB.mas * nx", "2d", "the velocity of B becomes no number"),
+        ("  var overlap = ", "  var overlap = sphereA.sise - ", "2b", "the positions become no numbers"),
+    ],
+)
+def test_numbers_that_are_none_have_one_cause_and_accuse_nothing_else(
+    tmp_path: Path, old: str, new: str, task: str, cause: str
+):
+    """A misspelt field is NaN in JavaScript, a division by zero infinite: neither is read as another mistake."""
+    text = (CORRECT[0].parent / "plain.js").read_text()
+    assert old in text
+    (tmp_path / "solver.js").write_text(text.replace(old, new))
+    faults = [row for row in check_solver(tmp_path / "solver.js") if row.verdict == "fault" and row.task[0] == "2"]
+
+    assert {row.task for row in faults} == {task}
+    assert len({row.cause for row in faults}) == 1
+    assert faults[0].cause.startswith(cause)
+
+
 def test_the_bound_on_a_scene_lets_a_right_solver_pass_and_a_wrong_restitution_not():
     """Motions that are exact but for e = 0.85 leave the bound of e = 0.9 wherever there are at most three spheres."""
     for (scenario, record), (other, other_record) in zip(scenes(0.9)[1:4], scenes(0.85)[1:4]):

@@ -68,6 +68,8 @@ LOADING = {
     "endless_load.js": ("while (true) {}\n" + JS, "does not come back within 2 s while it is loaded"),
     "syntax.js": ("var a = 1;\nlet b = ;\n" + JS, "SyntaxError: Unexpected token ';' (line 2, column 9)"),
     "syntax_crlf.js": ("\ufeffvar a = 1;\r\nlet b = ;\r\n", "SyntaxError: Unexpected token ';' (line 2, column 9)"),
+    "escape.js": (r"throw new Error('\x1b[31m\u202e\x07')", r"Error: \x1b[31m\u202e\x07 (line 1"),
+    "escape.py": (r"raise ValueError('\x1b[31m\n\x07')", r"ValueError: \x1b[31m\n\x07 (line 1"),
     "unclosed.js": (JS[:-3], "SyntaxError"),
     "throws.js": (JS + "\n  nothing.x = 1;\n", "ReferenceError: nothing is not defined (line 93, column 3)"),
     "endless_load.py": ("while True: pass\n" + PY, "does not come back within 4 s while it is loaded"),
@@ -78,6 +80,7 @@ LOADING = {
     "memory_load.py": ("x = bytearray(10**10)\n", "wants more memory than it is given while it is loaded"),
     "exit.py": ("import sys\nsys.exit(3)\n", "ends the process (SystemExit: 3) (line 2, column 1)"),
     "kill.py": ("import os\nos._exit(3)\n", "ended its own process (exit status 3)"),
+    "abort.py": ("import os\nos.abort()\n", "its process was ended by SIGABRT"),
     "segfault.py": ("import ctypes\nctypes.string_at(0)\n", "ended its own process (SIGSEGV)"),
 }  # fmt: skip
 
@@ -89,6 +92,7 @@ def test_a_file_that_cannot_be_loaded_is_one_row_that_says_why_and_where(results
 
     assert [row.name for row in rows] == ["loads"]
     assert LOADING[name][1] in first(rows)
+    assert first(rows).isprintable(), "what acts on a terminal is escaped"
 
 
 CALLS = {

@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
+from unittest import mock
 from xml.etree import ElementTree
 
 import jsonschema
@@ -16,6 +17,7 @@ from playwright.sync_api import Error, Page, sync_playwright
 from adapters.play import play
 from adapters.solver_process import SolverProcess
 from adapters.student import engine_file
+from reports.check import command
 from reports.check.machine import SCHEMA
 from reports.check.smallest import Smallest, smallest_scene
 from reports.check.verdict import check_file
@@ -44,13 +46,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(folder: Path):
-    """The first line is the sentence to begin with; the page is where the command was given."""
-    right, wrong = (process("check", folder / who / "Exercise.js", cwd=folder) for who in ("anna", "ben"))
+    """The first line is the sentence to begin with; the page, and it alone, is where the command was given."""
+    cwd = folder / "desk"
+    cwd.mkdir()
+    right, wrong = (process("check", folder / who / "Exercise.js", cwd=cwd) for who in ("anna", "ben"))
 
     assert (right.returncode, wrong.returncode) == (0, 1)
     assert right.stdout.startswith("No fault found")
     assert wrong.stdout.replace("\n", " ").startswith("1. Task 2c impulse, impulse: it divides by (mA + mB)")
-    assert (folder / "check.html").is_file()
+    assert [path.name for path in cwd.iterdir()] == ["check.html"]
 
 
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
@@ -84,23 +88,44 @@ def test_the_table_of_a_class_fits_a_terminal(folder: Path):
     ("words", "message"),
     [
         (["nobody.js"], "nobody.js: is not there; name an Exercise.js, a solver.py or a folder of them"),
+        ([""], '"": is not there; name a file or a folder'),
+        (["anna/Exercise.js", "--page", ""], '"": is not there; name a file or a folder'),
         (["class.txt"], "a solver is a .js or a .py file"),
         (["empty"], "holds no .js and no .py file"),
         (["anna/Exercise.js", "--junit", "no/such/x.xml"], "--junit no/such/x.xml: No such file or directory"),
-        (["anna/Exercise.js", "--page", "class.txt"], "class.txt is there and no page of a check"),
+        (["anna/Exercise.js", "--page", "class.txt"], "class.txt: is there and no page of a check; name another file"),
         ([".", "--page", "p.html"], "--page p.html: shows one file"),
+        (["anna/Exercise.js", "--page", "no/x.html"], "--page no/x.html: No such file or directory; name another file"),
+        (["anna/Exercise.js", "--page", "empty"], "--page empty: Is a directory; name another file"),
+        ([".", "--junit", "class.txt"], "--junit class.txt: is there and no JUnit file of a check; name another file"),
+        (["anna/Exercise.js", "--junit", "anna/Exercise.js"], "Exercise.js: is there and no JUnit file of a check"),
+        (["anna/Exercise.js", "--junit", "./check.html"], "--junit check.html: is where the page goes"),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], message: str):
     """No traceback, whatever is asked for."""
     (folder / "class.txt").write_text("mine")
     (folder / "empty").mkdir(exist_ok=True)
-    done = crosscheck("check", *words, cwd=folder)
+    with mock.patch.object(command, "check_file", side_effect=command.check_file) as asked:
+        done = crosscheck("check", *words, cwd=folder)
 
     assert done.returncode == 2
     assert message in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert (folder / "class.txt").read_text() == "mine"
+    assert (folder / "anna" / "Exercise.js").read_text() == RIGHT.read_text()
+    assert not any("anna" in str(call) for call in asked.call_args_list), "nothing is checked before it is refused"
+
+
+def test_a_junit_file_of_an_earlier_check_is_written_over_and_a_page_is_not(folder: Path):
+    """Each kind knows its own; neither takes the other's place."""
+    (folder / "none.py").write_text("x = 1\n")
+    first, again = (crosscheck("check", "none.py", "--json", "--junit", "r.xml", cwd=folder) for _ in range(2))
+    other = crosscheck("check", "none.py", "--json", "--page", "r.xml", cwd=folder)
+    (folder / "none.py").unlink()
+
+    assert (first.returncode, again.returncode, other.returncode) == (1, 1, 2)
+    assert ElementTree.parse(folder / "r.xml").getroot().get("name") == "crosscheck check"
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import sys
@@ -16,6 +17,8 @@ from reports.check.terminal import print_class, print_file
 from reports.check.verdict import FileCheck, check_file
 from reports.exits import BAD_INPUT, DONE, FAILED, refuse, say
 
+# What an earlier file of ours has among its first HEAD bytes, and nothing else has: it may be written over.
+PAGE, JUNIT, HEAD = b'<meta name="generator" content="crosscheck check">', b'<testsuites name="crosscheck check"', 4096
 HANDED_OUT = ("gl-matrix.js", "gl-matrix-min.js", "mainScript.js")  # lie beside a student's file
 
 
@@ -24,6 +27,9 @@ def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) 
     files = files_of(path)
     if page is not None and path.is_dir():
         refuse([f"--page {page}: shows one file; {path} is a folder"])
+    if page is None and not path.is_dir() and not json_wanted:
+        page = Path("check.html")
+    places_for(page, junit)
     checks = list(checked(files, path.is_dir() and not json_wanted))
     if not path.is_dir() and checks[0].refused:
         refuse([checks[0].refused])
@@ -33,8 +39,8 @@ def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) 
         print_class(path, checks) if path.is_dir() else print_file(checks[0])
     if junit is not None:
         write(junit, as_junit(checks))
-    if not path.is_dir() and (page or not json_wanted):
-        make_page(page or Path("check.html"), checks[0])
+    if page is not None:
+        make_page(page, checks[0])
     sys.exit(DONE if all(one.passed for one in checks) else FAILED)
 
 
@@ -52,6 +58,23 @@ def files_of(path: Path) -> list[Path]:
     if not found:
         refuse([f"{path}: holds no .js and no .py file"])
     return found
+
+
+def places_for(page: Path | None, junit: Path | None) -> None:
+    """Exit 2, before anything is checked, if what is to be written has no place or would take somebody else's."""
+    if page is not None and junit is not None and page.resolve() == junit.resolve():
+        refuse([f"--junit {junit}: is where the page goes; name another file"])
+    for option, path, mark, what in (("--page", page, PAGE, "page"), ("--junit", junit, JUNIT, "JUnit file")):
+        if path is None:
+            continue
+        try:
+            if path.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            if path.is_file() and mark not in path.read_bytes()[:HEAD]:
+                refuse([f"{option} {path}: is there and no {what} of a check; name another file"])
+            path.parent.stat()
+        except OSError as fault:
+            refuse([f"{option} {path}: {fault.strerror or fault}; name another file"])
 
 
 def checked(files: Sequence[Path], progress: bool) -> Iterator[FileCheck]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.check.questions import HITS, QUESTIONS, Answer, Ball, direction
+from reports.check.questions import HITS, QUESTIONS, Answer, Ball, direction, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import near
 from scenarios.model import Array
@@ -174,7 +174,7 @@ class Finding:
 def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | None:
     """The impulse and the update that give every hit, fewest mistakes first; None if nothing does."""
     seen = [(hit_of(q.balls, answers[name].last), changes(q.balls, answers[name].last)) for name, q in HITS.items()]
-    if not all(np.isfinite(change).all() for _, change in seen):
+    if not finite(answers, "v"):
         return None
     pairs = sorted(product(IMPULSES, UPDATES), key=lambda pair: (pair[0] != "") + (pair[1] != ""))
     for e in restitution.candidates:

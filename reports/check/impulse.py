@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from reports.check.impacts import IMPULSES, PARTING, UPDATES, Finding, Hit, changes, hit_of, tangent
-from reports.check.questions import HITS, QUESTIONS, Answer
+from reports.check.questions import HITS, QUESTIONS, Answer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import Row, judged, near, not_asked, shown
 from scenarios.model import Array
@@ -15,6 +15,8 @@ from scenarios.model import Array
 
 def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Finding | None) -> list[Row]:
     """The rows of (c) and (d)."""
+    if not finite(answers, "v"):
+        return [*no_number(answers, restitution.own), bystanders(answers)]
     name, question = next(iter(HITS.items()))
     after = answers[name].last
     hit, came = hit_of(question.balls, after), changes(question.balls, after)
@@ -49,6 +51,33 @@ def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Fi
     ]  # fmt: skip
     # The velocities say more of a mistake in (d) than the energy and the restitution that it spoils.
     return sorted(rows, key=lambda row: (row.task, row.task == "2d" and row.name in ("energy", "restitution")))
+
+
+def no_number(answers: dict[str, Answer], e: float) -> list[Row]:
+    """The one row on velocities that are no numbers: nothing else can be read from them."""
+    if not finite(answers, "x"):
+        return impulse_not_asked("the positions become no numbers before it")
+    lost = {name: [not np.isfinite(ball.v).all() for ball in answers[name].last] for name in HITS}
+    name = next(name for name in HITS if any(lost[name]))
+    balls, after = QUESTIONS[name].balls, answers[name].last
+    hit, came = hit_of(balls, after), changes(balls, after)
+    P = IMPULSES[""](hit, e)
+    a, b = (any(both) for both in zip(*lost.values()))
+    why = "(a field that does not exist, a division by zero?)"
+    if a and b:
+        asked = f"What impulse has A from B, for {shown(hit.ma)} and {shown(hit.mb)} kg?"
+        return [
+            judged("impulse", "2c", asked, f"{shown(hit.ma * came[0])} N s", f"{shown(P)} N s", False,
+                   f"the impulse is no number {why}"),
+            not_asked("velocity of A", "2d", "the impulse is no number"),
+        ]  # fmt: skip
+    who, right = ("A", hit.va + P / hit.ma) if a else ("B", hit.vb - P / hit.mb)
+    return [
+        not_asked("impulse", "2c", f"the velocity of {who} becomes no number"),
+        judged(f"velocity of {who}", "2d", f"What velocity has {who} after the hit?",
+               f"{shown(after[int(b)].v)} m/s", f"{shown(right)} m/s", False,
+               f"the velocity of {who} becomes no number {why}"),
+    ]  # fmt: skip
 
 
 def right_update(found: Finding | None) -> bool:

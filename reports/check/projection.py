@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.check.questions import HITS, QUESTIONS, Answer, Ball, direction
+from reports.check.questions import HITS, QUESTIONS, Answer, Ball, direction, finite
 from reports.check.rows import Row, judged, near, not_asked, shown
 
 
@@ -51,7 +51,7 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
     n, distance = direction(a, b)
     t = np.array([-n[1], n[0]])
     da, db = np.subtract(after[0].x, a.x), np.subtract(after[1].x, b.x)
-    across = max(abs(float(da @ t)), abs(float(db @ t)))
+    across = float(np.abs([da @ t, db @ t]).max())  # NaN if one is
     return Shift(float(da @ n), float(-(db @ n)), across, a.r + b.r - distance, distance, a.r + b.r)
 
 
@@ -70,21 +70,28 @@ def projection_rows(answers: dict[str, Answer], velocities_explained: bool) -> l
                f"{shown(shift.across)} m across it", "0 m across it", along, across_cause(seen)),
         split(balls, shift) if right and along else not_asked("split", "2b", "they do not meet in one point"),
     ]  # fmt: skip
-    still = QUESTIONS["at rest to each other"].balls
-    kept = all(near(x.v, y.v) for x, y in zip(still, answers["at rest to each other"].last))
-    if kept or not velocities_explained:
-        rows.append(judged(
-            "velocities", "2b", "Does the displacement leave the velocities of a pair at relative rest alone?",
-            shown(answers["at rest to each other"].last[0].v) + " m/s", shown(still[0].v) + " m/s", kept,
-            "the displacement changes the velocity, too",
-        ))  # fmt: skip
-    return [*rows, parting(answers["part"])]
+    return [*rows, *at_rest(answers, velocities_explained), parting(answers["part"])]
+
+
+def at_rest(answers: dict[str, Answer], explained: bool) -> list[Row]:
+    """What a pair at relative rest says of the displacement; nothing if the impulse explains it or is no number."""
+    still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
+    kept = all(near(x.v, y.v) for x, y in zip(still, after))
+    numbers = bool(np.isfinite([b.v for b in after]).all())
+    if not kept and (explained or not finite(answers, "v")):
+        return []
+    return [judged(
+        "velocities", "2b" if numbers else "2c", "Is a pair at relative rest displaced without a change of velocity?",
+        shown(after[0].v) + " m/s", shown(still[0].v) + " m/s", kept,
+        "the displacement changes the velocity, too" if numbers
+        else "the velocities of a pair at relative rest become no numbers (a division by zero?)",
+    )]  # fmt: skip
 
 
 def total_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
     """The mistake that gives the displacement of all pairs; "" if none does."""
-    if not all(np.isfinite([s.a, s.b]).all() for _, s, _ in seen):
-        return "the positions become no numbers"
+    if lost := no_numbers(seen):
+        return lost
     moved = [(abs(s.a) > 1e-9, abs(s.b) > 1e-9) for _, s, _ in seen]
     if all(a and not b for a, b in moved) or all(b and not a for a, b in moved):
         who = "A" if moved[0][0] else "B"
@@ -101,8 +108,15 @@ def total_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
     return ""
 
 
+def no_numbers(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
+    """That positions are lost, before any other cause is looked for; "" if none is."""
+    return "" if np.isfinite([b.x for *_, after in seen for b in after]).all() else "the positions become no numbers"
+
+
 def across_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
     """Along what else they are moved; "" if along nothing that is known."""
+    if lost := no_numbers(seen):
+        return lost
     ways = {
         "they are moved along x only": lambda a, b: np.array([1.0, 0.0]),
         "they are moved along y only": lambda a, b: np.array([0.0, 1.0]),

@@ -165,6 +165,11 @@ def direction(a: Ball, b: Ball) -> tuple[Array, float]:
     return r / distance, distance
 
 
+def finite(answers: dict[str, Answer], part: str) -> bool:
+    """Whether "x" or "v" of both spheres is a number after every hit."""
+    return bool(np.isfinite([getattr(b, part) for name in HITS for b in answers[name].last]).all())
+
+
 def named(answers: dict[str, Answer], prefix: str) -> Iterator[tuple[Question, Answer]]:
     """Questions whose name begins so, with their answers."""
     return ((QUESTIONS[name], answers[name]) for name in answers if name.startswith(prefix))

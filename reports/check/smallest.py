@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from tempfile import TemporaryDirectory
 from time import monotonic
 
 import numpy as np
 from hypothesis import HealthCheck, Phase, find, settings
 from hypothesis import strategies as st
+from hypothesis.configuration import set_hypothesis_home_dir
 from hypothesis.errors import Flaky, NoSuchExample
 
 from adapters.solver_file import SolverFailed
@@ -56,9 +59,20 @@ def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
         max_examples=DRAWS, derandomize=True, database=None, deadline=None,
         suppress_health_check=list(HealthCheck), phases=(Phase.generate, Phase.shrink),
     )  # fmt: skip
-    with suppress(NoSuchExample, Flaky):  # nothing found, or the time was up while it shrank
+    with homeless(), suppress(NoSuchExample, Flaky):  # nothing found, or the time was up while it shrank
         find(scene, faulty, settings=rules)
     return shown_by(process, *without_idlers(process, *best["so far"], e), e) if best else None
+
+
+@contextmanager
+def homeless() -> Iterator[None]:
+    """Hypothesis keeps what it has read in .hypothesis of the folder the user works in; here in one that goes."""
+    with TemporaryDirectory() as home:
+        set_hypothesis_home_dir(home)
+        try:
+            yield
+        finally:
+            set_hypothesis_home_dir(None)
 
 
 def without_idlers(
