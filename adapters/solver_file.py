@@ -13,6 +13,9 @@ KINDS = {".js": "javascript", ".py": "python"}
 class NotASolver(ValueError):
     """A path that is no JavaScript or Python text; the message names it and says what to do."""
 
+    def __init__(self, what: str) -> None:
+        super().__init__(printable(what))
+
 
 class SolverFailed(Exception):
     """A solver that cannot be loaded or did not come back from a call.
@@ -57,11 +60,18 @@ def read_solver(path: Path) -> SolverText:
             raise NotASolver(f"{path}: has {size / 1e6:.1f} MB; a solver has a few kilobytes, at most 1 MB is read")
         data = path.read_bytes()
     except OSError as fault:
+        if dangling(path):
+            raise NotASolver(f"{path}: is a link to {path.readlink()}, which is not there") from None
         raise NotASolver(f"{path}: {fault.strerror or fault}; name a file that can be read") from None
     text = decoded(path, data).replace("\r\n", "\n").replace("\r", "\n")
     if not text.strip():
         raise NotASolver(f"{path}: is empty; save your solver into it")
     return SolverText(path, kind, text)
+
+
+def dangling(path: Path) -> bool:
+    """Whether it is a link to nothing."""
+    return path.is_symlink() and not path.exists()
 
 
 def decoded(path: Path, data: bytes) -> str:

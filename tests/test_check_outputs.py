@@ -76,10 +76,16 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
 
 
 def test_the_table_of_a_class_fits_a_terminal(folder: Path):
-    """A line a file, and how many are right."""
+    """A line a file, and how many are right of those that were checked; a link to nothing is told, too."""
+    (folder / "eve.js").symlink_to("gone.js")
     done = crosscheck("check", folder, cwd=folder)
+    refused = check_file(folder / "eve.js").refused
+    (folder / "eve.js").unlink()
 
-    assert "1 of 4 files without a fault." in done.stdout
+    assert "1 of 3 files without a fault; 2 not checked." in done.stdout
+    (eve,) = (line for line in done.stdout.splitlines() if line.startswith("eve.js"))
+    assert not {"ok", "FAULT"} & set(eve.split())
+    assert refused == f"{folder}/eve.js: is a link to gone.js, which is not there"
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
     assert "Traceback" not in done.stderr
 

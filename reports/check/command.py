@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from adapters.solver_file import KINDS, SolverFailed
+from adapters.solver_file import KINDS, SolverFailed, dangling
 from adapters.solver_process import SolverProcess
 from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
@@ -45,14 +45,14 @@ def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) 
 
 
 def files_of(path: Path) -> list[Path]:
-    """The file, or all solvers below a folder, in order of their names; exits 2 if there are none."""
+    """The file, or all solvers below a folder, links to nothing too, in order of their names; exits 2 without any."""
     if not path.exists():
         refuse([f"{path}: is not there; name an Exercise.js, a solver.py or a folder of them"])
     if not path.is_dir():
         return [path]
     found = sorted(
         file for file in path.rglob("*")
-        if file.suffix.lower() in KINDS and file.is_file() and file.name not in HANDED_OUT
+        if file.suffix.lower() in KINDS and (file.is_file() or dangling(file)) and file.name not in HANDED_OUT
         and not any(part.startswith((".", "__", "node_modules")) for part in file.relative_to(path).parts)
     )  # fmt: skip
     if not found:

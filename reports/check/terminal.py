@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from adapters.solver_file import printable
 from reports.check.rows import TASKS
 from reports.check.verdict import FileCheck
 
@@ -41,14 +42,15 @@ def print_file(one: FileCheck) -> None:
 
 
 def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
-    """A row a file: a verdict for every task and the sentence to begin with."""
+    """A row a file: a verdict for every task and the sentence to begin with; "-" and the reason if it is no solver."""
     console = Console()
     table = Table("solver", *TASKS, "first of all", box=None, padding=(0, 1, 0, 0))
     table.columns[0].no_wrap = True
     for one in checks:
         words = [f"[{STYLE[word]}]{SHORT[word]}" for word in one.tasks.values()]
         first = one.refused or next((f"{row.name}: {row.cause}" for row in one.faults), "")
-        table.add_row(escape(str(one.path.relative_to(folder))), *words, escape(first))
+        table.add_row(escape(printable(str(one.path.relative_to(folder)))), *words, escape(first))
     console.print(table)
-    right = sum(one.passed for one in checks)
-    console.print(f"\n{right} of {len(checks)} files without a fault.", highlight=False)
+    right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
+    rest = f"; {refused} not checked" if refused else ""
+    console.print(f"\n{right} of {len(checks) - refused} files without a fault{rest}.", highlight=False)
