@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from reports import style
-from reports.stability.limits import Limit
+from reports.stability.limits import ONLY_BEYOND, Limit
 
 FILE = Path(__file__).with_name("stability_limits.csv")
 COLUMNS = ("engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "verdict", "reason",
@@ -47,7 +47,11 @@ def number(text: str) -> float:
 
 
 def reaches(limit: Kept | Limit, harsher: int) -> tuple[float, float]:
-    """The bracket on a line on which harsher is larger: from what works to what fails; open where nothing does."""
+    """The bracket on a line on which harsher is larger: from what works to what fails; open where nothing does.
+
+    What works only beyond a limit fails on the mild side of it: its line runs the other way.
+    """
+    harsher = -harsher if limit.verdict == ONLY_BEYOND else harsher
     works = -inf if limit.works_at != limit.works_at else harsher * limit.works_at
     fails = inf if limit.fails_at != limit.fails_at else harsher * limit.fails_at
     return works, fails

@@ -22,7 +22,11 @@ TEXT = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
 LINES = [line for kind, block in BLOCKS[1:] if kind == "sh" for line in block.splitlines() if line.strip()]
 CLUSTER = [line for line in LINES if "--extra cluster" in line]
-COMMANDS = [line for line in LINES if line not in CLUSTER]
+COMMANDS = [
+    pytest.param(line, marks=[pytest.mark.slow] if " stability " in line else [])  # ten seconds each
+    for line in LINES
+    if line not in CLUSTER
+]
 BIN = Path(sys.executable).parent
 
 

@@ -25,6 +25,8 @@ from reports.speed.results import Results
 from reports.terminal import Progress
 from scenarios.catalogue import scenario
 
+pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
+
 CHROMIUM = shutil.which("chromium")
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
 SCENES = ("head_on_equal_e09", "asteroids")

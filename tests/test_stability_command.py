@@ -18,6 +18,8 @@ from reports.stability.maps import MAPS
 from tests.command_line import crosscheck
 from tests.test_page import CHROMIUM, FLAGS
 
+pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
+
 ROOT = Path(__file__).parent.parent
 ASKED = ("slow_hit", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_row")
 
