@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 from reports.archive import FILES, Archive
@@ -81,12 +82,14 @@ def replace_folder(made: Path, target: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def may_write(target: Path) -> None:
-    """Raise `FolderTaken` unless `target` is absent, empty, or holds a run and nothing else."""
+def may_write(
+    target: Path, ours: Callable[[str], bool] = FILES.__contains__, strangers: str = "no run of crosscheck made"
+) -> None:
+    """Raise `FolderTaken` unless `target` is absent, empty, or holds only names that are `ours`."""
     if target == Path.cwd() or target in Path.cwd().parents:
         raise FolderTaken(f"--out {target}: is where you are; name another folder, or go elsewhere")
     if target.is_file():
         raise FolderTaken(f"--out {target}: is a file; name a folder that does not exist yet")
-    strange = sorted(path.name for path in target.iterdir() if path.name not in FILES) if target.exists() else []
+    strange = sorted(path.name for path in target.iterdir() if not ours(path.name)) if target.exists() else []
     if strange:
-        raise FolderTaken(f"--out {target}: holds {strange[0]}, which no run of crosscheck made; name another folder")
+        raise FolderTaken(f"--out {target}: holds {strange[0]}, which {strangers}; name another folder")

@@ -17,7 +17,7 @@ from rich.table import Table
 from reports import style
 from reports.commands import checked_engines, checked_scenes
 from reports.exits import DONE, FAILED, INTERRUPTED, refuse, say
-from reports.folders import replace_folder
+from reports.folders import FolderTaken, may_write, replace_folder
 from reports.machine import about
 from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
@@ -42,8 +42,10 @@ def run_speed(
     out = out.resolve()
     part = out.with_name(f"{out.name}.part-{os.getpid()}")
     try:
-        must_be_ours(out)
+        may_write(out, is_ours, "crosscheck speed did not make")
         part.mkdir(parents=True)
+    except FolderTaken as fault:
+        refuse([str(fault)])
     except OSError as fault:
         refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
     try:
@@ -76,16 +78,9 @@ def carry_out(plan: Plan, command: str) -> tuple[Results, dict[str, Any]]:
         return results, header | {"seconds": progress.seconds, "load": results.measured.busy}
 
 
-def must_be_ours(out: Path) -> None:
-    """Exit 2 unless `out` is absent, empty, or holds what this command wrote and nothing else."""
-    if out.is_file():
-        refuse([f"--out {out}: is a file; name a folder that does not exist yet"])
-    if out == Path.cwd() or out in Path.cwd().parents:
-        refuse([f"--out {out}: is where you are; name another folder, or go elsewhere"])
-    there = sorted(path.name for path in out.iterdir()) if out.exists() else []
-    strange = [name for name in there if not name.startswith("speed") and name != "machine.json"]
-    if strange:
-        refuse([f"--out {out}: holds {strange[0]}, which crosscheck speed did not make; name another folder"])
+def is_ours(name: str) -> bool:
+    """Whether a file of that name is of this command."""
+    return name.startswith("speed") or name == "machine.json"
 
 
 def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:
