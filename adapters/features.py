@@ -31,19 +31,22 @@ class Feature:
         return ENGINES[self.engine].make
 
 
-def _pymunk(**changed: Any) -> Engine:
+def changed_pymunk(**changed: Any) -> Engine:
+    """pymunk, matched, with these parameters of its adapter."""
     from adapters.pymunk import Pymunk
 
     return Pymunk("matched", **changed)
 
 
-def _box2d(**changed: Any) -> Engine:
+def changed_box2d(**changed: Any) -> Engine:
+    """Box2D 2.3, matched, with these parameters of its adapter."""
     from adapters.box2d import Box2DEngine
 
     return Box2DEngine("matched", **changed)
 
 
-def _box2d_v3(**changed: Any) -> Engine:
+def changed_box2d_v3(**changed: Any) -> Engine:
+    """Box2D 3.1, matched, with these parameters of its adapter."""
     from adapters.box2d_v3 import Box2DV3
 
     return Box2DV3("matched", **changed)
@@ -72,14 +75,14 @@ def _rows(engine: str, make: Callable[..., Engine], changes: dict[str, dict[str,
 FEATURES: tuple[Feature, ...] = (
     Feature("reference:exercise", "kept in float32", _float32),
     Feature("reference:exercise", "all pairs, never a list", _all_pairs),
-    *_rows("pymunk:matched", _pymunk, {
+    *_rows("pymunk:matched", changed_pymunk, {
         "10 iterations, not 50": {"iterations": 10},
         "200 iterations, not 50": {"iterations": 200},
         "sleeping": {"sleep_time_threshold": 0.5},
         "no rotation": {"turning": False},
         "hash, not tree": {"spatial_hash": (0.6, 1000)},
     }),
-    *_rows("box2d:matched", _box2d, {
+    *_rows("box2d:matched", changed_box2d, {
         "1 iteration, not 8": {"velocity_iterations": 1},
         "30 iterations, not 8": {"velocity_iterations": 30},
         "push-out, 3 iterations": {"position_iterations": 3},
@@ -89,7 +92,7 @@ FEATURES: tuple[Feature, ...] = (
         "no warm start": {"warm_starting": False},
         "no rotation": {"turning": False},
     }),
-    *_rows("box2d_v3:matched", _box2d_v3, {
+    *_rows("box2d_v3:matched", changed_box2d_v3, {
         "1 substep, not 4": {"substeps": 1},
         "16 substeps, not 4": {"substeps": 16},
         "CCD": {"continuous": True},

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 from adapters.engine import Engine
 from adapters.engines import ENGINES
+from adapters.features import changed_box2d, changed_box2d_v3, changed_pymunk
 from adapters.play import Run, play
 from scenarios.model import Scenario, Scene
 
@@ -33,52 +35,25 @@ class Switched:
         return getattr(self.engine, name)
 
 
-def switched(row: str, change: Callable[[Any], None]) -> Callable[[], Any]:
-    """What makes the engine of a row with `change` applied to its adapter after every `load`."""
-    return lambda: Switched(ENGINES[row].make(), change)
-
-
-def bullets(engine: Any) -> None:
-    """Box2D 2.3: continuous collision, and the disks that move at the start are bullets."""
-    engine.world.continuousPhysics = True
-    fly(engine)
-
-
-def bullets_v3(engine: Any) -> None:
-    """Box2D 3.1: the same."""
-    engine.world.continuous_enabled = True
-    fly(engine)
-
-
 def fly(engine: Any) -> None:
     """Make bullets of the disks that move: a bullet sees no other bullet in Box2D 3.1."""
     for body, velocity in zip(engine.bodies, engine.scene.velocity):
         body.bullet = bool(velocity.any())
 
 
-def default_bias(engine: Any) -> None:
-    """pymunk: overlaps are pushed out as shipped."""
-    engine.space.collision_bias = (1 - 0.1) ** 60
-
-
-def ten_iterations(engine: Any) -> None:
-    """pymunk: as many sequential impulses a contact as it does unasked."""
-    engine.space.iterations = 10
-
-
-def substeps_16(engine: Any) -> None:
-    """Box2D 3.1: four times as many substeps."""
-    engine.substeps = 16
+def with_bullets(make: Callable[..., Engine]) -> Callable[[], Any]:
+    """What makes an engine with continuous collision in which the disks that move at the start are bullets."""
+    return lambda: Switched(make(continuous=True), fly)
 
 
 PLAYERS: dict[str, Player] = {name: Player(row.make) for name, row in ENGINES.items()} | {
-    "pymunk:matched+ten_iterations": Player(switched("pymunk:matched", ten_iterations), "10 iterations for 50"),
-    "pymunk:matched+push_out": Player(switched("pymunk:matched", default_bias), "overlaps pushed out as shipped"),
-    "box2d:matched+bullets": Player(switched("box2d:matched", bullets), "continuous collision, what moves is a bullet"),
-    "box2d_v3:matched+bullets": Player(
-        switched("box2d_v3:matched", bullets_v3), "continuous collision, what moves is a bullet"
+    "pymunk:matched+ten_iterations": Player(partial(changed_pymunk, iterations=10), "10 iterations for 50"),
+    "pymunk:matched+push_out": Player(
+        partial(changed_pymunk, collision_bias=(1 - 0.1) ** 60), "overlaps pushed out as shipped"
     ),
-    "box2d_v3:matched+16_substeps": Player(switched("box2d_v3:matched", substeps_16), "16 substeps for 4"),
+    "box2d:matched+bullets": Player(with_bullets(changed_box2d), "continuous collision, what moves is a bullet"),
+    "box2d_v3:matched+bullets": Player(with_bullets(changed_box2d_v3), "continuous collision, what moves is a bullet"),
+    "box2d_v3:matched+16_substeps": Player(partial(changed_box2d_v3, substeps=16), "16 substeps for 4"),
 }
 
 
