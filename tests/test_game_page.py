@@ -16,17 +16,10 @@ from reports.game.pilot import SHIP
 from reports.game.server import Game, application
 from scenarios.closed_forms import world_pushes
 from scenarios.files import read_scene_file
-from tests.browsing import chromium, opened, overhang, served
+from tests.browsing import opened, overhang, served
 from tests.test_flight import steered_home
 
 FLOWN = ["reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:float64"]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One for all."""
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

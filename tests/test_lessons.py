@@ -25,7 +25,7 @@ from reports.lessons.meeting import hit_of_the_reference, two
 from reports.lessons.pages import ROUTES, offline
 from reports.lessons.switches import Switched, Switches
 from scenarios.catalogue import scenario
-from tests.browsing import chromium, opened, overhang, served
+from tests.browsing import opened, overhang, served
 
 FLOAT32 = 2.0**-24
 QUICK = ("particle", "meeting", "gravity")
@@ -105,13 +105,6 @@ def test_conventions_are_measured(monkeypatch: pytest.MonkeyPatch):
     assert slow["box2d:shipped"][1] == "departs"
     assert rows["What coefficient of friction acts between two disks?"]["box2d:shipped"] == ("0.2", "departs")
     assert swapped["What is e of a pair that closes at 0.1 m/s, where 0.5 is stated?"]["pymunk:shipped"][1] == "keeps"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One for all."""
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")
