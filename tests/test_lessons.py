@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-import json
-import zlib
 from collections.abc import Iterator
-from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
@@ -22,7 +18,7 @@ from reports.lessons.catalogue import LESSONS
 from reports.lessons.lesson import Lesson, play_once
 from reports.lessons.mechanisms import SWITCHED
 from reports.lessons.meeting import hit_of_the_reference, two
-from reports.lessons.pages import ROUTES, offline
+from reports.lessons.pages import ROUTES
 from reports.lessons.switches import Switched, Switches
 from scenarios.catalogue import scenario
 from tests.browsing import opened, overhang, served
@@ -139,39 +135,19 @@ def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
     assert (narrow <= 0, wide <= 0, playing, heard) == (True, True, False, [])
 
 
-def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
-    """It asks nothing of anywhere, its sliders work, and what it holds is what the lesson shows live."""
-    lesson = LESSONS["order"]
-    path = tmp_path / "order.html"
-    path.write_text(offline(lesson, lambda *_: None))
-    page, heard = opened(browser, path.as_uri())
-    page.on("request", lambda request: heard.append(request.url))
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
-    before = page.locator(".curve").last.get_attribute("d")
-    page.locator(".sliders [name=order]").focus()
-    page.keyboard.press("End")
-    page.evaluate("lesson.ready")
-    after = page.locator(".curve").last.get_attribute("d")
-    packed = page.locator("#grid").text_content()
-    page.context.close()
-    held = json.loads(zlib.decompress(base64.b64decode(packed or "")))
-
-    assert before != after
-    assert heard == []
-    assert len(held) == len(lesson.grid)
-    assert held["1,0"]["charts"] == json.loads(json.dumps(lesson.at((1, 0)).told()["charts"]))
-
-
 def test_the_list_of_lessons_fits_and_leads_to_each(browser: Browser, url: str, monkeypatch: pytest.MonkeyPatch):
     """With the table of conventions below it, which says when and with what it was measured."""
     monkeypatch.setattr(conventions, "ENGINES", {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")})
     page, heard = opened(browser, url, viewport={"width": 400, "height": 800})
     links = page.locator(".shelf a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
+    waits = page.locator("#measured").inner_text()
+    page.locator("#measured table").wait_for()
     text = page.locator("#conventions").inner_text()
     wide = overhang(page)
     page.context.close()
 
     assert links == [f"/lesson/{name}" for name in LESSONS]
+    assert waits.startswith("Measuring") or "pymunk" in waits
     assert "pymunk 7.3.1" in text
     assert " UTC" in text
     assert (wide <= 0, heard) == (True, [])
