@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
@@ -74,12 +75,14 @@ class Game:
             await socket.close(LATER, f"{MOST_TABS} pages are open already: close one")
             return
         self.tabs += 1
-        session = Session(self.engines, self.file)
+        session = None
         try:
+            session = await run_in_threadpool(Session, self.engines, self.file)
             with suppress(WebSocketDisconnect):
                 await converse(socket, session)
         finally:
-            session.close()
+            if session is not None:
+                session.close()
             self.tabs -= 1
 
 
@@ -90,7 +93,11 @@ def same_origin(socket: WebSocket) -> bool:
 
 
 async def converse(socket: WebSocket, session: Session) -> None:
-    """Answer message by message; the page asks for every frame, so that a slow one is never ahead of itself."""
+    """Answer message by message; the page asks for every frame, so that a slow one is never ahead of itself.
+
+    The engines of a tab work in a thread, one message at a time: a solver that hangs, or is compiled for the first
+    time, keeps its own tab waiting and no other.
+    """
     allowance, faults = Allowance(MOST_A_SECOND), 0
     await socket.send_text(as_json(session.field()))
     while True:
@@ -101,7 +108,7 @@ async def converse(socket: WebSocket, session: Session) -> None:
             await socket.close(POLICY, f"more than {MOST_A_SECOND} messages a second")
             return
         try:
-            answer = session.answer(event.get("text") or event.get("bytes") or "")
+            answer = await run_in_threadpool(session.answer, event.get("text") or event.get("bytes") or "")
         except ValueError as fault:
             faults += 1
             answer = {"kind": "fault", "text": str(fault)}
