@@ -95,11 +95,13 @@ def no_tabs(served: Served) -> bool:
 
 
 @pytest.mark.parametrize(
-    "origin", [None, "null", "http://evil.example", "http://localhost:1", "http://127.0.0.1.evil.example", "file://"]
-)
+    "origin",
+    [None, "null", "http://evil.example", "http://localhost:1", "http://127.0.0.1.evil.example", "file://",
+     "https://localhost:{port}", "http://localhost:{port}.evil.example", "http://127.0.0.1:{port}"],
+)  # fmt: skip
 def test_pages_of_other_origins_cannot_drive_it(served: Served, origin: str | None):
     """403 before a flight is made; the same tab from its own origin is let in."""
-    with pytest.raises(InvalidStatus) as refusal, served.open(origin):
+    with pytest.raises(InvalidStatus) as refusal, served.open(origin and origin.format(port=served.port)):
         pass
 
     assert refusal.value.response.status_code == 403

@@ -88,8 +88,8 @@ class Game:
 
 def same_origin(socket: WebSocket) -> bool:
     """Whether the page that opens the socket comes from this very server: no other may drive it."""
-    origin = urlsplit(socket.headers.get("origin", ""))
-    return origin.hostname in NAMES and origin.netloc == socket.headers.get("host")
+    host = socket.headers.get("host", "")
+    return urlsplit(f"//{host}").hostname in NAMES and socket.headers.get("origin") == f"http://{host}"
 
 
 async def converse(socket: WebSocket, session: Session) -> None:

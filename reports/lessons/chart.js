@@ -86,7 +86,7 @@ function drawGuide(picture, axis, place, text) {
   const ends = axis === "x" ? { x1: place, x2: place, y1: top, y2: height - bottom } : { x1: left, x2: width - right, y1: place, y2: place };
   picture.append(svg("line", { class: "guide", ...ends }));
   const late = axis === "y" || place > width / 2;
-  const at = axis === "x" ? { x: place + (late ? -5 : 5), y: top + 11 } : { x: width - right - 4, y: place - 5 };
+  const at = axis === "x" ? { x: place + (late ? -5 : 5), y: height - bottom - 6 } : { x: width - right - 4, y: place - 5 };
   picture.append(svg("text", { class: "axis", ...at, "text-anchor": late ? "end" : "start" }, text));
 }
 

@@ -105,7 +105,7 @@ def readings(case: Case, limits: Sequence[Limit], player: str, value: float) -> 
 
     Where a run can only fail or not, the share of runs that fail.
     """
-    bound, unit = case.predicate.bound, case.predicate.unit
+    bound, unit = case.predicate.bound, case.predicate.unit.removeprefix("1")
 
     def read(trial: Trial) -> float:
         return abs(trial.worst) if bound else trial.failed / trial.runs
@@ -137,7 +137,7 @@ def in_numbers(case: Case, trial: Trial, limit: Limit) -> list[tuple[str, str]]:
     """What failing means, what these runs do, the player's bracket and the reason, with how that was tested."""
     bound = f", by more than {measured(case, case.predicate.bound)}" if case.predicate.bound else ""
     told = [
-        ("To fail", f"{case.predicate.means}{bound}."),
+        ("Failing means", f"{case.predicate.means}{bound}."),
         ("Here", f"{counted(trial)}: {trial.event or f'off by {measured(case, trial.worst)}'}."),
         (limit.player, f"{in_words(limit, case)}."),
     ]
@@ -175,7 +175,7 @@ LIMITS = Lesson(
     sliders=(
         Slider("case", "Case", tuple(SEEN)),
         Slider("player", "Who plays", tuple(ENGINES), list(ENGINES).index("box2d:matched")),
-        Slider("place", "Gentle to harsh", HARSHNESS, 5),
+        Slider("place", "How harsh", HARSHNESS, 5),
     ),
     names=(*ENGINES, TRUTH),
     show=show_limits,
