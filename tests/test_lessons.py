@@ -20,6 +20,7 @@ from reports.lessons.mechanisms import SWITCHED
 from reports.lessons.meeting import hit_of_the_reference, two
 from reports.lessons.pages import ROUTES
 from reports.lessons.switches import Switched, Switches
+from reports.style import TRUTH
 from scenarios.catalogue import scenario
 from tests.browsing import opened, overhang, served
 
@@ -74,6 +75,29 @@ def test_the_switched_reference_lies_on_the_engine(
 
     assert apart(on) <= bound
     assert apart(off) > 300 * bound
+
+
+@pytest.mark.parametrize("name", LESSONS)
+def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name: str):
+    """Drawn in the replay and, where a chart can show it, in a chart; all who are drawn are in the legend."""
+    lesson = LESSONS[name]
+    shown = lesson.at(lesson.start)
+    drawn = {curve.name for chart in shown.charts for curve in chart.curves}
+
+    assert shown.film is not None
+    assert any(run.trajectory is not None for run in shown.film.runs)
+    assert (shown.film.truth is None) == (name == "push-out")  # its disks overlap from the start
+    assert (TRUTH in drawn) == (name not in ("push-out", "crowd"))  # nor has a cost in time
+    assert drawn | {run.name for run in shown.film.runs} <= set(lesson.names)
+
+
+def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
+    """Equal disks, e = 1, hit at one end: all orders of the hits give everything to the last disk."""
+    curves = {curve.name: np.asarray(curve.y) for curve in LESSONS["row"].at((0, 3, 2)).charts[0].curves}
+
+    assert curves[TRUTH].tolist() == [0, 0, 0, 0, 0, 5]
+    assert np.abs(curves["reference:exercise"] - curves[TRUTH]).max() <= 1e-12
+    assert np.abs(curves["box2d:matched"] - curves[TRUTH]).max() > 1.0
 
 
 def test_the_numbers_of_a_hit_are_those_of_the_solver():
