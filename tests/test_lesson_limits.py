@@ -92,3 +92,10 @@ def test_every_case_has_its_values_within_the_atlas():
         assert min(values) <= min(ladder)
         assert max(ladder) <= max(values)
         assert len(set(ladder)) == len(ladder)
+
+
+def test_the_slider_says_the_parameter_of_its_case():
+    """With its unit: what the same place means depends on the case."""
+    said = [LESSON.at(at(name, "pymunk:matched", 3)).said["place"] for name in ("slow_hit", "tunnelling_head_on")]
+
+    assert said == ["closing speed = 0.275 m/s", "v dt / R = 1"]
