@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import shutil
+import signal
+import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 
 import pytest
 from playwright.sync_api import Browser, Page
+from websockets.sync.client import connect
 
 from adapters.engines import ENGINES
 from reports.game import command
 from reports.game.command import PATIENCE, own_rows
 from reports.game.server import Game, application
 from tests.browsing import opened, served
-from tests.command_line import crosscheck
+from tests.command_line import CROSSCHECK, crosscheck
 from tests.test_game_page import fly
 
 SOLVER = Path(__file__).parent / "solvers" / "correct" / "plain.js"
@@ -49,7 +52,7 @@ def page_of(browser: Browser, path: Path, monkeypatch: pytest.MonkeyPatch) -> It
 
 
 def test_a_right_solver_flies_as_the_reference_does(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Under its file's name, the ship under thrust in both, until the first hit and beyond."""
+    """Under its file's name, the ship under thrust in both."""
     with page_of(browser, solver(tmp_path), monkeypatch) as page:
         page.keyboard.down("w")
         fly(page, 20)
@@ -84,9 +87,21 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
     assert solid == "reference:exercise"
     assert row.startswith("left: ")
     assert reason in row
-    assert banner.startswith("Exercise.js:own left: ") or banner.startswith("Exercise.js left: ")
+    assert banner.startswith("Exercise.js left: ")
     assert reason in banner
     assert took < 10 * PATIENCE
+
+
+def test_the_page_says_that_it_waits(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """While an answer takes longer than a second; then why."""
+    path = solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
+    with page_of(browser, path, monkeypatch) as page:
+        page.evaluate("game.ask(4)")
+        page.wait_for_function("() => document.getElementById('banner').textContent.startsWith('Waiting')")
+        page.wait_for_function("() => !game.waiting", timeout=10_000 * PATIENCE)
+        banner = page.locator("#banner").inner_text()
+
+    assert banner.startswith("Exercise.js left: ")
 
 
 @pytest.mark.parametrize(
@@ -135,8 +150,6 @@ def test_every_file_that_cannot_fly_is_told(tmp_path: Path, monkeypatch: pytest.
 
 def test_a_solver_that_hangs_keeps_no_other_tab_waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """The engines of each tab work in a thread of their own."""
-    from websockets.sync.client import connect
-
     path = solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
     for name, row in own_rows([f"{path}:own"]).items():
         monkeypatch.setitem(ENGINES, name, row)
@@ -159,3 +172,25 @@ def test_a_solver_that_hangs_keeps_no_other_tab_waiting(tmp_path: Path, monkeypa
     assert took < 0.8 * waited
     assert waited > PATIENCE
     assert "does not come back" in answer
+
+
+def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
+    """As soon as the patience with it is at its end: exit 0, and nothing but where it was and that it has stopped."""
+    solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
+    words = [CROSSCHECK, "play", "--port", "8300", "--engine", "Exercise.js"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as started:
+        assert started.stdout is not None
+        url = started.stdout.readline().split()[0].rstrip("/")
+        with connect(url.replace("http", "ws") + "/fly", origin=url) as tab:  # type: ignore[arg-type]
+            tab.recv(timeout=20)
+            for _ in range(2):
+                tab.send('{"do": "frames", "count": 4}')
+            sleep(0.3)
+            began = monotonic()
+            started.send_signal(signal.SIGINT)
+            out, complaints = started.communicate(timeout=60)
+            took = monotonic() - began
+
+    assert (started.returncode, out) == (0, "Stopped.\n")
+    assert [line for line in complaints.splitlines() if "is taken" not in line] == []
+    assert took < 10 * PATIENCE

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 import sys
 import webbrowser
+from asyncio import CancelledError
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -158,9 +160,17 @@ def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
     print(f"{url}  (Ctrl-C stops it)", flush=True)
     if opens:
         webbrowser.open(url)
+    server = uvicorn.Server(config_of(app))
+    logging.getLogger("uvicorn.error").addFilter(is_news)
     with suppress(KeyboardInterrupt):
-        uvicorn.Server(config_of(app)).run(sockets=[listening])
+        server.run(sockets=[listening])
     print("Stopped.")
+
+
+def is_news(record: logging.LogRecord) -> bool:
+    """Whether the server's complaint is about more than work that was cut off because the server stops."""
+    cut_off = record.exc_info and isinstance(record.exc_info[1], CancelledError)
+    return not (cut_off or record.getMessage().startswith("Cancel "))
 
 
 config_of = partial(
