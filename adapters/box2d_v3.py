@@ -20,7 +20,7 @@ from scenarios.model import Array, Scene, State
 SUBSTEPS = 4  # as the manual recommends; `step` has no default
 HERTZ, DAMPING_RATIO, PUSH_SPEED = 30.0, 10.0, 3.0  # the engine's contact tuning
 
-LENGTH_UNIT = Lock()  # it is global to the process: worlds in other threads wait, or would step in this one's unit
+LENGTH_UNIT = Lock()  # it is global to the process: threads take turns, or worlds would be made in another's unit
 
 
 def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:

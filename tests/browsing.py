@@ -68,7 +68,7 @@ def belongs(asked: str, url: str) -> bool:
     """Whether what is asked for is of the page itself: its server's, the very file, or data within it."""
     host = urlsplit(url).hostname
     if host is None:
-        return asked.startswith("data:") or asked.split("#")[0] == url
+        return asked.startswith(("data:", "blob:")) or asked.split("#")[0] == url
     return urlsplit(asked).hostname == host
 
 

@@ -17,7 +17,7 @@ class Game {
 
   connect() {
     this.socket = new WebSocket(`ws://${location.host}/fly`);
-    this.socket.onopen = () => { this.say(this.field ? "" : "Starting the engines …"); if (this.field) this.begin(); };
+    this.socket.onopen = () => { this.say(this.field ? "" : "Starting the engines; the first time they are compiled, which takes a while …"); if (this.field) this.begin(); };
     this.socket.onmessage = (event) => this.hear(JSON.parse(event.data));
     this.socket.onclose = (event) => {
       this.say(`${event.reason || "The server is not there"}. Trying again …`);

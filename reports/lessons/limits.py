@@ -105,7 +105,8 @@ def readings(case: Case, limits: Sequence[Limit], player: str, value: float) -> 
 
     Where a run can only fail or not, the share of runs that fail.
     """
-    bound, unit = case.predicate.bound, case.predicate.unit.removeprefix("1")
+    bound = case.predicate.bound
+    unit = "" if case.predicate.unit == "1" else case.predicate.unit
 
     def read(trial: Trial) -> float:
         return abs(trial.worst) if bound else trial.failed / trial.runs
@@ -135,10 +136,13 @@ def in_words(limit: Limit, case: Case) -> str:
 
 def in_numbers(case: Case, trial: Trial, limit: Limit) -> list[tuple[str, str]]:
     """What failing means, what these runs do, the player's bracket and the reason, with how that was tested."""
-    bound = f", by more than {measured(case, case.predicate.bound)}" if case.predicate.bound else ""
+    bound, read = "", trial.event
+    if case.predicate.bound:
+        bound = f", by more than {measured(case, case.predicate.bound)}"
+        read = read or f"off by {measured(case, trial.worst)}"
     told = [
         ("Failing means", f"{case.predicate.means}{bound}."),
-        ("Here", f"{counted(trial)}: {trial.event or f'off by {measured(case, trial.worst)}'}."),
+        ("Here", f"{counted(trial)}{f': {read}' if read else ''}."),
         (limit.player, f"{in_words(limit, case)}."),
     ]
     if limit.verdict != NEVER_FAILS:
