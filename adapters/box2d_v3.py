@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
 from importlib.metadata import version
 from math import atan2, cos, pi, sin
+from threading import Lock
 from time import perf_counter
 from typing import Any
 
@@ -16,6 +19,19 @@ from scenarios.model import Array, Scene, State
 
 SUBSTEPS = 4  # as the manual recommends; `step` has no default
 HERTZ, DAMPING_RATIO, PUSH_SPEED = 30.0, 10.0, 3.0  # the engine's contact tuning
+
+LENGTH_UNIT = Lock()  # it is global to the process: threads take turns, or worlds would be made in another's unit
+
+
+def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
+    """A method that sets the length unit and needs it until it returns."""
+
+    @wraps(method)
+    def alone(*arguments: Any, **named: Any) -> None:
+        with LENGTH_UNIT:
+            method(*arguments, **named)
+
+    return alone
 
 
 class Box2DV3:
@@ -46,6 +62,7 @@ class Box2DV3:
         self.continuous = not self.matched if continuous is None else continuous
         self.sleeping = not self.matched if sleeping is None else sleeping
 
+    @in_its_unit
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world; the length unit is global to the process, so each profile sets its own."""
         must_fit(
@@ -117,6 +134,7 @@ class Box2DV3:
         self.bodies[disk].apply_force_to_center(vector(force))
         self.bodies[disk].apply_torque(float(torque))
 
+    @in_its_unit
     def step(self, count: int = 1) -> None:
         """`count` calls of `step`; hit events live for one step, so they are collected after each."""
         pyb2d3.set_length_units_per_meter(self.unit)  # another world may have set its own since

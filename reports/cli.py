@@ -173,7 +173,12 @@ def lesson(
     name: Annotated[str, typer.Argument(metavar="[NAME]", help="Begin with this one.")] = "",
     port: Port = 8000,
     opens: Opens = False,
-    export: Annotated[Path | None, typer.Option(help="Write lesson NAME as one page that needs no server.")] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PATH", parser=place, help="Write NAME as one page that needs no server, or all to a folder."
+        ),
+    ] = None,
 ) -> None:
     """Learn why engines differ: short pages with scenes that run and the exact answer beside them."""
     from reports.lessons.command import open_lesson

@@ -83,13 +83,14 @@ def replace_folder(made: Path, target: Path) -> None:
 
 
 def may_write(
-    target: Path, ours: Callable[[str], bool] = FILES.__contains__, strangers: str = "no run of crosscheck made"
-) -> None:
-    """Raise `FolderTaken` unless `target` is absent, empty, or holds only names that are `ours`."""
+    target: Path, ours: Callable[[str], bool] = FILES.__contains__, strangers: str = "no run of crosscheck made",
+    option: str = "--out",
+) -> None:  # fmt: skip
+    """Raise `FolderTaken` unless `target`, named by `option`, is absent, empty, or holds only names that are `ours`."""
     if target == Path.cwd() or target in Path.cwd().parents:
-        raise FolderTaken(f"--out {target}: is where you are; name another folder, or go elsewhere")
+        raise FolderTaken(f"{option} {target}: is where you are; name another folder, or go elsewhere")
     if target.is_file():
-        raise FolderTaken(f"--out {target}: is a file; name a folder that does not exist yet")
+        raise FolderTaken(f"{option} {target}: is a file; name a folder that does not exist yet")
     strange = sorted(path.name for path in target.iterdir() if not ours(path.name)) if target.exists() else []
     if strange:
-        raise FolderTaken(f"--out {target}: holds {strange[0]}, which {strangers}; name another folder")
+        raise FolderTaken(f"{option} {target}: holds {strange[0]}, which {strangers}; name another folder")

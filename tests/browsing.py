@@ -54,18 +54,22 @@ def served(app: Starlette) -> Iterator[str]:
 
 
 def opened(browser: Browser, url: str, **context: Any) -> tuple[Page, list[str]]:
-    """The page at `url`, and what it complained of or asked of other machines."""
+    """The page at `url`, and what it complained of or asked of other machines; a file may ask for nothing at all."""
     page = browser.new_context(**context).new_page()
     heard: list[str] = []
-    own = (urlsplit(url).hostname,)
-    page.route(
-        lambda each: urlsplit(each).hostname not in own,
-        lambda route: (heard.append(route.request.url), route.abort())[1],
-    )
+    page.route(lambda each: not belongs(each, url), lambda route: (heard.append(route.request.url), route.abort())[1])
     page.on("console", lambda message: heard.append(message.text) if message.type in ("error", "warning") else None)
     page.on("pageerror", lambda error: heard.append(str(error)))
     page.goto(url)
     return page, heard
+
+
+def belongs(asked: str, url: str) -> bool:
+    """Whether what is asked for is of the page itself: its server's, the very file, or data within it."""
+    host = urlsplit(url).hostname
+    if host is None:
+        return asked.startswith(("data:", "blob:")) or asked.split("#")[0] == url
+    return urlsplit(asked).hostname == host
 
 
 def overhang(page: Page) -> int:

@@ -163,6 +163,40 @@ def test_a_ship_that_leaves_is_set_back_to_its_start():
     assert not flight.saved().thrusts[-1].stop > flight.left_at * FRAME
 
 
+@pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched"])
+def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
+    """As in the exercise: the rest of the frame it is already under way again, pushed from its start and from rest."""
+    flight = flown([name], 222, [(0, "s", True)], asteroids=0)
+    while flight.left_at < 0:
+        flight.advance()
+    # After k steps, velocity first, it is a dt2 k (k + 1) / 2 behind, position first a dt2 k (k - 1) / 2.
+    a, first = 0.25 * flight.dt**2 / 2, 1 if ENGINES[name].alpha == 1.0 else -1
+    behind = a * np.arange(6000) * (np.arange(6000) + first)
+    leaves = int(np.argmax(START[0] - behind < -5.0))
+    since = flight.frame * flight.substeps - leaves
+    state = flight.solid.state
+
+    assert 0 < since < flight.substeps
+    assert state.position[SHIP] == pytest.approx([START[0] - behind[since], START[1]], abs=1e-13)
+    assert state.velocity[SHIP] == pytest.approx([-0.25 * since * flight.dt, 0.0], abs=1e-13)
+
+
+def test_looking_at_every_step_near_an_edge_changes_no_bit():
+    """The ship turns round 0.1 m before the edge, where it is looked at step by step; `play` looks once a frame."""
+    names = list(ENGINES)
+    keys = [(0, "s", True), (150, "s", False), (151, "w", True)]
+    flight = flown(names, 400, keys, seed=4, asteroids=8)
+    scenario = flight.saved()
+    ends = [play(ENGINES[name].make(), name, scenario, flight.dt).trajectory for name in names]
+    nearest = min(float(end.position[:, SHIP, 0].min()) for end in ends if end is not None)
+
+    assert flight.left_at < 0
+    assert -5.0 < nearest < -4.7
+    for end, state in zip(ends, bits(flight)):
+        assert end is not None
+        assert {name: array.tobytes() for name, array in vars(end.at(-1)).items()} == state
+
+
 def test_the_marker_names_the_first_hit():
     """pymunk as shipped has restitution 0.81 in a field of 0.9, so it parts at the first hit; the oracle names it."""
     flight = flown(["reference:exercise", "pymunk:shipped", "pymunk:matched"], 64, [])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,17 +19,10 @@ from reports.game.pilot import SHIP
 from reports.game.server import Game, application
 from scenarios.closed_forms import world_pushes
 from scenarios.files import read_scene_file
-from tests.browsing import chromium, opened, overhang, served
+from tests.browsing import opened, overhang, served
 from tests.test_flight import steered_home
 
 FLOWN = ["reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:float64"]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One for all."""
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")
@@ -254,3 +250,23 @@ def test_with_reduced_motion_nothing_moves_by_itself(page: Page):
 
     assert page.evaluate("[game.now.frame, game.paused]") == [0, True]
     assert "starts the flight" in page.locator("#banner").inner_text()
+
+
+def test_the_frame_time_is_measured_by_a_command():
+    """`python -m tests.bench_game` prints a row for each thing timed, and how fast the flight goes."""
+    words = [sys.executable, "-m", "tests.bench_game", "1"]
+    done = subprocess.run(words, cwd=Path(__file__).parent.parent, capture_output=True, text=True, timeout=120)
+    lines = done.stdout.splitlines()
+    numbers = [[float(number) for number in re.findall(r"\d+\.\d\d", line[:50])] for line in lines[2:6]]
+
+    assert done.returncode == 0, done.stderr
+    assert lines[0].startswith("4 engines, 21 disks")
+    assert all(0 < mean <= most and part <= most for mean, part, most in numbers)
+    assert float(lines[-1].split()[0]) > 1.0
+
+
+def test_the_page_tells_its_frame_time(page: Page):
+    """Pictures a second, and what the engines take of a frame."""
+    fly(page, 30)
+
+    assert re.search(r"\d+ pictures a second.* engines take \d+\.\d ms", page.locator("#pace").inner_text())

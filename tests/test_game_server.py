@@ -19,10 +19,14 @@ import uvicorn
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from adapters.box2d_v3 import Box2DV3
+from adapters.engines import ENGINES
 from reports.game.command import play_game
+from reports.game.flight import field_scenario
 from reports.game.server import MOST_A_SECOND, MOST_FAULTS, MOST_TABS, Game, application, config_of, taken_socket
+from tests.test_flight import bits, flown
 
-ENGINES = ["reference:exercise", "pymunk:shipped"]
+FLOWN = ["reference:exercise", "pymunk:shipped"]
 FRAME = json.dumps({"do": "frames", "count": 1})
 
 
@@ -30,7 +34,7 @@ class Served:
     """A server in a thread of its own, on a free port."""
 
     def __init__(self) -> None:
-        self.game = Game(ENGINES)
+        self.game = Game(FLOWN)
         listening = taken_socket(0)
         self.port = listening.getsockname()[1]
         self.origin = f"http://localhost:{self.port}"
@@ -91,11 +95,13 @@ def no_tabs(served: Served) -> bool:
 
 
 @pytest.mark.parametrize(
-    "origin", [None, "null", "http://evil.example", "http://localhost:1", "http://127.0.0.1.evil.example", "file://"]
-)
+    "origin",
+    [None, "null", "http://evil.example", "http://localhost:1", "http://127.0.0.1.evil.example", "file://",
+     "https://localhost:{port}", "http://localhost:{port}.evil.example", "http://127.0.0.1:{port}"],
+)  # fmt: skip
 def test_pages_of_other_origins_cannot_drive_it(served: Served, origin: str | None):
     """403 before a flight is made; the same tab from its own origin is let in."""
-    with pytest.raises(InvalidStatus) as refusal, served.open(origin):
+    with pytest.raises(InvalidStatus) as refusal, served.open(origin and origin.format(port=served.port)):
         pass
 
     assert refusal.value.response.status_code == 403
@@ -174,6 +180,26 @@ def test_ten_tabs_fly_their_own_flights_and_give_them_back(served: Served):
 
     assert frames == list(range(1, 11))
     assert no_tabs(served)
+
+
+def test_a_flight_is_the_same_whatever_another_tab_does_meanwhile(monkeypatch: pytest.MonkeyPatch):
+    """Box2D 3.1 has one unit of length for all its worlds: another tab's world is made before or after, not within."""
+    alone = flown(["box2d_v3:shipped"], 100)
+    other, options, tabs = ENGINES["box2d_v3:matched"].make(), Box2DV3._options, []
+
+    def interrupted(engine: Box2DV3) -> dict[str, float]:
+        if not tabs:
+            tabs.append(threading.Thread(target=other.load, args=(field_scenario().scene, alone.dt)))
+            tabs[0].start()
+            tabs[0].join(0.3)
+        return options(engine)
+
+    monkeypatch.setattr(Box2DV3, "_options", interrupted)
+    together = flown(["box2d_v3:shipped"], 100)
+    tabs[0].join()
+    other.close()
+
+    assert bits(together) == bits(alone)
 
 
 def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_told(served: Served, tmp_path: Path):

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-import json
-import zlib
 from collections.abc import Iterator
-from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
@@ -22,10 +18,11 @@ from reports.lessons.catalogue import LESSONS
 from reports.lessons.lesson import Lesson, play_once
 from reports.lessons.mechanisms import SWITCHED
 from reports.lessons.meeting import hit_of_the_reference, two
-from reports.lessons.pages import ROUTES, offline
+from reports.lessons.pages import ROUTES
 from reports.lessons.switches import Switched, Switches
+from reports.style import TRUTH
 from scenarios.catalogue import scenario
-from tests.browsing import chromium, opened, overhang, served
+from tests.browsing import opened, overhang, served
 
 FLOAT32 = 2.0**-24
 QUICK = ("particle", "meeting", "gravity")
@@ -80,6 +77,29 @@ def test_the_switched_reference_lies_on_the_engine(
     assert apart(off) > 300 * bound
 
 
+@pytest.mark.parametrize("name", LESSONS)
+def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name: str):
+    """Drawn in the replay and, where a chart can show it, in a chart; all who are drawn are in the legend."""
+    lesson = LESSONS[name]
+    shown = lesson.at(lesson.start)
+    drawn = {curve.name for chart in shown.charts for curve in chart.curves}
+
+    assert shown.film is not None
+    assert any(run.trajectory is not None for run in shown.film.runs)
+    assert (shown.film.truth is None) == (name == "push-out")  # its disks overlap from the start
+    assert (TRUTH in drawn) == (name not in ("push-out", "crowd"))  # nor has a cost in time
+    assert drawn | {run.name for run in shown.film.runs} <= set(lesson.names)
+
+
+def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
+    """Equal disks, e = 1, hit at one end: all orders of the hits give everything to the last disk."""
+    curves = {curve.name: np.asarray(curve.y) for curve in LESSONS["row"].at((0, 3, 2)).charts[0].curves}
+
+    assert curves[TRUTH].tolist() == [0, 0, 0, 0, 0, 5]
+    assert np.abs(curves["reference:exercise"] - curves[TRUTH]).max() <= 1e-12
+    assert np.abs(curves["box2d:matched"] - curves[TRUTH]).max() > 1.0
+
+
 def test_the_numbers_of_a_hit_are_those_of_the_solver():
     """The impulse that lesson 4 writes out is the one the solver tells, and momentum is kept."""
     scene = two(0.9, 10.0, 1.0).scene
@@ -108,13 +128,6 @@ def test_conventions_are_measured(monkeypatch: pytest.MonkeyPatch):
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One for all."""
-    with chromium() as browser:
-        yield browser
-
-
-@pytest.fixture(scope="module")
 def url() -> Iterator[str]:
     """Where the lessons are served."""
     with served(application(Game(["reference:exercise"]), ROUTES)) as url:
@@ -136,7 +149,8 @@ def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
         page.evaluate("lesson.ready")
         assert page.evaluate(curves) != before, slider.key
         shown = page.locator(f".sliders label:has([name={slider.key}]) output").inner_text()
-        assert shown == slider.shown[-1 if slider.start < len(slider.values) - 1 else 0]
+        own = slider.shown[-1 if slider.start < len(slider.values) - 1 else 0]
+        assert shown == page.evaluate("lesson.shown.said").get(slider.key, own)
     narrow = overhang(page)
     page.set_viewport_size({"width": 1280, "height": 900})
     wide = overhang(page)
@@ -146,39 +160,19 @@ def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
     assert (narrow <= 0, wide <= 0, playing, heard) == (True, True, False, [])
 
 
-def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
-    """It asks nothing of anywhere, its sliders work, and what it holds is what the lesson shows live."""
-    lesson = LESSONS["order"]
-    path = tmp_path / "order.html"
-    path.write_text(offline(lesson, lambda *_: None))
-    page, heard = opened(browser, path.as_uri())
-    page.on("request", lambda request: heard.append(request.url))
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
-    before = page.locator(".curve").last.get_attribute("d")
-    page.locator(".sliders [name=order]").focus()
-    page.keyboard.press("End")
-    page.evaluate("lesson.ready")
-    after = page.locator(".curve").last.get_attribute("d")
-    packed = page.locator("#grid").text_content()
-    page.context.close()
-    held = json.loads(zlib.decompress(base64.b64decode(packed or "")))
-
-    assert before != after
-    assert heard == []
-    assert len(held) == len(lesson.grid)
-    assert held["1,0"]["charts"] == json.loads(json.dumps(lesson.at((1, 0)).told()["charts"]))
-
-
 def test_the_list_of_lessons_fits_and_leads_to_each(browser: Browser, url: str, monkeypatch: pytest.MonkeyPatch):
     """With the table of conventions below it, which says when and with what it was measured."""
     monkeypatch.setattr(conventions, "ENGINES", {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")})
     page, heard = opened(browser, url, viewport={"width": 400, "height": 800})
     links = page.locator(".shelf a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
+    waits = page.locator("#measured").inner_text()
+    page.locator("#measured table").wait_for()
     text = page.locator("#conventions").inner_text()
     wide = overhang(page)
     page.context.close()
 
     assert links == [f"/lesson/{name}" for name in LESSONS]
+    assert waits.startswith("Measuring") or "pymunk" in waits
     assert "pymunk 7.3.1" in text
     assert " UTC" in text
     assert (wide <= 0, heard) == (True, [])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
@@ -20,12 +18,8 @@ from reports.charts import CHARTS
 from reports.comparison import Comparison, compare
 from reports.page import write_page
 from scenarios.catalogue import scenario
+from tests.browsing import opened, overhang
 
-CHROMIUM = shutil.which("chromium")
-FLAGS = [
-    "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
-    "--disable-sync", "--no-first-run",
-]  # fmt: skip
 HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>{{ 7 * 7 }}"
 LONG = "a_name_without_a_place_to_break_it_" * 6
 PLAYERS = ("reference:exercise", "pymunk:matched", "box2d:shipped")
@@ -71,43 +65,9 @@ def path(comparisons: list[Comparison], tmp_path_factory: pytest.TempPathFactory
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """Debian's Chromium; where it is missing the tests are skipped, in CI they fail."""
-    if CHROMIUM is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("chromium is not installed: apt-get install chromium")
-        pytest.skip("chromium is not installed")
-    with sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield browser
-        browser.close()
-
-
-def opened(browser: Browser, path: Path, **context: Any) -> tuple[Page, list[str]]:
-    """The page in a browser that refuses every request but for the file, and what it asked for or complained of."""
-    page = browser.new_context(**context).new_page()
-    heard: list[str] = []
-    page.route(lambda url: url != path.as_uri(), lambda route: route.abort())
-
-    def hear_request(request: Request) -> None:
-        if request.url.split("#")[0] != path.as_uri() and not request.url.startswith("data:"):
-            heard.append(request.url)
-
-    def hear_console(message: ConsoleMessage) -> None:
-        if message.type in ("error", "warning"):
-            heard.append(message.text)
-
-    page.on("request", hear_request)
-    page.on("console", hear_console)
-    page.on("pageerror", lambda error: heard.append(str(error)))
-    page.goto(path.as_uri())
-    return page, heard
-
-
-@pytest.fixture(scope="module")
 def desktop(browser: Browser, path: Path) -> tuple[Page, list[str]]:
     """The page at 1280 px, opened once: that takes two seconds."""
-    return opened(browser, path, viewport={"width": 1280, "height": 900})
+    return opened(browser, path.as_uri(), viewport={"width": 1280, "height": 900})
 
 
 @pytest.fixture
@@ -142,7 +102,7 @@ def test_every_chart_is_drawn_once_it_is_in_view(page: Page) -> None:
 
 def test_nothing_is_drawn_before_it_is_in_view(browser: Browser, path: Path) -> None:
     """A page just opened has drawn no chart and unpacked no replay of its last scenario."""
-    page, _ = opened(browser, path)
+    page, _ = opened(browser, path.as_uri())
     drawn = page.locator(f"#s-{ASTEROIDS} .main-svg").count(), page.evaluate("name => name in players", ASTEROIDS)
     page.context.close()
 
@@ -270,14 +230,14 @@ def test_failed_and_refused_runs_are_in_sight(page: Page) -> None:
 @pytest.mark.parametrize("width", [400, 1280])
 def test_the_page_never_scrolls_sideways(browser: Browser, path: Path, width: int) -> None:
     """All fits the width, however long a word is; wide tables scroll by themselves."""
-    page, heard = opened(browser, path, viewport={"width": width, "height": 800}, reduced_motion="reduce")
+    page, heard = opened(browser, path.as_uri(), viewport={"width": width, "height": 800}, reduced_motion="reduce")
     for name in (HEAD_ON, ORBIT, ASTEROIDS):
         with_player(page, name)
     page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
-    overhang = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    wide = overhang(page)
     page.context.close()
 
-    assert overhang <= 0
+    assert wide <= 0
     assert heard == []
 
 
@@ -301,3 +261,17 @@ def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:
     )
 
     assert "crosscheck run nothing" in (tmp_path / "r.html").read_text()
+
+
+def test_the_browser_of_these_tests_hears_what_a_page_asks_for(browser: Browser, tmp_path: Path) -> None:
+    """A page that asks for another file, for another machine, and complains: all three are heard, data is not."""
+    path = tmp_path / "asks.html"
+    own = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAAC"
+    images = f"<img src=other.png><img src=http://elsewhere.invalid/a.png><img src={own}>"
+    path.write_text(f"<!doctype html>{images}<script>console.error('ouch')</script>")
+    page, heard = opened(browser, path.as_uri())
+    page.wait_for_load_state("networkidle")
+    page.context.close()
+
+    assert {"ouch", (tmp_path / "other.png").as_uri(), "http://elsewhere.invalid/a.png"} <= set(heard)
+    assert not any(each.startswith("data:") for each in heard)

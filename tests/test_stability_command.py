@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from playwright.sync_api import ConsoleMessage, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
 from reports.stability.maps import MAPS
+from tests.browsing import opened
 from tests.command_line import crosscheck
-from tests.test_page import CHROMIUM, FLAGS
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
@@ -105,25 +105,13 @@ def test_bad_input_is_one_clear_sentence(words: list[str], says: str):
 
 
 @pytest.fixture(params=[1280, 400])
-def page(request: pytest.FixtureRequest, atlas: Path):
+def page(request: pytest.FixtureRequest, browser: Browser, atlas: Path):
     """The page in a browser without a network, and what its console said."""
-    if CHROMIUM is None:
-        pytest.skip("no chromium on this machine")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        context = browser.new_context(viewport={"width": request.param, "height": 900}, offline=True)
-        opened, faults = context.new_page(), []
-
-        def hear(message: ConsoleMessage) -> None:
-            if message.type == "error":
-                faults.append(message.text)
-
-        opened.on("console", hear)
-        opened.on("pageerror", lambda error: faults.append(str(error)))
-        opened.goto((atlas / "stability.html").as_uri())
-        yield opened
-        assert faults == []
-        browser.close()
+    uri, size = (atlas / "stability.html").as_uri(), {"width": request.param, "height": 900}
+    page, faults = opened(browser, uri, viewport=size, offline=True)
+    yield page
+    page.context.close()
+    assert faults == []
 
 
 def test_a_failure_is_one_click_away_and_opens_just_before_it(page: Page):

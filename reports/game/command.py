@@ -3,29 +3,62 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 
-from adapters.engines import ENGINES, row_of
+from adapters.engines import ENGINES, OWN, Row
+from adapters.play import fault_of
+from adapters.student import engine_file
 from reports.commands import checked_engines
 from reports.exits import refuse
+from reports.game.flight import FRAME, field_scenario
 from reports.game.server import Game, application, serve
 from reports.lessons.pages import ROUTES
 from scenarios.files import SceneFileError, read_scene_file
 from scenarios.model import Scenario
 
 MOST_DISKS = 200  # of a scene file: more are no longer drawn sixty times a second
+PATIENCE = 2.0  # s that a solver's file may take for a frame, while the others wait for it
 FIRST = ("reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:float64")
 
 
 def play_game(flight: Path | None, engines: Sequence[str], port: int, opens: bool) -> None:
     """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is none."""
     chosen = checked_engines(engines) if engines else list(FIRST)
-    ENGINES.update((name, row_of(name)) for name in chosen)  # a solver's file is a row like any other while it flies
-    game = Game(chosen, read_flight(flight) if flight else None)
+    file = read_flight(flight) if flight else None
+    # A solver's file is a row like any other while it flies; one that cannot fly at all is told before.
+    ENGINES.update(own_rows([name for name in chosen if name.endswith(OWN)]))
+    game = Game(chosen, file)
     try:
         serve(application(game, ROUTES), port, "/", opens)
     except OSError as fault:
         refuse([f"--port {port}: {fault}; name another"])
+
+
+def own_rows(names: Sequence[str]) -> dict[str, Row]:
+    """The rows of solvers' files, `PATH:own`, each tried on a lone ship; exits 2 with a line for each that fails."""
+    rows, faults = {}, []
+    for name in names:
+        path = Path(name.removesuffix(OWN))
+        rows[name] = engine_file(path, PATIENCE)
+        if reason := grounded(rows[name]):
+            faults.append(f"{path}: {reason.removeprefix(f'{path.name} ')}")
+    if faults:
+        refuse(faults)
+    return rows
+
+
+def grounded(row: Row) -> str:
+    """Why an engine cannot take a lone ship through a step; "" if it can."""
+    engine = row.make()
+    try:
+        engine.load(field_scenario(asteroids=0).scene, FRAME)
+        engine.step()
+        return fault_of(engine.read(), inf)
+    except Exception as error:  # somebody's solver may raise anything
+        return str(error) or type(error).__name__
+    finally:
+        engine.close()
 
 
 def read_flight(path: Path) -> Scenario:

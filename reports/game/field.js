@@ -23,7 +23,7 @@ class Field {
     Object.assign(this, { field, last: null });
     const [left, bottom, right, top] = field.wrap ?? this.around(field);
     this.view = { left, bottom, right, top };
-    this.canvas.style.aspectRatio = `${right - left} / ${top - bottom}`;
+    this.canvas.closest(".cockpit").style.setProperty("--ratio", (right - left) / (top - bottom));
     this.rocks = field.radius.map((_, disk) => this.rock(disk));
     this.fit();
   }

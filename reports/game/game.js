@@ -9,7 +9,7 @@ class Game {
   constructor() {
     this.sky = new Field(by("sky"));
     this.rows = [...document.querySelectorAll("tr[data-engine]")];
-    Object.assign(this, { field: null, frames: [], waiting: 0, owed: 0, paused: calm.matches, down: new Set(), stopped: new Set(), pace: [] });
+    Object.assign(this, { field: null, frames: [], waiting: 0, owed: 0, paused: calm.matches, down: new Set(), stopped: new Set(), gone: new Set(), pace: [], drawn: [] });
     this.listen();
     this.connect();
     requestAnimationFrame((now) => this.tick(now));
@@ -17,7 +17,7 @@ class Game {
 
   connect() {
     this.socket = new WebSocket(`ws://${location.host}/fly`);
-    this.socket.onopen = () => { this.say(""); if (this.field) this.begin(); };
+    this.socket.onopen = () => { this.say(this.field ? "" : "Starting the engines; the first time they are compiled, which takes a while …"); if (this.field) this.begin(); };
     this.socket.onmessage = (event) => this.hear(JSON.parse(event.data));
     this.socket.onclose = (event) => {
       this.say(`${event.reason || "The server is not there"}. Trying again …`);
@@ -34,14 +34,17 @@ class Game {
     if (message.kind === "field") this.open(message);
     else if (message.kind === "frame") this.arrive(message);
     else if (message.kind === "file") this.download(message);
-    else { this.waiting = 0; this.say(message.text); }
+    else { this.waiting = 0; this.announce(message.text); }
   }
 
   open(field) {
-    Object.assign(this, { field, frames: [field.first, field.first], waiting: 0, owed: 0, told: "" });
+    Object.assign(this, { field, frames: [field.first, field.first], waiting: 0, owed: 0 });
     this.stopped.clear();
+    this.gone.clear();
+    this.say("");
     this.sky.begin(field);
     this.showPaused();
+    this.nameThoseWhoLeave(field.first);
     this.show();
   }
 
@@ -49,10 +52,10 @@ class Game {
     this.frames = [this.frames[1], frame];
     this.arrived = performance.now();
     this.span = (frame.frame - this.frames[0].frame) * this.field.interval * 1000;
-    this.pace.push([this.arrived, frame.ms]);
-    while (this.pace[0][0] < this.arrived - 1000) this.pace.shift();
+    recent(this.pace, [this.arrived, frame.ms, frame.t]);
     this.waiting = 0;
     this.stopWhereTheyPart(frame);
+    this.nameThoseWhoLeave(frame);
     this.show();
   }
 
@@ -60,6 +63,12 @@ class Game {
     const parted = this.field.engines.filter((name, k) => frame.flyers[k].parted && !this.stopped.has(name));
     parted.forEach((name) => this.stopped.add(name));
     if (parted.length && by("stop").checked) this.pause(true);
+  }
+
+  nameThoseWhoLeave(frame) {
+    const left = this.field.engines.filter((name, k) => frame.flyers[k].left && !this.gone.has(name));
+    left.forEach((name) => this.gone.add(name));
+    if (left.length) this.announce(`${left.map(shortName).join(", ")} left: ${frame.flyers[this.field.engines.indexOf(left[0])].left}`);
   }
 
   tick(now) {
@@ -73,16 +82,20 @@ class Game {
         this.ask(count);
       }
     }
+    if (this.waiting && now - this.asked > 1000) this.tell("Waiting for the engines …");
     if (this.field && this.sky.size) this.draw(now);
     requestAnimationFrame((later) => this.tick(later));
   }
 
   get now() { return this.frames[1]; }
 
-  ask(count) { this.waiting = count; this.send({ do: "frames", count }); }
+  ask(count) { this.wait(count); this.send({ do: "frames", count }); }
+
+  wait(count) { Object.assign(this, { waiting: count, asked: performance.now() }); }
 
   // Between the last two frames that came, as far as time has gone on since: motion is smooth at any rate of the screen.
   draw(now) {
+    const began = performance.now();
     const share = this.span ? Math.min(1, (now - this.arrived) / this.span) : 1;
     const [before, after] = this.frames;
     const flyers = after.flyers.map((flyer, k) => ({
@@ -91,6 +104,7 @@ class Game {
     }));
     const marks = after.flyers.flatMap((flyer, k) => flyer.parted ? [this.mark(flyer.parted, this.field.engines[k])] : []);
     this.sky.draw(flyers, after.solid, after.push, marks);
+    recent(this.drawn, [now, performance.now() - began]);
   }
 
   between(before, after, disk, share) {
@@ -103,7 +117,7 @@ class Game {
     ];
   }
 
-  mark({ x, y, i, j }, name) { return { x, y, name, text: `${name} ${pairOf(i, j)}` }; }
+  mark({ x, y, i, j }, name) { return { x, y, name, text: `${shortName(name)} ${pairOf(i, j)}` }; }
 
   show() {
     const frame = this.now;
@@ -141,18 +155,26 @@ class Game {
     if (!flyer.parted) return "";
     const { t, i, j, shared, solid_only: mine } = flyer.parted;
     const solid = this.field.engines[this.now.solid];
-    const whose = shared ? "both hit, and part differently" : `only ${mine ? solid : name} hits`;
+    const whose = shared ? "both hit, and part differently" : `only ${shortName(mine ? solid : name)} hits`;
     return `${t.toFixed(2)} s, ${pairOf(i, j)}: ${whose}`;
   }
 
+  // Over the last second; the flight is slowed where the engines, the way to the server or the screen are too slow.
   showPace(frame) {
-    if (!frame.ms || this.pace.length < 2) return;
-    const seconds = (this.pace.at(-1)[0] - this.pace[0][0]) / 1000;
-    const mean = this.pace.reduce((sum, [, ms]) => sum + ms, 0) / this.pace.length;
-    by("pace").textContent = `${((this.pace.length - 1) / seconds).toFixed(0)} frames a second; the engines take ${mean.toFixed(1)} ms of a frame's ${(this.field.interval * 1000).toFixed(1)} ms`;
+    if (!frame.ms || this.pace.length < 2 || this.drawn.length < 2) return;
+    const [a, b] = [this.pace[0], this.pace.at(-1)];
+    const share = (b[2] - a[2]) / ((b[0] - a[0]) / 1000);
+    const rate = (this.drawn.length - 1) / ((this.drawn.at(-1)[0] - this.drawn[0][0]) / 1000);
+    const slowed = !this.paused && share > 0 && share < 0.95 ? `; the flight is slowed to ${(100 * share).toFixed(0)} %` : "";
+    by("pace").textContent = `${rate.toFixed(0)} pictures a second, ${mean(this.drawn).toFixed(1)} ms to draw one; the engines take ${mean(this.pace).toFixed(1)} ms of a frame's ${(this.field.interval * 1000).toFixed(1)} ms${slowed}`;
   }
 
-  say(text) { this.message = text; this.tell(""); }
+  say(text) { clearTimeout(this.timer); this.message = text; this.tell(""); }
+
+  announce(text) {
+    this.say(text);
+    this.timer = setTimeout(() => { this.message = ""; if (this.field) this.show(); }, 6000);
+  }
 
   tell(text) {
     const shown = this.message || text;
@@ -176,7 +198,7 @@ class Game {
     if (by("wishes") && !by("wishes").reportValidity()) return;
     const numbers = Object.fromEntries([...wishes.entries()].map(([key, value]) => [key, Number(value)]));
     this.release();
-    this.waiting = 1;
+    this.wait(1);
     this.send({ do: "fly", engines, ...numbers });
   }
 
@@ -197,8 +219,7 @@ class Game {
     link.click();
     URL.revokeObjectURL(link.href);
     const until = cut ? `, up to ${seconds.toFixed(2)} s, where the ship first left the field` : "";
-    this.say(`Saved ${name}${until}: crosscheck run ${name}`);
-    setTimeout(() => { this.message = ""; this.show(); }, 6000);
+    this.announce(`Saved ${name}${until}: crosscheck run ${name}`);
   }
 
   listen() {
@@ -243,6 +264,16 @@ class Game {
 
 const keyOf = (event) => KEYS[event.key] ?? KEYS[event.key.toLowerCase()];
 const pairOf = (i, j) => `${i === SHIP ? "ship" : i} × ${j < 0 ? `wall ${-1 - j}` : j === SHIP ? "ship" : j}`;
-const short = (metres) => metres === 0 ? "0" : metres < 1e-3 ? metres.toExponential(0) : metres.toFixed(3);
+const raised = (digits) => [...digits].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("");
+const short = (metres) => metres === 0 ? "0" : metres >= 1e-3 ? metres.toFixed(3)
+  : metres.toExponential(0).replace(/e-(\d+)/, (_, digits) => `×10⁻${raised(digits)}`);
+const shortName = (name) => name.endsWith(":own") ? name.slice(0, -4).split("/").pop() : name;
+const mean = (rows) => rows.reduce((sum, row) => sum + row[1], 0) / rows.length;
+
+// Keeps the rows of the last second; the first number of a row is its time in ms.
+function recent(rows, row) {
+  rows.push(row);
+  while (rows[0][0] < row[0] - 1000) rows.shift();
+}
 
 window.game = new Game();

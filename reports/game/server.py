@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 import sys
 import webbrowser
+from asyncio import CancelledError
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -14,6 +16,7 @@ from urllib.parse import urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
@@ -74,23 +77,29 @@ class Game:
             await socket.close(LATER, f"{MOST_TABS} pages are open already: close one")
             return
         self.tabs += 1
-        session = Session(self.engines, self.file)
+        session = None
         try:
+            session = await run_in_threadpool(Session, self.engines, self.file)
             with suppress(WebSocketDisconnect):
                 await converse(socket, session)
         finally:
-            session.close()
+            if session is not None:
+                session.close()
             self.tabs -= 1
 
 
 def same_origin(socket: WebSocket) -> bool:
     """Whether the page that opens the socket comes from this very server: no other may drive it."""
-    origin = urlsplit(socket.headers.get("origin", ""))
-    return origin.hostname in NAMES and origin.netloc == socket.headers.get("host")
+    host = socket.headers.get("host", "")
+    return urlsplit(f"//{host}").hostname in NAMES and socket.headers.get("origin") == f"http://{host}"
 
 
 async def converse(socket: WebSocket, session: Session) -> None:
-    """Answer message by message; the page asks for every frame, so that a slow one is never ahead of itself."""
+    """Answer message by message; the page asks for every frame, so that a slow one is never ahead of itself.
+
+    The engines of a tab work in a thread, one message at a time: a solver that hangs, or is compiled for the first
+    time, keeps its own tab waiting and no other.
+    """
     allowance, faults = Allowance(MOST_A_SECOND), 0
     await socket.send_text(as_json(session.field()))
     while True:
@@ -101,7 +110,7 @@ async def converse(socket: WebSocket, session: Session) -> None:
             await socket.close(POLICY, f"more than {MOST_A_SECOND} messages a second")
             return
         try:
-            answer = session.answer(event.get("text") or event.get("bytes") or "")
+            answer = await run_in_threadpool(session.answer, event.get("text") or event.get("bytes") or "")
         except ValueError as fault:
             faults += 1
             answer = {"kind": "fault", "text": str(fault)}
@@ -151,9 +160,17 @@ def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
     print(f"{url}  (Ctrl-C stops it)", flush=True)
     if opens:
         webbrowser.open(url)
+    server = uvicorn.Server(config_of(app))
+    logging.getLogger("uvicorn.error").addFilter(is_news)
     with suppress(KeyboardInterrupt):
-        uvicorn.Server(config_of(app)).run(sockets=[listening])
+        server.run(sockets=[listening])
     print("Stopped.")
+
+
+def is_news(record: logging.LogRecord) -> bool:
+    """Whether the server's complaint is about more than work that was cut off because the server stops."""
+    cut_off = record.exc_info and isinstance(record.exc_info[1], CancelledError)
+    return not (cut_off or record.getMessage().startswith("Cancel "))
 
 
 config_of = partial(

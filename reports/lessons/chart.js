@@ -53,12 +53,14 @@ function drawChart(chart) {
   caption.textContent = chart.title;
   const { width, height, left, right, top, bottom } = SIZE;
   const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${chart.title}: ${chart.y} against ${chart.x}` });
-  const x = new Axis(chart.curves.flatMap((curve) => curve.x), chart.log.includes("x"), left, width - right);
+  const [from, to] = chart.reverse ? [width - right, left] : [left, width - right];
+  const x = new Axis(chart.curves.flatMap((curve) => curve.x), chart.log.includes("x"), from, to);
   const y = new Axis(chart.curves.flatMap((curve) => curve.y), chart.log.includes("y"), height - bottom, top);
   drawAxes(picture, chart, x, y);
   const clip = `clip-${Math.round(performance.now() * 1e3)}-${Math.floor(Math.random() * 1e9)}`;
   picture.append(svg("clipPath", { id: clip }));
   picture.lastChild.append(svg("rect", { x: left - 4, y: top - 4, width: width - left - right + 8, height: height - top - bottom + 8 }));
+  chart.guides.forEach(([axis, value, text]) => drawGuide(picture, axis, axis === "x" ? x.place(value) : y.place(value), text));
   chart.curves.forEach((curve, k) => drawCurve(picture, curve, x, y, chart.curves.length - k, clip));
   figure.append(caption, picture);
   return figure;
@@ -78,6 +80,16 @@ function drawAxes(picture, chart, x, y) {
   picture.append(svg("text", { class: "axis", x: -(top + height - bottom) / 2, y: 13, transform: "rotate(-90)", "text-anchor": "middle" }, chart.y));
 }
 
+// A line across, with its text at the end where it is least in the way.
+function drawGuide(picture, axis, place, text) {
+  const { width, height, left, right, top, bottom } = SIZE;
+  const ends = axis === "x" ? { x1: place, x2: place, y1: top, y2: height - bottom } : { x1: left, x2: width - right, y1: place, y2: place };
+  picture.append(svg("line", { class: "guide", ...ends }));
+  const late = axis === "y" || place > width / 2;
+  const at = axis === "x" ? { x: place + (late ? -5 : 5), y: height - bottom - 6 } : { x: width - right - 4, y: place - 5 };
+  picture.append(svg("text", { class: "axis", ...at, "text-anchor": late ? "end" : "start" }, text));
+}
+
 // The lower a curve lies, the wider it is, so that those that coincide stay visible under each other.
 function drawCurve(picture, curve, x, y, rank, clip) {
   const look = looks[curve.name];
@@ -85,7 +97,7 @@ function drawCurve(picture, curve, x, y, rank, clip) {
   const points = curve.x.map((each, k) => [x.place(each), y.place(curve.y[k])]);
   const path = points.map(([px, py], k) => `${k ? "L" : "M"}${px.toFixed(1)},${py.toFixed(1)}`).join("");
   const width = curve.name === "truth" ? 1.3 : 1.5 + 0.8 * Math.min(rank - 1, 5);
-  const line = svg("path", { class: "curve", d: path, stroke: colour, "stroke-width": width, "stroke-dasharray": look.dash.join(","), "clip-path": `url(#${clip})` });
+  const line = svg("path", { class: curve.faint ? "curve faint" : "curve", d: path, stroke: colour, "stroke-width": width, "stroke-dasharray": look.dash.join(","), "clip-path": `url(#${clip})` });
   line.append(svg("title", {}, curve.name));
   picture.append(line);
   if (!curve.dots) return;

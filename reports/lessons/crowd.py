@@ -13,13 +13,14 @@ from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown
 from reports.style import TRUTH, number
 from scenarios.exercise import asteroid_field
 from scenarios.model import Scenario, Trajectory
-from scenarios.oracle import with_oracle
+from scenarios.oracle import MOST_DISKS, with_oracle
 from scenarios.placing import box, lay_out, scatter
 
 EVERY_PAIR = "reference:every_pair"
 COST_NAMES = (EVERY_PAIR, "reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64")
 SIZES = (5, 10, 20, 50, 100, 200, 400)
 SUBSTEPS, ROUNDS = 4, 5
+SECONDS = 4.0  # that the quarter of a second is replayed for
 HORIZON_NAMES = ("reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64")
 
 
@@ -53,7 +54,10 @@ def show_cost(settings: Settings) -> Shown:
     for curve in curves:
         x, y = np.log(sizes[-3:]), np.log(np.asarray(curve.y)[-3:])
         facts.append((f"{curve.name}: cost grows as number to the power", number(float(np.polyfit(x, y, 1)[0]), 2)))
-    return Shown([Chart("Cost of a step", "disks", "µs a step", curves, "xy")], None, facts)
+    largest = scenes[-1] if last > MOST_DISKS else with_oracle(scenes[-1])
+    film = Played.by(largest, ("reference:exercise", "event_driven:float64"), SUBSTEPS).film
+    pace = {"pace": largest.duration / SECONDS}
+    return Shown([Chart("Cost of a step", "disks", "µs a step", curves, "xy")], film, facts, opening=pace)
 
 
 COST = Lesson(
@@ -71,7 +75,7 @@ COST = Lesson(
         Slider("most", "Disks, up to", (50, 100, 200, 400), 1),
         Slider("fill", "Part of the box they cover", (0.05, 0.2), 1),
     ),
-    names=COST_NAMES,
+    names=(*COST_NAMES, TRUTH),
     show=show_cost,
 )  # fmt: skip
 

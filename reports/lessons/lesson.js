@@ -20,10 +20,13 @@ class Lesson {
   get at() { return this.sliders.map((slider) => slider.value).join(","); }
 
   moved(slider) {
-    const texts = JSON.parse(slider.dataset.shown);
-    slider.parentElement.querySelector("output").textContent = texts[slider.value];
-    slider.setAttribute("aria-valuetext", texts[slider.value]);
+    this.say(slider, JSON.parse(slider.dataset.shown)[slider.value]);
     this.ready = this.ask(this.at);
+  }
+
+  say(slider, text) {
+    slider.parentElement.querySelector("output").textContent = text;
+    slider.setAttribute("aria-valuetext", text);
   }
 
   // A slider that moves on before its answer is there leaves it unused.
@@ -43,6 +46,7 @@ class Lesson {
 
   async show(shown) {
     this.shown = shown;
+    for (const slider of this.sliders) if (slider.name in shown.said) this.say(slider, shown.said[slider.name]);
     document.querySelector(".curves").replaceChildren(...shown.charts.map(drawChart));
     document.querySelector(".worked").replaceChildren(...shown.steps.map(([what, text]) => row("li", ["b", what], ["span", text])));
     document.querySelector(".facts-table tbody").replaceChildren(...shown.facts.map(([what, text]) => row("tr", ["th", what], ["td", text])));
@@ -55,15 +59,12 @@ class Lesson {
     element.querySelector(".picture").style.setProperty("--ratio", film.ratio);
     if (!this.player) {
       this.player = players.lesson = new Player(element, pack, looks);
-      this.player.seek(0);
       return;
     }
-    const time = this.player.time;
-    Object.assign(this.player, { pack });
-    this.player.slider.max = pack.duration;
-    this.player.slider.step = pack.duration / 1000;
-    this.player.fit();
+    const { time, playing } = this.player;
+    this.player.showPack(pack);
     this.player.seek(time);
+    if (playing) this.player.start();
   }
 }
 

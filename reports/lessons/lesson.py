@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -16,7 +16,7 @@ from adapters.engines import ENGINES
 from adapters.play import Run, play
 from reports.comparison import Comparison, answered, cut
 from reports.laws import deviation
-from reports.replay import pack, played, ratio_of
+from reports.replay import pack_layers, played, ratio_of
 from reports.style import TRUTH, number
 from scenarios.model import Array, Scenario, Trajectory
 
@@ -42,36 +42,49 @@ class Slider:
 
 @dataclass(frozen=True)
 class Curve:
-    """name: whose (a player, `truth`, or `reference:switched` for the reference with a mechanism on); x, y: (k,)."""
+    """name: whose (a player, `truth`, or `reference:switched` for the reference with a mechanism on); x, y: (k,).
+
+    dots: whether its points are marked; faint: whether it stands back behind the others.
+    """
 
     name: str
     x: ArrayLike
     y: ArrayLike
     dots: bool = False
+    faint: bool = False
 
     def told(self) -> dict[str, Any]:
         """For JSON: thinned out and rounded to what can be seen; what is not finite is left out."""
         x, y = np.asarray(self.x, float), np.asarray(self.y, float)
         kept = np.linspace(0, len(x) - 1, min(POINTS, len(x))).round().astype(int)
         kept = kept[np.isfinite(x[kept]) & np.isfinite(y[kept])]
-        return {"name": self.name, "x": rounded(x[kept]), "y": rounded(y[kept]), "dots": self.dots}
+        return {"name": self.name, "x": rounded(x[kept]), "y": rounded(y[kept]), "dots": self.dots, "faint": self.faint}
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Curves over one pair of axes; `log`: which of them, of "xy", are logarithmic."""
+    """Curves over one pair of axes.
+
+    Attributes:
+        title, x, y: what it shows, and the axes with their units.
+        log: which of the axes, of "xy", are logarithmic.
+        guides: lines across: (axis, value, text).
+        reverse: whether x runs to the left.
+    """
 
     title: str
     x: str
     y: str
     curves: Sequence[Curve]
     log: str = ""
+    guides: Sequence[tuple[str, float, str]] = ()
+    reverse: bool = False
 
     def told(self) -> dict[str, Any]:
         """For JSON."""
         return {
-            "title": self.title, "x": self.x, "y": self.y, "log": self.log,
-            "curves": [curve.told() for curve in self.curves],
+            "title": self.title, "x": self.x, "y": self.y, "log": self.log, "guides": list(self.guides),
+            "reverse": self.reverse, "curves": [curve.told() for curve in self.curves],
         }  # fmt: skip
 
 
@@ -84,21 +97,27 @@ class Shown:
         film: what is replayed, or None.
         facts: (what, number and unit) of this run.
         steps: paragraphs with the numbers of this run filled in.
+        opening: how the film opens, as `more` of `pack_layers`.
+        said: slider -> what it means here, where that depends on the others.
     """
 
     charts: Sequence[Chart]
     film: Comparison | None = None
     facts: Sequence[tuple[str, str]] = ()
     steps: Sequence[tuple[str, str]] = ()
+    opening: Mapping[str, Any] = field(default_factory=dict)
+    said: Mapping[str, str] = field(default_factory=dict)
 
     def told(self) -> dict[str, Any]:
         """For JSON."""
         film = None
         if self.film is not None:
-            film = {"pack": pack(self.film), "ratio": ratio_of(self.film.scenario, played(self.film))}
+            layers = played(self.film)
+            pack = pack_layers(self.film.scenario, layers, more=self.opening)
+            film = {"pack": pack, "ratio": ratio_of(self.film.scenario, layers)}
         return {
             "charts": [chart.told() for chart in self.charts], "film": film,
-            "facts": list(self.facts), "steps": list(self.steps),
+            "facts": list(self.facts), "steps": list(self.steps), "said": dict(self.said),
         }  # fmt: skip
 
 

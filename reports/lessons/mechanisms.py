@@ -9,16 +9,20 @@ from typing import Any
 import numpy as np
 
 from adapters.play import Run, play
+from reports.comparison import answered
 from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
 from reports.lessons.switches import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, Switched, Switches
 from reports.style import TRUTH, number
 from scenarios.lesson import free_fall
 from scenarios.model import Array, Scenario, Scene, Trajectory
+from scenarios.oracle import with_oracle
 from scenarios.placing import lay_out
 from scenarios.walls import bouncing_ball_e1
 
 SWITCHED, PLAIN = "reference:switched", "reference:exercise"
 ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed after gravity": BOX2D}
+SHOWN = 0.5  # the e whose hit is replayed in the page on mixing
+SECONDS = 3.0  # that the tenth of a second of the page on the cap is replayed for
 Read = Callable[[Trajectory], Array]
 
 
@@ -51,8 +55,10 @@ def told(runs: Sequence[Run], setting: str) -> list[tuple[str, str]]:
 
 
 def filmed(scenario: Scenario, runs: Sequence[Run]) -> Any:
-    """For the player of the page, which shows the runs at the step of the scenario."""
-    return Played(replace(scenario, substeps=(round(scenario.sample_interval / runs[0].dt),)), runs, None).film
+    """For the player of the page, which shows the runs at the step of the scenario, and the exact answer if any."""
+    seen = replace(scenario, substeps=(round(scenario.sample_interval / runs[0].dt),))
+    seen, truth = answered(seen if seen.truth else with_oracle(seen))
+    return Played(seen, runs, truth).film
 
 
 def pairs(closing: Array, restitution: float) -> Scene:
@@ -84,9 +90,9 @@ def show_threshold(settings: Settings) -> Shown:
     runs = runs_of(["box2d:shipped"], Switches(threshold=settings["threshold"]), scenario, 4)
     curves = over(closing, runs, parting(closing))
     facts = [*told(runs, "restitution threshold in m/s"), distance(curves, "box2d:shipped", "")]
-    return Shown(
-        [Chart("Parting over closing speed", "closing speed in m/s", "e of the hit", curves, "x")], None, facts
-    )
+    curves.append(Curve(TRUTH, closing, np.full(len(closing), settings["e"])))
+    chart = Chart("Parting over closing speed", "closing speed in m/s", "e of the hit", curves, "x")
+    return Shown([chart], filmed(scenario, runs), facts)
 
 
 def show_mixing(settings: Settings) -> Shown:
@@ -95,12 +101,17 @@ def show_mixing(settings: Settings) -> Shown:
     names = ("pymunk:shipped", PLAIN, SWITCHED)
     found: dict[str, list[float]] = {}
     for e in stated:
-        for run in runs_of(names[:1], Switches(mixing=settings["rule"]), asked(pairs(closing, float(e)), 0.5), 4):
+        scenario = asked(pairs(closing, float(e)), 0.5)
+        runs = runs_of(names[:1], Switches(mixing=settings["rule"]), scenario, 4)
+        for run in runs:
             if run.trajectory is not None:
                 found.setdefault(run.name, []).append(float(parting(closing)(run.trajectory)[0]))
+        if e == SHOWN:
+            film = filmed(scenario, runs)
     curves = [Curve(name, stated, found[name], dots=True) for name in names]
-    facts = [distance(curves, "pymunk:shipped", "")]
-    return Shown([Chart("Restitution of a pair", "e on each of the two disks", "e of the hit", curves)], None, facts)
+    facts = [("replayed: e on each of the two disks", number(SHOWN)), distance(curves, "pymunk:shipped", "")]
+    curves.append(Curve(TRUTH, stated, stated))
+    return Shown([Chart("Restitution of a pair", "e on each of the two disks", "e of the hit", curves)], film, facts)
 
 
 def falling(names: Sequence[str], on: Switches, substeps: int) -> Shown:
@@ -111,6 +122,7 @@ def falling(names: Sequence[str], on: Switches, substeps: int) -> Shown:
     runs = runs_of(names, on, scenario, substeps)
     curves = over_time(runs, lambda each: 1e3 * (each.position - exact)[:, 0, 1])
     facts = [*told(runs[:1], "substeps"), *(distance(curves, name, "mm") for name in names)]
+    curves.append(Curve(TRUTH, scenario.times, np.zeros(scenario.samples + 1)))
     return Shown([Chart("Above the parabola", "time in s", "mm", curves)], filmed(scenario, runs), facts)
 
 
@@ -159,7 +171,9 @@ def show_digits(settings: Settings) -> Shown:
     exact = start + scenario.times[:, None] * v
     curves = over_time(runs, lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16))
     facts = [*told(runs, "float32 rounding of the start in m"), distance(curves, "box2d:shipped", "m")]
-    return Shown([Chart("Distance from x + v t", "time in s", "m, 0 drawn as 10⁻¹⁶", curves, "y")], None, facts)
+    curves.append(Curve(TRUTH, scenario.times, np.full(scenario.samples + 1, 1e-16)))
+    chart = Chart("Distance from x + v t", "time in s", "m, 0 drawn as 10⁻¹⁶", curves, "y")
+    return Shown([chart], filmed(scenario, runs), facts)
 
 
 def show_cap(settings: Settings) -> Shown:
@@ -169,10 +183,13 @@ def show_cap(settings: Settings) -> Shown:
         position=np.column_stack([np.zeros(15), np.arange(15.0)]), velocity=np.column_stack([given, np.zeros(15)]),
         radius=np.full(15, 0.2), mass=np.ones(15), restitution=0.0,
     )  # fmt: skip
-    runs = runs_of(["box2d:shipped"], Switches(order=BOX2D, cap=settings["cap"]), asked(scene, 0.1), settings["k"])
+    scenario = asked(scene, 0.1)
+    runs = runs_of(["box2d:shipped"], Switches(order=BOX2D, cap=settings["cap"]), scenario, settings["k"])
     curves = over(given, runs, lambda each: each.velocity[-1, :, 0])
     facts = [*told(runs, "speed cap in m/s"), distance(curves, "box2d:shipped", "m/s")]
-    return Shown([Chart("Speed of a free disk", "speed it was given in m/s", "m/s", curves, "xy")], None, facts)
+    curves.append(Curve(TRUTH, given, given))
+    chart = Chart("Speed of a free disk", "speed it was given in m/s", "m/s", curves, "xy")
+    return Shown([chart], filmed(scenario, runs), facts, opening={"pace": 0.1 / SECONDS})
 
 
 def show_row(settings: Settings) -> Shown:
@@ -188,7 +205,10 @@ def show_row(settings: Settings) -> Shown:
     runs = runs_of(names, Switches(order=order, iterations=settings["iterations"]), scenario, 4)
     curves = over(np.arange(n + 1.0), runs, lambda each: each.velocity[-1, :, 0])
     facts = [*told(runs, "velocity, position iterations"), *(distance(curves, name, "m/s") for name in names)]
-    return Shown([Chart("Velocity after the hit", "disk", "m/s", curves)], filmed(scenario, runs), facts)
+    film = filmed(scenario, runs)
+    if film.truth is not None:
+        curves.append(Curve(TRUTH, np.arange(n + 1.0), film.truth.velocity[-1, :, 0]))
+    return Shown([Chart("Velocity after the hit", "disk", "m/s", curves)], film, facts)
 
 
 def page(
@@ -196,7 +216,7 @@ def page(
     *sliders: Slider,
 ) -> Lesson:  # fmt: skip
     """A page of this lesson."""
-    exact = (TRUTH,) if name == "gravity" else ()
+    exact = () if name == "push-out" else (TRUTH,)  # disks that overlap have no exact answer
     return Lesson(name, f"6.{part}", title, asks, (text,), sliders, (*names, PLAIN, SWITCHED, *exact), show)
 
 
@@ -236,7 +256,8 @@ MECHANISMS = (
     page(
         5, "push-out", "Slop and push-out", "What becomes of an overlap?",
         "The exercise projects an overlap away at once. Box2D undoes a share of it, three times a step, and leaves the "
-        "last bit, the slop, so that a contact stays a contact. Here a disk begins 20 cm deep in a fixed one.",
+        "last bit, the slop, so that a contact stays a contact. Here a disk begins 20 cm deep in a fixed one, which no "
+        "exact answer allows.",
         ["box2d:matched"], show_push_out,
         Slider("share", "Share undone each time", (0.0, 0.1, 0.2, 0.4), 0),
         Slider("slop", "Slop", (0.0, 1.25, 2.5, 5.0), 0, "mm"),
@@ -267,10 +288,10 @@ MECHANISMS = (
     ),
     page(
         9, "row", "Sequential impulses in a touching row", "What comes out of a row that touches?",
-        "The exercise lets one pair after the other collide, and the last disk flies off with everything. A solver of "
-        "simultaneous contacts fixes first what each contact shall become, e times its closing speed, 0 for those that "
-        "only touch, and then goes through all of them again and again. Neither is the truth: a row that "
-        "touches has none.",
+        "The exercise lets one pair after the other collide, and the last disk flies off with everything. So it is in "
+        "the exact answer, which all orders of these hits share. A solver of simultaneous contacts fixes first what "
+        "each contact shall become, e times its closing speed, 0 for those that only touch, and then goes through all "
+        "of them again and again: what comes out depends on how often.",
         ["box2d:matched", "pymunk:matched"], show_row,
         Slider("order", "Contacts", ("pair by pair", "all at once"), 0),
         Slider("iterations", "Iterations", (1, 2, 4, 8, 50), 3), Slider("n", "Disks in the row", (2, 3, 5), 1),

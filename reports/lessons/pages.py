@@ -8,6 +8,8 @@ import zlib
 from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import cache
+from threading import Lock
+from typing import NamedTuple
 
 from markupsafe import Markup
 from starlette.concurrency import run_in_threadpool
@@ -18,13 +20,15 @@ from starlette.routing import BaseRoute, Route
 from reports.cells import versions
 from reports.documents import looks_as_json, render
 from reports.lessons.catalogue import LESSONS
-from reports.lessons.conventions import table
+from reports.lessons.conventions import Convention, table
 from reports.lessons.crowd import EVERY_PAIR
 from reports.lessons.lesson import Lesson
 from reports.lessons.mechanisms import SWITCHED
 from reports.style import Look, look
 
 STYLES = ["lessons/lesson.css"]
+GROUPS = {"A solver, piece by piece": "12345", "How engines differ": "6", "What can be compared, and how far": "78"}
+MEASURING = Lock()  # two pages that ask at once get one measurement
 OWN = {  # who plays in lessons only
     SWITCHED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
     EVERY_PAIR: look("reference")._replace(dash=(7, 5)),
@@ -36,12 +40,23 @@ def looks_of(lesson: Lesson) -> dict[str, Look]:
     return {name: OWN.get(name) or look(*name.split(":", 1)) for name in lesson.names}
 
 
+class Links(NamedTuple):
+    """Where the pages are, `lesson` with {} for a name; "" for what is not there."""
+
+    lesson: str
+    shelf: str
+    game: str
+
+
+LIVE, FILES, ALONE = Links("/lesson/{}", "/lesson", "/"), Links("{}.html", "index.html", ""), Links("", "", "")
+
+
 def about() -> dict[str, str]:
     """When and with what the numbers were made."""
     return {"made": datetime.now(UTC).isoformat(timespec="seconds")[:16].replace("T", " ") + " UTC"} | versions()
 
 
-def lesson_page(lesson: Lesson, grid: str = "") -> str:
+def lesson_page(lesson: Lesson, links: Links = LIVE, grid: str = "") -> str:
     """The page; `grid`: every setting's answer, packed, for a page without a server."""
     names = list(LESSONS)
     k = names.index(lesson.name)
@@ -50,32 +65,53 @@ def lesson_page(lesson: Lesson, grid: str = "") -> str:
         "lessons/lesson.html.j2",
         ["player.js", "player_canvas.js", "lessons/chart.js", "lessons/lesson.js"], STYLES, connects=not grid,
         lesson=lesson, text=[Markup(paragraph) for paragraph in lesson.text], looks=looks_of(lesson),
-        looks_json=looks_as_json(looks_of(lesson)), grid=grid, around=around, about=about(),
+        looks_json=looks_as_json(looks_of(lesson)), grid=grid, around=around, links=links, about=about(),
         first=lesson.at(lesson.start).told(),
     )  # fmt: skip
 
 
-def offline(lesson: Lesson, progress: Callable[[int, int], None]) -> str:
-    """One page with the answer to every setting of the sliders, from runs made now."""
+def offline(lesson: Lesson, done: Callable[[], None], links: Links = ALONE) -> str:
+    """One page with the answer to every setting of the sliders, from runs made now; `done` is called after each."""
     answers = {}
-    for k, places in enumerate(lesson.grid):
+    for places in lesson.grid:
         answers[",".join(map(str, places))] = lesson.at(places).told()
-        progress(k + 1, len(lesson.grid))
+        done()
     packed = zlib.compress(json.dumps(answers, separators=(",", ":")).encode(), 9)
-    return lesson_page(lesson, base64.b64encode(packed).decode())
+    return lesson_page(lesson, links, base64.b64encode(packed).decode())
 
 
-def index_page() -> str:
-    """The list of lessons, and the conventions of the engines as the probes find them."""
-    return render("lessons/index.html.j2", [], STYLES, lessons=LESSONS, about=about(), table=measured())
+def index_page(links: Links = LIVE) -> str:
+    """The list of lessons; below it the conventions of the engines, which a live page asks for: it takes a while."""
+    live = links is LIVE
+    groups = {heading: [LESSONS[name] for name in LESSONS if LESSONS[name].number[0] in numbers]
+              for heading, numbers in GROUPS.items()}  # fmt: skip
+    return render(
+        "lessons/index.html.j2", ["lessons/index.js"] if live else [], STYLES, connects=live, groups=groups,
+        links=links, table=None if live else Markup(conventions_table()),
+    )  # fmt: skip
 
 
-measured = cache(table)
+def conventions_table() -> str:
+    """What the probes find in every engine, when and with which versions: measured once, when it is first asked for."""
+    with MEASURING:
+        rows, when = measured()
+    return render("lessons/conventions.html.j2", [], [], rows=rows, about=when)
+
+
+@cache
+def measured() -> tuple[list[Convention], dict[str, str]]:
+    """The table, and when and with what it was made."""
+    return table(), about()
 
 
 async def index(_: Request) -> Response:
     """/lesson."""
     return HTMLResponse(await run_in_threadpool(index_page))
+
+
+async def conventions(_: Request) -> Response:
+    """/lesson/conventions: the table alone."""
+    return HTMLResponse(await run_in_threadpool(conventions_table))
 
 
 async def page(request: Request) -> Response:
@@ -100,5 +136,6 @@ async def shown(request: Request) -> Response:
 
 
 ROUTES: list[BaseRoute] = [
-    Route("/lesson", index), Route("/lesson/{name}", page), Route("/lesson/{name}/shown", shown),
+    Route("/lesson", index), Route("/lesson/conventions", conventions),
+    Route("/lesson/{name}", page), Route("/lesson/{name}/shown", shown),
 ]  # fmt: skip

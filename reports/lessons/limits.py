@@ -1,0 +1,186 @@
+"""Lesson 8, where methods fail: cases of the atlas, searched when they are asked for, with the run that fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from math import isfinite
+from typing import Any, NamedTuple
+
+import pandas as pd
+
+from adapters.engines import ENGINES
+from adapters.play import Run
+from reports.comparison import Comparison
+from reports.lessons.lesson import Chart, Curve, Lesson, Settings, Shown, Slider
+from reports.stability.cases import CASES
+from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Search, Trial, players_of
+from reports.stability.overview import bracket, why
+from reports.stability.reasons import explained
+from reports.style import TRUTH, number
+from scenarios.model import Array, Scenario, Trajectory
+
+HARSHNESS = tuple(range(9))  # places from the gentlest value of a case to its harshest
+SECONDS = 4.0  # that a replay lasts
+
+
+class Seen(NamedTuple):
+    """A case of the atlas as the lesson shows it: what is drawn over time, of the first disk; and how harsh it gets."""
+
+    case: str
+    what: str
+    unit: str
+    read: Callable[[Trajectory], Array]
+    harshest: float | None = None
+
+    def value(self, place: int) -> float:
+        """The parameter at this place of `HARSHNESS`, evenly spread in its logarithm."""
+        first, last = CASES[self.case].values[0], self.harshest or CASES[self.case].values[-1]
+        return float(f"{first * (last / first) ** (place / HARSHNESS[-1]):.3g}")
+
+
+def way(each: Trajectory) -> Array:
+    """(k,) m that the first disk has gone along x."""
+    return each.position[:, 0, 0] - each.position[0, 0, 0]
+
+
+def aside(each: Trajectory) -> Array:
+    """(k,) m that it has been pushed aside."""
+    return each.position[:, 0, 1] - each.position[0, 0, 1]
+
+
+SEEN = {
+    "a fast disk meets another": Seen("tunnelling_head_on", "Way of the disk", "m", way),
+    "a fast disk meets a thin wall": Seen("tunnelling_thin_wall", "Way of the disk", "m", way),
+    "a slow hit": Seen("slow_hit", "Way of the first disk", "m", way),
+    "a near miss": Seen("near_miss", "The first disk, pushed aside", "m", aside),
+    "a scene made smaller": Seen("scale_down", "Way of the first disk", "m", way),
+    # A replay keeps seven digits of a place: farther out they are too few for a disk.
+    "far from the origin": Seen("far_from_origin", "Way of the disk", "m", way, harshest=1e5),
+    "a fast spin": Seen("spin", "Angle", "rad", lambda each: each.angle[:, 0]),
+}
+
+
+@cache
+def limits_of(name: str) -> list[Limit]:
+    """The limits of a case on every player, searched now, with their reasons, which players with one switch test."""
+    case = CASES[name]
+    return explained([Search(case, player, QUICK).limit() for player in players_of(case)])
+
+
+def run_at(case: Case, player: str, value: float) -> tuple[Trial, Scenario, Run]:
+    """All runs of a player at a value, and of them the first that fails, or the last, which has the worst phase."""
+    search, count = Search(case, player, QUICK), case.runs(QUICK)
+    trial = search.played(value)
+    return trial, *(search.seen.get(value) or case.play(player, case.scene(value, count - 1, count)))
+
+
+def show_limits(settings: Settings) -> Shown:
+    """The run at this value beside the exact answer, and the readings of all players up to their limits."""
+    seen, player = SEEN[settings["case"]], settings["player"]
+    case, value, limits = CASES[seen.case], seen.value(settings["place"]), limits_of(seen.case)
+    trial, scenario, run = run_at(case, player, value)
+    assert scenario.truth is not None
+    truth = scenario.truth(scenario.times)
+    drawn = [(player, run.trajectory), (TRUTH, truth)]
+    curves = [Curve(name, each.t, seen.read(each)) for name, each in drawn if each is not None]
+    found = next(limit for limit in limits if limit.player == player)
+    return Shown(
+        [Chart(seen.what, "time in s", seen.unit, curves), readings(case, limits, player, value)],
+        Comparison(scenario, truth, [run], pd.DataFrame()),
+        [(limit.player, in_words(limit, case)) for limit in limits if limit.player in ENGINES],
+        in_numbers(case, trial, found),
+        {"pace": scenario.duration / SECONDS} | event_of(trial),
+        {"place": with_unit(f"{case.parameter} = {number(value)}", case)},
+    )
+
+
+def event_of(trial: Trial) -> dict[str, Any]:
+    """What the replay marks: when and at which disk it fails."""
+    return {} if trial.works or not isfinite(trial.at) else {"event": {"t": trial.at, "disk": trial.disk}}
+
+
+def readings(case: Case, limits: Sequence[Limit], player: str, value: float) -> Chart:
+    """What is read at every value tried, harsher to the right, the player before all others.
+
+    Where a run can only fail or not, the share of runs that fail.
+    """
+    bound = case.predicate.bound
+    unit = "" if case.predicate.unit == "1" else case.predicate.unit
+
+    def read(trial: Trial) -> float:
+        return abs(trial.worst) if bound else trial.failed / trial.runs
+
+    curves = [
+        Curve(each.player, [t.value for t in each.trials], [read(t) for t in each.trials], mine, not mine)
+        for mine in (False, True) for each in limits if each.player in ENGINES and mine == (each.player == player)
+    ]  # fmt: skip
+    guides = [("x", value, "here"), *([("y", bound, "fails above")] if bound else [])]
+    axis = case.parameter if case.unit == "1" else f"{case.parameter} in {case.unit}"
+    what = (case.predicate.name.capitalize(), unit, "xy") if bound else ("Runs that fail", "share", "x")
+    return Chart(what[0], axis, what[1], curves, what[2], guides, case.values[0] > case.values[-1])
+
+
+def with_unit(text: str, case: Case) -> str:
+    """The text and the parameter's unit, if it has one."""
+    return text if case.unit == "1" else f"{text} {case.unit}"
+
+
+def in_words(limit: Limit, case: Case) -> str:
+    """The bracket of a limit."""
+    works, fails = bracket(limit)
+    if limit.verdict == NEVER_FAILS:
+        return f"does not fail up to {with_unit(works, case)}"
+    return f"works {works if works == 'nowhere' else f'at {works}'}, fails at {with_unit(fails, case)}"
+
+
+def in_numbers(case: Case, trial: Trial, limit: Limit) -> list[tuple[str, str]]:
+    """What failing means, what these runs do, the player's bracket and the reason, with how that was tested."""
+    bound, read = "", trial.event
+    if case.predicate.bound:
+        bound = f", by more than {measured(case, case.predicate.bound)}"
+        read = read or f"off by {measured(case, trial.worst)}"
+    told = [
+        ("Failing means", f"{case.predicate.means}{bound}."),
+        ("Here", f"{counted(trial)}{f': {read}' if read else ''}."),
+        (limit.player, f"{in_words(limit, case)}."),
+    ]
+    if limit.verdict != NEVER_FAILS:
+        tested = f" Tested: {limit.tested}." if limit.tested else ""
+        source = f" Source: {limit.source}." if limit.source else ""
+        told.append(("Why", f"{why(limit)}{tested}{source}"))
+    return told
+
+
+def counted(trial: Trial) -> str:
+    """How many runs fail."""
+    if trial.runs == 1:
+        return "it works" if trial.works else "it fails"
+    return f"none of {trial.runs} runs fails" if trial.works else f"{trial.failed} of {trial.runs} runs fail"
+
+
+def measured(case: Case, value: float) -> str:
+    """A reading with its unit, if it has one."""
+    return f"{number(value)} {case.predicate.unit}".removesuffix(" 1")
+
+
+LIMITS = Lesson(
+    name="limits", number="8", title="Where methods fail",
+    asks="How harsh may a scene be before a method breaks?",
+    text=(
+        "Every method works in gentle scenes. Make one thing harsher, a speed, a distance, a size, and most have a "
+        "value from which on they <b>fail</b>: a hit is missed, a spin is cut, a place is rounded away. The search "
+        "tries values from gentle to harsh, a hit at several moments of its step, and halves the gap between the last "
+        "value that works and the first that fails until the two are 5 % apart.",
+        "A reason counts as tested if the limit follows from it, or if a player that differs in that one thing gets "
+        "farther; else it is called likely. These are the cases that take a second; "
+        "<code>crosscheck stability</code> searches them all.",
+    ),
+    sliders=(
+        Slider("case", "Case", tuple(SEEN)),
+        Slider("player", "Who plays", tuple(ENGINES), list(ENGINES).index("box2d:matched")),
+        Slider("place", "How harsh", HARSHNESS, 5),
+    ),
+    names=(*ENGINES, TRUTH),
+    show=show_limits,
+)  # fmt: skip
