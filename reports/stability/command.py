@@ -22,7 +22,7 @@ from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, NEVER_WORKS, Limit
 from reports.stability.maps import MAPS
 from reports.stability.page import write_page
-from reports.stability.touching import TOUCHING
+from reports.stability.touching import TOUCHING, AtGap
 from reports.stability.vary import VARIES
 from reports.style import number
 from reports.terminal import Progress
@@ -71,8 +71,9 @@ def write_files(folder: Path) -> Atlas:
     """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
     atlas = read(folder)
     table(atlas.limits).to_csv(folder / "limits.csv", index=False)
-    laws = [(one.name, one.player, one.law, one.off) for one in atlas.laws]
-    pd.DataFrame(laws, columns=["scene", "player", "law", "off"]).to_csv(folder / "laws.csv", index=False)
+    laws = [(one.name, one.player, *at[:-1]) for one in atlas.laws for at in one.gaps]
+    columns = ["scene", "player", *AtGap._fields[:-1]]
+    pd.DataFrame(laws, columns=columns).to_csv(folder / "laws.csv", index=False)
     cells = [(one.name, one.player, *cell) for one in atlas.maps for cell in one.cells]
     columns = ["map", "player", "x", "y", "reading", "failed", "event"]
     pd.DataFrame(cells, columns=columns).to_csv(folder / "maps.csv", index=False)

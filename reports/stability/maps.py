@@ -17,7 +17,8 @@ from reports.stability.cases_hits import flyby
 from reports.stability.cases_stacks import column
 from reports.stability.players import Switched, play_as
 from reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
-from reports.stability.predicates_crowds import ENERGY_DRIFTS, STANDS
+from reports.stability.predicates_crowds import STANDS
+from reports.stability.predicates_gas import ENERGY_DRIFTS
 from scenarios.model import Scenario
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from adapters.engines import ENGINES
 from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit
 from reports.stability.maps import MAPS, MapOf
+from reports.stability.touching import AT_ONCE, PAIRS, AtGap
 from reports.style import number
 
 if TYPE_CHECKING:
@@ -66,10 +67,10 @@ def cell_of(section: Section, player: str) -> Cell:
 
 
 def why(limit: Limit) -> str:
-    """The reason, called likely where nothing tested it."""
+    """The reason as a sentence."""
     if not limit.reason:
         return "" if limit.verdict == NEVER_FAILS else "Not explained."
-    return limit.reason[0].upper() + limit.reason[1:] + "." if limit.tested else f"Likely: {limit.reason}."
+    return f"{limit.why[0].upper()}{limit.why[1:]}."
 
 
 def reasons(limits: Sequence[Limit]) -> list[Why]:
@@ -140,3 +141,13 @@ def map_cell(value: float, failed: bool, broken: str, bound: float) -> Cell:
     return Cell(
         "×" if failed else "", f"{number(value)}{'; ' + broken if broken else ''}", sum(share > s for s in steps)
     )
+
+
+def law_cell(at: AtGap) -> Cell:
+    """The law that a player follows at a gap; coloured where it follows none."""
+    if not at.velocity:
+        return Cell(at.law, "", -1, True)
+    motion = "; ".join(f"({number(x, 2)}, {number(y, 2)})" for x, y in at.velocity)
+    remark = f"{number(at.off, 2)} off, energy {number(at.energy)}; leave with {motion}"
+    short = {PAIRS: "pairs", AT_ONCE: "at once"}.get(at.law, f"energy {at.energy:.2f}")
+    return Cell(short, remark, {PAIRS: 0, AT_ONCE: 2}.get(at.law, 6))

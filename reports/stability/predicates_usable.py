@@ -16,7 +16,7 @@ MOST_RISE, MOST_OVERLAP = 0.05, 0.1  # of the energy at hand; radii
 def _usable(scenario: Scenario, played: Trajectory) -> Reading:
     parts = [part for part in (_rise(scenario, played), _overlap(scenario, played), _escape(scenario, played),
              _wrong_hits(scenario, played)) if part is not None]  # fmt: skip
-    return max(parts, key=lambda part: part.value)
+    return max(parts, key=lambda part: part.value, default=Reading(0.0))  # a disk alone can do nothing wrong
 
 
 def _rise(scenario: Scenario, played: Trajectory) -> Reading | None:

@@ -9,6 +9,7 @@ from math import atan, pi, sqrt
 from typing import NamedTuple
 
 from reports.stability.cases import CASES
+from reports.stability.cures import why_own
 from reports.stability.limits import NEVER_FAILS, Limit
 
 NEAR = 1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a hit lost by degrees
@@ -229,6 +230,9 @@ def explained(limits: Sequence[Limit]) -> list[Limit]:
 
 def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit:
     """The limit with its reason and with how that was tested: "" if it was not, or did not hold."""
+    if limit.case not in CASES:
+        text, tested = why_own(limit)
+        return replace(limit, reason=text, tested=tested)
     reason = reason_of(limit)
     if reason is None:
         return limit
