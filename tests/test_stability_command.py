@@ -21,7 +21,7 @@ from tests.test_page import CHROMIUM, FLAGS
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
 ROOT = Path(__file__).parent.parent
-ASKED = ("slow_hit", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_row")
+ASKED = ("slow_hit", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_break")
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,7 @@ def test_every_case_of_the_issue_is_there():
     wanted = {
         "tunnelling_head_on", "tunnelling_offset", "tunnelling_thin_wall", "tunnelling_thick_wall", "near_miss",
         "dt_gas_of_100", "bounce_drift", "slow_hit", "scale_up", "scale_down", "far_from_origin", "dense_gas",
-        "long_gas",
+        "long_gas", "long_wrapped_gas",
         "mass_ratio", "heavy_on_light", "heavy_in_gas", "column", "overlap_energy", "overlap_recovery", "overfull_box",
         "pile_comes_to_rest", "ball_comes_to_rest", "grazing", "spin", "stiff_push", "insertion_order", "restart",
         "thermometer", "equipartition",

@@ -80,13 +80,22 @@ class Cure(NamedTuple):
 HITS_WAIT = "a hit waits for the end of its step"
 CURES = {
     "at_home": Cure("box2d*", "offset", "positions are float32, too coarse so far out", "at the origin", at_home),
-    "faster": Cure("[pb]*", "*", "too slow for a time of the engine's own (threshold of restitution, rate of push-out)",
-                   "32 times as fast", faster),
-    "slower": Cure("[pb]*", "*", "too fast for a time of the engine's own (cap on speed, rate of push-out)", "32 times as slow", slower),
-    "larger": Cure("[pb]*", "*", "too small for a length of the engine's own (slop, margin, skin)",
-                   "32 times as large, at the same speeds", larger),
-    "smaller": Cure("[pb]*", "*", "too large for a length of the engine's own (cap on the way in a step, slop)",
-                    "32 times as small, at the same speeds", smaller),
+    "faster": Cure(
+        "[pb]*", "*", "too slow for a time of the engine's own (threshold of restitution, rate of push-out)",
+        "32 times as fast", faster,
+    ),
+    "slower": Cure(
+        "[pb]*", "*", "too fast for a time of the engine's own (cap on speed, rate of push-out)",
+        "32 times as slow", slower,
+    ),
+    "larger": Cure(
+        "[pb]*", "*", "too small for a length of the engine's own (slop, margin, skin)",
+        "32 times as large, at the same speeds", larger,
+    ),
+    "smaller": Cure(
+        "[pb]*", "*", "too large for a length of the engine's own (cap on the way in a step, slop)",
+        "32 times as small, at the same speeds", smaller,
+    ),
     "in_order": Cure("reference:[el]*", "*", HITS_WAIT, "as reference:ordered", player="reference:ordered"),
     "finer": Cure("*", "[!d]*", f"{HITS_WAIT}, and the step is too coarse for that", "in steps of an eighth", finer),
     **{
