@@ -155,7 +155,7 @@ def restarted(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
     return against(whole, replace(rest, trajectory=joined), scenario)
 
 
-PACKINGS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85)
+PACKINGS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85)  # at 0.851 the lattice is jammed: 0.85 takes long
 COUNTS = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
 LONG = (1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6)
 OTHER = "in its own order of insertion"
@@ -164,7 +164,7 @@ GAS = (
     Case(
         "dense_gas", FAMILY, "Up to which packing does a gas of 100 disks keep its energy over 200 steps?",
         "packing", "1", PACKINGS, dense, ENERGY_DRIFTS, drawn=True, also=("pymunk:matched+ten_iterations",),
-        quick_values=(0.1, 0.3, 0.6, 0.85), quick_runs=2, ratio=1.25,
+        quick_values=(0.1, 0.3, 0.6, 0.8), quick_runs=2, ratio=1.25,
     ),
     Case(
         "fast_gas", FAMILY, "How far may the disks of a gas of packing 0.3 fly in a step, over 300 steps?",
