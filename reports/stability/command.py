@@ -19,7 +19,7 @@ from reports.folders import FolderTaken, may_write, part_of, replace_folder
 from reports.journal import Busy, Journal
 from reports.stability.atlas import Atlas, Plan, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
-from reports.stability.limits import NEVER_FAILS, NEVER_WORKS, Limit
+from reports.stability.limits import Limit
 from reports.stability.maps import MAPS
 from reports.stability.page import write_page
 from reports.stability.touching import TOUCHING, AtGap
@@ -119,7 +119,7 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
         cells = [in_words(found[name, player]) if (name, player) in found else "" for player in players]
         rows.add_row(f"{Path(name).name}, {case_named(name).parameter}", *cells)
     console.print(rows)
-    console.print("A number: fails there. –: does not fail as far as was tried. never: fails everywhere.")
+    console.print("A number: fails there. –: does not fail so far. never: fails everywhere. *: works again beyond.")
     console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
     lost = [f"{one.case} on {one.player}" for one in limits if one.status != "ok"]
     lost += [f"{one.name} on {one.player}" for one in atlas.maps if one.status != "ok"]
@@ -131,8 +131,4 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
 
 def in_words(limit: Limit) -> str:
     """The limit in a few letters."""
-    if limit.verdict == NEVER_FAILS:
-        return "–"
-    if limit.verdict == NEVER_WORKS:
-        return "never" if limit.status == "ok" else limit.status
-    return number(limit.fails_at) + ("" if limit.monotone else "*")
+    return limit.word or number(limit.fails_at) + ("" if limit.monotone else "*")

@@ -153,6 +153,15 @@ class Limit:
         return next((trial for trial in self.trials if trial.value == self.fails_at), None)
 
     @property
+    def word(self) -> str:
+        """What stands in a table where there is no limit, "" where there is one."""
+        if self.status != "ok":
+            return self.status
+        if self.verdict == NEVER_WORKS:
+            return "refused" if self.failing is not None and self.failing.broken == "refused" else "never"
+        return "–" if self.verdict == NEVER_FAILS else ""
+
+    @property
     def why(self) -> str:
         """The reason, called likely where nothing tested it."""
         known = self.tested or not self.reason or self.reason.startswith(NOT_KNOWN)

@@ -56,9 +56,9 @@ def cell_of(section: Section, player: str) -> Cell:
         return Cell("")
     remark = f"{limit.verdict}. {why(limit)}"
     if limit.verdict == NEVER_FAILS:
-        return Cell("–", f"does not fail up to {number(limit.works_at)}", 0)
-    if limit.status != "ok" or limit.verdict == NEVER_WORKS:
-        return Cell("never" if limit.status == "ok" else limit.status, remark, -1, True)
+        return Cell(limit.word, f"does not fail up to {number(limit.works_at)}", 0)
+    if limit.word:
+        return Cell(limit.word, remark, -1, True)
     values = list(section.case.values)
     harsher = 1 if values[-1] > values[0] else -1
     passed = sum(harsher * value < harsher * limit.fails_at for value in values) / len(values)
@@ -112,12 +112,16 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     tested = [limit for limit in failing if limit.tested]
     found.append(
         f"The reasons of {len(tested)} of the {len(failing)} limits were tested: the limit follows from the reason, "
-        "or a player that differs in that one thing gets farther. The others are called likely."
+        "or a player that differs in that one thing gets farther, or the failing run works without it. The others are "
+        "called likely, or not known."
     )
     odd = [limit for limit in mine if not limit.monotone]
     if odd:
         names = ", ".join(dict.fromkeys(f"{limit.player} in {limit.case}" for limit in odd[:3]))
-        found.append(f"{len(odd)} work again beyond a value at which they fail (marked *), as {names}.")
+        found.append(
+            f"{len(odd)} of the searches found a player that works again beyond a value at which it fails (marked *), "
+            f"as {names}."
+        )
     return found
 
 
