@@ -126,10 +126,10 @@ MAPS = {
             play=with_iterations,
         ),
         Map(
-            "packing_and_dt", "How much energy does a gas of 36 disks lose or gain in 150 steps?",
-            "packing", "v dt / R", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8),
-            (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0),
-            lambda x, y, run: gas(x, run, steps=150, step=y), ENERGY_DRIFTS, runs=1,
+            "packing_and_dt", "How much energy does a gas of 36 disks lose or gain in 100 steps?",
+            "packing", "v dt / R", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75),
+            (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0),
+            lambda x, y, run: gas(x, run, steps=100, step=y), ENERGY_DRIFTS, runs=1,
         ),
     )
 }  # fmt: skip
