@@ -23,7 +23,7 @@ from reports.stability.atlas import Task, failed, limit_from, row_of
 from reports.stability.cases import CASES
 from reports.stability.cases_gas import gas
 from reports.stability.cases_hits import at_speed
-from reports.stability.failures import FRAMES, keep_failure, kept_failure, near, part_of
+from reports.stability.failures import AFTER, BEFORE, keep_failure, kept_failure, near, part_of
 from reports.stability.limits import FULL, QUICK, Case, Limit, Search, Trial
 from reports.stability.players import play_as
 from reports.stability.predicates import Predicate, Reading, judge
@@ -193,7 +193,7 @@ def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
 
 
 def test_of_a_failing_run_only_what_is_shown_is_kept_and_it_shows_the_same(tmp_path: Path):
-    """Of 4000 samples the 240 around the failure, with the hits among them; packed for the page as the whole would."""
+    """Of 4000 samples the 160 around the failure, with the hits among them; packed for the page as the whole would."""
     scenario = gas(0.3, 0, rows=3, columns=3, steps=4000, every=1)
     run = play_as("reference:exercise", scenario)
     whole = run.trajectory
@@ -208,7 +208,7 @@ def test_of_a_failing_run_only_what_is_shown_is_kept_and_it_shows_the_same(tmp_p
     assert kept is not None
     assert kept[1] is None
     part, shown = kept[0], near(failing, scenario)
-    assert len(part) == len(shown) == 2 * FRAMES + 1
+    assert len(part) == len(shown) == BEFORE + AFTER + 1
     assert 0 < len(part.collisions) < len(whole.collisions) / 10
     assert np.array_equal(part.position, whole.position[shown])
     packs = [pack_layers(scenario, [(run, one)], shown, {"view": []}) for one in (part, whole)]

@@ -157,7 +157,7 @@ def restarted(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
 
 PACKINGS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85)  # at 0.851 the lattice is jammed: 0.85 takes long
 COUNTS = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
-LONG = (1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6)
+LONG = (1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6)
 OTHER = "in its own order of insertion"
 
 GAS = (
