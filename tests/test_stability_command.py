@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 import shutil
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 from playwright.sync_api import ConsoleMessage, Page, sync_playwright
 
+from reports import cli
 from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
@@ -156,6 +158,15 @@ def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, atlas: Path):
     assert not re.search(r"(?:src|href)=\"https?:", html)
     one = MAPS["dt_and_speed"]
     assert page.locator(".grid tbody td").count() == 2 * len(one.x) * len(one.y)
+
+
+def test_the_atlas_and_the_report_point_at_each_other_where_they_are_made(atlas: Path):
+    """From folder to folder of the defaults; both ways."""
+    report, limits = Path("reports/out/latest/report.html"), Path("reports/out/stability/stability.html")
+    parameter = inspect.signature(cli.stability).parameters["out"].default
+    assert (cli.DEFAULT_OUT, parameter) == (report.parent, limits.parent)
+    assert 'href="../latest/report.html"' in (atlas / "stability.html").read_text()
+    assert 'href="../stability/stability.html"' in (ROOT / "reports" / "page.html.j2").read_text()
 
 
 def test_every_case_of_the_issue_is_there():
