@@ -94,7 +94,7 @@ def _beside(what: str, blocks: Array, ought: float, whose: str, disk: int = -1) 
     """A mean beside what it should be, in `MOST_OFF`, less what chance may do."""
     ratio, error = float(blocks.mean()) / ought, block_error(blocks) / ought
     off = max(0.0, abs(ratio - 1) - ERRORS * error) / MOST_OFF
-    return Reading(off, event=f"{ratio:.3f} +- {error:.3f} times {whose}", broken=what, disk=disk)
+    return Reading(off, event=f"{ratio:.3f} ± {error:.3f} times {whose}", broken=what, disk=disk)
 
 
 def _speeds(played: Trajectory) -> list[Reading]:
