@@ -139,12 +139,12 @@ def stored_scene(folder: Path, name: str) -> Path:
     return folder / "scenes" / f"{name}.toml"
 
 
-def packed(trajectory: Trajectory) -> bytes:
-    """An .npz with the arrays of `Trajectory`; its hits as collision_t, _i, _j, _impulse."""
+def packed(trajectory: Trajectory, small: bool = False) -> bytes:
+    """An .npz with the arrays of `Trajectory`; its hits as collision_t, _i, _j, _impulse. A small one takes longer."""
     arrays = {name: getattr(trajectory, name) for name in ("t", *STATE)}
     hits = {key: getattr(trajectory.collisions, name) for name, key in HITS.items()}
     file = io.BytesIO()
-    np.savez(file, **arrays, **hits)
+    (np.savez_compressed if small else np.savez)(file, **arrays, **hits)
     return file.getvalue()
 
 

@@ -127,8 +127,9 @@ def ratio_of(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) ->
 def layer(
     run: Run | None, trajectory: Trajectory, shown: NDArray[np.int64], scenario: Scenario
 ) -> tuple[dict[str, Any], bytes]:
-    """The head and the numbers of one layer; it ends where its trajectory ends."""
-    mine = shown[shown < len(trajectory)]
+    """The head and the numbers of one layer; it ends where its trajectory ends, of which it may be a part."""
+    first = round(trajectory.t[0] / scenario.sample_interval)
+    mine = shown[shown < first + len(trajectory)] - first
     position = trajectory.position[mine].reshape(len(mine), -1, 2)
     finite = np.nan_to_num(position, nan=0.0, posinf=1e9, neginf=-1e9)
     low, high = finite.min(axis=(0, 1)), finite.max(axis=(0, 1))
@@ -144,7 +145,7 @@ def layer(
     if marks:
         instant = np.rint(np.clip(hits.t / scenario.duration, 0, 1) * STEPS)
         body += np.concatenate([instant, hits.i, np.where(hits.j < 0, STEPS, hits.j)]).astype("<u2").tobytes()
-    ends = "" if len(trajectory) > scenario.samples else f"{trajectory.t[-1]:.4g}"
+    ends = "" if len(mine) == len(shown) else f"{trajectory.t[-1]:.4g}"
     head = {
         "name": name_of(run), "frames": len(mine), "low": [float(x) for x in low], "span": [float(x) for x in span],
         "turns": turns, "marks": marks, "hits": len(hits), "ends": ends,

@@ -9,8 +9,9 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from gases import compressibility, gas
+from gases import gas
 
+from reports.stability.hard_disks import compressibility
 from scenarios.events import EventEngine
 
 TABLE = Path(__file__).parent / "event_figures.csv"

@@ -9,21 +9,6 @@ from scenarios.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
 from scenarios.model import Scene
 from scenarios.placing import box, scatter
 
-# B_k / B_2^(k-1) of hard disks, k = 1 .. 10 (Clisby & McCoy, J. Stat. Phys. 122, 15, 2006).
-VIRIALS = [1, 1, (16 / 3 - 4 * np.sqrt(3) / np.pi) / 4, 0.53223180, 0.33355604, 0.1988425, 0.1148728, 0.0649930,
-           0.0362193, 0.0199537]  # fmt: skip
-
-
-def compressibility(packing: float) -> float:
-    """Z = p V / (N kT): the virial series in the packing, resummed as a Pade approximant [4/5]."""
-    series = np.array(VIRIALS) * 2.0 ** np.arange(10)
-    matrix = np.array(
-        [[series[5 + row - col] if 5 + row - col >= 0 else 0.0 for col in range(1, 6)] for row in range(5)]
-    )
-    below = np.append(1.0, np.linalg.solve(matrix, -series[5:10]))
-    above = [sum(below[m] * series[k - m] for m in range(min(k, 5) + 1)) for k in range(5)]
-    return float(np.polyval(above[::-1], packing) / np.polyval(below[::-1], packing))
-
 
 def gas(n: int, packing: float, seed: int = 0) -> tuple[Scene, np.ndarray]:
     """Disks of diameter and mass 1, kT = 1 and no momentum, on a triangular lattice; and their torus (2, 2)."""

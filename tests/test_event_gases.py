@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from event_figures import PACKINGS, measured, read
-from gases import compressibility
+
+from reports.stability.hard_disks import compressibility
 
 
 def check(row, tolerance):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 import shutil
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page
 
+from reports import cli
 from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
@@ -21,7 +23,7 @@ from tests.command_line import crosscheck
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
 ROOT = Path(__file__).parent.parent
-ASKED = ("slow_hit", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_row")
+ASKED = ("slow_hit", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_break")
 
 
 @pytest.fixture(scope="module")
@@ -146,12 +148,21 @@ def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, atlas: Path):
     assert page.locator(".grid tbody td").count() == 2 * len(one.x) * len(one.y)
 
 
+def test_the_atlas_and_the_report_point_at_each_other_where_they_are_made(atlas: Path):
+    """From folder to folder of the defaults; both ways."""
+    report, limits = Path("reports/out/latest/report.html"), Path("reports/out/stability/stability.html")
+    parameter = inspect.signature(cli.stability).parameters["out"].default
+    assert (cli.DEFAULT_OUT, parameter) == (report.parent, limits.parent)
+    assert 'href="../latest/report.html"' in (atlas / "stability.html").read_text()
+    assert 'href="../stability/stability.html"' in (ROOT / "reports" / "page.html.j2").read_text()
+
+
 def test_every_case_of_the_issue_is_there():
     """The names under which the eighteen cases stand."""
     wanted = {
         "tunnelling_head_on", "tunnelling_offset", "tunnelling_thin_wall", "tunnelling_thick_wall", "near_miss",
         "dt_gas_of_100", "bounce_drift", "slow_hit", "scale_up", "scale_down", "far_from_origin", "dense_gas",
-        "long_gas",
+        "long_gas", "long_wrapped_gas",
         "mass_ratio", "heavy_on_light", "heavy_in_gas", "column", "overlap_energy", "overlap_recovery", "overfull_box",
         "pile_comes_to_rest", "ball_comes_to_rest", "grazing", "spin", "stiff_push", "insertion_order", "restart",
         "thermometer", "equipartition",

@@ -14,7 +14,7 @@ from reports.stability.cases_alone import ball, far, on_spring, oscillator
 from reports.stability.limits import QUICK, Limit, Search
 from reports.stability.players import play_as
 from reports.stability.predicates import apex_drift
-from reports.stability.touching import TOUCHING, law_of
+from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, answers, law_of, named
 from scenarios.model import Trajectory
 
 PARTNERS = [f"{engine}:{profile}" for engine in ("box2d", "box2d_v3") for profile in ("shipped", "matched")]
@@ -171,23 +171,52 @@ def test_a_wrong_threshold_would_be_noticed():
     assert not min(found.works_at, found.fails_at) <= 1.0 <= max(found.works_at, found.fails_at)
 
 
+GAPS_TRIED = (0.0, 0.01, 0.1)
+
+
 @pytest.mark.parametrize(
-    ("scene", "player", "law"),
+    ("scene", "player", "words"),
     [
-        ("touching_row", "pymunk:matched", "pair after pair"),
-        ("touching_row", "box2d:matched", "all contacts at once"),
-        ("touching_row", "box2d_v3:matched", "none"), ("touching_break", "reference:exercise", "pair after pair"),
-        ("touching_break", "pymunk:matched", "all contacts at once"), ("touching_break", "box2d_v3:matched", "none"),
+        ("touching_cradle_of_3", "reference:exercise", (PAIRS, PAIRS, PAIRS)),
+        ("touching_cradle_of_3", "pymunk:matched", (PAIRS, PAIRS, PAIRS)),
+        ("touching_cradle_of_3", "box2d:matched", (AT_ONCE, PAIRS, PAIRS)),
+        ("touching_cradle_of_3", "box2d_v3:matched", ("none", PAIRS, PAIRS)),
+        ("touching_cradle_of_5", "event_driven:float64", (PAIRS, PAIRS, PAIRS)),
+        ("touching_break", "reference:exercise", (PAIRS, PAIRS, PAIRS)),
+        ("touching_break", "pymunk:matched", (AT_ONCE, AT_ONCE, PAIRS)),
+        ("touching_break", "box2d:matched", (AT_ONCE, AT_ONCE, PAIRS)),
+        ("touching_break", "box2d_v3:matched", ("none", "none", PAIRS)),
     ],
-)  # fmt: skip
-def test_touching_disks_are_hit_after_the_law_that_the_engine_is_known_for(scene: str, player: str, law: str):
-    """engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to neither."""
-    assert law_of(scene, player).law == law
+)
+def test_touching_disks_are_hit_after_the_law_that_the_engine_is_known_for(scene: str, player: str, words: tuple):
+    """engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to neither.
+
+    From a gap on that is wider than the way in a step, a thirty-second of a radius, everybody plays pair after pair.
+    """
+    found = law_of(scene, player, GAPS_TRIED)
+
+    assert tuple(at.law for at in found.gaps) == words
+    for at in found.gaps:
+        assert at.momentum < 1e-6  # float32
+        assert (at.law == "none") == (abs(at.energy - 1) > 1e-3)
 
 
-def test_the_named_laws_keep_momentum_and_energy():
-    """Whatever is compared with is at least possible."""
-    for one in TOUCHING.values():
-        for velocity in (v for answers in one.laws.values() for v in answers):
-            assert velocity.sum(axis=0) == pytest.approx([1, 0], abs=1e-15)
-            assert (velocity**2).sum() == pytest.approx(1.0)
+def test_the_named_laws_keep_momentum_and_energy_at_every_gap():
+    """Whatever is compared with is at least possible; and a gap that goes to 0 comes to one of the answers there."""
+    for name, one in TOUCHING.items():
+        for gap in GAPS:
+            for velocity in (v for allowed in answers(name, gap).values() for v in allowed):
+                assert velocity.sum(axis=0) == pytest.approx([1, 0], abs=1e-12)
+                assert (velocity**2).sum() == pytest.approx(1.0)
+        [small] = answers(name, 1e-3)[PAIRS]
+        assert min(np.abs(small - v).max() for v in one.laws[PAIRS]) < 2e-3
+
+
+def test_a_player_that_keeps_to_no_law_is_not_given_one():
+    """The negative control: an answer in the middle between the two laws, and one that loses a twentieth."""
+    laws = answers("touching_break", 0.0)
+    pairs, at_once = laws[PAIRS][0], laws[AT_ONCE][0]
+
+    assert named(pairs, 0.0, laws).law == PAIRS
+    assert named((pairs + at_once) / 2, 0.0, laws).law == "none"
+    assert named(at_once * 0.95, 0.0, laws).law == "none"

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import os
+import zlib
 from collections.abc import Callable
-from dataclasses import replace
-from math import isnan
+from dataclasses import asdict, replace
+from math import isnan, nan
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from adapters.play import Run
+from reports.journal import plain
+from reports.replay import pack_layers
 from reports.runner import run_all
 from reports.stability.atlas import Task, failed, limit_from, row_of
 from reports.stability.cases import CASES
+from reports.stability.cases_gas import gas
 from reports.stability.cases_hits import at_speed
-from reports.stability.limits import FULL, QUICK, Case, Limit, Search
+from reports.stability.failures import AFTER, BEFORE, keep_failure, kept_failure, near, part_of
+from reports.stability.limits import FULL, QUICK, Case, Limit, Search, Trial
+from reports.stability.players import play_as
 from reports.stability.predicates import Predicate, Reading, judge
 from reports.stability.reasons import explained
 from reports.worker_process import Failure
@@ -165,11 +174,6 @@ def test_a_worker_that_dies_is_a_row_of_the_table():
 
 def test_a_limit_comes_back_from_the_journal_as_it_was():
     """Through JSON, where what is not a number is text."""
-    import json
-    from dataclasses import asdict
-
-    from reports.journal import plain
-
     for found in (limit_of(case(lambda x, _: x / 17, UP)), limit_of(case(lambda _x, _run: 2.0, UP))):
         again = limit_from(json.loads(json.dumps(plain(asdict(found)))))
         assert repr(again) == repr(found)
@@ -186,3 +190,53 @@ def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
     assert alone.tested == "predicts 1"
     assert wrong.tested == ""
     assert row_of(wrong)["reason"].startswith("likely: ")
+
+
+def test_of_a_failing_run_only_what_is_shown_is_kept_and_it_shows_the_same(tmp_path: Path):
+    """Of 4000 samples the 160 around the failure, with the hits among them; packed for the page as the whole would."""
+    scenario = gas(0.3, 0, rows=3, columns=3, steps=4000, every=1)
+    run = play_as("reference:exercise", scenario)
+    whole = run.trajectory
+    assert whole is not None
+    failing = Trial(0.3, 1, 1, 2.0, first=0, at=float(scenario.times[3000]))
+    found = Limit("gas", "reference:exercise", "quick", "never works", nan, 0.3, (failing,))
+    search = Search(CASES["fast_gas"], "reference:exercise", QUICK, seen={0.3: (scenario, run)})
+    (tmp_path / "trajectories").mkdir()
+    keep_failure(search, found, tmp_path)
+    kept = kept_failure(found, tmp_path)
+
+    assert kept is not None
+    assert kept[1] is None
+    part, shown = kept[0], near(failing, scenario)
+    assert len(part) == len(shown) == BEFORE + AFTER + 1
+    assert 0 < len(part.collisions) < len(whole.collisions) / 10
+    assert np.array_equal(part.position, whole.position[shown])
+    packs = [pack_layers(scenario, [(run, one)], shown, {"view": []}) for one in (part, whole)]
+    heads, numbers = zip(*(head_and_numbers(pack) for pack in packs))
+    assert [head["layers"][0]["frames"] for head in heads] == [len(shown)] * 2
+    assert [head["layers"][0]["ends"] for head in heads] == ["", ""]
+    assert heads[0]["t"] == heads[1]["t"]
+    moved = len(shown) * scenario.scene.n * 2 * 2  # uint16 each of x and y
+    assert numbers[0][:moved] == numbers[1][:moved]
+
+
+def head_and_numbers(pack: str) -> tuple[Any, bytes]:
+    """The two parts of what the page's player reads."""
+    whole = zlib.decompress(base64.b64decode(pack))
+    size = int.from_bytes(whole[:4], "little")
+    return json.loads(whole[4 : 4 + size]), whole[4 + size :]
+
+
+def test_a_run_that_broke_off_is_kept_up_to_there():
+    """What is shown beyond its end is not there, and the page says when it ended."""
+    scenario = gas(0.3, 0, rows=3, columns=3, steps=100, every=1)
+    whole = play_as("reference:exercise", scenario).trajectory
+    assert whole is not None
+    until = replace(whole, t=whole.t[:50], position=whole.position[:50], velocity=whole.velocity[:50],
+                    angle=whole.angle[:50], angular_velocity=whole.angular_velocity[:50])  # fmt: skip
+    shown = np.arange(40, 61)
+    part = part_of(until, shown, scenario)
+    head, _ = head_and_numbers(pack_layers(scenario, [(Run("made", "up", "gas", 1.0), part)], shown))
+
+    assert len(part) == 10
+    assert (head["layers"][0]["frames"], head["layers"][0]["ends"]) == (10, f"{part.t[-1]:.4g}")

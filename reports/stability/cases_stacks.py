@@ -96,6 +96,7 @@ def pile(x: float, run: int, _of: int) -> Scenario:
 
 
 INELASTIC = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05)
+OVERLAPS = ("overlap", "radii", (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99), overlapping)
 
 STACKS = (
     Case(
@@ -108,11 +109,11 @@ STACKS = (
     ),
     Case(
         "overlap_energy", FAMILY, "From how deep an overlap are two disks at rest thrown apart?",
-        "overlap", "radii", (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99), overlapping, EJECTED,
+        *OVERLAPS, EJECTED,
     ),
     Case(
         "overlap_recovery", FAMILY, "From how deep an overlap are two disks parted within a second?",
-        "overlap", "radii", (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99), overlapping, NOT_APART,
+        *OVERLAPS, NOT_APART,
     ),
     Case(
         "overfull_box", FAMILY, "How full may a box be before it bursts?",

@@ -7,7 +7,7 @@ from functools import partial
 
 from reports.stability.limits import Case
 from reports.stability.predicates_usable import USABLE
-from scenarios.catalogue import SCENARIOS, scenario
+from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 from scenarios.model import Scenario
 
 FAMILY = "The largest dt of the suite's scenes"
@@ -35,8 +35,8 @@ def ladder(one: Scenario) -> tuple[float, ...]:
 
 SUITE = tuple(
     Case(
-        f"dt_{name}", FAMILY, build().asks, "dt", "s", ladder(build()), partial(at_dt, name), USABLE, ratio=1.2,
-        quick_values=ladder(build())[1::2],
+        f"dt_{name}", FAMILY, build().asks, "dt", "s", ladder(build()), partial(at_dt, name), USABLE,
+        drawn=name in DRAWN, ratio=1.2, quick_values=ladder(build())[1::2], quick_runs=1,
     )
     for name, build in SCENARIOS.items()
 )  # fmt: skip

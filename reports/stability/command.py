@@ -19,10 +19,10 @@ from reports.folders import FolderTaken, may_write, part_of, replace_folder
 from reports.journal import Busy, Journal
 from reports.stability.atlas import Atlas, Plan, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
-from reports.stability.limits import NEVER_FAILS, NEVER_WORKS, Limit
+from reports.stability.limits import Limit
 from reports.stability.maps import MAPS
 from reports.stability.page import write_page
-from reports.stability.touching import TOUCHING
+from reports.stability.touching import TOUCHING, AtGap
 from reports.stability.vary import VARIES
 from reports.style import number
 from reports.terminal import Progress
@@ -71,8 +71,9 @@ def write_files(folder: Path) -> Atlas:
     """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
     atlas = read(folder)
     table(atlas.limits).to_csv(folder / "limits.csv", index=False)
-    laws = [(one.name, one.player, one.law, one.off) for one in atlas.laws]
-    pd.DataFrame(laws, columns=["scene", "player", "law", "off"]).to_csv(folder / "laws.csv", index=False)
+    laws = [(one.name, one.player, *at[:-1]) for one in atlas.laws for at in one.gaps]
+    columns = ["scene", "player", *AtGap._fields[:-1]]
+    pd.DataFrame(laws, columns=columns).to_csv(folder / "laws.csv", index=False)
     cells = [(one.name, one.player, *cell) for one in atlas.maps for cell in one.cells]
     columns = ["map", "player", "x", "y", "reading", "failed", "event"]
     pd.DataFrame(cells, columns=columns).to_csv(folder / "maps.csv", index=False)
@@ -118,7 +119,7 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
         cells = [in_words(found[name, player]) if (name, player) in found else "" for player in players]
         rows.add_row(f"{Path(name).name}, {case_named(name).parameter}", *cells)
     console.print(rows)
-    console.print("A number: fails there. –: does not fail as far as was tried. never: fails everywhere.")
+    console.print("A number: fails there. –: does not fail so far. never: fails everywhere. *: works again beyond.")
     console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
     lost = [f"{one.case} on {one.player}" for one in limits if one.status != "ok"]
     lost += [f"{one.name} on {one.player}" for one in atlas.maps if one.status != "ok"]
@@ -130,8 +131,4 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
 
 def in_words(limit: Limit) -> str:
     """The limit in a few letters."""
-    if limit.verdict == NEVER_FAILS:
-        return "–"
-    if limit.verdict == NEVER_WORKS:
-        return "never" if limit.status == "ok" else limit.status
-    return number(limit.fails_at) + ("" if limit.monotone else "*")
+    return limit.word or number(limit.fails_at) + ("" if limit.monotone else "*")

@@ -12,7 +12,7 @@ from reports.stability.players import PLAYERS, play_as
 from reports.stability.predicates import Predicate, Reading, judge
 from scenarios.model import Scenario
 
-EXACT = "the exact answer"
+EXACT, NOT_KNOWN = "the exact answer", "not known"
 LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND = "limit", "does not fail", "never works", "works only beyond"
 
 
@@ -128,6 +128,7 @@ class Limit:
         trials: every value tried, from gentle to harsh.
         monotone: False if it works again beyond a value at which it fails.
         seconds: of processor time that the search took.
+        cured: of a scene of one's own, the change of `CURES` with which the failing run works.
         reason, source, tested: why, where that stands, and how it was tested: "" is a likely reason.
     """
 
@@ -139,6 +140,7 @@ class Limit:
     fails_at: float
     trials: tuple[Trial, ...]
     monotone: bool = True
+    cured: str = ""
     reason: str = ""
     source: str = ""
     tested: str = ""
@@ -149,6 +151,21 @@ class Limit:
     def failing(self) -> Trial | None:
         """The trial at `fails_at`."""
         return next((trial for trial in self.trials if trial.value == self.fails_at), None)
+
+    @property
+    def word(self) -> str:
+        """What stands in a table where there is no limit, "" where there is one."""
+        if self.status != "ok":
+            return self.status
+        if self.verdict == NEVER_WORKS:
+            return "refused" if self.failing is not None and self.failing.broken == "refused" else "never"
+        return "–" if self.verdict == NEVER_FAILS else ""
+
+    @property
+    def why(self) -> str:
+        """The reason, called likely where nothing tested it."""
+        known = self.tested or not self.reason or self.reason.startswith(NOT_KNOWN)
+        return self.reason if known else f"likely: {self.reason}"
 
     @property
     def runs(self) -> int:

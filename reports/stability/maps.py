@@ -17,7 +17,8 @@ from reports.stability.cases_hits import flyby
 from reports.stability.cases_stacks import column
 from reports.stability.players import Switched, play_as
 from reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
-from reports.stability.predicates_crowds import ENERGY_DRIFTS, STANDS
+from reports.stability.predicates_crowds import STANDS
+from reports.stability.predicates_gas import ENERGY_DRIFTS
 from scenarios.model import Scenario
 
 
@@ -125,10 +126,10 @@ MAPS = {
             play=with_iterations,
         ),
         Map(
-            "packing_and_dt", "How much energy does a gas of 36 disks lose or gain in 150 steps?",
-            "packing", "v dt / R", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8),
-            (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0),
-            lambda x, y, run: gas(x, run, steps=150, step=y), ENERGY_DRIFTS, runs=1,
+            "packing_and_dt", "How much energy does a gas of 36 disks lose or gain in 100 steps?",
+            "packing", "v dt / R", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75),
+            (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0),
+            lambda x, y, run: gas(x, run, steps=100, step=y), ENERGY_DRIFTS, runs=1,
         ),
     )
 }  # fmt: skip

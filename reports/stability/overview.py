@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from adapters.engines import ENGINES
 from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit
 from reports.stability.maps import MAPS, MapOf
+from reports.stability.touching import AT_ONCE, PAIRS, AtGap
 from reports.style import number
 
 if TYPE_CHECKING:
@@ -55,9 +56,9 @@ def cell_of(section: Section, player: str) -> Cell:
         return Cell("")
     remark = f"{limit.verdict}. {why(limit)}"
     if limit.verdict == NEVER_FAILS:
-        return Cell("–", f"does not fail up to {number(limit.works_at)}", 0)
-    if limit.status != "ok" or limit.verdict == NEVER_WORKS:
-        return Cell("never" if limit.status == "ok" else limit.status, remark, -1, True)
+        return Cell(limit.word, f"does not fail up to {number(limit.works_at)}", 0)
+    if limit.word:
+        return Cell(limit.word, remark, -1, True)
     values = list(section.case.values)
     harsher = 1 if values[-1] > values[0] else -1
     passed = sum(harsher * value < harsher * limit.fails_at for value in values) / len(values)
@@ -66,10 +67,10 @@ def cell_of(section: Section, player: str) -> Cell:
 
 
 def why(limit: Limit) -> str:
-    """The reason, called likely where nothing tested it."""
+    """The reason as a sentence."""
     if not limit.reason:
         return "" if limit.verdict == NEVER_FAILS else "Not explained."
-    return limit.reason[0].upper() + limit.reason[1:] + "." if limit.tested else f"Likely: {limit.reason}."
+    return f"{limit.why[0].upper()}{limit.why[1:]}."
 
 
 def reasons(limits: Sequence[Limit]) -> list[Why]:
@@ -111,12 +112,16 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     tested = [limit for limit in failing if limit.tested]
     found.append(
         f"The reasons of {len(tested)} of the {len(failing)} limits were tested: the limit follows from the reason, "
-        "or a player that differs in that one thing gets farther. The others are called likely."
+        "or a player that differs in that one thing gets farther, or the failing run works without it. The others are "
+        "called likely, or not known."
     )
     odd = [limit for limit in mine if not limit.monotone]
     if odd:
         names = ", ".join(dict.fromkeys(f"{limit.player} in {limit.case}" for limit in odd[:3]))
-        found.append(f"{len(odd)} work again beyond a value at which they fail (marked *), as {names}.")
+        found.append(
+            f"{len(odd)} of the searches found a player that works again beyond a value at which it fails (marked *), "
+            f"as {names}."
+        )
     return found
 
 
@@ -140,3 +145,13 @@ def map_cell(value: float, failed: bool, broken: str, bound: float) -> Cell:
     return Cell(
         "×" if failed else "", f"{number(value)}{'; ' + broken if broken else ''}", sum(share > s for s in steps)
     )
+
+
+def law_cell(at: AtGap) -> Cell:
+    """The law that a player follows at a gap; coloured where it follows none."""
+    if not at.velocity:
+        return Cell(at.law, "", -1, True)
+    motion = "; ".join(f"({number(x, 2)}, {number(y, 2)})" for x, y in at.velocity)
+    remark = f"{number(at.off, 2)} off, energy {number(at.energy)}; leave with {motion}"
+    short = {PAIRS: "pairs", AT_ONCE: "at once"}.get(at.law, f"energy {at.energy:.2f}")
+    return Cell(short, remark, {PAIRS: 0, AT_ONCE: 2}.get(at.law, 6))

@@ -14,18 +14,17 @@ from plotly.offline import get_plotlyjs
 
 from adapters.play import Run
 from reports import style
-from reports.archive import load_trajectory
 from reports.charts import Drawing, Line, figure_of, shortened
 from reports.page import HERE, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
 from reports.replay import pack_layers, ratio_of
 from reports.stability import overview
-from reports.stability.atlas import Atlas, case_named, file_of
+from reports.stability.atlas import Atlas, case_named
+from reports.stability.failures import kept_failure, near, part_of
 from reports.stability.limits import EXACT, Case, Limit, Trial
 from reports.stability.maps import MAPS
-from reports.stability.touching import TOUCHING
+from reports.stability.touching import GAPS, TOUCHING
 from scenarios.model import Scenario, Trajectory
 
-FRAMES = 120  # samples that are shown before a failure, and after it
 SECONDS = 5.0  # a replay lasts
 
 
@@ -80,7 +79,8 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
     html = environment.get_template("stability.html.j2").render(
         sections=sections, families=overview.families(sections), findings=overview.findings(limits), about=atlas.header,
         players=[name for name in names if "+" not in name], looks=looks, cell_of=overview.cell_of,
-        maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, words=overview, exact=EXACT,
+        maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, gaps=GAPS,
+        words=overview, exact=EXACT,
         css=Markup(css() + (HERE / "stability" / "stability.css").read_text()),
         looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
@@ -97,15 +97,16 @@ def section_of(case: Case, limits: list[Limit], folder: Path) -> Section:
 
 def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
     """The first failing run at the limit, from just before the failure; None if nothing was kept."""
-    failing, path = limit.failing, folder / "trajectories" / file_of(limit)
-    if failing is None or not path.exists():
+    failing, kept = limit.failing, kept_failure(limit, folder)
+    if failing is None or kept is None:
         return None
+    played, other = kept
     scenario = case.scene(failing.value, failing.first, failing.runs)
-    played = load_trajectory(path)
-    layers: list[tuple[Run | None, Trajectory]] = [(named(limit), played)]
-    if (beside := beside_of(case, scenario, path)) is not None:
-        layers.append((None, beside))
     shown = near(failing, scenario)
+    layers: list[tuple[Run | None, Trajectory]] = [(named(limit), played)]
+    beside = truth_of(scenario, shown) if case.beside == EXACT else other
+    if beside is not None and len(beside):
+        layers.append((None, beside))
     pack = pack_layers(scenario, layers, shown, opening(failing, scenario, shown))
     says = f"{case.parameter} = {style.number(failing.value)}: {failing.event}"
     return Replay(limit.player, pack, ratio_of(scenario, layers), says)
@@ -117,22 +118,12 @@ def named(limit: Limit) -> Run:
     return Run(engine, profile, limit.case, 0.0)
 
 
-def beside_of(case: Case, scenario: Scenario, path: Path) -> Trajectory | None:
-    """What a failing run is shown beside: the truth at its samples, or the other run that was kept with it."""
-    if case.beside != EXACT:
-        return load_trajectory(path.with_name(f"truth.{path.name}"))
+def truth_of(scenario: Scenario, shown: np.ndarray) -> Trajectory | None:
+    """The exact answer at the samples `shown`, if there is one."""
     try:
-        return scenario.truth(scenario.times) if scenario.truth is not None else None
+        return part_of(scenario.truth(scenario.times), shown, scenario) if scenario.truth is not None else None
     except ValueError:  # NoTruth: there is none
         return None
-
-
-def near(failing: Trial, scenario: Scenario) -> np.ndarray:
-    """The samples around the failure, at most `FRAMES` on either side of it."""
-    at = failing.at if np.isfinite(failing.at) else 0.0
-    middle = int(np.clip(round(at / scenario.sample_interval), 0, scenario.samples))
-    first = max(0, min(middle - FRAMES, scenario.samples - 2 * FRAMES))
-    return np.arange(first, min(scenario.samples, first + 2 * FRAMES) + 1)
 
 
 def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, Any]:

@@ -16,7 +16,7 @@ MOST_RISE, MOST_OVERLAP = 0.05, 0.1  # of the energy at hand; radii
 def _usable(scenario: Scenario, played: Trajectory) -> Reading:
     parts = [part for part in (_rise(scenario, played), _overlap(scenario, played), _escape(scenario, played),
              _wrong_hits(scenario, played)) if part is not None]  # fmt: skip
-    return max(parts, key=lambda part: part.value)
+    return max(parts, key=lambda part: part.value, default=Reading(0.0))  # a disk alone can do nothing wrong
 
 
 def _rise(scenario: Scenario, played: Trajectory) -> Reading | None:
@@ -57,14 +57,12 @@ def _wrong_hits(scenario: Scenario, played: Trajectory) -> Reading | None:
     k = min(len(played), len(true))
     played, true = cut(played, k), cut(true, k)
     found = match(played.collisions, true.collisions, float(true.t[-1]), scenario.dt(scenario.substeps[0]))
-    at, what = found.first_wrong or (np.nan, "")
-    return Reading(
-        2.0 * (len(found.missed) + len(found.invented)),
-        at,
-        what,
-        "hits",
-        disk=int(what.split()[1].split("-")[0]) if what else -1,
-    )
+    if found.first_wrong is None:
+        return None
+    at, what = found.first_wrong
+    kind, pair = what.split(maxsplit=1)
+    wrong = len(found.missed) + len(found.invented)
+    return Reading(2.0 * wrong, at, f"{kind} hit: {pair}", "hits", disk=int(pair.split("-")[0]))
 
 
 USABLE = Predicate(

@@ -1,21 +1,30 @@
-"""Which law a player follows where touching disks are hit: named, never scored, for no limit of small gaps decides."""
+"""Which law a player follows where touching disks are hit, and how far they must be apart until the question is gone.
+
+Named, never scored: where disks touch, no limit of small gaps decides; where they do not, the exact answer does.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
-from typing import Any
+from functools import cache
+from math import ceil, nan, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from reports.stability.cases_hits import AFTER, LEAD, RADIUS
+from reports.stability.cases_hits import LEAD, RADIUS
 from reports.stability.players import play_as
 from scenarios.model import Array, Scenario
+from scenarios.oracle import with_oracle
 from scenarios.placing import lay_out
 
 NEAR = 0.02  # of the incoming speed: a player whose velocities are farther from every law follows none of them
-SPEED, DT = 8.0, 1 / 256  # an eighth of a radius a step; far above any threshold
+SPEED, DT = 8.0, 1 / 1024  # a radius in 32 steps: where a hit is found late, its normal is off; above any threshold
+AFTER = 24  # steps after the hit: a player may take a step a contact
 PAIRS, AT_ONCE = "pair after pair", "all contacts at once"
+
+
+GAPS = (0.0, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0)  # radii
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,50 +33,81 @@ class Touching:
 
     Attributes:
         asks: what happens, in a sentence.
-        position: (n, 2) in radii; disk 0 comes in along x at speed 1.
+        position: (n, 2) in radii, all touching; disk 0 comes in along x at speed 1.
+        parted: (n, 2) by how much a disk is moved for each radius of gap.
         laws: name -> velocities (n, 2) in units of the incoming speed; several where the order is free.
         source: of the laws.
     """
 
     asks: str
     position: Array
+    parted: Array
     laws: dict[str, list[Array]]
     source: str
 
 
+class AtGap(NamedTuple):
+    """What a player did at a gap in radii: the law it is nearest to, how far it is, and what it made of the start's.
+
+    `law` is "none" if it is farther than `NEAR` from every one; momentum: by how much it changed, of all there is;
+    energy: what is left of it; velocity: of the disks, over the incoming speed.
+    """
+
+    gap: float
+    law: str
+    off: float
+    momentum: float
+    energy: float
+    velocity: tuple[tuple[float, float], ...]
+
+
 @dataclass(frozen=True)
 class LawOf:
-    """What a player did: the law it is nearest to, "none" if that is farther than `NEAR`, and how far it is."""
+    """What a player did at every gap."""
 
     name: str
     player: str
-    law: str
-    off: float
-    velocity: tuple[tuple[float, float], ...]
+    gaps: tuple[AtGap, ...]
     status: str = "ok"
+
+    @property
+    def law(self) -> str:
+        """That it follows where the disks touch."""
+        return self.gaps[0].law if self.gaps else self.status
 
     @staticmethod
     def from_record(record: dict[str, Any]) -> LawOf:
-        """From a line of the journal."""
-        velocity = tuple((float(x), float(y)) for x, y in record["velocity"])
-        return LawOf(record["name"], record["player"], record["law"], float(record["off"]), velocity, record["status"])
+        """From a line of the journal, where what is not finite is text."""
+        gaps = []
+        for gap, law, *numbers, velocity in record["gaps"]:
+            off, momentum, energy = map(float, numbers)
+            gaps.append(AtGap(gap, law, off, momentum, energy, tuple((float(x), float(y)) for x, y in velocity)))
+        return LawOf(**record | {"gaps": tuple(gaps)})
+
+
+def cradle(n: int) -> Touching:
+    """A disk hits a row of n - 1."""
+    row = np.stack([2.0 * np.arange(n) - 2, np.zeros(n)], axis=-1)
+    apart = np.stack([np.maximum(0.0, np.arange(n) - 1), np.zeros(n)], axis=-1)
+    last, together = np.zeros((n, 2)), np.zeros((n, 2))
+    last[-1, 0] = 1.0
+    together[:, 0] = 2 / n
+    together[0, 0] -= 1
+    return Touching(
+        f"A disk hits a row of {n - 1}.", row, apart, {PAIRS: [last], AT_ONCE: [together]},
+        "equal masses swap velocities pair by pair; or e = 1 is asked of every contact in one solve",
+    )  # fmt: skip
 
 
 BREAK = np.array([[-1 / 8, -sqrt(3) / 8], [3 / 4, sqrt(3) / 4], [3 / 8, -sqrt(3) / 8]])
 MIRRORED = BREAK[[0, 2, 1]] * [1, -1]
 TOUCHING = {
-    "touching_row": Touching(
-        "A disk hits a row of two that touch.",
-        np.array([[-2.0, 0], [0, 0], [2, 0]]),
-        {
-            PAIRS: [np.array([[0.0, 0], [0, 0], [1, 0]])],
-            AT_ONCE: [np.array([[-1 / 3, 0], [2 / 3, 0], [2 / 3, 0]])],
-        },
-        "equal masses swap velocities pair by pair; or e = 1 is asked of every contact in one solve",
-    ),
+    "touching_cradle_of_3": cradle(3),
+    "touching_cradle_of_5": cradle(5),
     "touching_break": Touching(
-        "A disk hits two that touch, in their middle.",
+        "A disk hits two, in their middle.",
         np.array([[-sqrt(3), 0], [0, 1], [0, -1]]),
+        np.array([[0.0, 0], [0, 0], [sqrt(3) / 2, -1 / 2]]),
         {
             PAIRS: [BREAK, MIRRORED],
             AT_ONCE: [np.array([[-1 / 5, 0], [3 / 5, sqrt(3) / 5], [3 / 5, -sqrt(3) / 5]])],
@@ -77,27 +117,49 @@ TOUCHING = {
 }
 
 
-def scene_of(one: Touching) -> Scenario:
-    """Disk 0 flies in and is there in the middle of its fourth step."""
-    position = one.position * RADIUS
+def scene_of(one: Touching, gap: float) -> Scenario:
+    """Disk 0 flies in and is there in the middle of its fourth step; seen until the last hit is long over."""
+    position = (one.position + gap * one.parted) * RADIUS
     position[0, 0] -= SPEED * DT * (LEAD + 0.5)
     n = len(position)
     scene = lay_out(
         position=position, velocity=[[SPEED, 0], *np.zeros((n - 1, 2))], radius=np.full(n, RADIUS), mass=np.ones(n),
         restitution=1.0,
     )  # fmt: skip
-    steps = LEAD + 1 + AFTER
+    crossing = 4 * gap * RADIUS / (SPEED * DT)  # steps: four gaps, or one at a quarter of the speed
+    steps = LEAD + 1 + AFTER + ceil(crossing)
     return Scenario("touching", one.asks, one.source, scene, steps * DT, DT, (1,))
 
 
-def law_of(name: str, player: str) -> LawOf:
-    """Play a scene, and compare with every law."""
+@cache
+def answers(name: str, gap: float) -> dict[str, list[Array]]:
+    """Law -> the velocities (n, 2) it allows; of disks that do not touch, pair after pair is the exact answer."""
     one = TOUCHING[name]
-    run = play_as(player, scene_of(one))
-    if run.status != "ok" or run.trajectory is None:
-        return LawOf(name, player, f"refused: {run.reason}" if run.status == "unsupported" else run.status, np.nan, ())
-    velocity = run.trajectory.velocity[-1] / SPEED
-    off = {law: min(float(np.abs(velocity - v).max()) for v in answers) for law, answers in one.laws.items()}
+    if gap == 0:
+        return one.laws
+    scenario = with_oracle(scene_of(one, gap))
+    assert scenario.truth is not None
+    return one.laws | {PAIRS: [scenario.truth(scenario.times).velocity[-1] / SPEED]}
+
+
+def law_of(name: str, player: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
+    """Play a scene at every gap, and compare with every law."""
+    found = []
+    for gap in gaps:
+        run = play_as(player, scene_of(TOUCHING[name], gap))
+        if run.status != "ok" or run.trajectory is None:
+            found.append(AtGap(gap, "refused" if run.status == "unsupported" else run.status, nan, nan, nan, ()))
+            continue
+        velocity = run.trajectory.velocity[-1] / SPEED
+        found.append(named(velocity, gap, answers(name, gap)))
+    return LawOf(name, player, tuple(found))
+
+
+def named(velocity: Array, gap: float, laws: dict[str, list[Array]]) -> AtGap:
+    """The law that velocities (n, 2), in units of the incoming speed, are nearest to."""
+    off = {law: min(float(np.abs(velocity - v).max()) for v in allowed) for law, allowed in laws.items()}
     nearest = min(off, key=lambda law: off[law])
+    momentum = float(np.linalg.norm(velocity.sum(axis=0) - [1, 0]))
+    rows = tuple((float(x), float(y)) for x, y in velocity)
     law = nearest if off[nearest] <= NEAR else "none"
-    return LawOf(name, player, law, off[nearest], tuple((float(x), float(y)) for x, y in velocity))
+    return AtGap(gap, law, off[nearest], momentum, float((velocity**2).sum()), rows)

@@ -1,0 +1,147 @@
+"""Why a scene of one's own fails where it does: the failing run with one thing changed, until it works."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from fnmatch import fnmatch
+from typing import NamedTuple
+
+import numpy as np
+
+from reports.stability.limits import NOT_KNOWN, Limit, Search
+from reports.stability.players import play_as
+from reports.stability.predicates import judge
+from reports.stability.vary import at_offset, at_scale, at_tempo
+from scenarios.model import Scenario
+
+FINER = 8
+UNITS = 32.0  # a power of two: what knows no unit plays the same to the last bit, so that no change helps by chance
+
+
+def finer(one: Scenario) -> Scenario:
+    """The same in steps of an eighth."""
+    return replace(one, substeps=(one.substeps[0] * FINER,))
+
+
+def faster(one: Scenario) -> Scenario:
+    """The same film, 32 times as fast."""
+    return at_tempo(one, UNITS)
+
+
+def slower(one: Scenario) -> Scenario:
+    """The same film, 32 times as slow."""
+    return at_tempo(one, 1 / UNITS)
+
+
+def larger(one: Scenario) -> Scenario:
+    """The same, 32 times as large and as slow, so that speeds stay."""
+    return at_tempo(at_scale(one, UNITS), 1 / UNITS)
+
+
+def smaller(one: Scenario) -> Scenario:
+    """The same, 32 times as small and as fast."""
+    return at_tempo(at_scale(one, 1 / UNITS), UNITS)
+
+
+def at_home(one: Scenario) -> Scenario:
+    """The same with its middle at the origin along x."""
+    return at_offset(one, -float(np.mean(one.scene.position[:, 0])))
+
+
+def unchanged(one: Scenario) -> Scenario:
+    """The same."""
+    return one
+
+
+class Cure(NamedTuple):
+    """One change to a failing run.
+
+    Attributes:
+        players, varied: patterns of players and of what is varied, for which it is tried.
+        tells: why it failed, if it works with the change.
+        how: the change in words.
+        change: what is done to the scene.
+        player: who plays it instead; "" is the same.
+    """
+
+    players: str
+    varied: str
+    tells: str
+    how: str
+    change: Callable[[Scenario], Scenario] = unchanged
+    player: str = ""
+
+    def fits(self, player: str, varied: str) -> bool:
+        """Whether it is tried."""
+        return fnmatch(player, self.players) and fnmatch(varied, self.varied)
+
+
+HITS_WAIT = "a hit waits for the end of its step"
+CURES = {
+    "at_home": Cure("box2d*", "offset", "positions are float32, too coarse so far out", "at the origin", at_home),
+    "faster": Cure(
+        "[pb]*", "*", "too slow for a time of the engine's own (threshold of restitution, rate of push-out)",
+        "32 times as fast", faster,
+    ),
+    "slower": Cure(
+        "[pb]*", "*", "too fast for a time of the engine's own (cap on speed, rate of push-out)",
+        "32 times as slow", slower,
+    ),
+    "larger": Cure(
+        "[pb]*", "*", "too small for a length of the engine's own (slop, margin, skin)",
+        "32 times as large, at the same speeds", larger,
+    ),
+    "smaller": Cure(
+        "[pb]*", "*", "too large for a length of the engine's own (cap on the way in a step, slop)",
+        "32 times as small, at the same speeds", smaller,
+    ),
+    "in_order": Cure("reference:[el]*", "*", HITS_WAIT, "as reference:ordered", player="reference:ordered"),
+    "finer": Cure("*", "[!d]*", f"{HITS_WAIT}, and the step is too coarse for that", "in steps of an eighth", finer),
+    **{
+        f"{box}_swept": Cure(f"{box}:matched", "*", "disks are not swept against each other",
+                             f"as {box}:matched+bullets", player=f"{box}:matched+bullets")
+        for box in ("box2d", "box2d_v3")
+    },
+    **{
+        f"{engine}_matched": Cure(f"{engine}:shipped", "*", "a default of the engine that the matched profile changes",
+                                  f"as {engine}:matched", player=f"{engine}:matched")
+        for engine in ("pymunk", "box2d", "box2d_v3")
+    },
+}  # fmt: skip
+"""In the order in which they are tried: what shows one thing alone comes first, a finer step where nothing finer does.
+
+Where the step itself is varied, a finer one is no news.
+"""
+
+
+def cure_of(search: Search, limit: Limit) -> str:
+    """The first change with which the run that failed at the limit works; "" if none does, or nothing failed.
+
+    What an engine refuses is explained by itself.
+    """
+    seen = search.failure(limit)
+    if seen is None or seen[1].status == "unsupported":
+        return ""
+    scenario, _ = seen
+    for name, cure in CURES.items():
+        if cure.fits(search.player, search.case.parameter):
+            changed = cure.change(scenario)
+            if not judge(search.case.predicate, changed, play_as(cure.player or search.player, changed)).failed:
+                return name
+    return ""
+
+
+def why_own(limit: Limit) -> tuple[str, str]:
+    """Why a scene of one's own fails, and how that was tested: "" if it was not."""
+    failing, varied = limit.failing, limit.case.rsplit(":", 1)[-1]
+    if failing is None:
+        return "", ""
+    if cure := CURES.get(limit.cured):
+        return cure.tells, f"works {cure.how}"
+    if failing.broken == "refused":
+        return "the player refuses it", "it says so"
+    if varied == "dt" and failing.broken in ("penetration", "escape"):
+        return HITS_WAIT, ""
+    tried = [cure.how for cure in CURES.values() if cure.fits(limit.player, varied)]
+    return f"{NOT_KNOWN}; it also fails {', '.join(tried)}" if tried else NOT_KNOWN, ""

@@ -1,0 +1,72 @@
+"""Keeps of the first failing run at a limit what is shown: the samples around the failure, and the hits among them."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.archive import STATE, load_trajectory, packed
+from reports.replay import HITS
+from reports.stability.limits import EXACT, Limit, Search, Trial
+from scenarios.model import Collisions, Scenario, Trajectory, frozen
+
+BEFORE, AFTER = 120, 40  # samples of a failure that are shown
+
+
+def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
+    """Save the first failing run of a search, and the other run that it is judged by if there is one."""
+    failing, seen = limit.failing, search.failure(limit)
+    if failing is None or seen is None or seen[1].trajectory is None:
+        return
+    scenario, run = seen
+    assert run.trajectory is not None
+    path = file_of(limit, folder)
+    shown = near(failing, scenario)
+    path.write_bytes(packed(part_of(run.trajectory, shown, scenario), small=True))
+    if search.case.beside != EXACT:
+        assert scenario.truth is not None
+        beside_file(path).write_bytes(packed(part_of(scenario.truth(scenario.times), shown, scenario), small=True))
+
+
+def kept_failure(limit: Limit, folder: Path) -> tuple[Trajectory, Trajectory | None] | None:
+    """What was saved: the failing run and the one beside it; None if nothing was."""
+    path = file_of(limit, folder)
+    if not path.exists():
+        return None
+    beside = beside_file(path)
+    return load_trajectory(path), load_trajectory(beside) if beside.exists() else None
+
+
+def file_of(limit: Limit, folder: Path) -> Path:
+    """The file of the failing run."""
+    name = f"{limit.case}.{limit.player}".replace("/", "_").replace(":", "-")
+    name = name if len(name) < 200 else hashlib.sha256(name.encode()).hexdigest()[:16]
+    return folder / "trajectories" / f"{name}.npz"
+
+
+def beside_file(path: Path) -> Path:
+    """The file of the other run."""
+    return path.with_name(f"beside.{path.name}")
+
+
+def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
+    """The samples around the failure, up to `BEFORE` and `AFTER` it; where it is early or late, more of the others."""
+    at = failing.at if np.isfinite(failing.at) else 0.0
+    middle = int(np.clip(round(at / scenario.sample_interval), 0, scenario.samples))
+    first = max(0, min(middle - BEFORE, scenario.samples - BEFORE - AFTER))
+    return np.arange(first, min(scenario.samples, first + BEFORE + AFTER) + 1)
+
+
+def part_of(whole: Trajectory, shown: NDArray[np.int64], scenario: Scenario) -> Trajectory:
+    """A trajectory at the samples `shown` that it has, and what it hits meanwhile, if that is few enough to show."""
+    first, last = shown[0], shown[-1]
+    t, x, v, angle, spin = (frozen(getattr(whole, name)[first : last + 1]) for name in ("t", *STATE))
+    hits = whole.collisions
+    low, high = (k * scenario.sample_interval for k in (first - 0.5, last + 0.5))
+    among = (hits.t >= low) & (hits.t <= high)
+    among &= among.sum() <= HITS
+    columns = [getattr(hits, name)[among] for name in ("t", "i", "j", "impulse")]
+    return Trajectory(t, x, v, angle, spin, Collisions(*columns))

@@ -1,0 +1,138 @@
+"""What failing means for gases at e = 1: what drifts, and where they part from what the literature says of them."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports import laws
+from reports.stability.hard_disks import Gas, gas_in_box
+from reports.stability.predicates import Predicate, Reading, first_above, truth_of
+from scenarios.model import Array, Scenario, Trajectory
+
+BLOCKS = 10
+ERRORS = 4.0  # block errors: of ten blocks a mean is farther off by chance in 3 of 1000 readings (Student's t)
+MOST_OFF = 0.05  # of what the literature says, besides
+RANGES = 5  # of speed, each of which holds as many disks as the others
+
+
+def _energy_drifts(scenario: Scenario, played: Trajectory) -> Reading:
+    energy = laws.energy(played, scenario.scene)
+    off = np.abs(energy / energy[0] - 1)
+    factor = energy[-1] / energy[0]
+    at = first_above(played.t, off, ENERGY_DRIFTS.bound)
+    return Reading(float(off.max()), at, f"the energy is {factor:.4g} of what it was", disk=-1)
+
+
+def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
+    mass, velocity = scenario.scene.mass[:, None], played.velocity
+    momentum = (mass * velocity).sum(axis=1)
+    whole = np.linalg.norm(mass * velocity[0], axis=1).sum()
+    off = np.linalg.norm(momentum - momentum[0], axis=1) / whole
+    at = first_above(played.t, off, MOMENTUM_DRIFTS.bound)
+    return Reading(float(off.max()), at, f"momentum of {off.max():.3g} of all there is came from nowhere", disk=-1)
+
+
+def _gas_parts(scenario: Scenario, played: Trajectory) -> Reading:
+    apart = np.linalg.norm(played.position - truth_of(scenario).position, axis=2) / scenario.scene.radius
+    off = apart.max(axis=1)
+    worst = int(np.argmax(apart[-1]))
+    return Reading(
+        float(off.max()), first_above(played.t, off, GAS_PARTS.bound), f"disk {worst} is somewhere else", disk=worst
+    )
+
+
+def in_blocks(series: Array) -> Array:
+    """(`BLOCKS`, ...) means of a series (k, ...) over as many stretches of it; the first tenth is left out."""
+    settled = series[len(series) // 10 :]
+    return np.array([block.mean(axis=0) for block in np.array_split(settled, BLOCKS)])
+
+
+def block_error(blocks: Array) -> float:
+    """The standard error of the mean of (`BLOCKS`,)."""
+    return float(blocks.std(ddof=1)) / sqrt(len(blocks))
+
+
+def _temperatures_part(scenario: Scenario, played: Trajectory) -> Reading:
+    mass = scenario.scene.mass
+    kinetic = mass * (played.velocity**2).sum(axis=2) / 2
+    light, heavy = (kinetic[:, mass == kind].mean(axis=1) for kind in (mass.min(), mass.max()))
+    blocks = np.log2(in_blocks(heavy) / in_blocks(light))
+    off = max(0.0, abs(float(blocks.mean())) - ERRORS * block_error(blocks))
+    at = first_above(played.t, np.abs(np.log2(heavy / light)), 1.0)
+    return Reading(off, at, f"heavy disks are {2 ** blocks.mean():.3g} times as hot as light ones", disk=-1)
+
+
+def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
+    hits = played.collisions
+    ought = literature(scenario)
+    parts = _speeds(played)
+    parts.append(_beside("rate", counted(played, hits.j >= 0, np.ones(len(hits))), ought.rate, "Enskog's rate of hits"))
+    if not np.isnan(hits.impulse).any():  # Box2D 3.1 does not tell with what impulse it hits
+        pushed = counted(played, hits.j < 0, hits.impulse)
+        parts.append(_beside("pressure", pushed, ought.force, "the pressure of the virial series"))
+    return max(parts, key=lambda part: part.value)._replace(at=float(played.t[len(played) // 10]))
+
+
+def literature(scenario: Scenario) -> Gas:
+    """What the gas of equal disks of a scenario should do, at the temperature that it starts with."""
+    scene = scenario.scene
+    size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
+    temperature = scene.mass[0] * (scene.velocity**2).sum() / 2 / scene.n
+    return gas_in_box(scene.n, float(scene.radius[0]), size, float(temperature), float(scene.mass[0]))
+
+
+def counted(played: Trajectory, which: NDArray[np.bool_], weights: Array) -> Array:
+    """(`BLOCKS`,) sums of the weights of some hits, a second, in as many stretches after the first tenth."""
+    edges = np.linspace(0.1 * played.t[-1], played.t[-1], BLOCKS + 1)
+    return np.histogram(played.collisions.t[which], edges, weights=weights[which])[0] / np.diff(edges)
+
+
+def _beside(what: str, blocks: Array, ought: float, whose: str, disk: int = -1) -> Reading:
+    """A mean beside what it should be, in `MOST_OFF`, less what chance may do."""
+    ratio, error = float(blocks.mean()) / ought, block_error(blocks) / ought
+    off = max(0.0, abs(ratio - 1) - ERRORS * error) / MOST_OFF
+    return Reading(off, event=f"{ratio:.3f} ± {error:.3f} times {whose}", broken=what, disk=disk)
+
+
+def _speeds(played: Trajectory) -> list[Reading]:
+    """How many disks have each range of speed, beside Maxwell's law."""
+    shares = in_blocks(shares_of_speeds(played))
+    words = ("the slowest", *("those between",) * (RANGES - 2), "the fastest")
+    return [
+        _beside("not Maxwell", shares[:, k], 1 / RANGES, f"the share that {words[k]} fifth should be")
+        for k in range(RANGES)
+    ]
+
+
+def shares_of_speeds(played: Trajectory) -> Array:
+    """(k, `RANGES`) share of the disks in each of the ranges of speed that should hold equally many.
+
+    Velocities of n equal disks at a given energy are spread evenly over a sphere in 2n dimensions: a disk has more than
+    the share s of the energy with the probability (1 - s)^(n - 1), which is Maxwell's exp(-m v2 / 2kT) for many.
+    """
+    energy = (played.velocity**2).sum(axis=2)
+    n = energy.shape[1]
+    share = energy / energy.sum(axis=1, keepdims=True)
+    rank = 1 - (1 - share) ** (n - 1)
+    bins = np.clip((rank * RANGES).astype(int), 0, RANGES - 1)
+    return (bins[:, :, None] == np.arange(RANGES)).mean(axis=1)
+
+
+ENERGY_DRIFTS = Predicate("energy drifts", "of the energy", 0.01, "energy comes or goes at e = 1", _energy_drifts)
+MOMENTUM_DRIFTS = Predicate(
+    "momentum drifts", "of all momenta", 1e-5, "momentum comes from nowhere: more than a hundred roundings in float32",
+    _momentum_drifts,
+)  # fmt: skip
+GAS_PARTS = Predicate("parts", "radii", 1e-3, "the same gas is somewhere else", _gas_parts)
+TEMPERATURES_PART = Predicate(
+    "temperatures part", "doublings", 0.5, "one kind of disk is hotter by half a doubling and 4 block errors",
+    _temperatures_part,
+)  # fmt: skip
+WRONG_GAS = Predicate(
+    "wrong gas", "of the bound", 1.0,
+    "Maxwell's speeds, Enskog's rate or the virial series' wall pressure are missed by 5 % and 4 block errors",
+    _wrong_gas,
+)  # fmt: skip

@@ -1,0 +1,156 @@
+"""The thermometer of the atlas: it reads the literature's numbers off an exact gas, and notices one that is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+
+from reports.stability.cases import CASES
+from reports.stability.cases_gas import RADIUS, gas, wrapped_run
+from reports.stability.hard_disks import compressibility, gas_in_box
+from reports.stability.players import play_as
+from reports.stability.predicates import judge
+from reports.stability.predicates_gas import (
+    BLOCKS,
+    ERRORS,
+    MOMENTUM_DRIFTS,
+    TEMPERATURES_PART,
+    WRONG_GAS,
+    block_error,
+    counted,
+    in_blocks,
+    literature,
+    shares_of_speeds,
+)
+from scenarios.model import Scenario, Trajectory, frozen
+
+EXACT = "event_driven:float64"
+LATE_AND_NOT = ("pymunk:matched", "reference:ordered")
+
+
+def played(player: str, scenario: Scenario) -> Trajectory:
+    """The whole run."""
+    run = play_as(player, scenario)
+    assert run.status == "ok"
+    assert run.trajectory is not None
+    return run.trajectory
+
+
+def verdict(predicate, scenario: Scenario, trajectory: Trajectory):
+    """The reading of a trajectory as if somebody had played it."""
+    run = play_as(EXACT, replace(scenario, duration=scenario.sample_interval))
+    return judge(predicate, scenario, replace(run, trajectory=trajectory))
+
+
+@pytest.mark.parametrize(("packing", "z"), [(0.1, 1.23614), (0.3, 2.06326), (0.5, 4.1063)])
+def test_the_virial_series_is_that_of_clisby_and_mccoy(packing: float, z: float):
+    """Their ten coefficients resummed; Henderson's (1 + eta2 / 8) / (1 - eta)2 is within 0.5 % up to 0.5."""
+    assert compressibility(packing) == pytest.approx(z, abs=1e-4)
+    assert compressibility(packing) == pytest.approx((1 + packing**2 / 8) / (1 - packing) ** 2, rel=5e-3)
+
+
+def test_in_a_large_box_the_rate_is_enskogs_and_the_pressure_that_of_the_bulk():
+    """4 / sqrt(pi) (Z - 1) sqrt(kT / m) / sigma hits a disk; a wall of a million diameters is no matter."""
+    radius, packing, n = 0.5, 0.3, 10**12
+    size = np.full(2, sqrt(n * pi * radius**2 / packing))
+    found, z = gas_in_box(n, radius, size, 1.0), compressibility(packing)
+
+    assert 2 * found.rate / n == pytest.approx(4 / sqrt(pi) * (z - 1), rel=1e-5)
+    assert found.force / (2 * size.sum()) == pytest.approx(z * n / size.prod(), rel=1e-5)
+
+
+@pytest.mark.parametrize("packing", [0.2, 0.4, 0.6])
+def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literature(packing: float):
+    """Two gases of a hundred disks, within 1 % (scaled particle theory, corners) and four block errors.
+
+    The negative control: the pressure of a bulk of the same packing, without a thought of walls, is not within that.
+    """
+    rates, forces = [], []
+    for run in range(2):
+        scenario = gas(packing, run, rows=10, columns=10, steps=8000, every=80)
+        one, ought = played(EXACT, scenario), literature(scenario)
+        hits = one.collisions
+        rates.append(counted(one, hits.j >= 0, np.ones(len(hits))) / ought.rate)
+        forces.append(counted(one, hits.j < 0, hits.impulse) / ought.force)
+    scene = scenario.scene
+    size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
+    temperature = (scene.velocity**2).sum() / 2 / scene.n
+    bulk = compressibility(packing) * packing / (pi * RADIUS**2) * temperature * 2 * size.sum() / ought.force
+
+    def within(blocks: np.ndarray) -> bool:
+        return abs(blocks.mean() - 1) < 0.01 + ERRORS * block_error(blocks)
+
+    assert within(np.concatenate(rates))
+    assert within(np.concatenate(forces))
+    assert not within(np.concatenate(forces) / bulk)
+
+
+def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
+    """All of it, for two draws; a gas hotter by a fifth hits more often by a tenth."""
+    for run in range(2):
+        scenario = CASES["thermometer"].scene(0.4, run, 2)
+        assert not judge(WRONG_GAS, scenario, play_as(EXACT, scenario)).failed
+    hot = replace(scenario, scene=replace(scenario.scene, velocity=scenario.scene.velocity * sqrt(1.2)))
+    reading = verdict(WRONG_GAS, scenario, played(EXACT, hot))
+
+    assert reading.failed
+    assert reading.broken in ("rate", "pressure")
+
+
+def test_speeds_that_are_not_maxwells_are_noticed():
+    """All disks equally fast, and all as drawn: only the second has a fifth of them in each fifth of the law."""
+    rng, k, n = np.random.default_rng(0), 500, 100
+    drawn = rng.normal(size=(k, n, 2))
+    angle = rng.uniform(0, 2 * pi, (k, n))
+    same = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    scenario = CASES["thermometer"].scene(0.4, 0, 2)
+    one = played(EXACT, scenario)
+    late = scenario.times[: k + 1][1:]
+    shares = {
+        name: in_blocks(shares_of_speeds(replace(one, t=late, velocity=frozen(velocity))))
+        for name, velocity in (("drawn", drawn), ("same", same))
+    }
+
+    assert shares["drawn"].shape == (BLOCKS, 5)
+    assert np.abs(shares["drawn"].mean(axis=0) - 0.2).max() < 0.005  # 50 000 draws: 0.0018
+    assert shares["same"].max() == 1.0
+    equal = one.velocity / np.linalg.norm(one.velocity, axis=2, keepdims=True)
+    speed = np.linalg.norm(one.velocity[0], axis=1)
+    assert verdict(WRONG_GAS, scenario, replace(one, velocity=frozen(equal * speed.mean()))).broken == "not Maxwell"
+
+
+def test_equipartition_holds_in_an_exact_gas_up_to_a_mass_ratio_of_1e4_and_a_hotter_kind_is_noticed():
+    """Block errors tell chance from heat: disks of twice the temperature fail, whatever their mass."""
+    for ratio in (1.5, 100.0, 1e4):
+        scenario = CASES["equipartition"].scene(ratio, 0, 2)
+        one = played(EXACT, scenario)
+        assert not verdict(TEMPERATURES_PART, scenario, one).failed
+        heavy = scenario.scene.mass == ratio
+        hotter = one.velocity * np.where(heavy, sqrt(2), 1.0)[:, None]
+        assert verdict(TEMPERATURES_PART, scenario, replace(one, velocity=frozen(hotter))).failed
+
+
+def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_noticed():
+    """float64 to 1e-14, float32 to 1e-6, in 1000 steps; one disk stopped at the end is one part in some twenty."""
+    scenario = wrapped_run(1000.0, 0, 1)
+    for player, bound in (("reference:exercise", 1e-14), ("pymunk:matched", 1e-14), ("box2d:matched", 1e-6),
+                          ("box2d_v3:matched", 1e-6)):  # fmt: skip
+        one = played(player, scenario)
+        reading = verdict(MOMENTUM_DRIFTS, scenario, one)
+        assert not reading.failed
+        assert reading.value < bound
+        velocity = np.array(one.velocity)
+        velocity[-1, 0] = 0.0
+        assert verdict(MOMENTUM_DRIFTS, scenario, replace(one, velocity=frozen(velocity))).failed
+
+
+def test_finding_hits_late_costs_a_dense_gas_its_rate():
+    """At packing 0.6 an engine that waits for the end of a step hits a tenth too seldom; in order within it, not."""
+    scenario = CASES["thermometer"].scene(0.6, 0, 2)
+    late, in_order = (judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in LATE_AND_NOT)
+
+    assert (late.failed, late.broken) == (True, "rate")
+    assert not in_order.failed
