@@ -119,6 +119,8 @@ class PythonSolver:
             what = f"ends the process (SystemExit: {error})"
         else:
             what = f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}"
+        if "for ^" in what:
+            what += "; a power is written **"
         if isinstance(error, SyntaxError) and error.filename == self.name:
             return SolverFailed("error", what, error.lineno or 0, error.offset or 0)
         mine = [f for f in traceback.TracebackException.from_exception(error).stack if f.filename == self.name]

@@ -7,7 +7,7 @@ import numpy as np
 from adapters.solver_file import SolverFailed
 from adapters.solver_process import SolverProcess
 from reports.check.questions import Answer, Ball, Question, ask
-from reports.check.rows import Row, judged, near, not_asked, shown
+from reports.check.rows import FOLLOWS, Row, judged, near, not_asked, shown
 
 DT = 1e-3  # s, the exercise's
 EDGES = {"right": (5.2, 0.1), "left": (-5.2, -0.1), "top": (0.1, 3.2), "bottom": (-0.1, -3.2)}  # m, a place beyond each
@@ -38,11 +38,8 @@ def loop_rows(process: SolverProcess, faulty: bool) -> list[Row]:
     came = ask(process, asked)
     failed = next((answer.failed for answer in came.values() if answer.failed), None)
     if failed:
-        return [
-            judged(
-                "step", "loop", "Does performSimStep come back?", "it fails", "yes", False, f"performSimStep: {failed}"
-            )
-        ]
+        cause = FOLLOWS if faulty else f"performSimStep: {failed}"
+        return [judged("step", "loop", "Does performSimStep come back?", "it fails", "yes", False, cause)]
     if faulty:
         rows = [not_asked("all spheres", "loop", "the functions that it calls have faults of their own")]
     else:

@@ -11,7 +11,7 @@ import numpy as np
 from adapters.solver_file import SolverFailed
 from adapters.solver_process import SolverProcess
 from adapters.student import spheres_of
-from reports.check.rows import TOLERANCE, Row, judged, near, not_asked, shown
+from reports.check.rows import FOLLOWS, TOLERANCE, Row, judged, near, not_asked, shown
 from scenarios.closed_forms import world_pushes
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
@@ -21,7 +21,6 @@ DT = 1e-3  # s, the exercise's
 INTERVAL = 0.02  # s
 SLACK = 2.0  # on a bound of first order in dt: what is left out is smaller by another dt v / r
 LIMIT = 2.0  # s that a sample interval may take
-FOLLOWS = "it follows from the faults above"
 
 
 class Played(NamedTuple):

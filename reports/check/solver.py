@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,11 @@ from adapters.solver_file import SolverFailed, read_solver
 from adapters.solver_process import SolverProcess
 from reports.check.detection import detection_rows
 from reports.check.functions import implemented
-from reports.check.impacts import explain
+from reports.check.impacts import APPROACH, BACKWARDS, explain
 from reports.check.impulse import impulse_not_asked, impulse_rows
 from reports.check.loop import loop_rows
 from reports.check.motion import motion_rows
-from reports.check.projection import projection_rows
+from reports.check.projection import projection_rows, pulled
 from reports.check.questions import HITS, QUESTIONS, Answer, ask
 from reports.check.restitution import Restitution, restitution_of
 from reports.check.rows import Row, judged, not_asked
@@ -97,13 +98,15 @@ def task_2(process: SolverProcess, answers: dict[str, Answer], text: str) -> tup
     if not usable:
         why = "the collision function cannot be judged further"
         return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None
-    rows += detection_rows(mine)
+    rows += detection_rows(mine, text)
     if not reacts(mine):
         why = "the overlapping pairs of these questions are taken to be apart"
         return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None
     restitution = restitution_of(text, mine)
     found = explain(mine, restitution)
-    rows += projection_rows(mine, found is not None and bool(found.impulse or found.update) and found.task != "2b")
+    if found is not None and found.impulse == APPROACH and pulled(mine):
+        found = replace(found, impulse=BACKWARDS)
+    rows += projection_rows(mine, found)
     return rows + impulse_rows(mine, restitution, found), restitution
 
 

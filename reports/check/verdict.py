@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.solver_file import NotASolver
-from reports.check.rows import TASKS, Row, Verdict, worst
-from reports.check.scenes import FOLLOWS
+from reports.check.rows import FOLLOWS, TASKS, Row, Verdict, worst
 from reports.check.solver import examine
 
 MOST = 3  # sentences
