@@ -182,10 +182,11 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     const moved = a.position.x !== ax || a.position.y !== ay || b.position.x !== bx || b.position.y !== by;
     if (kicked) {
       const sign = du * (ax - bx) + dv * (ay - by) < 0 ? -1 : 1;
-      world.hits[world.hits.length] = `[${world.steps},${i},${j},${sign * a.mass * sqrt(du * du + dv * dv)}]`;
+      world.hits[world.hits.length] = `[${world.steps},${i},${j},${text(sign * a.mass * sqrt(du * du + dv * dv))}]`;
     }
     if ((kicked || moved || overlaps) && world.log.length < 400) {
-      world.log[world.log.length] = `[${world.steps},${i},${j},${ax},${ay},${au},${av},${bx},${by},${bu},${bv},`
+      world.log[world.log.length] = `[${world.steps},${i},${j},${text(ax)},${text(ay)},${text(au)},${text(av)},`
+        + `${text(bx)},${text(by)},${text(bu)},${text(bv)},`
         + `${text(a.position.x)},${text(a.position.y)},${text(a.velocity.x)},${text(a.velocity.y)},`
         + `${text(b.position.x)},${text(b.position.y)},${text(b.velocity.x)},${text(b.velocity.y)}]`;
     }

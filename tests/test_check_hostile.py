@@ -70,6 +70,10 @@ LOADING = {
     "syntax_crlf.js": ("\ufeffvar a = 1;\r\nlet b = ;\r\n", "SyntaxError: Unexpected token ';' (line 2, column 9)"),
     "escape.js": (r"throw new Error('\x1b[31m\u202e\x07')", r"Error: \x1b[31m\u202e\x07 (line 1"),
     "escape.py": (r"raise ValueError('\x1b[31m\n\x07')", r"ValueError: \x1b[31m\n\x07 (line 1"),
+    "export.js": ("export " + JS[JS.index("function") :], "plain script, which has no modules; leave it out (line 1"),
+    "import.js": ("import { vec2 } from './gl-matrix.js';\n" + JS, "plain script, which has no modules; leave it out"),
+    "module.js": (JS + "module.exports = { integrate };", "module is not defined: the exercise's page loads"),
+    "page.js": ("document.title = 'mine';\n" + JS, "document is not defined: a solver is run without page"),
     "unclosed.js": (JS[:-3], "SyntaxError"),
     "throws.js": (JS + "\n  nothing.x = 1;\n", "ReferenceError: nothing is not defined (line 93, column 3)"),
     "endless_load.py": ("while True: pass\n" + PY, "does not come back within 4 s while it is loaded"),
@@ -105,7 +109,9 @@ CALLS = {
     "nan.js": (within(JS, "integrate", "sphere.velocity.x = NaN;"), "NaN"),
     "infinity.js": (within(JS, "integrate", "sphere.velocity.x = Infinity;"), "infinite"),
     "typo.js": (JS.replace("sphere.velocity.x +=", "sphere.velocty.x +="), "(reading 'x') (line 38, column 10)"),
-    "vec2.js": (within(JS, "integrate", "vec2.create();"), "vec2 is not defined: gl-matrix is not provided"),
+    "vec2.js": (within(JS, "integrate", "vec2.normalise();"), "vec2.normalise is not a function (line 38, column 6)"),
+    "strings.js": (JS.replace("x += sphere.force.x", "x += '' + sphere.force.x"), "velocity: it is no number"),
+    "array.js": (within(JS, "integrate", "sphere.position = [1, 2];"), "position: it is no number"),
     "clock.js": (within(JS, "integrate", "var t = Date.now();"), "run without page, network and clock"),
     "endless_integrate.py": (within(PY, "integrate", "    while True: pass"), "does not come back within 1 s"),
     "stubborn.py": (
@@ -138,6 +144,7 @@ def test_a_function_that_never_comes_back_does_not_hide_the_other(results: Resul
 
 
 REPLACED = {
+    "Math.hypot": "Math.hypot = vec2.length;\n",
     "Math.sqrt": "Math.sqrt = function (x) { return 1; };\n",
     "Math": "Math = { PI: 3, sqrt: function () { return 2; }, random: function () {}, pow: function () {} };\n",
     "Object.prototype.x": "Object.prototype.x = 7;\n",
@@ -166,6 +173,8 @@ HARMLESS = {
     "reads_stdin.py": within(PY, "integrate", "    import sys; sys.stdin.read()").encode(),
     "const.js": JS.replace("numAsteroids = 20;", "const numAsteroids = 20;\nlet earth, ufo, asteroids;").encode(),
     "strict.js": (STRICT + JS).encode(),
+    "node.js": (JS + "if (typeof module !== 'undefined') module.exports = { integrate };").encode(),
+    "own_vec2.js": (JS + "const vec2 = { own: true };\nfunction vec3() {}").encode(),
 }  # fmt: skip
 
 

@@ -87,7 +87,7 @@ def integrated(question: Question, came: Answer, alone: Answer) -> Row:
     moved = np.subtract(end.x, start.x)
     wrong = [
         k for k, (b, a) in enumerate(zip(question.balls, came.last))
-        if not (near(np.subtract(a.x, b.x), moved, 1e-3) and near(a.v, end.v) and near(a.w, end.w))
+        if not (near(a.x, np.add(b.x, moved)) and near(a.v, end.v) and near(a.w, end.w))
     ]  # fmt: skip
     if not wrong:
         return judged("all spheres", "loop", asked, "yes", "yes", True)

@@ -124,8 +124,8 @@ def law_row(
     cause = (found or "").format(**words)
     if name == "spin":
         cause = cause.replace("the force", "the torque").replace("F/m", "torque/MoI")
-    if cause and not np.isfinite(np.asarray(came[0], float)).all():
-        cause = "it is no number"
+    if not np.isfinite(np.asarray(came[0], float)).all():
+        cause = "it is no number (a field that does not exist, text, a division by zero?)"
     return judged(name, "1", asked, f"{shown(came[0])} {unit}", f"{shown(right)} {unit}", found == "", cause)
 
 

@@ -22,8 +22,8 @@ PRODUCTS: dict[str, Callable[[float, float, float, float, float], float]] = {
     "is not multiplied by n": lambda v, across, other, n, m: v,
 }
 PLACES = {  # (0: A, 1: B; 0: x, 1: y)
-    "vA.x n.x": {(0, 0)}, "vA.y n.y": {(0, 1)}, "vB.x n.x": {(1, 0)}, "vB.y n.y": {(1, 1)},
     "(vA.x - vB.x) n.x": {(0, 0), (1, 0)}, "(vA.y - vB.y) n.y": {(0, 1), (1, 1)},
+    "vA.x n.x": {(0, 0)}, "vA.y n.y": {(0, 1)}, "vB.x n.x": {(1, 0)}, "vB.y n.y": {(1, 1)},
     "vA.n": {(0, 0), (0, 1)}, "vB.n": {(1, 0), (1, 1)},
 }  # fmt: skip
 

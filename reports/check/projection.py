@@ -47,6 +47,8 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "only the size of A is used": lambda s, a, b: a.r - s.distance,
     "only the size of B is used": lambda s, a, b: b.r - s.distance,
     "the shares are the inverse masses, which do not add up to 1": lambda s, a, b: s.overlap * (1 / a.m + 1 / b.m),
+    "both are moved by the share of A": lambda s, a, b: 2 * s.overlap * a.m / (a.m + b.m),
+    "both are moved by the share of B": lambda s, a, b: 2 * s.overlap * b.m / (a.m + b.m),
     "the shares are the masses, which do not add up to 1": lambda s, a, b: s.overlap * (a.m + b.m),
 }
 
@@ -149,7 +151,8 @@ def across_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
     moved = [way_of([(b[who], b[1 - who], after[who]) for b, _, after in seen]) for who in (0, 1)]
     if moved[0] == moved[1]:
         return f"they are moved {moved[0]}" if moved[0] else ""
-    return "; ".join(f"{who} is moved {way}" for who, way in zip("AB", moved) if way)
+    parts = (f"{who}.{way}" if "is set" in way else f"{who} is moved {way}" for who, way in zip("AB", moved) if way)
+    return "; ".join(parts)
 
 
 def way_of(seen: list[tuple[Ball, Ball, Ball]]) -> str | None:
@@ -162,7 +165,21 @@ def way_of(seen: list[tuple[Ball, Ball, Ball]]) -> str | None:
             crosses.append(x * v - y * u)
         if near(crosses, 0.0, 0.01):
             return name
-    return None
+    return next((f"{which} is set, not changed (= for +=)" for which in SET if was_set(which, seen)), None)
+
+
+SET = ("position", "position.x", "position.y")
+
+
+def was_set(which: str, seen: list[tuple[Ball, Ball, Ball]]) -> bool:
+    """Whether a position, or one part of it, is the displacement itself, which is along the normal."""
+    crosses = []
+    for one, other, after in seen:
+        n, moved = direction(one, other)[0], np.subtract(after.x, one.x)
+        x = after.x[0] if which != "position.y" else moved[0]
+        y = after.x[1] if which != "position.x" else moved[1]
+        crosses.append(x * n[1] - y * n[0])
+    return near(crosses, 0.0, 0.01)
 
 
 def split(balls: tuple[Ball, ...], shift: Shift) -> Row:

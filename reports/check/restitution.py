@@ -21,8 +21,8 @@ NUMBER = re.compile(r"(?<![\w.])\d*\.?\d+(?![\w.])")
 
 
 def code_of(text: str) -> str:
-    """A file without its comments."""
-    return COMMENTS.sub(" ", text)
+    """A file with blanks for its comments, so that its lines keep their numbers."""
+    return COMMENTS.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
 
 
 @dataclass(frozen=True)

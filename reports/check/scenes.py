@@ -84,13 +84,14 @@ def scene_row(scenario: Scenario, record: TruthRecord | None, played: Played, dt
     truth = truth_of(scenario, record)
     k = len(truth)
     away = np.hypot(*np.moveaxis(played.position[:k] - truth.position, -1, 0))
-    allowed = bounds(scenario, record, truth.t, dt)[:, None] + TOLERANCE
+    allowed = (bounds(scenario, record, truth.t, dt) + rounding(truth.position, truth.velocity, truth.t, dt))[:, None]
     ratio = np.where(np.isfinite(away), away, np.inf) / allowed
     at, disk = np.unravel_index(int(ratio.argmax()), ratio.shape)
     turned = np.abs(played.angle[:k] - truth.angle)
-    if not (turned <= turning_bounds(scenario, truth.t, dt)[:, None] + TOLERANCE).all():
+    may_turn = turning_bounds(scenario, truth.t, dt) + rounding(truth.angle, truth.angular_velocity, truth.t, dt)
+    if not (turned <= may_turn[:, None]).all():
         got = f"a sphere is turned by {shown(turned.max())} rad too much or too little"
-        expected = f"at most {shown(turning_bounds(scenario, truth.t, dt)[-1])} rad, by dt = {shown(dt)} s"
+        expected = f"at most {shown(may_turn[-1])} rad, by dt = {shown(dt)} s"
         return judged(scenario.name, "scenes", scenario.asks, got, expected, False, cause)
     got = f"sphere {disk} is {shown(away[at, disk])} m away at {shown(truth.t[at])} s"
     expected = f"at most {shown(allowed[at, 0])} m, by dt = {shown(dt)} s"
@@ -102,6 +103,11 @@ def truth_of(scenario: Scenario, record: TruthRecord | None) -> Trajectory:
     if record is None:
         return world_pushes(scenario.scene, scenario.thrusts, scenario.times)
     return record.sampled(scenario.scene, scenario.thrusts, scenario.times)
+
+
+def rounding(place: Array, rate: Array, t: Array, dt: float) -> Array:
+    """(k,) what single precision may add, in the unit of `place`: every step rounds place and rate by 2^-24."""
+    return TOLERANCE + 2.0**-24 * t / dt * (np.abs(place).max() + np.abs(rate).max() * t / 2)
 
 
 def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:

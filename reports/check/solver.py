@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from reports.check.loop import loop_rows
 from reports.check.motion import motion_rows
 from reports.check.projection import projection_rows, pulled
 from reports.check.questions import HITS, QUESTIONS, Answer, ask
-from reports.check.restitution import Restitution, restitution_of
+from reports.check.restitution import Restitution, code_of, restitution_of
 from reports.check.rows import Row, judged, not_asked
 from reports.check.scenes import scene_rows
 
@@ -65,7 +66,21 @@ def rows_of(process: SolverProcess, text: str) -> tuple[list[Row], float | None]
         loop_rows(process, faulty) if not stuck(answers) else [not_asked("step", "loop", "a call did not come back")]
     )
     e = restitution.played if restitution is not None else None
-    return rows + scene_rows(process, rows, e), e
+    rows += scene_rows(process, rows, e)
+    return hinted(rows, text) if process.kind == "javascript" else rows, e
+
+
+def hinted(rows: list[Row], text: str) -> list[Row]:
+    """The first fault with a word on a condition that sets a variable, if the file has one: Python refuses those."""
+    slip, faulty = SET_IN_CONDITION.search(code_of(text)), (row for row in rows if row.verdict == "fault")
+    if slip is None or (first := next(faulty, None)) is None:
+        return rows
+    line = text.count("\n", 0, slip.start()) + 1
+    hint = f"{first.cause} (line {line} has = in the condition of an {slip[1]}: it sets, == compares)"
+    return [replace(row, cause=hint) if row.cause == first.cause else row for row in rows]
+
+
+SET_IN_CONDITION = re.compile(r"\b(if|while)\s*\(\s*[\w.]+\s*=(?![=>])")
 
 
 MOTION = ("push", "push, other numbers", "coast", "push twice")
