@@ -14,10 +14,10 @@ from time import monotonic
 from types import TracebackType
 from typing import Any
 
-from adapters.solver_file import SolverFailed, read_solver
+from adapters.solver_file import PATIENCE, SolverFailed, read_solver
 from scenarios.truth_cache import folder
 
-STARTING = 12.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
+STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
 GRACE = 4.0  # s beyond what the calls of a request may take
 Request = tuple[str, Any, float]
 """A command of the worker, its argument, and how long it may take, s."""
@@ -55,7 +55,7 @@ class SolverProcess:
         """Start the process and give it the file; what it says then.
 
         It stops a file that does not load by itself. A process that says nothing at all is started once more before
-        the file is blamed: a start of V8 has been seen to hang, once in two thousand.
+        the file is blamed: starts of V8 have been seen to hang, how rarely is not known.
         """
         for last in (False, True):
             self.process: subprocess.Popen[bytes] | None = subprocess.Popen(
@@ -77,11 +77,11 @@ class SolverProcess:
     def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
         self.close()
 
-    def request(self, requests: Sequence[Request]) -> list[Any | SolverFailed]:
-        """The answer to each, or how it failed; raises `SolverFailed` if the process is lost."""
+    def request(self, requests: Sequence[Request], total: float = float("inf")) -> list[Any | SolverFailed]:
+        """The answer to each, or how it failed, within `total` s; raises `SolverFailed` if the process is lost."""
         # After one call that does not come back the worker puts no other like it, so a few limits are enough.
-        most = 2 * max((limit for _, _, limit in requests), default=0.0)
-        answers = self.exchange(requests, most + GRACE)
+        most = PATIENCE * max((limit for _, _, limit in requests), default=0.0)
+        answers = self.exchange(requests, min(most + GRACE, total))
         return [SolverFailed(**a["failed"]) if "failed" in a else a["done"] for a in answers]
 
     def do(self, command: str, argument: Any = None, limit: float = 5.0) -> Any:

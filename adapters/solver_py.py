@@ -12,9 +12,9 @@ from math import sqrt
 from types import FrameType, ModuleType
 from typing import Any
 
-from adapters.solver_file import SolverFailed, SolverText
+from adapters.solver_file import PATIENCE, SolverFailed, SolverText
 
-LOAD_LIMIT = 4.0  # s; importing numba takes one
+LOAD_LIMIT = 3.0  # s; importing numba takes one
 LOGGED = 400  # contacts that are kept for the judge
 
 
@@ -93,13 +93,15 @@ class PythonSolver:
 
     @contextmanager
     def guarded(self, limit: float, when: str) -> Iterator[None]:
-        """Turns whatever the file does into `SolverFailed`, and stops it after `limit` s."""
+        """Turns whatever the file does into `SolverFailed`, and stops it after `limit` s of processor time."""
 
         def stop(_signal: int, _frame: FrameType | None) -> None:
             raise SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
 
-        signal.signal(signal.SIGALRM, stop)
-        signal.setitimer(signal.ITIMER_REAL, limit)
+        timers = {signal.ITIMER_PROF: (signal.SIGPROF, limit), signal.ITIMER_REAL: (signal.SIGALRM, PATIENCE * limit)}
+        for timer, (number, after) in timers.items():  # the clock stops what only waits
+            signal.signal(number, stop)
+            signal.setitimer(timer, after)
         try:
             yield
         except SolverFailed:
@@ -107,7 +109,8 @@ class PythonSolver:
         except BaseException as error:  # SystemExit too: a solver may not end the process
             raise self.failure(error, when) from None
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0)
+            for timer in timers:
+                signal.setitimer(timer, 0)
 
     def failure(self, error: BaseException, when: str) -> SolverFailed:
         """What was raised, in a sentence, with its place in the solver's file."""

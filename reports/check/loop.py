@@ -15,20 +15,22 @@ ONTO = {"right": (-5.0, 0.1), "left": (5.0, -0.1), "top": (0.1, -3.0), "bottom":
 A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)  # a pair that hits
 
 
-def loop_rows(process: SolverProcess, faulty: bool) -> list[Row]:
-    """The rows of the step; where the file has none, a row that says so. `faulty`: the functions it calls are."""
+def loop_rows(process: SolverProcess, faulty: bool, begun: object) -> list[Row]:
+    """The rows of the step; where the file has none, a row that says so.
+
+    `faulty`: the functions it calls are; `begun`: what came of its first initScene.
+    """
     has = process.functions
     if not (has["begin"] and has["step"]):
         missing = "initScene" if not has["begin"] else "performSimStep"
         return [not_asked("step", "loop", f"the file has no function {missing}")]
     try:
+        if isinstance(begun, SolverFailed):
+            raise begun
         process.do("begin", limit=2.0)
     except SolverFailed as failure:
-        return [
-            judged(
-                "step", "loop", "Does initScene make a scene?", "it fails", "a scene", False, f"initScene: {failure}"
-            )
-        ]
+        cause = f"initScene: {failure}"
+        return [judged("step", "loop", "Does initScene make a scene?", "it fails", "a scene", False, cause)]
     start = process.do("globals")
     if not start or len(start) < 3:
         got = f"{len(start)} spheres" if start else "no ufo or no asteroids"

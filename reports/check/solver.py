@@ -54,16 +54,18 @@ LOADS = "Can the file be loaded, and does it leave the language as it is?"
 
 def rows_of(process: SolverProcess, text: str) -> tuple[list[Row], float | None]:
     """The rows of a file that is loaded, and its restitution; raises `SolverFailed` if its process is lost."""
-    if process.functions["begin"]:
-        process.request([("begin", None, 2.0)])  # makes the globals that must not change; judged with the step
+    # Makes the globals that must not change; judged with the step.
+    begun = process.request([("begin", None, 2.0)])[0] if process.functions["begin"] else None
     asked = {k: q for k, q in QUESTIONS.items() if process.functions["integrate" if k in MOTION else "collide"]}
     answers = ask(process, asked)
-    rows = [loads(process), *task_1(process, answers)]
+    rows = [loads(process), *task_1(process, answers, text)]
     contact, restitution = task_2(process, answers, text)
     rows += contact
     faulty = any(row.verdict == "fault" for row in rows)
     rows += (
-        loop_rows(process, faulty) if not stuck(answers) else [not_asked("step", "loop", "a call did not come back")]
+        loop_rows(process, faulty, begun)
+        if not stuck(answers)
+        else [not_asked("step", "loop", "a call did not come back")]
     )
     e = restitution.played if restitution is not None else None
     rows += scene_rows(process, rows, e)
@@ -99,17 +101,17 @@ def loads(process: SolverProcess) -> Row:
                   f"the file replaces {what}, which the rest of the page uses, too")  # fmt: skip
 
 
-def task_1(process: SolverProcess, answers: dict[str, Answer]) -> list[Row]:
+def task_1(process: SolverProcess, answers: dict[str, Answer], text: str) -> list[Row]:
     """The rows of integrate."""
     mine = {name: answer for name, answer in answers.items() if name in MOTION}
-    rows, usable = implemented("1", process.functions["integrate"], mine)
+    rows, usable = implemented("1", process.functions["integrate"], mine, text)
     return rows + (motion_rows(mine) if usable else [not_asked("velocity", "1", "integrate cannot be judged further")])
 
 
 def task_2(process: SolverProcess, answers: dict[str, Answer], text: str) -> tuple[list[Row], Restitution | None]:
     """The rows of the collision function, and its restitution where it has one."""
     mine = {name: answer for name, answer in answers.items() if name not in MOTION}
-    rows, usable = implemented("2a", process.functions["collide"], mine)
+    rows, usable = implemented("2a", process.functions["collide"], mine, text)
     if not usable:
         why = "the collision function cannot be judged further"
         return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None

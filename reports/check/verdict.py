@@ -11,6 +11,7 @@ from reports.check.rows import FOLLOWS, TASKS, Row, Verdict, worst
 from reports.check.solver import examine
 
 MOST = 3  # sentences
+NONE = "holds no .js and no .py file"
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,9 @@ def sentence(row: Row) -> str:
 
 
 def check_file(path: Path) -> FileCheck:
-    """The check of one file, whatever it is."""
+    """The check of one file, whatever it is; of a folder, that there is none."""
+    if path.is_dir():
+        return FileCheck(path, [], f"{path}: {NONE}")
     try:
         rows, restitution = examine(path)
         return FileCheck(path, rows, restitution=restitution)
