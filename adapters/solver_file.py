@@ -35,6 +35,11 @@ class SolverFailed(Exception):
         super().__init__(what)
         self.kind, self.what, self.line, self.column = kind, what, line, column
 
+    @property
+    def status(self) -> str:
+        """Of a run that it ends, one of `STATUSES` of play.py."""
+        return self.kind if self.kind in ("timeout", "crashed") else "error"
+
     def __str__(self) -> str:
         return f"{self.what} (line {self.line}, column {self.column})" if self.line else self.what
 
