@@ -149,6 +149,11 @@ def test_a_contact_is_judged_by_the_formula():
     assert "sphere 1 has (0.91, 0) m/s after it, not (0.9, 0) m/s" in contact_fault(
         np.array([before, after]), scene, 0, 1
     )
+    at_touch = np.array([before, after]) + [[[0, 0, 0, 0], [0.1, 0, 0, 0]], [[0.05, 0, 0, 0], [0.05, 0, 0, 0]]]
+    assert "sphere 1 has (0.91, 0) m/s after it" in contact_fault(at_touch, scene, 0, 1), (
+        "who reacts at a touch is judged"
+    )
+    assert contact_fault(at_touch[[0, 0]], scene, 0, 1) == "", "who does not is free"
     far = np.array([before, after]) + np.array([[0.0] * 4, [0.3, 0.0, 0.0, 0.0]])
     assert "react at a distance" in contact_fault(far, scene, 0, 1)
 

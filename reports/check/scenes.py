@@ -167,9 +167,11 @@ def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
         return "the numbers become NaN or infinite"
     r, reach = a[:2] - b[:2], scene.radius[i] + scene.radius[j]
     d = float(np.hypot(*r))
-    if abs(d - reach) <= TOLERANCE * reach or d == 0:
+    came = np.array([a2[2:] - a[2:], b2[2:] - b[2:]])
+    touching = abs(d - reach) <= TOLERANCE * reach
+    if d == 0 or (touching and near(came, 0.0)):
         return ""
-    if d > reach:
+    if d > reach and not touching:
         return (
             "" if near(states[1], states[0]) else f"they react at a distance of {shown(d)} m, beyond {shown(reach)} m"
         )
@@ -177,7 +179,6 @@ def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
     vn = float((a[2:] - b[2:]) @ n)
     J = -(1 + scene.restitution) * vn / (1 / scene.mass[i] + 1 / scene.mass[j])
     change = np.array([J / scene.mass[i] * n, -J / scene.mass[j] * n])
-    came = np.array([a2[2:] - a[2:], b2[2:] - b[2:]])
     free = vn >= 0 and near(came, 0.0)
     if not (near(apart, reach) or (vn >= 0 and near(apart, d))):
         return f"their centres are {shown(apart)} m apart after it, not {shown(reach)} m"
