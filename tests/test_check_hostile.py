@@ -88,6 +88,11 @@ LOADING = {
     "memory_load.py": ("x = bytearray(10**10)\n", "wants more memory than it is given while it is loaded"),
     "exit.py": ("import sys\nsys.exit(3)\n", "ends the process (SystemExit: 3) (line 2, column 1)"),
     "kill.py": ("import os\nos._exit(3)\n", "ended its own process (exit status 3)"),
+    "intrudes.py": (
+        "import os\nfor k in range(3, 30):\n    try: os.write(k, b'[]\\n')\n    except OSError: pass\n",
+        "wrote into the channel that its answers come by",
+    ),
+    "asks.py": ("n = input('how many? ')\n", "nobody is there to answer input() (line 1, column 5)"),
     "abort.py": ("import os\nos.abort()\n", "its process was ended by SIGABRT"),
     "segfault.py": ("import ctypes\nctypes.string_at(0)\n", "ended its own process (SIGSEGV)"),
 }  # fmt: skip
@@ -136,6 +141,8 @@ CALLS = {
         .replace("s.SIG_IGN)\n", "s.SIG_IGN)\n    while True: pass\n"),
         "had to be stopped",
     ),
+    "awaits.py": (PY.replace("def integrate", "async def integrate"), "runs nothing: it is an async def"),
+    "yields.py": (within(PY, "integrate", "    yield"), "runs nothing: it is an async def"),
     "sleeps.py": (within(PY, "integrate", "    import time; time.sleep(100)"), "does not come back within 1 s"),
     "recursion.py": (within(PY, "integrate", "    integrate(sphere, dt)"), "calls itself without end"),
     "memory.py": (within(PY, "integrate", "    x = [0] * 10**10"), "wants more memory than it is given"),
@@ -195,6 +202,8 @@ HARMLESS = {
     "latin.js": ("// Größe\n" + JS).encode("latin-1"),
     "floods.js": within(JS, "integrate", "for (var k = 0; k < 1000; k++) console.log('flood', k);").encode(),
     "floods.py": within(PY, "integrate", "    print('flood' * 1000)").encode(),
+    "single.py": within(PY, "integrate", "    import numpy as n; sphere.velocity.x = n.float32(sphere.velocity.x)").encode(),
+    "json.py": ("import json\njson.dumps = json.loads = None\n" + PY).encode(),
     "waits_once.py": within(PY, "integrate", "    import time; time.sleep(done.pop() if done else 0)")
     .replace("import", "done = [1.5]\nimport", 1)
     .encode(),

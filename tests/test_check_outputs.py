@@ -153,6 +153,16 @@ def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smalle
     assert abs(smallest.yours.position[-1] - smallest.truth.position[-1]).max() > 0.005
 
 
+def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """Without any time to draw scenes, a pair that hits is tried."""
+    monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
+    with SolverProcess(folder / "ben" / "Exercise.js") as process:
+        found = smallest_scene(process, 0.9)
+
+    assert found is not None
+    assert found.scenario.scene.n == 2
+
+
 def test_a_right_solver_has_no_failing_scene():
     """The negative control of the search: nothing is found in what is right."""
     with SolverProcess(RIGHT) as process:

@@ -84,6 +84,7 @@ IMPULSES: dict[str, Impulse] = {
     "it is divided by the distance once too often (after the displacement)": scaled(lambda h, e: 1 / h.s),
     "it is divided by n.n, though n is a unit vector, or a square root is missing": scaled(lambda h, e: 1 / h.d**2),
     "it is divided by n.n, though n is a unit vector (after the displacement)": scaled(lambda h, e: 1 / h.s**2),
+    "the quotient is rounded down (// or floor)": lambda h, e: np.floor(-(1 + e) * h.vn * h.mu) * h.n,
     "the velocity of B is left out": lambda h, e: -(1 + e) * (h.va @ h.n) * h.mu * h.n,
     "the velocity of A is left out": lambda h, e: (1 + e) * (h.vb @ h.n) * h.mu * h.n,
     "the velocities are added, not subtracted": lambda h, e: -(1 + e) * ((h.va + h.vb) @ h.n) * h.mu * h.n,
