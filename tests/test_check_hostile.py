@@ -202,7 +202,7 @@ HARMLESS = {
     "latin.js": ("// Größe\n" + JS).encode("latin-1"),
     "floods.js": within(JS, "integrate", "for (var k = 0; k < 1000; k++) console.log('flood', k);").encode(),
     "floods.py": within(PY, "integrate", "    print('flood' * 1000)").encode(),
-    "single.py": within(PY, "integrate", "    import numpy as n; sphere.velocity.x = n.float32(sphere.velocity.x)").encode(),
+    "single.py": within(PY, "integrate", "    import numpy; sphere.mass = numpy.float32(sphere.mass)").encode(),
     "json.py": ("import json\njson.dumps = json.loads = None\n" + PY).encode(),
     "waits_once.py": within(PY, "integrate", "    import time; time.sleep(done.pop() if done else 0)")
     .replace("import", "done = [1.5]\nimport", 1)
