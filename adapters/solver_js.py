@@ -62,7 +62,7 @@ class JavaScriptSolver:
         return answer["done"]
 
     def evaluated(self, code: str, limit: float, may_repeat: bool) -> object:
-        """What V8 makes of `code`; what was stopped without having run for `limit` s is asked again if that is alright.
+        """What V8 makes of `code`; what was stopped without having run for `limit` s is asked again if `may_repeat`.
 
         V8 is stopped by the clock, on a busy machine before it has had its time.
         """

@@ -62,23 +62,25 @@ def rows_of(process: SolverProcess, text: str) -> tuple[list[Row], float | None]
     contact, restitution = task_2(process, answers, text)
     rows += contact
     faulty = any(row.verdict == "fault" for row in rows)
-    rows += (
-        loop_rows(process, faulty, begun)
-        if not stuck(answers)
-        else [not_asked("step", "loop", "a call did not come back")]
-    )
+    if stuck(answers):
+        rows.append(not_asked("step", "loop", "a call did not come back"))
+    else:
+        rows += loop_rows(process, faulty, begun)
     e = restitution.played if restitution is not None else None
     rows += scene_rows(process, rows, e)
     return hinted(rows, text) if process.kind == "javascript" else rows, e
 
 
 def hinted(rows: list[Row], text: str) -> list[Row]:
-    """The first fault with a word on a condition that sets a variable, if the file has one: Python refuses those."""
+    """The rows, the first fault with a word on a condition that sets a variable, if the file has one.
+
+    Python takes no such condition.
+    """
     slip, faulty = SET_IN_CONDITION.search(code_of(text)), (row for row in rows if row.verdict == "fault")
     if slip is None or (first := next(faulty, None)) is None:
         return rows
     line = text.count("\n", 0, slip.start()) + 1
-    hint = f"{first.cause} (line {line} has = in the condition of an {slip[1]}: it sets, == compares)"
+    hint = f"{first.cause} (line {line} has = in the condition of {slip[1]}: it sets, == compares)"
     return [replace(row, cause=hint) if row.cause == first.cause else row for row in rows]
 
 
