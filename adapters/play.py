@@ -89,7 +89,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callab
     except MemoryError:  # the limit is not the engine's: left to whoever set it
         raise
     except Exception as error:  # an engine may raise anything; the run says what
-        status, reason = "error", f"{type(error).__name__}: {error}"
+        status, reason = getattr(error, "status", "error"), f"{type(error).__name__}: {error}"
     if states:
         hits = hits_of(engine)
     trajectory = gather(scenario, states, first_hits(hits, dt, weight_impulse(scenario.scene, dt))) if states else None

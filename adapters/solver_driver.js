@@ -3,8 +3,13 @@
 // It keeps the built-ins it needs, because a solver may replace them, and answers in JSON that it writes itself.
 Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   const { parse, stringify } = JSON;
-  const { keys } = Object;
+  const { keys, is, setPrototypeOf, getOwnPropertyDescriptor } = Object;
+  const { apply, ownKeys } = Reflect;
+  const { slice } = String.prototype;
   const { sqrt } = Math;
+  const symbolText = Symbol.prototype.toString;
+  const globe = globalThis;
+  const empty = () => setPrototypeOf([], null);  // an array that no change of Array.prototype reaches
   const FIELDS = ["position", "velocity", "force", "alpha", "angularVelocity", "torque", "mass", "MoI", "size"];
   const BUILT_IN = { Math, Object, Array, Number, Function, String, JSON };
   const original = snapshot();
@@ -21,31 +26,37 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   let world;  // the scene being played
 
   function snapshot() {
-    const found = {};
-    for (const name of keys(BUILT_IN)) {
-      const holders = [[name, BUILT_IN[name]], [name + ".prototype", BUILT_IN[name].prototype]];
-      for (const [path, holder] of holders) {
-        if (!holder) continue;
-        for (const key of Object.getOwnPropertyNames(holder)) {
-          const described = Object.getOwnPropertyDescriptor(holder, key);
-          found[path + "." + key] = described.value || described.get;
-        }
-      }
+    const found = setPrototypeOf({}, null), names = keys(BUILT_IN);
+    for (let k = 0; k < names.length; k++) {
+      remember(found, names[k], BUILT_IN[names[k]]);
+      if (BUILT_IN[names[k]].prototype) remember(found, names[k] + ".prototype", BUILT_IN[names[k]].prototype);
     }
     return found;
   }
 
+  function remember(found, path, holder) {
+    const own = ownKeys(holder);
+    for (let k = 0; k < own.length; k++) {
+      const described = setPrototypeOf(getOwnPropertyDescriptor(holder, own[k]), null);
+      const name = typeof own[k] === "symbol" ? apply(symbolText, own[k], []) : own[k];
+      found[path + "." + name] = described.value || described.get;
+    }
+  }
+
   function bind(solver) {
     file = solver;
-    const found = globalThis.Math === BUILT_IN.Math ? replaced() : ["Math"];
+    const found = replaced();
     const has = (name) => (typeof file[name] === "function" ? "true" : "false");
     return `{"integrate":${has("integrate")},"collide":${has("collide")},"step":${has("step")},"wrap":${has("wrap")},`
       + `"begin":${has("begin")},"replaced":[${list(found)}]}`;
   }
 
   function replaced() {
-    const now = snapshot(), found = [];
-    for (const path of keys(now)) if (!Object.is(now[path], original[path])) found[found.length] = path;
+    const now = snapshot(), paths = keys(now), names = keys(BUILT_IN), found = empty();
+    for (let k = 0; k < names.length; k++) if (globe[names[k]] !== BUILT_IN[names[k]]) found[found.length] = names[k];
+    for (let k = 0; k < paths.length; k++) {
+      if (!is(now[paths[k]], original[paths[k]])) found[found.length] = paths[k];
+    }
     return found;
   }
 
@@ -77,7 +88,8 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   }
 
   function everybody() {
-    const all = [file.ufo()], others = file.asteroids();
+    const all = empty(), others = file.asteroids();
+    all[0] = file.ufo();
     for (let i = 0; i < others.length; i++) all[all.length] = others[i];
     return all;
   }
@@ -89,15 +101,15 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
 
   function place(into, r) {
     const from = sphere(r);
-    for (const name of ["position", "velocity", "force"]) {
-      into[name].x = from[name].x;
-      into[name].y = from[name].y;
+    for (let k = 0; k < 3; k++) {
+      into[FIELDS[k]].x = from[FIELDS[k]].x;
+      into[FIELDS[k]].y = from[FIELDS[k]].y;
     }
     for (let k = 3; k < FIELDS.length; k++) into[FIELDS[k]] = from[FIELDS[k]];
   }
 
   function strange(spheres) {
-    const found = [];
+    const found = empty();
     for (let i = 0; i < spheres.length; i++) {
       const own = keys(spheres[i]);
       for (let k = 0; k < own.length; k++) {
@@ -117,7 +129,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
 
   // One question: spheres, calls -> the spheres after each call, whether anything was returned, what went wrong.
   function ask(question) {
-    let states = "", returned = false, spheres = [], known = "", problem = "null";
+    let states = "", returned = false, spheres = empty(), known = "", problem = "null";
     try {
       if (question.world) {
         spheres = everybody();
@@ -144,11 +156,12 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
       what = error && error.message !== undefined ? error.name + ": " + error.message : "threw " + error;
       stack = typeof error.stack === "string" ? error.stack : "";
     } catch (_) { what = what || "threw something that cannot be shown"; }
-    return `{"what":${stringify(what)},"stack":${stringify(stack)}}`;
+    return `{"what":${stringify(apply(slice, what, [0, 400]))},"stack":${stringify(apply(slice, stack, [-2000]))}}`;
   }
 
   function load(scene) {
-    world = { dt: scene.dt, gravity: scene.gravity, wrap: scene.wrap, steps: 0, hits: [], log: [], spheres: [] };
+    world = { dt: scene.dt, gravity: scene.gravity, wrap: scene.wrap, steps: 0, hits: empty(), log: empty(),
+      spheres: empty() };
     for (let i = 0; i < scene.spheres.length; i++) world.spheres[i] = sphere(scene.spheres[i]);
     return "null";
   }
@@ -182,10 +195,11 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     const moved = a.position.x !== ax || a.position.y !== ay || b.position.x !== bx || b.position.y !== by;
     if (kicked) {
       const sign = du * (ax - bx) + dv * (ay - by) < 0 ? -1 : 1;
-      world.hits[world.hits.length] = `[${world.steps},${i},${j},${sign * a.mass * sqrt(du * du + dv * dv)}]`;
+      world.hits[world.hits.length] = `[${world.steps},${i},${j},${text(sign * a.mass * sqrt(du * du + dv * dv))}]`;
     }
     if ((kicked || moved || overlaps) && world.log.length < 400) {
-      world.log[world.log.length] = `[${world.steps},${i},${j},${ax},${ay},${au},${av},${bx},${by},${bu},${bv},`
+      world.log[world.log.length] = `[${world.steps},${i},${j},${text(ax)},${text(ay)},${text(au)},${text(av)},`
+        + `${text(bx)},${text(by)},${text(bu)},${text(bv)},`
         + `${text(a.position.x)},${text(a.position.y)},${text(a.velocity.x)},${text(a.velocity.y)},`
         + `${text(b.position.x)},${text(b.position.y)},${text(b.velocity.x)},${text(b.velocity.y)}]`;
     }
@@ -193,7 +207,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
 
   // As projectObjects: beyond an edge of the box, onto the opposite one.
   function wrapped(p) {
-    const [left, bottom, right, top] = world.wrap;
+    const left = world.wrap[0], bottom = world.wrap[1], right = world.wrap[2], top = world.wrap[3];
     p.x = p.x < left ? right : p.x > right ? left : p.x;
     p.y = p.y < bottom ? top : p.y > top ? bottom : p.y;
   }

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 LARGEST = 2**20  # bytes; the exercise's file has about five thousand
+PATIENCE = 3  # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
+LONGEST = 300  # characters of a message
 KINDS = {".js": "javascript", ".py": "python"}
 
 
@@ -22,14 +24,21 @@ class SolverFailed(Exception):
 
     Attributes:
         kind: "error" (threw), "timeout", "memory" or "crashed".
-        what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is escaped.
+        what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is escaped, and what
+            goes on for more than `LONGEST` characters is cut.
         line, column: where in the solver's file, from 1; 0 where nobody can tell.
     """
 
     def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
         what = printable(what)
+        what = what if len(what) <= LONGEST else what[:LONGEST] + " ..."
         super().__init__(what)
         self.kind, self.what, self.line, self.column = kind, what, line, column
+
+    @property
+    def status(self) -> str:
+        """Of a run that it ends, one of `STATUSES` of play.py."""
+        return self.kind if self.kind in ("timeout", "crashed") else "error"
 
     def __str__(self) -> str:
         return f"{self.what} (line {self.line}, column {self.column})" if self.line else self.what
@@ -75,7 +84,9 @@ def dangling(path: Path) -> bool:
 
 
 def decoded(path: Path, data: bytes) -> str:
-    """Text from UTF-8, from UTF-16 with its mark, or from Windows' Latin letters."""
+    """Text from UTF-8, from UTF-16 or UTF-32 with its mark, or from Windows' Latin letters."""
+    if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
+        return data.decode("utf-32", errors="replace")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", errors="replace")
     odd = next((k for k, byte in enumerate(data) if byte < 32 and byte not in b"\t\n\r\f\v"), None)

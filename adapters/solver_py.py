@@ -8,13 +8,12 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from math import sqrt
 from types import FrameType, ModuleType
 from typing import Any
 
-from adapters.solver_file import SolverFailed, SolverText
+from adapters.solver_file import PATIENCE, SolverFailed, SolverText
 
-LOAD_LIMIT = 4.0  # s; importing numba takes one
+LOAD_LIMIT = 3.0  # s; importing numba takes one
 LOGGED = 400  # contacts that are kept for the judge
 
 
@@ -93,13 +92,15 @@ class PythonSolver:
 
     @contextmanager
     def guarded(self, limit: float, when: str) -> Iterator[None]:
-        """Turns whatever the file does into `SolverFailed`, and stops it after `limit` s."""
+        """Turns whatever the file does into `SolverFailed`, and stops it after `limit` s of processor time."""
 
         def stop(_signal: int, _frame: FrameType | None) -> None:
             raise SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
 
-        signal.signal(signal.SIGALRM, stop)
-        signal.setitimer(signal.ITIMER_REAL, limit)
+        timers = {signal.ITIMER_PROF: (signal.SIGPROF, limit), signal.ITIMER_REAL: (signal.SIGALRM, PATIENCE * limit)}
+        for timer, (number, after) in timers.items():  # the clock stops what only waits
+            signal.signal(number, stop)
+            signal.setitimer(timer, after)
         try:
             yield
         except SolverFailed:
@@ -107,7 +108,8 @@ class PythonSolver:
         except BaseException as error:  # SystemExit too: a solver may not end the process
             raise self.failure(error, when) from None
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0)
+            for timer in timers:
+                signal.setitimer(timer, 0)
 
     def failure(self, error: BaseException, when: str) -> SolverFailed:
         """What was raised, in a sentence, with its place in the solver's file."""
@@ -119,6 +121,10 @@ class PythonSolver:
             what = f"ends the process (SystemExit: {error})"
         else:
             what = f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}"
+        if "for ^" in what:
+            what += "; a power is written **"
+        elif isinstance(error, EOFError):
+            what += "; nobody is there to answer input()"
         if isinstance(error, SyntaxError) and error.filename == self.name:
             return SolverFailed("error", what, error.lineno or 0, error.offset or 0)
         mine = [f for f in traceback.TracebackException.from_exception(error).stack if f.filename == self.name]
@@ -151,6 +157,8 @@ class PythonSolver:
             for name, *arguments in question["calls"]:
                 on = {"integrate": 1, "collide": 2}.get(name, 0)
                 result = self.file[name](*(spheres[i] for i in arguments[:on]), *arguments[on:])
+                if hasattr(result, "send"):
+                    raise TypeError(f"a call of {name} runs nothing: it is an async def, or has a yield")
                 returned = returned or isinstance(result, (Fields, dict, list, tuple)) or hasattr(result, "position")
                 spheres = self.everybody() if question["world"] else spheres
                 states.append([row_of(s) for s in spheres])
@@ -212,9 +220,9 @@ class PythonSolver:
         if before[2:4] != after[2:4] or before[6:] != after[6:]:
             du, dv = after[2] - before[2], after[3] - before[3]
             sign = -1.0 if du * x + dv * y < 0 else 1.0
-            self.hit_rows.append([self.steps, i, j, sign * a.mass * sqrt(du * du + dv * dv)])
+            self.hit_rows.append([self.steps, i, j, number(sign * a.mass * (du * du + dv * dv) ** 0.5)])
         if (before != after or x * x + y * y < reach * reach) and len(self.log) < LOGGED:
-            self.log.append([self.steps, i, j, *before, *after])
+            self.log.append([self.steps, i, j, *map(number, before), *map(number, after)])
 
     def read(self, _argument: Any = None) -> list[list[float]]:
         """The scene's spheres as they are."""

@@ -5,10 +5,10 @@ It runs with the rights of the user who started it: the limits are against accid
 
 from __future__ import annotations
 
-import json
 import os
 import resource
 import sys
+from json import dumps, loads  # as they are before a solver may replace them
 from pathlib import Path
 from typing import IO, Any
 
@@ -23,13 +23,13 @@ def main() -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
-        solver = load(Path(json.loads(requests.readline())))
+        solver = load(Path(loads(requests.readline())))
     except SolverFailed as failure:
         tell(answers, {"failed": vars(failure)})
         return
     tell(answers, {"functions": solver.functions, "surface": solver.surface, "versions": solver.versions()})
     for line in requests:
-        tell(answers, reply(solver, json.loads(line)))
+        tell(answers, reply(solver, loads(line)))
 
 
 def private_pipes() -> tuple[IO[str], IO[str]]:
@@ -74,7 +74,7 @@ def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, 
 
 def tell(answers: IO[str], what: Any) -> None:
     """One line to the parent."""
-    answers.write(json.dumps(what) + "\n")
+    answers.write(dumps(what) + "\n")
     answers.flush()
 
 

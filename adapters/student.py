@@ -72,6 +72,8 @@ class Student:
             raise Unsupported("the exercise has no walls")
         if scene.static.any():
             raise Unsupported("the exercise has no disks that cannot move")
+        if scene.n > 1 and self.restitution == -1:
+            raise Unsupported(f"{self.path.name} lets spheres that meet go on as they were: its collisions do nothing")
         if scene.n > 1 and not abs(self.restitution - scene.restitution) <= REST:
             raise Unsupported(f"the file has e = {self.restitution:.3g}, the scene needs {scene.restitution:g}")
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from adapters.solver_js import GL_MATRIX
 from adapters.solver_process import SolverProcess
 from reports.check.questions import QUESTIONS, Ball, ask
 from reports.check.rows import TASKS
@@ -147,8 +149,34 @@ def test_a_contact_is_judged_by_the_formula():
     assert "sphere 1 has (0.91, 0) m/s after it, not (0.9, 0) m/s" in contact_fault(
         np.array([before, after]), scene, 0, 1
     )
+    at_touch = np.array([before, after]) + [[[0, 0, 0, 0], [0.1, 0, 0, 0]], [[0.05, 0, 0, 0], [0.05, 0, 0, 0]]]
+    assert "sphere 1 has (0.91, 0) m/s after it" in contact_fault(at_touch, scene, 0, 1), (
+        "who reacts at a touch is judged"
+    )
+    assert contact_fault(at_touch[[0, 0]], scene, 0, 1) == "", "who does not is free"
     far = np.array([before, after]) + np.array([[0.0] * 4, [0.3, 0.0, 0.0, 0.0]])
     assert "react at a distance" in contact_fault(far, scene, 0, 1)
+
+
+def test_gl_matrix_is_the_file_of_its_package_with_its_licence():
+    """Version 2.8.1 as npm has it (integrity sha512-0YCjVpE3pS5XWlN3J4X7AiAx65+nqAI54LndtVFnQZB6G/FVLkZH8y8V6R3cIoOQR4p
+    UdfwQGd1iwyoXHJ4Qfw==), dist/gl-matrix-min.js, unchanged."""
+    data = GL_MATRIX.read_bytes()
+
+    assert hashlib.sha256(data).hexdigest() == "fb4f71b2df9dd73212e35780bd10c25ce7f4307f7ddc4e1c4b8d212812098fc4"
+    assert b"Permission is hereby granted, free of charge" in data[:2000]
+
+
+def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path):
+    """A name of its own in the text loads it; a file without one has no such globals."""
+    code = "function integrate(sphere, dt) { sphere.alpha = typeof globalThis['ve' + 'c2'] === 'object' ? 1 : 2; }\n"
+    seen = {}
+    for name, text in {"with.js": code + "// vec2\n", "without.js": code}.items():
+        (tmp_path / name).write_text(text)
+        with SolverProcess(tmp_path / name) as process:
+            seen[name] = ask(process, {"push": QUESTIONS["push"]})["push"].last[0].alpha
+
+    assert seen == {"with.js": 1.0, "without.js": 2.0}
 
 
 def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():

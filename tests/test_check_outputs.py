@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import shutil
 import subprocess
@@ -14,14 +13,11 @@ import jsonschema
 import pytest
 from playwright.sync_api import Error, Page, sync_playwright
 
-from adapters.play import play
 from adapters.solver_process import SolverProcess
-from adapters.student import engine_file
 from reports.check import command
 from reports.check.machine import SCHEMA
 from reports.check.smallest import Smallest, smallest_scene
 from reports.check.verdict import check_file
-from scenarios.catalogue import scenario
 from tests.command_line import CROSSCHECK, crosscheck, process
 from tests.solvers.mutants import CORRECT, MUTANTS
 
@@ -47,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(folder: Path):
     """The first line is the sentence to begin with; the page, and it alone, is where the command was given."""
-    cwd = folder / "desk"
+    cwd = folder / ".desk"
     cwd.mkdir()
     right, wrong = (process("check", folder / who / "Exercise.js", cwd=cwd) for who in ("anna", "ben"))
 
@@ -73,21 +69,6 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
     assert [int(s.get("failures", "")) > 0 for s in suites] == [False, True, True, False]
     assert [s.get("errors") for s in suites] == ["0", "0", "0", "1"]
     assert sum(len(list(s)) for s in suites) == sum(int(s.get("tests", "")) for s in suites)
-
-
-def test_the_table_of_a_class_fits_a_terminal(folder: Path):
-    """A line a file, and how many are right of those that were checked; a link to nothing is told, too."""
-    (folder / "eve.js").symlink_to("gone.js")
-    done = crosscheck("check", folder, cwd=folder)
-    refused = check_file(folder / "eve.js").refused
-    (folder / "eve.js").unlink()
-
-    assert "1 of 3 files without a fault; 2 not checked." in done.stdout
-    (eve,) = (line for line in done.stdout.splitlines() if line.startswith("eve.js"))
-    assert not {"ok", "FAULT"} & set(eve.split())
-    assert refused == f"{folder}/eve.js: is a link to gone.js, which is not there"
-    assert max(len(line) for line in done.stdout.splitlines()) <= 80
-    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -172,6 +153,16 @@ def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smalle
     assert abs(smallest.yours.position[-1] - smallest.truth.position[-1]).max() > 0.005
 
 
+def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """Without any time to draw scenes, a pair that hits is tried."""
+    monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
+    with SolverProcess(folder / "ben" / "Exercise.js") as process:
+        found = smallest_scene(process, 0.9)
+
+    assert found is not None
+    assert found.scenario.scene.n == 2
+
+
 def test_a_right_solver_has_no_failing_scene():
     """The negative control of the search: nothing is found in what is right."""
     with SolverProcess(RIGHT) as process:
@@ -208,7 +199,7 @@ def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(folder: Path, 
     assert fits
     assert title == "Exercise.js: what is wrong, and where"
     assert shown["truth"] is not None
-    assert abs(shown["Exercise.js:own"][0][1] - shown["truth"][0][1]) > 0.004
+    assert max(abs(x - y) for x, y in zip(shown["Exercise.js:own"][0], shown["truth"][0])) > 0.004
 
 
 def test_text_of_a_file_is_inert_on_its_page(tmp_path: Path):
@@ -220,52 +211,3 @@ def test_text_of_a_file_is_inert_on_its_page(tmp_path: Path):
     write_page(tmp_path / "check.html", check_file(path), None)
 
     assert "<script>alert" not in (tmp_path / "check.html").read_text()
-
-
-@pytest.mark.parametrize("name", ["plain.js", "plain.py", "arrays.py"])
-def test_a_file_plays_as_an_engine(name: str):
-    """A right file makes of the ship's flight what the reference makes of it, to rounding, in every language."""
-    flight = scenario("ship_thrust")
-    runs = {}
-    for row in (engine_file(RIGHT.parent / name), engine_file(RIGHT)):
-        engine = row.make()
-        runs[row.summary] = play(engine, "x:own", flight, flight.dt(4))
-        engine.close()
-    first, *others = runs.values()
-
-    assert all(one.status == "ok" for one in runs.values())
-    assert all(abs(one.trajectory.position - first.trajectory.position).max() < 1e-12 for one in others)  # type: ignore[union-attr]
-
-
-@pytest.mark.parametrize(
-    ("scene", "reason"),
-    [
-        ("head_on_equal_e1", "the file has e = 0.9, the scene needs 1"),
-        ("wall_to_wall", "the exercise has no walls"),
-    ],
-)
-def test_a_scene_that_the_file_cannot_play_is_refused(scene: str, reason: str):
-    """Its restitution is written into it, and it has no walls."""
-    engine = engine_file(RIGHT).make()
-    question = scenario(scene)
-    played = play(engine, "x:own", question, question.dt(question.substeps[0]))
-    engine.close()
-
-    assert played.status == "unsupported"
-    assert reason in played.reason
-
-
-@pytest.mark.slow
-def test_run_takes_a_file_as_an_engine(folder: Path):
-    """It stands in the tables beside the others, under its own path."""
-    words = ["run", "head_on_equal_e09", "--dt", str(1 / 60), "--engine", "reference:exercise"]
-    done = crosscheck(*words, "--engine", "anna/Exercise.js", "--out", "run", cwd=folder)
-    bad = crosscheck(*words, "--engine", "dora/solver.py", "--out", "bad", cwd=folder)
-
-    assert done.returncode == 0, done.stderr
-    rows = list(csv.DictReader((folder / "run" / "runs.csv").read_text().splitlines()))
-    assert [(row["engine"], row["profile"], row["status"]) for row in rows] == [
-        ("reference", "exercise", "ok"), ("anna/Exercise.js", "own", "ok")
-    ]  # fmt: skip
-    assert bad.returncode == 2
-    assert "is not text" in bad.stderr

@@ -14,11 +14,12 @@ from adapters.solver_file import KINDS, SolverFailed, dangling
 from adapters.solver_process import SolverProcess
 from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
-from reports.check.verdict import FileCheck, check_file
+from reports.check.verdict import NONE, FileCheck, check_file
 from reports.exits import BAD_INPUT, DONE, FAILED, refuse, say
 
 # What an earlier file of ours has among its first HEAD bytes, and nothing else has: it may be written over.
 PAGE, JUNIT, HEAD = b'<meta name="generator" content="crosscheck check">', b'<testsuites name="crosscheck check"', 4096
+NOBODYS = (".", "__", "node_modules")  # how the names of files and folders begin that no student wrote
 HANDED_OUT = ("gl-matrix.js", "gl-matrix-min.js", "mainScript.js")  # lie beside a student's file
 
 
@@ -45,19 +46,24 @@ def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) 
 
 
 def files_of(path: Path) -> list[Path]:
-    """The file, or all solvers below a folder, links to nothing too, in order of their names; exits 2 without any."""
+    """The file, or all solvers below a folder, links to nothing too, in order of their names; exits 2 without any.
+
+    Where every solver has a folder of its own, a folder without one stands among them.
+    """
     if not path.exists():
         refuse([f"{path}: is not there; name an Exercise.js, a solver.py or a folder of them"])
     if not path.is_dir():
         return [path]
+    theirs = [one for one in path.rglob("*") if not any(p.startswith(NOBODYS) for p in one.relative_to(path).parts)]
     found = sorted(
-        file for file in path.rglob("*")
+        file for file in theirs
         if file.suffix.lower() in KINDS and (file.is_file() or dangling(file)) and file.name not in HANDED_OUT
-        and not any(part.startswith((".", "__", "node_modules")) for part in file.relative_to(path).parts)
     )  # fmt: skip
     if not found:
-        refuse([f"{path}: holds no .js and no .py file"])
-    return found
+        refuse([f"{path}: {NONE}"])
+    owners = {file.relative_to(path).parts[0] for file in found}
+    empty = [one for one in theirs if one.parent == path and one.is_dir() and one.name not in owners]
+    return found if any(file.parent == path for file in found) else sorted(found + empty)
 
 
 def places_for(page: Path | None, junit: Path | None) -> None:

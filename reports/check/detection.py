@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from itertools import product
 
 import numpy as np
 
 from reports.check.questions import QUESTIONS, Answer, Ball, named
+from reports.check.restitution import code_of
 from reports.check.rows import Row, judged, near, shown
 
-Rule = Callable[[float, float, float, float], bool]
-# (dx, dy, size of A, size of B) in m -> whether they would be taken to collide
+Rule = Callable[[float, float, float, float], bool | None]
+
+
+# (dx, dy, size of A, size of B) in m -> whether they would be taken to collide, None if either
 RULES: dict[str, Rule] = {
     "": lambda x, y, a, b: np.hypot(x, y) < a + b,
     "only the size of A is used": lambda x, y, a, b: np.hypot(x, y) < a,
@@ -27,6 +31,8 @@ RULES: dict[str, Rule] = {
     "the sizes are subtracted": lambda x, y, a, b: np.hypot(x, y) < abs(a - b),
     "the sizes are multiplied": lambda x, y, a, b: np.hypot(x, y) < a * b,
     "x and y are compared one by one, as of boxes": lambda x, y, a, b: abs(x) < a + b and abs(y) < a + b,
+    "dx is taken for dy, too": lambda x, y, a, b: np.hypot(x, x) < a + b,
+    "dy is taken for dx, too": lambda x, y, a, b: np.hypot(y, y) < a + b,
     "|dx| + |dy| is taken for the distance": lambda x, y, a, b: abs(x) + abs(y) < a + b,
     "dx + dy is taken for the distance": lambda x, y, a, b: abs(x + y) < a + b,
     "only x is compared": lambda x, y, a, b: abs(x) < a + b,
@@ -36,26 +42,70 @@ RULES: dict[str, Rule] = {
     "every pair is taken to be apart": lambda x, y, a, b: False,
 }
 
+# As JavaScript reads it: + before ^, and what ^ takes is cut to a whole number.
+SQUARES: dict[str, Callable[[float, float], float]] = {
+    "dx ^ 2 + dy ^ 2": lambda x, y: int(x) ^ int(2 + y) ^ 2,
+    "(dx ^ 2) + (dy ^ 2)": lambda x, y: (int(x) ^ 2) + (int(y) ^ 2),
+    "dx * dx + dy * dy": lambda x, y: x * x + y * y,
+}
+REACHES: dict[str, Callable[[float], float]] = {
+    "the squared sum of the sizes": lambda s: s * s,
+    "(sizeA + sizeB) ^ 2": lambda s: int(s) ^ 2,
+}
+
+
+def rooted(square: Callable[[float, float], float]) -> Rule:
+    """Whether the root is below the sum of the sizes; that of a negative number is NaN, which may go either way."""
+    return lambda x, y, a, b: None if square(x, y) < 0 else bool(square(x, y) < (a + b) ** 2)
+
+
+def compared(square: Callable[[float, float], float], reach: Callable[[float], float]) -> Rule:
+    """The same without a root."""
+    return lambda x, y, a, b: bool(square(x, y) < reach(a + b))
+
+
+BITS = "^ is no power but acts on bits (XOR)"
+# Only asked of a file that has a ^: some give the pattern of a file that compares nothing.
+XOR = {f"{BITS}: the root of {left}": rooted(square) for left, square in SQUARES.items() if "^" in left}
+XOR |= {
+    f"{BITS}: {left} is compared with {right}": compared(square, reach)
+    for (left, square), (right, reach) in product(SQUARES.items(), REACHES.items())
+    if "^" in left + right
+}
+# >= and < bind before ^, too: what is compared is the 2.
+XOR |= {
+    f"{BITS}: dx ^ 2 + dy ^ 2 < (sizeA + sizeB) ^ 2": lambda x, y, a, b: (int(x) ^ int(2 + y) ^ (a + b > 2) ^ 2) != 0,
+    f"{BITS}: dx ^ 2 + dy ^ 2 >= (sizeA + sizeB) ^ 2": lambda x, y, a, b: (int(x) ^ int(2 + y) ^ (a + b <= 2) ^ 2) == 0,
+    f"{BITS}: dx ^ 2 + dy ^ 2 > (sizeA + sizeB) ^ 2": lambda x, y, a, b: (int(x) ^ int(2 + y) ^ (a + b < 2) ^ 2) == 0,
+    f"{BITS}: (a < b) ^ 2 is what is asked, and is never zero": lambda x, y, a, b: True,
+}
+
 
 def acts(question: tuple[Ball, ...], after: list[Ball]) -> bool:
     """Whether a call changed where two spheres are or how they move."""
     return any(not (near(b.x, a.x) and near(b.v, a.v)) for a, b in zip(question, after))
 
 
-def detection_rows(answers: dict[str, Answer]) -> list[Row]:
-    """The rows of (a)."""
-    return [reach(answers), touch(answers["touch"]), same_centre(answers["same centre"])]
+def detection_rows(answers: dict[str, Answer], text: str) -> list[Row]:
+    """The rows of (a); `text` of the file."""
+    return [
+        reach(answers, (XOR if "^" in code_of(text) else {}) | RULES),
+        touch(answers["touch"]),
+        same_centre(answers["same centre"]),
+    ]
 
 
-def reach(answers: dict[str, Answer]) -> Row:
-    """Which of many pairs react, and the rule that gives this pattern."""
+def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> Row:
+    """Which of many pairs react, and the first of the rules that gives this pattern."""
     seen = []
     for question, answer in named(answers, "reach/"):
         a, b = question.balls
         (dx, dy), size = np.subtract(a.x, b.x), (a.r, b.r)
         seen.append(((dx, dy, *size), bool(answer.balls) and acts(question.balls, answer.last)))
-    cause = next((name for name, rule in RULES.items() if all(bool(rule(*q)) == was for q, was in seen)), None)
+    cause = next((name for name, rule in rules.items() if all(rule(*q) in (was, None) for q, was in seen)), None)
     wrong = [(q, was) for q, was in seen if was != RULES[""](*q)]
+    if no_number(answers):
+        cause = "the distance is no number (a field that does not exist, a division by zero?)"
     if cause is None and mixed_up(answers):
         cause = "the distance is not the one between the centres: positions are added or mixed up"
     if not wrong:
@@ -69,6 +119,12 @@ def reach(answers: dict[str, Answer]) -> Row:
 
 
 ASKED = "Which pairs are taken to collide?"
+
+
+def no_number(answers: dict[str, Answer]) -> bool:
+    """Whether all pairs, near or far, lose their positions."""
+    reached = [answer.last for _, answer in named(answers, "reach/") if answer.balls]
+    return bool(reached) and not np.isfinite([[b.x for b in balls] for balls in reached]).any()
 
 
 def mixed_up(answers: dict[str, Answer]) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 from reports.check.questions import QUESTIONS, Answer, Ball
 from reports.check.rows import Row, judged, near
@@ -11,7 +13,7 @@ FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
 MAY_FAIL = ("same centre",)  # is judged by a row of its own
 
 
-def implemented(task: str, there: bool, answers: dict[str, Answer]) -> tuple[list[Row], bool]:
+def implemented(task: str, there: bool, answers: dict[str, Answer], text: str) -> tuple[list[Row], bool]:
     """The rows on the function of a task and its arguments, and whether it can be judged further."""
     function = FUNCTIONS[task]
     asked = f"Does {function} do something with the spheres it is given?"
@@ -20,7 +22,8 @@ def implemented(task: str, there: bool, answers: dict[str, Answer]) -> tuple[lis
         return [judged("implemented", task, asked, got, "it changes them", False, cause)], False
 
     if not there:
-        return fault("there is no such function", f"not implemented: the file has no function {function}")
+        return fault("there is no such function", 
+                     f"not implemented: the file has no function {function}{instead(function, text)}")  # fmt: skip
     failed = {name: answer for name, answer in answers.items() if answer.failed and name not in MAY_FAIL}
     if failed:
         answer = next(iter(failed.values()))
@@ -28,6 +31,16 @@ def implemented(task: str, there: bool, answers: dict[str, Answer]) -> tuple[lis
     if not any(changed(QUESTIONS[name].balls, answer.last) for name, answer in answers.items() if answer.balls):
         return fault("nothing is changed", nothing(function, answers.values()))
     return [arguments(task, function, answers.values())], True
+
+
+def instead(function: str, text: str) -> str:
+    """What the file has that may have been meant; "" if nothing is like it."""
+    names = re.findall(r"\b(?:function\s*\*?|def|const|let|var)\s+(\w+)", text)
+    if function in names:
+        return ", but one inside something else, where nobody finds it"
+    near_ones = get_close_matches(function.lower(), [name.lower() for name in names], 1, 0.8)
+    meant = next((name for name in names if name.lower() in near_ones), "")
+    return f", but {meant}" if meant else ""
 
 
 def nothing(function: str, answers: Iterable[Answer]) -> str:

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from reports.check.impacts import IMPULSES, PARTING, UPDATES, Finding, Hit, changes, hit_of, tangent
+from reports.check.hits import Hit, changes, hit_of
+from reports.check.impacts import IMPULSES, PARTING, UPDATES, Finding, tangent
 from reports.check.questions import HITS, QUESTIONS, Answer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import Row, judged, near, not_asked, shown
@@ -26,7 +27,7 @@ def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Fi
     fine_c = found is not None and not found.impulse
     impulse = found.impulse if found else partly(answers, e)
     update = found.update if found and found.task == "2d" else ""
-    mistake = (found.sentence if found else "") or impulse
+    mistake = (found.mistake if found else "") or impulse
     spoilt = "2d" if fine_c else "2c"  # the part in which lies what spoils energy and restitution
     got, lost = hit.ma * came[0], energy(hit, came)
     across, gained = float(got @ tangent(hit)), hit.ma * came[0] + hit.mb * came[1]
@@ -38,7 +39,7 @@ def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Fi
         judged("energy", spoilt, "How much kinetic energy does the hit add?", f"{shown(lost)} J",
                f"{shown(-(1 - e * e) / 2 * hit.mu * hit.vn**2)} J", bool(lost <= 1e-9), mistake),
         replace(restitution.row(mistake), task=spoilt if not near(restitution.came, e) else "2c"),
-        restitution.speeds(), separating(answers, found, e),
+        restitution.speeds(mistake), separating(answers, found, e),
         judged("velocity of A", "2d", "What velocity has A after the hit, by the impulse that acts?",
                f"{shown(after[0].v)} m/s", f"{shown(hit.va + acts / hit.ma)} m/s",
                right_update(found) or near(came[0], acts / hit.ma), update or impulse),
@@ -101,7 +102,7 @@ def partly(answers: dict[str, Answer], e: float) -> str:
 
 def acting(hit: Hit, found: Finding | None, right: Array) -> Array:
     """The impulse the file computes, right or wrong, so that (d) is judged by itself."""
-    return IMPULSES[found.impulse](hit, found.e) if found else right
+    return found.law(hit, found.e) if found else right
 
 
 def energy(hit: Hit, came: Array) -> float:
@@ -120,12 +121,12 @@ def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> R
     ]
     if all(near(came, 0.0) for _, came in seen):
         return Row("parting", "2c", asked, "no impulse", either, "note", "only pairs that approach get an impulse")
-    law, update = (IMPULSES[found.impulse], UPDATES[found.update]) if found else (IMPULSES[""], UPDATES[""])
-    if all(near(update.change(h, law(h, e), e), came, 0.1) for h, came in seen):
+    law, change = (found.law, found.change) if found else (IMPULSES[""], UPDATES[""].change)
+    if all(near(change(h, law(h, e), e), came, 0.1) for h, came in seen):
         note = "pairs that part get an impulse too, as the formula is printed; it turns them back"
         return Row("parting", "2c", asked, "an impulse, by the same formula", either, "note", note)
     got = f"A is changed by {shown(seen[0][1][0])} m/s"
-    return judged("parting", "2c", asked, got, either, False, found.sentence if found else "")
+    return judged("parting", "2c", asked, got, either, False, found.mistake if found else "")
 
 
 UNALIKE = "A and B are not treated alike: it matters which is called first"

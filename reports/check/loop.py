@@ -7,7 +7,7 @@ import numpy as np
 from adapters.solver_file import SolverFailed
 from adapters.solver_process import SolverProcess
 from reports.check.questions import Answer, Ball, Question, ask
-from reports.check.rows import Row, judged, near, not_asked, shown
+from reports.check.rows import FOLLOWS, Row, judged, near, not_asked, shown
 
 DT = 1e-3  # s, the exercise's
 EDGES = {"right": (5.2, 0.1), "left": (-5.2, -0.1), "top": (0.1, 3.2), "bottom": (-0.1, -3.2)}  # m, a place beyond each
@@ -15,20 +15,22 @@ ONTO = {"right": (-5.0, 0.1), "left": (5.0, -0.1), "top": (0.1, -3.0), "bottom":
 A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)  # a pair that hits
 
 
-def loop_rows(process: SolverProcess, faulty: bool) -> list[Row]:
-    """The rows of the step; where the file has none, a row that says so. `faulty`: the functions it calls are."""
+def loop_rows(process: SolverProcess, faulty: bool, begun: object) -> list[Row]:
+    """The rows of the step; where the file has none, a row that says so.
+
+    `faulty`: the functions it calls are; `begun`: what came of its first initScene.
+    """
     has = process.functions
     if not (has["begin"] and has["step"]):
         missing = "initScene" if not has["begin"] else "performSimStep"
         return [not_asked("step", "loop", f"the file has no function {missing}")]
     try:
+        if isinstance(begun, SolverFailed):
+            raise begun
         process.do("begin", limit=2.0)
     except SolverFailed as failure:
-        return [
-            judged(
-                "step", "loop", "Does initScene make a scene?", "it fails", "a scene", False, f"initScene: {failure}"
-            )
-        ]
+        cause = f"initScene: {failure}"
+        return [judged("step", "loop", "Does initScene make a scene?", "it fails", "a scene", False, cause)]
     start = process.do("globals")
     if not start or len(start) < 3:
         got = f"{len(start)} spheres" if start else "no ufo or no asteroids"
@@ -38,11 +40,8 @@ def loop_rows(process: SolverProcess, faulty: bool) -> list[Row]:
     came = ask(process, asked)
     failed = next((answer.failed for answer in came.values() if answer.failed), None)
     if failed:
-        return [
-            judged(
-                "step", "loop", "Does performSimStep come back?", "it fails", "yes", False, f"performSimStep: {failed}"
-            )
-        ]
+        cause = FOLLOWS if faulty else f"performSimStep: {failed}"
+        return [judged("step", "loop", "Does performSimStep come back?", "it fails", "yes", False, cause)]
     if faulty:
         rows = [not_asked("all spheres", "loop", "the functions that it calls have faults of their own")]
     else:
@@ -90,7 +89,7 @@ def integrated(question: Question, came: Answer, alone: Answer) -> Row:
     moved = np.subtract(end.x, start.x)
     wrong = [
         k for k, (b, a) in enumerate(zip(question.balls, came.last))
-        if not (near(np.subtract(a.x, b.x), moved, 1e-3) and near(a.v, end.v) and near(a.w, end.w))
+        if not (near(a.x, np.add(b.x, moved)) and near(a.v, end.v) and near(a.w, end.w))
     ]  # fmt: skip
     if not wrong:
         return judged("all spheres", "loop", asked, "yes", "yes", True)

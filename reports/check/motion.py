@@ -16,6 +16,13 @@ PUSHES = ("push", "push, other numbers", "coast")
 X: Array = np.array([1.0, 0.0])
 Y: Array = np.array([0.0, 1.0])
 G: Array = np.array([0.0, -9.81])  # m/s2
+
+
+def taken(vector: Array, part: int) -> Array:
+    """One part of a vector for both; an angular quantity has only one."""
+    return np.full_like(vector, vector.flat[part if vector.ndim else 0])
+
+
 # (v or w, force or torque, mass or inertia, the other of the two, dt) -> v' or w'
 PUSHED: dict[str, Law] = {
     "": lambda v, f, m, _o, dt: v + f / m * dt,
@@ -33,6 +40,9 @@ PUSHED: dict[str, Law] = {
     "the force is taken for a velocity": lambda v, f, _m, _o, _dt: f + 0 * v,
     "gravity is added, which the exercise has not": lambda v, f, m, _o, dt: v + (f / m + G[: np.size(v)]) * dt,
     "x and y of the force are exchanged": lambda v, f, m, _o, dt: v + np.flip(f) / m * dt,
+    "y takes the force along x": lambda v, f, m, _o, dt: v + taken(f, 0) / m * dt,
+    "x takes the force along y": lambda v, f, m, _o, dt: v + taken(f, 1) / m * dt,
+    "the quotient is rounded down (// or floor)": lambda v, f, m, _o, dt: v + np.floor(f / m) * dt,
     "only x is changed": lambda v, f, m, _o, dt: v + f / m * dt * X[: np.size(v)],
     "only y is changed": lambda v, f, m, _o, dt: v + f / m * dt * Y[: np.size(v)],
     "it is in degrees": lambda v, f, m, _o, dt: v + np.degrees(f / m * dt),
@@ -52,9 +62,17 @@ MOVED: dict[str, Law] = {
     "dt is counted twice": lambda x, _v, new, _a, dt: x + 2 * new * dt,
     "dt is halved": lambda x, _v, new, _a, dt: x + new * dt / 2,
     "the sign is wrong": lambda x, _v, new, _a, dt: x - new * dt,
-    "it is moved by the mean of old and new {velocity}": lambda x, v, new, _a, dt: x + (v + new) / 2 * dt,
+    "it is moved by v dt + a dt2 / 2, the mean of old and new {velocity}": lambda x, v, new, _a, dt: (
+        x + (v + new) / 2 * dt
+    ),
     "it is moved by v dt + a dt2": lambda x, _v, new, a, dt: x + new * dt + a * dt * dt,
     "it is moved by v dt + a dt2 / 2 with the new {velocity}": lambda x, _v, new, a, dt: x + new * dt + a * dt * dt / 2,
+    "it is moved by the acceleration, not by the {velocity}": lambda x, _v, _n, a, dt: x + a * dt,
+    "y takes the velocity along x": lambda x, _v, new, _a, dt: x + taken(new, 0) * dt,
+    "x takes the velocity along y": lambda x, _v, new, _a, dt: x + taken(new, 1) * dt,
+    "x is moved by both parts of the velocity, y by none": lambda x, _v, new, _a, dt: (
+        x + X[: np.size(x)] * new.sum() * dt
+    ),
     "it is moved by a dt2 / 2 alone": lambda x, _v, _n, a, dt: x + a * dt * dt / 2,
     "it is set to {velocity} times dt, not changed by it": lambda x, _v, new, _a, dt: new * dt + 0 * x,
     "only x is moved": lambda x, _v, new, _a, dt: x + new * dt * X[: np.size(x)],
@@ -75,16 +93,18 @@ def motion_rows(answers: dict[str, Answer]) -> list[Row]:
     places = [(np.array(b.x), np.array(b.v), np.array(a.v), np.array(b.F) / b.m, dt) for b, dt, a in seen]
     angles = [(np.array(b.alpha), np.array(b.w), np.array(a.w), b.torque / b.MoI, dt) for b, dt, a in seen]
     after = [a for _, _, a in seen]
+    velocity = law_row("velocity", "What velocity has a sphere after one step under a force?", "m/s", PUSHED, linear,
+                       [a.v for a in after], {"mass": "mass", "other": "MoI"})  # fmt: skip
+    spin = law_row("spin", "What angular velocity has it after one step under a torque?", "rad/s", PUSHED, angular,
+                   [a.w for a in after], {"mass": "MoI", "other": "mass"})  # fmt: skip
     return [
-        law_row("velocity", "What velocity has a sphere after one step under a force?", "m/s", PUSHED, linear,
-                [a.v for a in after], {"mass": "mass", "other": "MoI"}),
+        velocity,
         law_row("position", "Where is it after that step, its velocity being what came?", "m", MOVED, places,
                 [a.x for a in after], {"velocity": "velocity"}),
-        law_row("spin", "What angular velocity has it after one step under a torque?", "rad/s", PUSHED, angular,
-                [a.w for a in after], {"mass": "MoI", "other": "mass"}),
+        spin,
         law_row("angle", "What is its angle then, its angular velocity being what came?", "rad", MOVED, angles,
                 [a.alpha for a in after], {"velocity": "angular velocity"}),
-        coasting(seen[2][0], seen[2][2]),
+        coasting(seen[2][0], seen[2][2], velocity.cause or spin.cause),
         lasting(answers["push twice"]),
         untouched(seen),
     ]  # fmt: skip
@@ -104,8 +124,8 @@ def law_row(
     cause = (found or "").format(**words)
     if name == "spin":
         cause = cause.replace("the force", "the torque").replace("F/m", "torque/MoI")
-    if cause and not np.isfinite(np.asarray(came[0], float)).all():
-        cause = "it is no number"
+    if not np.isfinite(np.asarray(came[0], float)).all():
+        cause = "it is no number (a field that does not exist, text, a division by zero?)"
     return judged(name, "1", asked, f"{shown(came[0])} {unit}", f"{shown(right)} {unit}", found == "", cause)
 
 
@@ -131,13 +151,14 @@ def damped(given: list[tuple], came: list) -> str | None:
     return None
 
 
-def coasting(before: Ball, after: Ball) -> Row:
-    """Without a force velocity and spin stay."""
+def coasting(before: Ball, after: Ball, mistake: str) -> Row:
+    """Without a force velocity and spin stay; `mistake`: what is known to be wrong with them."""
     return judged(
         "coasting", "1", "Does a sphere keep its velocity and spin where nothing acts on it?",
         f"v = {shown(after.v)} m/s, w = {shown(after.w)} rad/s",
         f"v = {shown(before.v)} m/s, w = {shown(before.w)} rad/s",
-        near(after.v, before.v) and near(after.w, before.w), "something acts on it, though force and torque are zero",
+        near(after.v, before.v) and near(after.w, before.w),
+        mistake or "something acts on it, though force and torque are zero",
     )  # fmt: skip
 
 

@@ -7,8 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from reports.check.impacts import BACKWARDS, Finding
 from reports.check.questions import HITS, QUESTIONS, Answer, Ball, direction, finite
 from reports.check.rows import Row, judged, near, not_asked, shown
+from scenarios.model import Array
 
 
 class Shift(NamedTuple):
@@ -22,10 +24,11 @@ class Shift(NamedTuple):
     sizes: float
 
 
+PULLED = "the sign is wrong: they are pulled into each other"
 # (shift) -> the displacement of both together that a mistake would give, m
 TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "the positions are never changed: not implemented": lambda s, a, b: 0.0,
-    "the sign is wrong: they are pulled into each other": lambda s, a, b: -s.overlap,
+    PULLED: lambda s, a, b: -s.overlap,
     "only half of the overlap is taken out: it is halved twice": lambda s, a, b: s.overlap / 2,
     "the overlap is counted twice: each is moved by all of it": lambda s, a, b: 2 * s.overlap,
     "the sign is wrong, and the overlap is counted twice": lambda s, a, b: -2 * s.overlap,
@@ -38,11 +41,22 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "they are moved by their distance, not by the overlap": lambda s, a, b: s.distance,
     "the overlap is taken of squares": lambda s, a, b: s.sizes**2 - s.distance**2,
     "the overlap is size plus distance": lambda s, a, b: s.sizes + s.distance,
+    "the squared distance is taken for the distance": lambda s, a, b: (s.sizes - s.distance**2) / s.distance,
+    "brackets are missing: each is moved by sizes - distance / 2": lambda s, a, b: 2 * s.sizes - s.distance,
+    "brackets are missing: sizes / 2 - distance": lambda s, a, b: s.sizes / 2 - s.distance,
     "only the size of A is used": lambda s, a, b: a.r - s.distance,
     "only the size of B is used": lambda s, a, b: b.r - s.distance,
     "the shares are the inverse masses, which do not add up to 1": lambda s, a, b: s.overlap * (1 / a.m + 1 / b.m),
+    "both are moved by the share of A": lambda s, a, b: 2 * s.overlap * a.m / (a.m + b.m),
+    "both are moved by the share of B": lambda s, a, b: 2 * s.overlap * b.m / (a.m + b.m),
     "the shares are the masses, which do not add up to 1": lambda s, a, b: s.overlap * (a.m + b.m),
 }
+
+
+def pulled(answers: dict[str, Answer]) -> bool:
+    """Whether pairs that hit are displaced the wrong way."""
+    shifts = [shift_of(question.balls, answers[name].last) for name, question in HITS.items()]
+    return all(s.a + s.b < 0 and near(s.across, 0.0, 0.1) for s in shifts)
 
 
 def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
@@ -55,22 +69,24 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
     return Shift(float(da @ n), float(-(db @ n)), across, a.r + b.r - distance, distance, a.r + b.r)
 
 
-def projection_rows(answers: dict[str, Answer], velocities_explained: bool) -> list[Row]:
-    """The rows of (b); `velocities_explained`: what happens at relative rest follows from the impulse."""
+def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[Row]:
+    """The rows of (b); `found`: what the velocities say."""
     seen = [(q.balls, shift_of(q.balls, answers[name].last), answers[name].last) for name, q in HITS.items()]
     balls, shift, after = seen[0]
     distance = float(np.hypot(*np.subtract(after[0].x, after[1].x)))
     right = all(near(s.a + s.b, s.overlap, 0.1) for _, s, _ in seen)
     along = all(near(s.across, 0.0, 0.1) for _, s, _ in seen)
+    backwards = found is not None and found.impulse == BACKWARDS
+    explained = found is not None and bool(found.mistake) and found.task != "2b"
     rows = [
         judged("one point", "2b", "How far apart are the centres of a pair after it?", f"{shown(distance)} m",
                f"{shown(shift.sizes)} m: they meet in one point", right and along,
-               "" if right and along else total_cause(seen)),
+               "" if right and along else BACKWARDS if backwards else total_cause(seen)),
         judged("normal", "2b", "Are they moved along the line of their centres?",
                f"{shown(shift.across)} m across it", "0 m across it", along, across_cause(seen)),
         split(balls, shift) if right and along else not_asked("split", "2b", "they do not meet in one point"),
     ]  # fmt: skip
-    return [*rows, *at_rest(answers, velocities_explained), parting(answers["part"])]
+    return [*rows, *at_rest(answers, explained), parting(answers["part"])]
 
 
 def at_rest(answers: dict[str, Answer], explained: bool) -> list[Row]:
@@ -113,26 +129,57 @@ def no_numbers(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
     return "" if np.isfinite([b.x for *_, after in seen for b in after]).all() else "the positions become no numbers"
 
 
+# (n, A or B before, the other) -> the direction in which a mistake would move it
+WAYS: dict[str, Callable[[Array, Ball, Ball], Array]] = {
+    "along x only": lambda n, one, other: np.array([1.0, 0.0]),
+    "along y only": lambda n, one, other: np.array([0.0, 1.0]),
+    "with the wrong sign of x or of y": lambda n, one, other: n * [1, -1],
+    "by the x part of the normal in x and in y": lambda n, one, other: np.ones(2) * n[0],
+    "by the y part of the normal in x and in y": lambda n, one, other: np.ones(2) * n[1],
+    "along their relative velocity": lambda n, one, other: np.subtract(one.v, other.v),
+    "along the tangent": lambda n, one, other: np.array([-n[1], n[0]]),
+    "with x and y of the normal exchanged": lambda n, one, other: n[::-1],
+    "along the sum of their positions": lambda n, one, other: np.add(one.x, other.x),
+    "along its own position": lambda n, one, other: np.array(one.x),
+}
+
+
 def across_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
-    """Along what else they are moved; "" if along nothing that is known."""
+    """Along what else they are moved, or one of them is; "" if along nothing that is known."""
     if lost := no_numbers(seen):
         return lost
-    ways = {
-        "they are moved along x only": lambda a, b: np.array([1.0, 0.0]),
-        "they are moved along y only": lambda a, b: np.array([0.0, 1.0]),
-        "they are moved along their relative velocity": lambda a, b: np.subtract(a.v, b.v),
-        "they are moved along the tangent": lambda a, b: np.array([b.x[1] - a.x[1], a.x[0] - b.x[0]]),
-        "x and y of the normal are exchanged": lambda a, b: np.subtract(a.x, b.x)[::-1],
-        "they are moved along the sum of their positions": lambda a, b: np.add(a.x, b.x),
-        "each is moved along its own position": lambda a, b: np.array(a.x),
-    }
+    moved = [way_of([(b[who], b[1 - who], after[who]) for b, _, after in seen]) for who in (0, 1)]
+    if moved[0] == moved[1]:
+        return f"they are moved {moved[0]}" if moved[0] else ""
+    parts = (f"{who}.{way}" if "is set" in way else f"{who} is moved {way}" for who, way in zip("AB", moved) if way)
+    return "; ".join(parts)
+
+
+def way_of(seen: list[tuple[Ball, Ball, Ball]]) -> str | None:
+    """Along what one of a pair is moved, of (it before, the other, it after); "" along the normal, None if unknown."""
+    ways = {"": lambda n, one, other: n} | WAYS
     for name, way in ways.items():
-        crosses = [
-            float(np.cross([*np.subtract(after[0].x, balls[0].x), 0], [*way(*balls), 0])[2]) for balls, _, after in seen
-        ]
+        crosses = []
+        for one, other, after in seen:
+            (x, y), (u, v) = np.subtract(after.x, one.x), way(direction(one, other)[0], one, other)
+            crosses.append(x * v - y * u)
         if near(crosses, 0.0, 0.01):
             return name
-    return ""
+    return next((f"{which} is set, not changed (= for +=)" for which in SET if was_set(which, seen)), None)
+
+
+SET = ("position", "position.x", "position.y")
+
+
+def was_set(which: str, seen: list[tuple[Ball, Ball, Ball]]) -> bool:
+    """Whether a position, or one part of it, is the displacement itself, which is along the normal."""
+    crosses = []
+    for one, other, after in seen:
+        n, moved = direction(one, other)[0], np.subtract(after.x, one.x)
+        x = after.x[0] if which != "position.y" else moved[0]
+        y = after.x[1] if which != "position.x" else moved[1]
+        crosses.append(x * n[1] - y * n[0])
+    return near(crosses, 0.0, 0.01)
 
 
 def split(balls: tuple[Ball, ...], shift: Shift) -> Row:

@@ -20,6 +20,11 @@ NAMED = re.compile(
 NUMBER = re.compile(r"(?<![\w.])\d*\.?\d+(?![\w.])")
 
 
+def code_of(text: str) -> str:
+    """A file with blanks for its comments, so that its lines keep their numbers."""
+    return COMMENTS.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
+
+
 @dataclass(frozen=True)
 class Restitution:
     """Of a file.
@@ -63,12 +68,12 @@ class Restitution:
         cause = cause or f"e = {shown(self.own)} is written into the file, but it is not what comes out"
         return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
 
-    def speeds(self) -> Row:
-        """The same at any speed."""
+    def speeds(self, mistake: str) -> Row:
+        """The same at any speed; `mistake` as above."""
         return judged(
             "any speed", "2c", "Is it the same for pairs that close at 2 mm/s and at 200 m/s?",
             f"{shown(self.slow)} and {shown(self.fast)}", shown(self.came),
-            near([self.slow, self.fast], self.came), "the restitution depends on the speed",
+            near([self.slow, self.fast], self.came), mistake or "the restitution depends on the speed",
         )  # fmt: skip
 
 
@@ -83,7 +88,7 @@ def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
 
 def written(text: str) -> list[float]:
     """What may be the e of a file: numbers that a name such as e or restitution gets; 0.9 if that or 1.9 occurs."""
-    code = COMMENTS.sub(" ", text)
+    code = code_of(text)
     named = [float(value) for _, value in NAMED.findall(code) if 0 <= float(value) <= 1]
     numbers = [float(x) for x in NUMBER.findall(code)]
     return named + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)

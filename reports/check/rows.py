@@ -11,6 +11,7 @@ import numpy as np
 Verdict = Literal["right", "fault", "note", "not asked"]
 # Single precision is allowed: a dozen operations of 6e-8 each. What is wrong is wrong by far more than that.
 TOLERANCE = 1e-6
+FOLLOWS = "it follows from the faults above"
 UNKNOWN = "unknown: no common mistake gives these numbers"
 TASKS = {
     "file": "the file",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +12,13 @@ from adapters.solver_file import SolverFailed, read_solver
 from adapters.solver_process import SolverProcess
 from reports.check.detection import detection_rows
 from reports.check.functions import implemented
-from reports.check.impacts import explain
+from reports.check.impacts import APPROACH, BACKWARDS, explain
 from reports.check.impulse import impulse_not_asked, impulse_rows
 from reports.check.loop import loop_rows
 from reports.check.motion import motion_rows
-from reports.check.projection import projection_rows
+from reports.check.projection import projection_rows, pulled
 from reports.check.questions import HITS, QUESTIONS, Answer, ask
-from reports.check.restitution import Restitution, restitution_of
+from reports.check.restitution import Restitution, code_of, restitution_of
 from reports.check.rows import Row, judged, not_asked
 from reports.check.scenes import scene_rows
 
@@ -52,19 +54,37 @@ LOADS = "Can the file be loaded, and does it leave the language as it is?"
 
 def rows_of(process: SolverProcess, text: str) -> tuple[list[Row], float | None]:
     """The rows of a file that is loaded, and its restitution; raises `SolverFailed` if its process is lost."""
-    if process.functions["begin"]:
-        process.request([("begin", None, 2.0)])  # makes the globals that must not change; judged with the step
+    # Makes the globals that must not change; judged with the step.
+    begun = process.request([("begin", None, 2.0)])[0] if process.functions["begin"] else None
     asked = {k: q for k, q in QUESTIONS.items() if process.functions["integrate" if k in MOTION else "collide"]}
     answers = ask(process, asked)
-    rows = [loads(process), *task_1(process, answers)]
+    rows = [loads(process), *task_1(process, answers, text)]
     contact, restitution = task_2(process, answers, text)
     rows += contact
     faulty = any(row.verdict == "fault" for row in rows)
-    rows += (
-        loop_rows(process, faulty) if not stuck(answers) else [not_asked("step", "loop", "a call did not come back")]
-    )
+    if stuck(answers):
+        rows.append(not_asked("step", "loop", "a call did not come back"))
+    else:
+        rows += loop_rows(process, faulty, begun)
     e = restitution.played if restitution is not None else None
-    return rows + scene_rows(process, rows, e), e
+    rows += scene_rows(process, rows, e)
+    return hinted(rows, text) if process.kind == "javascript" else rows, e
+
+
+def hinted(rows: list[Row], text: str) -> list[Row]:
+    """The rows, the first fault with a word on a condition that sets a variable, if the file has one.
+
+    Python takes no such condition.
+    """
+    slip, faulty = SET_IN_CONDITION.search(code_of(text)), (row for row in rows if row.verdict == "fault")
+    if slip is None or (first := next(faulty, None)) is None:
+        return rows
+    line = text.count("\n", 0, slip.start()) + 1
+    hint = f"{first.cause} (line {line} has = in the condition of {slip[1]}: it sets, == compares)"
+    return [replace(row, cause=hint) if row.cause == first.cause else row for row in rows]
+
+
+SET_IN_CONDITION = re.compile(r"\b(if|while)\s*\(\s*[\w.]+\s*=(?![=>])")
 
 
 MOTION = ("push", "push, other numbers", "coast", "push twice")
@@ -83,27 +103,29 @@ def loads(process: SolverProcess) -> Row:
                   f"the file replaces {what}, which the rest of the page uses, too")  # fmt: skip
 
 
-def task_1(process: SolverProcess, answers: dict[str, Answer]) -> list[Row]:
+def task_1(process: SolverProcess, answers: dict[str, Answer], text: str) -> list[Row]:
     """The rows of integrate."""
     mine = {name: answer for name, answer in answers.items() if name in MOTION}
-    rows, usable = implemented("1", process.functions["integrate"], mine)
+    rows, usable = implemented("1", process.functions["integrate"], mine, text)
     return rows + (motion_rows(mine) if usable else [not_asked("velocity", "1", "integrate cannot be judged further")])
 
 
 def task_2(process: SolverProcess, answers: dict[str, Answer], text: str) -> tuple[list[Row], Restitution | None]:
     """The rows of the collision function, and its restitution where it has one."""
     mine = {name: answer for name, answer in answers.items() if name not in MOTION}
-    rows, usable = implemented("2a", process.functions["collide"], mine)
+    rows, usable = implemented("2a", process.functions["collide"], mine, text)
     if not usable:
         why = "the collision function cannot be judged further"
         return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None
-    rows += detection_rows(mine)
+    rows += detection_rows(mine, text)
     if not reacts(mine):
         why = "the overlapping pairs of these questions are taken to be apart"
         return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None
     restitution = restitution_of(text, mine)
     found = explain(mine, restitution)
-    rows += projection_rows(mine, found is not None and bool(found.impulse or found.update) and found.task != "2b")
+    if found is not None and found.impulse == APPROACH and pulled(mine):
+        found = replace(found, impulse=BACKWARDS)
+    rows += projection_rows(mine, found)
     return rows + impulse_rows(mine, restitution, found), restitution
 
 

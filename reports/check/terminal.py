@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
+from rich.padding import Padding
 from rich.table import Table
 
 from adapters.solver_file import printable
@@ -41,16 +42,34 @@ def print_file(one: FileCheck) -> None:
         console.print(details)
 
 
+def name_in(folder: Path, one: FileCheck) -> str:
+    """A file as its class knows it."""
+    return printable(str(one.path.relative_to(folder)))
+
+
+def elided(name: str, room: int) -> str:
+    """A name that fits, without its middle if it is too long: who it is and which file stand at its ends."""
+    if len(name) <= room:
+        return name
+    end = max(room // 2, 1)
+    return f"{name[: max(room - end - 1, 1)]}…{name[-end:]}"
+
+
 def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
-    """A row a file: a verdict for every task and the sentence to begin with; "-" and the reason if it is no solver."""
+    """A row a file, a verdict for every task or "-" if it is no solver; below, of each the sentence to begin with."""
     console = Console()
-    table = Table("solver", *TASKS, "first of all", box=None, padding=(0, 1, 0, 0))
-    table.columns[0].no_wrap = True
+    table = Table("solver", *TASKS, box=None, padding=(0, 1, 0, 0))
+    widest = {task: max(len(task), *(len(SHORT[one.tasks[task]]) for one in checks)) for task in TASKS}
+    room = console.width - sum(width + 1 for width in widest.values()) - 1
     for one in checks:
         words = [f"[{STYLE[word]}]{SHORT[word]}" for word in one.tasks.values()]
-        first = one.refused or next((f"{row.name}: {row.cause}" for row in one.faults), "")
-        table.add_row(escape(printable(str(one.path.relative_to(folder)))), *words, escape(first))
+        table.add_row(escape(elided(name_in(folder, one), room)), *words)
     console.print(table)
+    first = {name_in(folder, one): one.sentences[0].removeprefix(f"{one.path}: ") for one in checks if not one.passed}
+    if first:
+        console.print("\nTo begin with:")
+    for name, sentence in first.items():
+        console.print(Padding(f"[bold]{escape(name)}[/bold]: {escape(sentence)}", (0, 0, 0, 2)), highlight=False)
     right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
     rest = f"; {refused} not checked" if refused else ""
     console.print(f"\n{right} of {len(checks) - refused} files without a fault{rest}.", highlight=False)

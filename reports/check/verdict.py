@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.solver_file import NotASolver
-from reports.check.rows import TASKS, Row, Verdict, worst
-from reports.check.scenes import FOLLOWS
+from reports.check.rows import FOLLOWS, TASKS, Row, Verdict, worst
 from reports.check.solver import examine
 
 MOST = 3  # sentences
+NONE = "holds no .js and no .py file"
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,9 @@ def sentence(row: Row) -> str:
 
 
 def check_file(path: Path) -> FileCheck:
-    """The check of one file, whatever it is."""
+    """The check of one file, whatever it is; of a folder, that there is none."""
+    if path.is_dir():
+        return FileCheck(path, [], f"{path}: {NONE}")
     try:
         rows, restitution = examine(path)
         return FileCheck(path, rows, restitution=restitution)

@@ -1,0 +1,57 @@
+"""A pair before a hit and what the hit changed, as the laws of impact take it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from reports.check.questions import Ball, direction
+from scenarios.model import Array
+
+
+class Hit(NamedTuple):
+    """A pair before the call, m, m/s, kg: u = vA - vB, n from B to A, distance d, sum of sizes s; shifts of A and B."""
+
+    va: Array
+    vb: Array
+    n: Array
+    d: float
+    s: float
+    ma: float
+    mb: float
+    shift_a: Array
+    shift_b: Array
+
+    @property
+    def u(self) -> Array:
+        """Relative velocity."""
+        return self.va - self.vb
+
+    @property
+    def vn(self) -> float:
+        """Its part along n; negative where they approach."""
+        return float(self.u @ self.n)
+
+    @property
+    def mu(self) -> float:
+        """Reduced mass."""
+        return 1 / (1 / self.ma + 1 / self.mb)
+
+
+def hit_of(balls: tuple[Ball, ...], after: list[Ball]) -> Hit:
+    """A pair and how it was displaced."""
+    a, b = balls
+    n, d = direction(a, b)
+    shifts = (np.subtract(y.x, x.x) for x, y in zip(balls, after))
+    return Hit(np.array(a.v), np.array(b.v), n, d, a.r + b.r, a.m, b.m, *shifts)
+
+
+Impulse = Callable[[Hit, float], Array]
+"""What A gets from B by a law, N s, from a pair and the restitution."""
+
+
+def changes(balls: tuple[Ball, ...], after: list[Ball]) -> Array:
+    """(2, 2) m/s, what was added to both velocities."""
+    return np.array([np.subtract(y.v, x.v) for x, y in zip(balls, after)])

@@ -1,0 +1,97 @@
+"""Slips in one part of the formulas of a hit: in one product of a scalar product, in one velocity of one sphere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import product
+
+import numpy as np
+
+from reports.check.hits import Hit, Impulse
+from reports.check.rows import near
+from scenarios.model import Array
+
+Change = Callable[[Hit, Array, float], tuple[Array, Array]]
+# (velocity, of the other axis, of the other sphere, n, n of the other axis) -> one product of (vA - vB).n
+PRODUCTS: dict[str, Callable[[float, float, float, float, float], float]] = {
+    "is left out": lambda v, across, other, n, m: 0.0,
+    "has the wrong sign": lambda v, across, other, n, m: -v * n,
+    "takes the other part of n": lambda v, across, other, n, m: v * m,
+    "takes the velocity along the other axis": lambda v, across, other, n, m: across * n,
+    "takes the velocity of the other sphere": lambda v, across, other, n, m: other * n,
+    "is not multiplied by n": lambda v, across, other, n, m: v,
+}
+PLACES = {  # (0: A, 1: B; 0: x, 1: y)
+    "(vA.x - vB.x) n.x": {(0, 0), (1, 0)}, "(vA.y - vB.y) n.y": {(0, 1), (1, 1)},
+    "vA.x n.x": {(0, 0)}, "vA.y n.y": {(0, 1)}, "vB.x n.x": {(1, 0)}, "vB.y n.y": {(1, 1)},
+    "vA.n": {(0, 0), (0, 1)}, "vB.n": {(1, 0), (1, 1)},
+}  # fmt: skip
+
+
+def scalar_products() -> dict[str, Impulse]:
+    """The impulses with one slip in (vA - vB).n, by what the slip is."""
+    return {
+        f"in the scalar product {where} {how}": with_slip(places, one)
+        for (where, places), (how, one) in product(PLACES.items(), PRODUCTS.items())
+    }
+
+
+def with_slip(places: set[tuple[int, int]], one: Callable[..., float]) -> Impulse:
+    """The right impulse but for the products at `places`, which are made by `one`."""
+
+    def impulse(h: Hit, e: float) -> Array:
+        v, total = (h.va, h.vb), 0.0
+        for who, k in product((0, 1), (0, 1)):
+            given = (v[who][k], v[who][1 - k], v[1 - who][k], h.n[k], h.n[1 - k])
+            total += (1 - 2 * who) * (one(*given) if (who, k) in places else v[who][k] * h.n[k])
+        return -(1 + e) * total * h.mu * h.n
+
+    return impulse
+
+
+# (p: its part of +J n for A, -J n for B; q: the part along the other axis; all of it along n; mass, mass of the other;
+# velocity before; e) -> what is added to one velocity along one axis, m/s
+COMPONENTS: dict[str, Callable[..., float]] = {
+    "": lambda p, q, whole, m, other, v, e: p / m,
+    "is never changed": lambda p, q, whole, m, other, v, e: 0.0,
+    "has the wrong sign": lambda p, q, whole, m, other, v, e: -p / m,
+    "takes the other part of n": lambda p, q, whole, m, other, v, e: q / m,
+    "takes the other part of n, with the wrong sign": lambda p, q, whole, m, other, v, e: -q / m,
+    "is set, not changed (= for +=)": lambda p, q, whole, m, other, v, e: p / m - v,
+    "is set, not changed, with the wrong sign": lambda p, q, whole, m, other, v, e: -p / m - v,
+    "is divided by the mass of the other": lambda p, q, whole, m, other, v, e: p / other,
+    "is not divided by its mass": lambda p, q, whole, m, other, v, e: p,
+    "is multiplied by its mass": lambda p, q, whole, m, other, v, e: p * m,
+    "is changed twice": lambda p, q, whole, m, other, v, e: 2 * p / m,
+    "is changed along x and along y": lambda p, q, whole, m, other, v, e: (p + q) / m,
+    "is not multiplied by n": lambda p, q, whole, m, other, v, e: whole / m,
+    "is multiplied by e": lambda p, q, whole, m, other, v, e: e * p / m,
+}
+
+
+def components(seen: Sequence[tuple[Hit, Array]], right: Impulse, e: float) -> tuple[str, Change] | None:
+    """What is done to each part of both velocities, with the right impulse; None if one of them follows no law."""
+    found = {}
+    for who, axis in product((0, 1), (0, 1)):
+        came = [change[who, axis] for _, change in seen]
+        fits = (
+            name for name in COMPONENTS
+            if near([component(name, h, right(h, e), who, axis, e) for h, _ in seen], came, 0.1)
+        )  # fmt: skip
+        found[who, axis] = next(fits, None)
+    if None in found.values():
+        return None
+
+    def change(h: Hit, P: Array, e: float) -> tuple[Array, Array]:
+        a, b = (np.array([component(found[who, k], h, P, who, k, e) for k in (0, 1)]) for who in (0, 1))
+        return a, b
+
+    slips = [f"v{'AB'[who]}.{'xy'[k]} {slip}" for (who, k), slip in found.items() if slip]
+    return "; ".join(slips), change
+
+
+def component(name: str | None, h: Hit, P: Array, who: int, axis: int, e: float) -> float:
+    """What a law of `COMPONENTS` adds, m/s."""
+    sign, masses, v = 1 - 2 * who, (h.ma, h.mb), (h.va, h.vb)[who]
+    own, other = masses[who], masses[1 - who]
+    return COMPONENTS[name or ""](sign * P[axis], sign * P[1 - axis], sign * (P @ h.n), own, other, v[axis], e)
