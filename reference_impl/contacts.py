@@ -21,6 +21,7 @@ CONTACT = np.dtype([
     ("impulse", "f8"), ("slide", "f8"),  # N s along the normal and along the tangent (-ny, nx)
     ("strongest", "f8"),  # N s, of the impulses that one solve added
     ("nudged", "f8"),  # N s, of `switched.nudge`
+    ("island", "i8"), ("colour", "i8"),  # from 1; 0: none yet
 ])  # fmt: skip
 
 
@@ -28,11 +29,11 @@ class Contacts(NamedTuple):
     """`found[0]` contacts, and what else is kept from stage to stage."""
 
     found: np.ndarray  # (1,): how many
-    rows: np.ndarray  # of CONTACT, enough for all there can be, and one to spare
+    rows: np.ndarray  # of CONTACT, enough for twice as many as there can be
     start: np.ndarray  # (n, 2) m: where the disks were at the start of the step
     moved: np.ndarray  # (n, 2) m: what they have moved since
     nudge: np.ndarray  # (n, 2) m/s: what the next move adds to the velocity
-    before: np.ndarray  # (n, n + w, 2) N s: impulse and slide of the pair in the last step, 0 if it was none
+    before: np.ndarray  # (n, n + w, 3): impulse, slide, colour of the pair in the last step, 0 if it was no contact
 
 
 def no_contacts(n: int, walls: int, precision: type) -> Contacts:
@@ -41,11 +42,11 @@ def no_contacts(n: int, walls: int, precision: type) -> Contacts:
     place: np.ndarray = np.zeros((n, 2), precision)
     return Contacts(
         found=np.zeros(1, np.int64),
-        rows=np.zeros(most + 1, CONTACT).view(np.recarray),
+        rows=np.zeros(2 * most + 1, CONTACT).view(np.recarray),
         start=place,
         moved=np.zeros_like(place),
         nudge=np.zeros((n, 2)),
-        before=np.zeros((n, n + walls, 2)),
+        before=np.zeros((n, n + walls, 3)),
     )
 
 
@@ -61,6 +62,7 @@ def detect(disks: Disks, world: World, margin: float, skin: float, touching: boo
         contact = kept.rows[c]
         kept.before[contact.i, column(contact.j, n), 0] = contact.impulse
         kept.before[contact.i, column(contact.j, n), 1] = contact.slide
+        kept.before[contact.i, column(contact.j, n), 2] = contact.colour
     kept.found[0] = 0
     for i in range(n):
         for j in range(i + 1, n):
@@ -85,6 +87,7 @@ def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int
     gap, contact.nx, contact.ny = gap_of(disks, world, i, j)
     contact.gap = gap - skin
     contact.target = contact.strongest = 0.0
+    contact.island, contact.colour = 0, int(kept.before[i, other, 2])
     contact.impulse, contact.slide = kept.before[i, other, 0], kept.before[i, other, 1]
 
 
@@ -95,45 +98,68 @@ def column(j: int, n: int) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def turn_round(kept: Contacts) -> None:
-    """Go through the contacts from the last disks to the first, as an engine does whose lists grow at the front."""
-    rows, last, spare = kept.rows, kept.found[0] - 1, len(kept.rows) - 1
-    for c in range((last + 1) // 2):
-        rows[spare] = rows[c]
-        rows[c] = rows[last - c]
-        rows[last - c] = rows[spare]
+def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+    """Sort the contacts into islands, which share no disk that moves, in the order in which a search finds them.
+
+    It goes from disk to disk, from the last on, and knows the last contact of a disk first (Box2D 2.3, b2World::Solve).
+    """
+    rows, n, count, copies = kept.rows, len(mass), kept.found[0], len(kept.rows) // 2
+    for c in range(count):
+        rows[copies + c] = rows[c]
+    seen, stack, done = np.zeros(n, np.bool_), np.zeros(n, np.int64), 0
+    for seed in range(n - 1, -1, -1):
+        high = 0
+        if not seen[seed] and mass[seed] != inf:
+            seen[seed], stack[0], high = True, seed, 1
+        while high > 0:
+            high -= 1
+            disk = stack[high]
+            for c in range(copies + count - 1, copies - 1, -1):
+                i, j = rows[c].i, rows[c].j
+                if rows[c].island == 0 and (i == disk or j == disk):
+                    rows[c].island = seed + 1
+                    rows[done] = rows[c]
+                    done += 1
+                    other = j if i == disk else i
+                    if other >= 0 and not seen[other] and mass[other] != inf:
+                        seen[other], stack[high] = True, other
+                        high += 1
 
 
 @njit(cache=True, error_model="numpy")
 def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
-    """Sort the contacts into colours, none of which has a disk that moves twice, and go through colour after colour.
+    """Sort the contacts by colours, none of which has a disk that moves twice.
 
-    Each takes the first colour that is free, what does not move the second (Box2D 3.1, b2AssignGraphColor).
+    A new contact takes the first colour that is free, or the second where only one can move, and keeps it for as long
+    as it lasts (Box2D 3.1, b2AssignGraphColor).
     """
-    rows, spare, done, colour = kept.rows, len(kept.rows) - 1, 0, 0
-    while done < kept.found[0]:
-        first = done
-        for c in range(done, kept.found[0]):
-            if fits(mass, rows, first, done, rows[c].i, rows[c].j, colour):
-                rows[spare] = rows[c]
-                for k in range(c, done, -1):
-                    rows[k] = rows[k - 1]
-                rows[done] = rows[spare]
+    rows, count, copies, most = kept.rows, kept.found[0], len(kept.rows) // 2, 0
+    for c in range(count):
+        if rows[c].colour == 0:
+            colour = 1 if rows[c].j >= 0 and mass[rows[c].i] != inf and mass[rows[c].j] != inf else 2
+            while taken(mass, kept, c, colour):
+                colour += 1
+            rows[c].colour = colour
+        most = max(most, rows[c].colour)
+        rows[copies + c] = rows[c]
+    done = 0
+    for colour in range(1, most + 1):
+        for c in range(copies, copies + count):
+            if rows[c].colour == colour:
+                rows[done] = rows[c]
                 done += 1
-        colour += 1
 
 
 @njit(cache=True, error_model="numpy")
-def fits(mass, rows, first: int, done: int, i: int, j: int, colour: int) -> bool:  # type: ignore[no-untyped-def]
-    """Whether neither i nor j, if it moves, is in any of the contacts from `first` to before `done`."""
+def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no-untyped-def]
+    """Whether a disk of contact c that moves has another contact of this colour."""
+    i, j = kept.rows[c].i, kept.rows[c].j
     moving_i, moving_j = mass[i] != inf, j >= 0 and mass[j] != inf
-    if colour == 0 and not (moving_i and moving_j):
-        return False
-    for c in range(first, done):
-        a, b = rows[c].i, rows[c].j
-        if (moving_i and (a == i or b == i)) or (moving_j and (a == j or b == j)):
-            return False
-    return True
+    for k in range(kept.found[0]):
+        a, b = kept.rows[k].i, kept.rows[k].j
+        if kept.rows[k].colour == colour and ((moving_i and (a == i or b == i)) or (moving_j and (a == j or b == j))):
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")

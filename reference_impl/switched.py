@@ -13,6 +13,7 @@ from numba import njit
 from reference_impl.contacts import (
     Contacts,
     by_colour,
+    by_island,
     closing,
     detect,
     gap_along,
@@ -22,17 +23,16 @@ from reference_impl.contacts import (
     push_to_target,
     rub,
     turn,
-    turn_round,
 )  # fmt: skip
 from reference_impl.exercise import collide, collide_wall, touching, touching_wall, wrap
 from reference_impl.state import Disks, World
 
 STAGES = (
-    "accelerate", "move", "pair_by_pair", "detect", "last_first", "aim", "warm_start", "bounce", "cap", "push_out",
+    "accelerate", "move", "pair_by_pair", "detect", "by_island", "aim", "warm_start", "bounce", "cap", "push_out",
     "nudge", "soften", "relax", "restitute", "by_colour",
 )  # fmt: skip
 (
-    ACCELERATE, MOVE, PAIR_BY_PAIR, DETECT, LAST_FIRST, AIM, WARM_START, BOUNCE, CAP, PUSH_OUT,
+    ACCELERATE, MOVE, PAIR_BY_PAIR, DETECT, BY_ISLAND, AIM, WARM_START, BOUNCE, CAP, PUSH_OUT,
     NUDGE, SOFTEN, RELAX, RESTITUTE, BY_COLOUR,
 ) = range(len(STAGES))  # fmt: skip
 
@@ -85,8 +85,8 @@ def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h:
         pair_by_pair(disks, world, on, k, hits)
     elif stage == DETECT:
         detect(disks, world, on.margin, on.skin, on.touching, kept)
-    elif stage == LAST_FIRST:
-        turn_round(kept)
+    elif stage == BY_ISLAND:
+        by_island(disks.mass, kept)
     elif stage == AIM:
         aim(disks.velocity, world.restitution, on.threshold, kept)
     elif stage == WARM_START:
@@ -208,20 +208,31 @@ def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def push_out(disks: Disks, world: World, on: Switches, kept: Contacts) -> None:
-    """Undo a share of every overlap beyond the slop, some times; stop where all are within three slops."""
-    if on.push_share == 0.0:
-        return
-    for _ in range(on.push_iterations):
-        worst = 0.0
-        for c in range(kept.found[0]):
-            i, j = kept.rows[c].i, kept.rows[c].j
-            gap, nx, ny = gap_of(disks, world, i, j)
-            gap -= on.skin if j < 0 else 0.0
-            worst = min(worst, gap)
-            by = min(max(-on.push_share * (gap + on.slop), 0.0), on.push_most)
-            push_apart(disks.position, disks.mass, i, j, nx, ny, by / inverse_mass(disks.mass, i, j))
-        if worst >= -3.0 * on.slop:
-            return
+    """Undo a share of every overlap beyond the slop, some times in every island."""
+    first = 0
+    while on.push_share > 0.0 and first < kept.found[0]:
+        end = first
+        while end < kept.found[0] and kept.rows[end].island == kept.rows[first].island:
+            end += 1
+        worst = -inf
+        for _ in range(on.push_iterations):
+            if worst < -3.0 * on.slop:  # else all are within three slops
+                worst = push_out_island(disks, world, on, kept, first, end)
+        first = end
+
+
+@njit(cache=True, error_model="numpy")
+def push_out_island(disks: Disks, world: World, on: Switches, kept: Contacts, first: int, end: int) -> float:
+    """Once through the contacts from `first` to before `end`; returns the smallest gap in m there was, at most 0."""
+    worst = 0.0
+    for c in range(first, end):
+        i, j = kept.rows[c].i, kept.rows[c].j
+        gap, nx, ny = gap_of(disks, world, i, j)
+        gap -= on.skin if j < 0 else 0.0
+        worst = min(worst, gap)
+        by = min(max(-on.push_share * (gap + on.slop), 0.0), on.push_most)
+        push_apart(disks.position, disks.mass, i, j, nx, ny, by / inverse_mass(disks.mass, i, j))
+    return worst
 
 
 @njit(cache=True, error_model="numpy")

@@ -209,16 +209,25 @@ def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
     assert outputs[0] == outputs[1]
 
 
-def test_colours_never_hold_a_moving_disk_twice_and_what_stands_comes_after_the_first():
-    """A row of five on a floor: pairs 01 and 23, then 12 and 34 with what is left, floors from the second colour on."""
-    row = lay_out(
-        position=[[x, 0.5] for x in range(5)], velocity=[[0.0, -1.0]] * 5, radius=[0.5] * 5, mass=[1.0] * 5,
-        walls=[[[-2.0, 0.0], [7.0, 0.0]]], restitution=0.0,
-    )  # fmt: skip
-    engine = Switched(("accelerate", "detect", "by_colour", "move"), touching=True, margin=0.01)
-    engine.load(row, 0.001)
-    engine.step(1)
-    kept = engine.kept
-    found = [(int(kept.rows[c].i), int(kept.rows[c].j)) for c in range(kept.found[0])]
+ROW = lay_out(
+    position=[[x, 0.5] for x in (0.0, 1.0, 2.0, 5.0, 6.0)], velocity=[[0.0, -1.0]] * 5, radius=[0.5] * 5,
+    mass=[1.0] * 5, walls=[[[-2.0, 0.0], [9.0, 0.0]]], restitution=0.0,
+)  # fmt: skip
 
-    assert found == [(0, 1), (2, 3), (1, 2), (3, 4), (0, -1), (1, -1), (2, -1), (3, -1), (4, -1)]
+
+def found(stage: str) -> list[tuple[int, int]]:
+    """The contacts of `ROW`, three disks and two, all on a floor, as a stage orders them."""
+    engine = Switched(("accelerate", "detect", stage, "move"), touching=True, margin=0.01)
+    engine.load(ROW, 0.001)
+    engine.step(1)
+    return [(int(row.i), int(row.j)) for row in engine.kept.rows[: engine.kept.found[0]]]
+
+
+def test_colours_never_hold_a_moving_disk_twice_and_what_stands_comes_after_the_first():
+    """Pairs 01 and 34, then 12 with the floors of the others, then those of 1 and 2."""
+    assert found("by_colour") == [(0, 1), (3, 4), (1, 2), (0, -1), (3, -1), (4, -1), (1, -1), (2, -1)]
+
+
+def test_islands_come_from_the_last_disk_on_and_the_floor_joins_none():
+    """First all of the last two, then all of the first three, each from its last disk to its first."""
+    assert found("by_island") == [(4, -1), (3, 4), (3, -1), (2, -1), (1, 2), (1, -1), (0, 1), (0, -1)]

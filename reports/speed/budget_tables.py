@@ -34,10 +34,10 @@ class Table(NamedTuple):
 
 
 def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
-    """Root mean squares of all parts in radii, a row a player; the parts first, then sum, all, engine, what is left."""
+    """Root mean squares in radii, a row a player: engine, what is left unexplained, the parts, sum and all."""
     here = budget[budget.scenario == scenario]
     parts = [part for part in causes(budget) if here[here.part == part].position_radii.max() > LEAST]
-    columns = [*parts, INTERPLAY, SUM, ALL, TOTAL, UNEXPLAINED]
+    columns = [TOTAL, UNEXPLAINED, *parts, INTERPLAY, SUM, ALL]
     rows: dict[str, list[Cell]] = {}
     notes: dict[str, str] = {}
     for (engine, profile), group in here.groupby(WHO, sort=False):
@@ -61,14 +61,14 @@ def cell(value: float) -> Cell:
 
 def overview(budget: pd.DataFrame) -> Table:
     """In how many scenes each part is the largest, and in how many all but `EXPLAINED` is explained; bars of all."""
-    columns = [*causes(budget), "explained"]
+    columns = ["explained", *causes(budget)]
     rows = {}
     for (engine, profile), group in budget[budget.note == ""].groupby(WHO, sort=False):
         scenes = group.pivot(index="scenario", columns="part", values="position_radii")
         known = scenes.reindex(columns=causes(budget)).fillna(0.0)
         largest = known[known.max(axis=1) > LEAST].idxmax(axis=1)
-        counts = [int((largest == part).sum()) for part in known.columns]
-        counts.append(int((scenes[UNEXPLAINED] <= EXPLAINED * scenes[TOTAL]).sum()))
+        explained = int((scenes[UNEXPLAINED] <= EXPLAINED * scenes[TOTAL]).sum())
+        counts = [explained, *(int((largest == part).sum()) for part in known.columns)]
         rows[f"{engine}:{profile}"] = [Cell(count, count / len(scenes)) for count in counts]
     return Table("", np.nan, columns, rows, {})
 
