@@ -23,17 +23,17 @@ from reference_impl.contacts import (
     push_to_target,
     rub,
     turn,
-)  # fmt: skip
+)
 from reference_impl.exercise import collide, collide_wall, touching, touching_wall, wrap
 from reference_impl.state import Disks, World
 
 STAGES = (
-    "accelerate", "move", "pair_by_pair", "detect", "by_island", "aim", "warm_start", "bounce", "cap", "push_out",
-    "nudge", "soften", "relax", "restitute", "by_colour",
+    "accelerate", "move", "pair_by_pair", "detect", "by_island", "by_colour", "aim", "warm_start", "bounce", "cap",
+    "push_out", "nudge", "soften", "relax", "restitute",
 )  # fmt: skip
 (
-    ACCELERATE, MOVE, PAIR_BY_PAIR, DETECT, BY_ISLAND, AIM, WARM_START, BOUNCE, CAP, PUSH_OUT,
-    NUDGE, SOFTEN, RELAX, RESTITUTE, BY_COLOUR,
+    ACCELERATE, MOVE, PAIR_BY_PAIR, DETECT, BY_ISLAND, BY_COLOUR, AIM, WARM_START, BOUNCE, CAP,
+    PUSH_OUT, NUDGE, SOFTEN, RELAX, RESTITUTE,
 ) = range(len(STAGES))  # fmt: skip
 
 
@@ -87,6 +87,8 @@ def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h:
         detect(disks, world, on.margin, on.skin, on.touching, kept)
     elif stage == BY_ISLAND:
         by_island(disks.mass, kept)
+    elif stage == BY_COLOUR:
+        by_colour(disks.mass, kept)
     elif stage == AIM:
         aim(disks.velocity, world.restitution, on.threshold, kept)
     elif stage == WARM_START:
@@ -105,8 +107,6 @@ def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h:
         soften(disks, on, kept, h, False)
     elif stage == RESTITUTE:
         restitute(disks, kept)
-    elif stage == BY_COLOUR:
-        by_colour(disks.mass, kept)
 
 
 @njit(cache=True, error_model="numpy")

@@ -132,6 +132,9 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(monkeypatch
     (row,) = budget_of("free_fall", 0, "reference:exercise", 4)
 
     assert (row["part"], row["note"]) == (TOTAL, "error: RuntimeError: no <b>such</b> thing")
+    table = pd.DataFrame([row], columns=budget.COLUMNS)
+    assert budget_tables.of_scene(table, "free_fall").notes == {"reference:exercise": row["note"]}
+    assert budget_tables.overview(table).rows == {}
 
 
 def test_tables_have_the_largest_part_and_bars_by_decades():

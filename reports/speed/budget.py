@@ -24,6 +24,10 @@ TIME, INTERPLAY, SUM, ALL, TOTAL, UNEXPLAINED = (
     "time of hits", "interplay", "sum", "all", "engine", "unexplained",
 )  # fmt: skip
 TOTALS = (SUM, ALL, TOTAL)
+COLUMNS = [
+    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "part", "position_radii", "energy", "share",
+    "off_engine_radii", "off_reference_radii", "off_apart_radii", "closed_apart_radii", "note",
+]  # fmt: skip
 LIMIT = 0.5  # radii by which late hits alone may put a disk off: where all is far off, no part adds up to anything
 
 
@@ -62,7 +66,7 @@ class Offset(NamedTuple):
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
     """A row a part of what puts player `name` of `HABITS` off in a scene, at this many steps a sample interval.
 
-    Columns: scenario, seed, engine, profile, dt_s, until_s (how far it was followed), part; position_radii and energy,
+    Of `COLUMNS`: until_s, how far the scene was followed; position_radii and energy,
     the root mean square of what it changes, the energy in parts of that at hand; share, by which it makes up the
     position's total (1 in all; negative: it makes up for others); off_engine_radii, off_reference_radii and
     off_apart_radii: what switching it off changes in the engine, in the reference with all the rest, and how far these

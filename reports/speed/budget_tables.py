@@ -75,7 +75,5 @@ def overview(budget: pd.DataFrame) -> Table:
 
 def switched_off(budget: pd.DataFrame) -> list[dict[str, Any]]:
     """Every habit that the engine lets one switch off, where that changes anything: the change in both."""
-    if "off_engine_radii" not in budget:
-        return []
     rows = budget[budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST]
     return [{str(key): value for key, value in row.items()} for row in rows.to_dict("records")]

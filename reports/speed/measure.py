@@ -95,8 +95,9 @@ def measure(plan: Plan, progress: Progress) -> Measured:
 
 def reach(plan: Plan, measured: Measured, progress: Progress) -> dict[tuple[str, int], int]:
     """(scene, seed) -> how many sample intervals have an exact answer; those that have none are told of."""
-    wanted = dict.fromkeys((*plan.scenes, *plan.feature_scenes, *plan.budget_scenes))
+    wanted = dict.fromkeys((*plan.scenes, *plan.feature_scenes))
     draws = [(scene, seed) for scene in wanted for seed in plan.effort.seeds_of(scene, plan.seed)]
+    draws += [(scene, plan.seed) for scene in plan.budget_scenes if scene not in wanted]
     found = {}
     drawn = {draw: partial(ladder.reach_of, *draw) for draw in draws if draw[0] in DRAWN}  # these may take seconds each
     answers = [(draw, ladder.reach_of(*draw)) for draw in draws if draw not in drawn]
@@ -161,7 +162,7 @@ def measure_budget(plan: Plan, reaches: Mapping[tuple[str, int], int], measured:
         if isinstance(result, Failure):
             measured.left_out.append((f"error budget of {' '.join(key)}", f"{result.status}: {result.reason}"))
     rows = [row for key in tasks if not isinstance(results[key], Failure) for row in results[key]]
-    measured.budget = pd.DataFrame(rows)
+    measured.budget = pd.DataFrame(rows, columns=budget.COLUMNS)
 
 
 def measure_times(plan: Plan, scenes: Sequence[str], measured: Measured, progress: Progress) -> None:
