@@ -66,12 +66,11 @@ class Offset(NamedTuple):
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
     """A row a part of what puts player `name` of `HABITS` off in a scene, at this many steps a sample interval.
 
-    Of `COLUMNS`: until_s, how far the scene was followed; position_radii and energy,
-    the root mean square of what it changes, the energy in parts of that at hand; share, by which it makes up the
-    position's total (1 in all; negative: it makes up for others); off_engine_radii, off_reference_radii and
-    off_apart_radii: what switching it off changes in the engine, in the reference with all the rest, and how far these
-    two are apart; closed_apart_radii: how far the flight's part is from its closed form up to the first hit; note: why
-    there is nothing but that.
+    Of `COLUMNS`: until_s, how far the scene was followed; position_radii and energy, the root mean square of what the
+    part changes, the energy in parts of that at hand; share, by which it makes up the position's total (1 in all;
+    negative: it makes up for others); off_engine_radii, off_reference_radii and off_apart_radii: what switching it off
+    changes in the engine, in the reference with all the rest, and how far these two are apart; closed_apart_radii: how
+    far the flight's part is from its closed form up to the first hit; note: why there are no numbers.
     """
     at = followed(scene, seed, substeps)
     scenario, dt = at.scenario, at.dt
