@@ -26,8 +26,9 @@ class Box2DEngine:
     there all the same is refused. No friction, sleep, continuous collision or wall skin; at e = 1 no
     push-out, because it adds energy.
 
-    Changed one at a time by `features.py`: `continuous` and `sleeping` (None: the profile's), `bullet` (continuous
-    collision between disks, too), `warm_starting`, `turning` (False: no inertia, so no spin), the iterations.
+    Changed one at a time by `features.py` and `habits.py`: `continuous` and `sleeping` (None: the profile's), `bullet`
+    (continuous collision between disks, too), `warm_starting`, `turning` (False: no inertia, so no spin), `friction`,
+    the iterations.
     """
 
     listening, wrapping = True, 0.0
@@ -41,6 +42,7 @@ class Box2DEngine:
         bullet: bool = False,
         warm_starting: bool = True,
         turning: bool = True,
+        friction: float | None = None,
         velocity_iterations: int = VELOCITY_ITERATIONS,
         position_iterations: int | None = None,
     ) -> None:
@@ -48,6 +50,7 @@ class Box2DEngine:
         self.continuous = not self.matched if continuous is None else continuous
         self.sleeping = not self.matched if sleeping is None else sleeping
         self.bullet, self.warm_starting, self.turning = bullet, warm_starting, turning
+        self.friction = 0.0 if self.matched and friction is None else friction
         self.velocity_iterations, self.asked_position_iterations = velocity_iterations, position_iterations
 
     def load(self, scene: Scene, dt: float) -> None:
@@ -85,7 +88,8 @@ class Box2DEngine:
             self._wall(w)
 
     def _surface(self) -> dict[str, float]:
-        return {"restitution": float(self.scene.restitution), **({"friction": 0.0} if self.matched else {})}
+        friction = {} if self.friction is None else {"friction": self.friction}
+        return {"restitution": float(self.scene.restitution), **friction}
 
     def _disk(self, i: int) -> Any:
         scene, length = self.scene, self.length
@@ -170,7 +174,7 @@ class Box2DEngine:
             "speed cap in m/s": (None, self.speed_cap),
             "spin cap in rad/s": (None, self.spin_cap),
             "wall skin": (0.0 if matched else None, UNREAD),
-            "friction": (0.0 if matched else None, fixture.friction),
+            "friction": (self.friction, fixture.friction),
             "restitution": (self.scene.restitution, fixture.restitution),
             "sleeping": (self.sleeping if matched else None, world.GetAllowSleeping()),
             "continuous collision": (self.continuous if matched else None, world.continuousPhysics),

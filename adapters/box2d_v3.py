@@ -41,8 +41,9 @@ class Box2DV3:
     unit is 2 % of the smallest radius, which shrinks slop and speculative margin with it. The cap on
     spins cannot be lifted: a scene that reaches it is refused.
 
-    Changed one at a time by `features.py`: `substeps`, `continuous` and `sleeping` (None: the profile's), `bullet`
-    (continuous collision between disks, too), `turning` (False: no inertia, so no spin).
+    Changed one at a time by `features.py` and `habits.py`: `substeps`, `continuous` and `sleeping` (None: the
+    profile's), `bullet` (continuous collision between disks, too), `turning` (False: no inertia, so no spin),
+    `friction`, `restitution_threshold`.
     """
 
     listening, wrapping = True, 0.0
@@ -56,8 +57,12 @@ class Box2DV3:
         sleeping: bool | None = None,
         bullet: bool = False,
         turning: bool = True,
+        friction: float | None = None,
+        restitution_threshold: float | None = None,
     ) -> None:
         self.matched = profile == "matched"
+        self.friction = 0.0 if self.matched and friction is None else friction
+        self.restitution_threshold = 0.0 if self.matched and restitution_threshold is None else restitution_threshold
         self.substeps, self.bullet, self.turning = substeps, bullet, turning
         self.continuous = not self.matched if continuous is None else continuous
         self.sleeping = not self.matched if sleeping is None else sleeping
@@ -91,10 +96,12 @@ class Box2DV3:
         self.angle, self.spin, self.seen = np.array(scene.angle), np.array(scene.angular_velocity), 0
 
     def _options(self) -> dict[str, float]:
-        return {"restitution_threshold": 0.0, "maximum_linear_speed": 1e9} if self.matched else {}
+        threshold = self.restitution_threshold
+        options = {} if threshold is None else {"restitution_threshold": threshold}
+        return options | ({"maximum_linear_speed": 1e9} if self.matched else {})
 
     def _shape(self) -> Any:
-        friction = {"friction": 0.0} if self.matched else {}
+        friction = {} if self.friction is None else {"friction": self.friction}
         material = pyb2d3.surface_material(restitution=float(self.scene.restitution), **friction)
         return pyb2d3.shape_def(density=1.0, material=material, enable_hit_events=self.listening)
 
@@ -200,7 +207,7 @@ class Box2DV3:
                 "30, 10, 3" if matched else None,
                 UNREAD,
             ),
-            "friction": (0.0 if matched else None, self.bodies[0].shapes[0].friction),
+            "friction": (self.friction, self.bodies[0].shapes[0].friction),
             "restitution": (self.scene.restitution, self.bodies[0].shapes[0].restitution),
             "sleeping": (self.sleeping if matched else None, world.sleeping_enabled),
             "continuous collision": (self.continuous if matched else None, world.continuous_enabled),

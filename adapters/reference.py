@@ -49,7 +49,7 @@ class Reference:
             walls=np.array(scene.walls), low=np.array(low), high=np.array(high), **self.options,
         )  # fmt: skip
         self.pushed = False
-        self.variant.advance(self.disks, self.world, dt, 0)  # compiles, if nobody has yet
+        self._advance(0)  # compiles, if nobody has yet
 
     def push(self, disk: int, force: Array, torque: float) -> None:
         """Add to the disk's force and torque; `step` clears both."""

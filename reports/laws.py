@@ -83,9 +83,14 @@ def cross(u: Array, v: Array) -> Array:
 
 def deviation(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
     """(k, n) m between the positions in the samples both have; across the nearer edge where the scene wraps."""
+    return np.linalg.norm(apart(a, b, scene), axis=2)
+
+
+def apart(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
+    """(k, n, 2) m from b to a, as `deviation`."""
     k = min(len(a), len(b))
-    apart = a.position[:k] - b.position[:k]
+    way = a.position[:k] - b.position[:k]
     if scene.wrap is not None:
         size = scene.wrap[1] - scene.wrap[0]
-        apart = apart - size * np.round(apart / size)
-    return np.linalg.norm(apart, axis=2)
+        way = way - size * np.round(way / size)
+    return way

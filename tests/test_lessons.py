@@ -12,6 +12,7 @@ from playwright.sync_api import Browser
 
 from adapters.engines import ENGINES
 from adapters.play import play
+from adapters.switched import Switched
 from reports.game.server import Game, application
 from reports.lessons import conventions
 from reports.lessons.catalogue import LESSONS
@@ -19,7 +20,6 @@ from reports.lessons.lesson import Lesson, play_once
 from reports.lessons.mechanisms import SWITCHED
 from reports.lessons.meeting import hit_of_the_reference, two
 from reports.lessons.pages import ROUTES
-from reports.lessons.switches import Switched, Switches
 from reports.style import TRUTH
 from scenarios.catalogue import scenario
 from tests.browsing import opened, overhang, served
@@ -31,15 +31,15 @@ EVERY = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for
 
 @pytest.mark.parametrize("name", ["oblique_e09", "bouncing_ball_e1", "free_fall"])
 def test_with_nothing_switched_on_the_switches_give_the_reference(name: str):
-    """To a few roundings of float64: the two are written differently."""
+    """To the bit."""
     scene = scenario(name)
     plain = play_once("reference:exercise", scene, 2).trajectory
-    switched = play(Switched(Switches()), SWITCHED, scene, scene.dt(2)).trajectory
+    switched = play(Switched(), SWITCHED, scene, scene.dt(2)).trajectory
 
     assert plain is not None
     assert switched is not None
-    assert np.abs(plain.position - switched.position).max() <= 1e-14
-    assert np.abs(plain.velocity - switched.velocity).max() <= 1e-14
+    assert np.array_equal(plain.position, switched.position)
+    assert np.array_equal(plain.velocity, switched.velocity)
 
 
 @pytest.mark.parametrize(

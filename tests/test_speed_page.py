@@ -32,7 +32,7 @@ FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--
 SCENES = ("head_on_equal_e09", "asteroids")
 PLAYERS = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
 LITTLE = replace(QUICK, seeds=3, most_steps=1000, rounds=2, budget=0.0, sizes=(3, 10, 100, 1000), patience=1.0,
-    feature_scenes=("bouncing_ball_e1",))  # fmt: skip
+    feature_scenes=("bouncing_ball_e1",), budget_scenes=("head_on_equal_e09",))  # fmt: skip
 SAID = {"load": 0.0, "seconds": 1.0}
 
 
@@ -213,6 +213,7 @@ def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
             plot.locator(".main-svg").first.wait_for()
         assert tab.locator(".plot").count() == 2 + 2 + 1 + 2 * len(SCENES)
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with habits: three players; two switched off
         assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
         browser.close()
     assert [request.url for request in asked if not request.url.startswith(("file:", "data:", "blob:"))] == []

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from adapters.play import Run, play
+from adapters.switched import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, Switched
 from reports.comparison import answered
 from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
-from reports.lessons.switches import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, Switched, Switches
 from reports.style import TRUTH, number
 from scenarios.lesson import free_fall
 from scenarios.model import Array, Scenario, Scene, Trajectory
@@ -20,6 +20,7 @@ from scenarios.placing import lay_out
 from scenarios.walls import bouncing_ball_e1
 
 SWITCHED, PLAIN = "reference:switched", "reference:exercise"
+PRECISION = {53: np.float64, 24: np.float32}
 ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed after gravity": BOX2D}
 SHOWN = 0.5  # the e whose hit is replayed in the page on mixing
 SECONDS = 3.0  # that the tenth of a second of the page on the cap is replayed for
@@ -31,10 +32,10 @@ def asked(scene: Scene, duration: float) -> Scenario:
     return Scenario("mechanism", "Where does the engine differ?", "", scene, duration, 1 / 60)
 
 
-def runs_of(names: Sequence[str], on: Switches, scenario: Scenario, substeps: int) -> list[Run]:
+def runs_of(names: Sequence[str], on: Switched, scenario: Scenario, substeps: int) -> list[Run]:
     """The engines, the reference as it is, and the reference with what is switched on."""
     runs = [play_once(name, scenario, substeps) for name in (*names, PLAIN)]
-    return [*runs, play(Switched(on), SWITCHED, scenario, scenario.dt(substeps))]
+    return [*runs, play(on, SWITCHED, scenario, scenario.dt(substeps))]
 
 
 def over_time(runs: Sequence[Run], read: Read) -> list[Curve]:
@@ -87,7 +88,7 @@ def show_threshold(settings: Settings) -> Shown:
     """e of a hit against its closing speed."""
     closing = np.array([0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0])
     scenario = asked(pairs(closing, settings["e"]), 0.5)
-    runs = runs_of(["box2d:shipped"], Switches(threshold=settings["threshold"]), scenario, 4)
+    runs = runs_of(["box2d:shipped"], Switched(threshold=settings["threshold"]), scenario, 4)
     curves = over(closing, runs, parting(closing))
     facts = [*told(runs, "restitution threshold in m/s"), distance(curves, "box2d:shipped", "")]
     curves.append(Curve(TRUTH, closing, np.full(len(closing), settings["e"])))
@@ -102,7 +103,7 @@ def show_mixing(settings: Settings) -> Shown:
     found: dict[str, list[float]] = {}
     for e in stated:
         scenario = asked(pairs(closing, float(e)), 0.5)
-        runs = runs_of(names[:1], Switches(mixing=settings["rule"]), scenario, 4)
+        runs = runs_of(names[:1], Switched(mixing=settings["rule"]), scenario, 4)
         for run in runs:
             if run.trajectory is not None:
                 found.setdefault(run.name, []).append(float(parting(closing)(run.trajectory)[0]))
@@ -114,7 +115,7 @@ def show_mixing(settings: Settings) -> Shown:
     return Shown([Chart("Restitution of a pair", "e on each of the two disks", "e of the hit", curves)], film, facts)
 
 
-def falling(names: Sequence[str], on: Switches, substeps: int) -> Shown:
+def falling(names: Sequence[str], on: Switched, substeps: int) -> Shown:
     """mm above the parabola of a thrown disk."""
     scenario = free_fall()
     assert scenario.truth is not None
@@ -129,19 +130,19 @@ def falling(names: Sequence[str], on: Switches, substeps: int) -> Shown:
 def show_order(settings: Settings) -> Shown:
     """Velocity then position, or position then velocity."""
     order = {"velocity first": EXERCISE, "position first": POSITION_FIRST}[settings["order"]]
-    return falling(["pymunk:matched"], Switches(order=order), settings["k"])
+    return falling(["pymunk:matched"], Switched(order=order), settings["k"])
 
 
 def show_substeps(settings: Settings) -> Shown:
     """A step cut into smaller ones."""
-    return falling(["box2d_v3:matched"], Switches(substeps=settings["substeps"]), settings["k"])
+    return falling(["box2d_v3:matched"], Switched(substeps=settings["substeps"]), settings["k"])
 
 
 def show_gravity(settings: Settings) -> Shown:
     """Height of a ball that should bounce for ever."""
     scenario = bouncing_ball_e1()
     names = ["box2d:matched", "pymunk:matched"]
-    runs = runs_of(names, Switches(order=ORDERS[settings["order"]]), scenario, settings["k"])
+    runs = runs_of(names, Switched(order=ORDERS[settings["order"]]), scenario, settings["k"])
     curves = over_time(runs, lambda each: each.position[:, 0, 1])
     facts = [distance(curves, name, "m") for name in names]
     assert scenario.truth is not None
@@ -156,7 +157,7 @@ def show_push_out(settings: Settings) -> Shown:
         restitution=0.0,
     )  # fmt: skip
     scenario = asked(scene, 0.4)
-    on = Switches(order=BOX2D, push_share=settings["share"], slop=settings["slop"] / 1e3)
+    on = Switched(BOX2D, push_most=0.2, push_share=settings["share"], slop=settings["slop"] / 1e3)
     runs = runs_of(["box2d:matched"], on, scenario, 1)
     curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
     facts = [*told(runs, "linear slop in m"), distance(curves, "box2d:matched", "mm")]
@@ -167,7 +168,7 @@ def show_digits(settings: Settings) -> Shown:
     """How far a disk far out is from x + v t."""
     start, v = np.array([settings["far"], 0.0]), np.array([1.0, 0.3])
     scenario = asked(lay_out(position=[start], velocity=[v], radius=[0.5], mass=[1.0], restitution=0.0), 2.0)
-    runs = runs_of(["box2d:shipped"], Switches(digits=settings["digits"]), scenario, 4)
+    runs = runs_of(["box2d:shipped"], Switched(precision=PRECISION[settings["digits"]]), scenario, 4)
     exact = start + scenario.times[:, None] * v
     curves = over_time(runs, lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16))
     facts = [*told(runs, "float32 rounding of the start in m"), distance(curves, "box2d:shipped", "m")]
@@ -184,7 +185,7 @@ def show_cap(settings: Settings) -> Shown:
         radius=np.full(15, 0.2), mass=np.ones(15), restitution=0.0,
     )  # fmt: skip
     scenario = asked(scene, 0.1)
-    runs = runs_of(["box2d:shipped"], Switches(order=BOX2D, cap=settings["cap"]), scenario, settings["k"])
+    runs = runs_of(["box2d:shipped"], Switched(order=BOX2D, cap=settings["cap"]), scenario, settings["k"])
     curves = over(given, runs, lambda each: each.velocity[-1, :, 0])
     facts = [*told(runs, "speed cap in m/s"), distance(curves, "box2d:shipped", "m/s")]
     curves.append(Curve(TRUTH, given, given))
@@ -202,7 +203,7 @@ def show_row(settings: Settings) -> Shown:
     scenario = asked(scene, 1.0)
     order = {"pair by pair": EXERCISE, "all at once": BOX2D}[settings["order"]]
     names = ["box2d:matched", "pymunk:matched"]
-    runs = runs_of(names, Switches(order=order, iterations=settings["iterations"]), scenario, 4)
+    runs = runs_of(names, Switched(order, iterations=settings["iterations"], touching=True), scenario, 4)
     curves = over(np.arange(n + 1.0), runs, lambda each: each.velocity[-1, :, 0])
     facts = [*told(runs, "velocity, position iterations"), *(distance(curves, name, "m/s") for name in names)]
     film = filmed(scenario, runs)

@@ -24,6 +24,7 @@ class Effort:
         patience: s a step may take before an engine drops out of the sizes.
         feature_scenes: what changed engines are measured in: three disks, a hit that thresholds matter to, one disk
             under gravity, many hits, and a stack at rest.
+        budget_scenes: those in which it is asked what the errors are made of.
     """
 
     scenes: tuple[str, ...]
@@ -33,6 +34,7 @@ class Effort:
     budget: float
     sizes: tuple[int, ...]
     patience: float
+    budget_scenes: tuple[str, ...]
     feature_scenes: tuple[str, ...] = (
         "disk_between_static_disks", "slow_hit", "bouncing_ball_e1", "line_gas", "column_of_ten",
     )  # fmt: skip
@@ -54,8 +56,12 @@ QUICK = Effort(
         "ship_thrust", "asteroids",
     ),
     seeds=16, most_steps=5_000, rounds=5, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000), patience=0.1,
+    budget_scenes=(
+        "free_fall", "head_on_equal_e09", "oblique_e1", "slow_hit", "mass_ratios", "wall_to_wall", "bouncing_ball_e1",
+        "disk_between_static_disks", "line_gas", "cradle_with_gaps", "column_of_ten", "asteroids", "gas_of_100",
+    ),
 )  # fmt: skip
 FULL = Effort(
     scenes=tuple(SCENARIOS), seeds=16, most_steps=64_000, rounds=15, budget=0.5,
-    sizes=(3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000), patience=1.0,
+    sizes=(3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000), patience=1.0, budget_scenes=tuple(SCENARIOS),
 )  # fmt: skip

@@ -12,9 +12,10 @@ import pandas as pd
 
 from adapters.engines import row_of
 from adapters.features import FEATURES, Feature
+from adapters.habits import HABITS
 from reports.machine import busy_cores
 from reports.runner import run_all
-from reports.speed import ladder, models, sizes
+from reports.speed import budget, ladder, models, sizes
 from reports.speed.effort import Effort
 from reports.speed.timing import Sample
 from reports.terminal import Progress
@@ -50,6 +51,11 @@ class Plan:
         """Where the changed engines are measured, if any are."""
         return self.effort.feature_scenes if self.features else ()
 
+    @property
+    def budget_scenes(self) -> tuple[str, ...]:
+        """Where errors are taken apart: in the scenes asked for, if any are."""
+        return self.effort.budget_scenes if self.whole else tuple(self.scenes)
+
 
 @dataclass
 class Measured:
@@ -57,6 +63,7 @@ class Measured:
 
     Attributes:
         errors: kind, change, and the columns of `ladder.errors_of`.
+        budget: the columns of `budget.budget_of`.
         samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, singly, round, place, cost, wrapping, runs;
             cost in s per simulated second for scenes and features, in s a step for sizes and idle worlds.
         truths: as `models.closed_form` gives them.
@@ -66,6 +73,7 @@ class Measured:
     """
 
     errors: pd.DataFrame = field(default_factory=pd.DataFrame)
+    budget: pd.DataFrame = field(default_factory=pd.DataFrame)
     samples: pd.DataFrame = field(default_factory=pd.DataFrame)
     truths: pd.DataFrame = field(default_factory=pd.DataFrame)
     left_out: list[tuple[str, str]] = field(default_factory=list)
@@ -80,6 +88,7 @@ def measure(plan: Plan, progress: Progress) -> Measured:
     scenes = [scene for scene in plan.scenes if reaches.get((scene, plan.seed))]
     if scenes:
         measure_errors(plan, scenes, reaches, measured, progress)
+        measure_budget(plan, reaches, measured, progress)
         measure_times(plan, scenes, measured, progress)
     return measured
 
@@ -88,6 +97,7 @@ def reach(plan: Plan, measured: Measured, progress: Progress) -> dict[tuple[str,
     """(scene, seed) -> how many sample intervals have an exact answer; those that have none are told of."""
     wanted = dict.fromkeys((*plan.scenes, *plan.feature_scenes))
     draws = [(scene, seed) for scene in wanted for seed in plan.effort.seeds_of(scene, plan.seed)]
+    draws += [(scene, plan.seed) for scene in plan.budget_scenes if scene not in wanted]
     found = {}
     drawn = {draw: partial(ladder.reach_of, *draw) for draw in draws if draw[0] in DRAWN}  # these may take seconds each
     answers = [(draw, ladder.reach_of(*draw)) for draw in draws if draw not in drawn]
@@ -139,6 +149,20 @@ def rung_by_rung(task: Callable[[], list[dict]], workers: int) -> list[dict]:
             }]  # fmt: skip
         rows += result
     return sorted(rows, key=lambda row: row["substeps"])
+
+
+def measure_budget(plan: Plan, reaches: Mapping[tuple[str, int], int], measured: Measured, progress: Progress) -> None:
+    """What the errors are made of, of the engines whose habits are known, at the middle dt."""
+    tasks = {
+        (scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
+        for scene in plan.budget_scenes for name in plan.engines if name in HABITS and reaches[scene, plan.seed]
+    }  # fmt: skip
+    results = dict(done(tasks, plan.workers, progress, "parts of the error"))
+    for key, result in results.items():
+        if isinstance(result, Failure):
+            measured.left_out.append((f"error budget of {' '.join(key)}", f"{result.status}: {result.reason}"))
+    rows = [row for key in tasks if not isinstance(results[key], Failure) for row in results[key]]
+    measured.budget = pd.DataFrame(rows, columns=budget.COLUMNS)
 
 
 def measure_times(plan: Plan, scenes: Sequence[str], measured: Measured, progress: Progress) -> None:

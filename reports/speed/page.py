@@ -15,7 +15,8 @@ from plotly.offline import get_plotlyjs
 from reports import style
 from reports.charts import Drawing
 from reports.page import SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
-from reports.speed import charts
+from reports.speed import budget_tables, charts
+from reports.speed.budget import TOTALS, UNEXPLAINED
 from reports.speed.order import ELSEWHERE, UNSTEADY
 from reports.speed.pareto import ACCURACIES
 from reports.speed.results import Results
@@ -50,7 +51,8 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
         driving=charts.records(results.driving), feature_rows=charts.records(results.features),
         left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
-        feature_scenes=results.plan.feature_scenes,
+        feature_scenes=results.plan.feature_scenes, budget=budget_section(results),
+        totals=(*TOTALS, UNEXPLAINED),
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
     )  # fmt: skip
@@ -128,6 +130,18 @@ def sizes_section(results: Results) -> Section | None:
         charts.sizes(results.sizes, results.growth),
     )
     return section("sizes", "How the cost grows", "", {"sizes": drawing})
+
+
+def budget_section(results: Results) -> dict[str, Any] | None:
+    """What the errors are made of."""
+    budget = results.measured.budget
+    if budget.empty:
+        return None
+    return {
+        "overview": budget_tables.overview(budget),
+        "scenes": [budget_tables.of_scene(budget, scene) for scene in dict.fromkeys(budget.scenario)],
+        "off": budget_tables.switched_off(budget), "closed": float(budget.closed_apart_radii.max()),
+    }  # fmt: skip
 
 
 def features_section(results: Results) -> Section | None:

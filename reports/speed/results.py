@@ -149,7 +149,7 @@ class Results:
             "speed_samples": self.measured.samples, "speed_errors": self.measured.errors, "speed": self.points,
             "speed_pooled": self.pooled, "speed_orders": self.orders, "speed_reached": self.reached,
             "speed_sizes": self.sizes, "speed_features": self.features, "speed_driving": self.driving,
-            "speed_noise": self.noise, "speed_models": self.models,
+            "speed_noise": self.noise, "speed_models": self.models, "speed_budget": self.measured.budget,
         }  # fmt: skip
         for name, table in files.items():
             table.to_csv(folder / f"{name}.csv", index=False)

@@ -1,0 +1,247 @@
+"""Who touches whom, and what has pushed them: what `switched` keeps of a step, and from step to step.
+
+A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i and is that of the moment
+it was found. Compiled by numba, as `exercise` is.
+"""
+
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from reference_impl.exercise import direction, move, nearest_point
+from reference_impl.state import Disks, World
+
+CONTACT = np.dtype([
+    ("i", "i8"), ("j", "i8"),
+    ("nx", "f8"), ("ny", "f8"),  # the normal
+    ("gap", "f8"),  # m between the surfaces when it was found
+    ("target", "f8"),  # m/s: the parting speed it is to have
+    ("impulse", "f8"), ("slide", "f8"),  # N s along the normal and along the tangent (-ny, nx)
+    ("strongest", "f8"),  # N s, of the impulses that one solve added
+    ("nudged", "f8"),  # N s, of `switched.nudge`
+    ("island", "i8"), ("colour", "i8"),  # from 1; 0: none yet
+])  # fmt: skip
+
+
+class Contacts(NamedTuple):
+    """`found[0]` contacts, and what else is kept from stage to stage."""
+
+    found: np.ndarray  # (1,): how many
+    rows: np.ndarray  # of CONTACT, enough for twice as many as there can be
+    start: np.ndarray  # (n, 2) m: where the disks were at the start of the step
+    moved: np.ndarray  # (n, 2) m: what they have moved since
+    nudge: np.ndarray  # (n, 2) m/s: what the next move adds to the velocity
+    before: np.ndarray  # (n, n + w, 3): impulse, slide, colour of the pair in the last step, 0 if it was no contact
+
+
+def no_contacts(n: int, walls: int, precision: type) -> Contacts:
+    """None yet, of `n` disks whose places are kept in this precision, and so many walls."""
+    most = n * (n - 1) // 2 + n * walls
+    place: np.ndarray = np.zeros((n, 2), precision)
+    return Contacts(
+        found=np.zeros(1, np.int64),
+        rows=np.zeros(2 * most + 1, CONTACT).view(np.recarray),
+        start=place,
+        moved=np.zeros_like(place),
+        nudge=np.zeros((n, 2)),
+        before=np.zeros((n, n + walls, 3)),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def detect(disks: Disks, world: World, margin: float, skin: float, touching: bool, kept: Contacts) -> None:
+    """Find all that are nearer than `margin`, pairs i < j first, then walls, which are thicker by `skin`.
+
+    If `touching`, also what is just as near.
+    """
+    n = len(disks.radius)
+    kept.before[:] = 0.0
+    for c in range(kept.found[0]):
+        contact = kept.rows[c]
+        kept.before[contact.i, column(contact.j, n), 0] = contact.impulse
+        kept.before[contact.i, column(contact.j, n), 1] = contact.slide
+        kept.before[contact.i, column(contact.j, n), 2] = contact.colour
+    kept.found[0] = 0
+    for i in range(n):
+        for j in range(i + 1, n):
+            dx, dy = disks.position[i, 0] - disks.position[j, 0], disks.position[i, 1] - disks.position[j, 1]
+            reach = disks.radius[i] + disks.radius[j] + margin
+            near = dx * dx + dy * dy - reach * reach
+            if (near < 0.0 or (touching and near == 0.0)) and (disks.mass[i] != inf or disks.mass[j] != inf):
+                note(disks, world, 0.0, kept, i, j)
+    for i in range(n):
+        for w in range(len(world.walls)):
+            near = gap_of(disks, world, i, -1 - w)[0] - margin - skin
+            if (near < 0.0 or (touching and near == 0.0)) and disks.mass[i] != inf:
+                note(disks, world, skin, kept, i, -1 - w)
+
+
+@njit(cache=True, error_model="numpy")
+def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int) -> None:
+    """One contact more, with the impulses it had in the last step."""
+    contact, other = kept.rows[kept.found[0]], column(j, len(disks.radius))
+    kept.found[0] += 1
+    contact.i, contact.j = i, j
+    gap, contact.nx, contact.ny = gap_of(disks, world, i, j)
+    contact.gap = gap - skin
+    contact.target = contact.strongest = 0.0
+    contact.island, contact.colour = 0, int(kept.before[i, other, 2])
+    contact.impulse, contact.slide = kept.before[i, other, 0], kept.before[i, other, 1]
+
+
+@njit(cache=True, error_model="numpy")
+def column(j: int, n: int) -> int:
+    """Where `before` keeps disk j, or wall -1 - j."""
+    return j if j >= 0 else n - 1 - j
+
+
+@njit(cache=True, error_model="numpy")
+def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+    """Sort the contacts into islands, which share no disk that moves, in the order in which a search finds them.
+
+    It goes from disk to disk, from the last on, and knows the last contact of a disk first (Box2D 2.3, b2World::Solve).
+    """
+    rows, n, count, copies = kept.rows, len(mass), kept.found[0], len(kept.rows) // 2
+    for c in range(count):
+        rows[copies + c] = rows[c]
+    seen, stack, done = np.zeros(n, np.bool_), np.zeros(n, np.int64), 0
+    for seed in range(n - 1, -1, -1):
+        high = 0
+        if not seen[seed] and mass[seed] != inf:
+            seen[seed], stack[0], high = True, seed, 1
+        while high > 0:
+            high -= 1
+            disk = stack[high]
+            for c in range(copies + count - 1, copies - 1, -1):
+                i, j = rows[c].i, rows[c].j
+                if rows[c].island == 0 and (i == disk or j == disk):
+                    rows[c].island = seed + 1
+                    rows[done] = rows[c]
+                    done += 1
+                    other = j if i == disk else i
+                    if other >= 0 and not seen[other] and mass[other] != inf:
+                        seen[other], stack[high] = True, other
+                        high += 1
+
+
+@njit(cache=True, error_model="numpy")
+def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+    """Sort the contacts by colours, none of which has a disk that moves twice.
+
+    A new contact takes the first colour that is free, or the second where only one can move, and keeps it for as long
+    as it lasts (Box2D 3.1, b2AssignGraphColor).
+    """
+    rows, count, copies, most = kept.rows, kept.found[0], len(kept.rows) // 2, 0
+    for c in range(count):
+        if rows[c].colour == 0:
+            colour = 1 if rows[c].j >= 0 and mass[rows[c].i] != inf and mass[rows[c].j] != inf else 2
+            while taken(mass, kept, c, colour):
+                colour += 1
+            rows[c].colour = colour
+        most = max(most, rows[c].colour)
+        rows[copies + c] = rows[c]
+    done = 0
+    for colour in range(1, most + 1):
+        for c in range(copies, copies + count):
+            if rows[c].colour == colour:
+                rows[done] = rows[c]
+                done += 1
+
+
+@njit(cache=True, error_model="numpy")
+def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no-untyped-def]
+    """Whether a disk of contact c that moves has another contact of this colour."""
+    i, j = kept.rows[c].i, kept.rows[c].j
+    moving_i, moving_j = mass[i] != inf, j >= 0 and mass[j] != inf
+    for k in range(kept.found[0]):
+        a, b = kept.rows[k].i, kept.rows[k].j
+        if kept.rows[k].colour == colour and ((moving_i and (a == i or b == i)) or (moving_j and (a == j or b == j))):
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, float]:
+    """m between the surfaces, and the normal, as they are now."""
+    x, reach = disks.position, disks.radius[i]
+    if j >= 0:
+        px, py = x[j, 0], x[j, 1]
+        reach += disks.radius[j]
+    else:
+        px, py = nearest_point(world.walls, -1 - j, x[i, 0], x[i, 1])
+    distance, nx, ny = direction(x[i, 0] - px, x[i, 1] - py)
+    return distance - reach, nx, ny
+
+
+@njit(cache=True, error_model="numpy")
+def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
+    """m: the gap when it was found, before anything moved, and what both have moved along its normal since."""
+    i, j = contact.i, contact.j
+    gap = contact.gap + moved[i, 0] * contact.nx + moved[i, 1] * contact.ny
+    if j >= 0:
+        gap -= moved[j, 0] * contact.nx + moved[j, 1] * contact.ny
+    return gap
+
+
+@njit(cache=True, error_model="numpy")
+def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
+    """m/s along n, negative while they close in."""
+    speed = v[i, 0] * nx + v[i, 1] * ny
+    if j >= 0:
+        speed -= v[j, 0] * nx + v[j, 1] * ny
+    return speed
+
+
+@njit(cache=True, error_model="numpy")
+def inverse_mass(mass, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
+    """1/kg, of the two together; a wall has none."""
+    return 1.0 / mass[i] + (1.0 / mass[j] if j >= 0 else 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def push_to_target(disks: Disks, contact, target: float, share: float, memory: float) -> None:  # type: ignore[no-untyped-def]
+    """The impulse that gives a contact its target velocity, if it is a push in all.
+
+    `share` of it where the contact is soft, less `memory` times what it has been pushed by.
+    """
+    i, j, nx, ny, before = contact.i, contact.j, contact.nx, contact.ny, contact.impulse
+    wanted = (target - closing(disks.velocity, i, j, nx, ny)) / inverse_mass(disks.mass, i, j)
+    contact.impulse = max(before + share * wanted - memory * before, 0.0)
+    contact.strongest = max(contact.strongest, contact.impulse - before)
+    push_apart(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse - before)
+
+
+@njit(cache=True, error_model="numpy")
+def push_apart(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
+    """Add `by` along n to row i and against n to row j, each by its inverse mass."""
+    move(rows, i, nx, ny, by / mass[i])
+    if j >= 0:
+        move(rows, j, nx, ny, -by / mass[j])
+
+
+@njit(cache=True, error_model="numpy")
+def rub(disks: Disks, contact, friction: float) -> None:  # type: ignore[no-untyped-def]
+    """Stop the sliding of the surfaces where they touch, by at most `friction` times what presses."""
+    i, j, spin, inertia = contact.i, contact.j, disks.angular_velocity, disks.inertia
+    arm = disks.radius[i] + contact.gap / 2
+    speed = closing(disks.velocity, i, j, -contact.ny, contact.nx) - arm * spin[i]
+    weight = inverse_mass(disks.mass, i, j) + arm * arm / inertia[i]
+    if j >= 0:
+        other = disks.radius[j] + contact.gap / 2
+        speed -= other * spin[j]
+        weight += other * other / inertia[j]
+    most, before = friction * contact.impulse, contact.slide
+    contact.slide = min(max(before - speed / weight, -most), most)
+    turn(disks, contact, contact.slide - before)
+
+
+@njit(cache=True, error_model="numpy")
+def turn(disks: Disks, contact, by: float) -> None:  # type: ignore[no-untyped-def]
+    """N s more along the tangent, which turns both the same way round."""
+    i, j, inertia = contact.i, contact.j, disks.inertia
+    push_apart(disks.velocity, disks.mass, i, j, -contact.ny, contact.nx, by)
+    disks.angular_velocity[i] -= (disks.radius[i] + contact.gap / 2) * by / inertia[i]
+    if j >= 0:
+        disks.angular_velocity[j] -= (disks.radius[j] + contact.gap / 2) * by / inertia[j]

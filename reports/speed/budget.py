@@ -1,0 +1,203 @@
+"""Where an engine's error comes from: its habits switched on in the reference one at a time, and what is left over.
+
+As vectors, disk by disk and sample by sample, the parts close: engine - truth = parts + interplay + unexplained.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from adapters.engine import Engine
+from adapters.engines import row_of
+from adapters.habits import FLIGHT, Habit, habits_of, with_habits
+from adapters.play import Run, play
+from reports import laws, scales
+from reports.speed.ladder import held
+from reports.view import View
+from scenarios.model import Array, Scenario, Trajectory
+
+TIME, INTERPLAY, SUM, ALL, TOTAL, UNEXPLAINED = (
+    "time of hits", "interplay", "sum", "all", "engine", "unexplained",
+)  # fmt: skip
+TOTALS = (SUM, ALL, TOTAL)
+COLUMNS = [
+    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "part", "position_radii", "energy", "share",
+    "off_engine_radii", "off_reference_radii", "off_apart_radii", "closed_apart_radii", "note",
+]  # fmt: skip
+LIMIT = 0.5  # radii by which late hits alone may put a disk off: where all is far off, no part adds up to anything
+
+
+class NotPlayed(Exception):
+    """An engine failed the scene, so that there is nothing to explain."""
+
+
+class Offset(NamedTuple):
+    """What one cause changes: of positions (k, m, 2) in radii of the disks that move, of the energy (k,) over all."""
+
+    position: Array
+    energy: Array
+
+    def __add__(self, other: Offset) -> Offset:  # type: ignore[override]
+        return Offset(self.position + other.position, self.energy + other.energy)
+
+    def __sub__(self, other: Offset) -> Offset:
+        return Offset(self.position - other.position, self.energy - other.energy)
+
+    @property
+    def radii(self) -> float:
+        """Root mean square over disks and samples."""
+        return float(np.sqrt((self.position**2).sum(axis=2).mean()))
+
+    def share_of(self, total: Offset) -> float:
+        """By how much of the total's position it lies along it: what adds up to the total has 1 in all."""
+        size = float((total.position**2).sum())
+        return float((self.position * total.position).sum()) / size if size else 0.0
+
+    @property
+    def of_energy(self) -> float:
+        """Root mean square over the samples."""
+        return float(np.sqrt((self.energy**2).mean()))
+
+
+def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
+    """A row a part of what puts player `name` of `HABITS` off in a scene, at this many steps a sample interval.
+
+    Of `COLUMNS`: until_s, how far the scene was followed; position_radii and energy, the root mean square of what the
+    part changes, the energy in parts of that at hand; share, by which it makes up the position's total (1 in all;
+    negative: it makes up for others); off_engine_radii, off_reference_radii and off_apart_radii: what switching it off
+    changes in the engine, in the reference with all the rest, and how far these two are apart; closed_apart_radii: how
+    far the flight's part is from its closed form up to the first hit; note: why there are no numbers.
+    """
+    at = followed(scene, seed, substeps)
+    scenario, dt = at.scenario, at.dt
+    engine, profile = name.split(":")
+    known = {"scenario": scenario.name, "seed": seed, "engine": engine, "profile": profile, "dt_s": dt,
+             "until_s": scenario.duration}  # fmt: skip
+    try:
+        run = at.played(row_of(name).make())
+        budget = Budget(at, habits_of(name, run.settings, scenario.scene, dt), at.offset(run))
+        parts, checks = budget.parts(), budget.switched_off()
+    except NotPlayed as failure:
+        return [known | {"part": TOTAL, "note": str(failure)}]
+    checks[FLIGHT] = {"closed_apart_radii": at.flight_apart(parts[FLIGHT], row_of(name).alpha)}
+    shares = {part: {"share": each.share_of(parts[TOTAL])} for part, each in parts.items() if part not in TOTALS}
+    return [
+        known | {"part": part, "position_radii": each.radii, "energy": each.of_energy, "note": ""}
+        | shares.get(part, {}) | checks.get(part, {})
+        for part, each in parts.items()
+    ]  # fmt: skip
+
+
+def followed(scene: str, seed: int, substeps: int) -> Followed:
+    """The scene up to where late hits alone put a disk farther off than `LIMIT`."""
+    scenario, truth = held(scene, seed)
+    whole = Followed(scenario, truth, scenario.dt(substeps))
+    late = whole.played(with_habits([])).trajectory
+    assert late is not None
+    off = (laws.deviation(late, truth, scenario.scene) / scenario.scene.radius).max(axis=1)
+    last = max(int(np.append(np.flatnonzero(off > LIMIT), len(off))[0]) - 1, 1)
+    cut = {
+        name: getattr(truth, name)[: last + 1] for name in ("t", "position", "velocity", "angle", "angular_velocity")
+    }
+    shorter = replace(scenario, duration=last * scenario.sample_interval)
+    return Followed(shorter, replace(truth, **cut), whole.dt)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A scenario, its truth in all of it, and a dt in s."""
+
+    scenario: Scenario
+    truth: Trajectory
+    dt: float
+
+    def played(self, engine: Engine) -> Run:
+        """What an engine, not needed any more, makes of it.
+
+        Raises:
+            NotPlayed: it has failed.
+        """
+        try:
+            run = play(engine, "one:run", self.scenario, self.dt)
+        finally:
+            engine.close()
+        if run.status != "ok":
+            raise NotPlayed(f"{run.status}: {run.reason}")
+        return run
+
+    def offset(self, run: Run) -> Offset:
+        """How far it is from the truth; energies where no hit is near, as a step late is a whole hit late."""
+        scene, truth, played = self.scenario.scene, self.truth, run.trajectory
+        assert played is not None
+        apart = laws.apart(played, truth, scene)[:, ~scene.static] / scene.radius[~scene.static, None]
+        energy = laws.energy(played, scene) - laws.energy(truth, scene)
+        calm = View(self.scenario, self.dt, played, truth).calm
+        return Offset(apart, energy[calm] / (scales.energy(self.scenario) or 1.0))
+
+    def flight_apart(self, part: Offset, alpha: float) -> float:
+        """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first hit; see `Row.alpha` of the engines."""
+        truth, scene = self.truth, self.scenario.scene
+        calm = truth.t < truth.collisions.t.min(initial=np.inf)
+        gained = (truth.velocity - truth.velocity[0])[calm][:, ~scene.static] / scene.radius[~scene.static, None]
+        return float(np.abs(part.position[calm] - (alpha - 0.5) * self.dt * gained).max(initial=0.0))
+
+
+class Budget:
+    """The offset of one player, and its habits, each of which is played once with the same others."""
+
+    def __init__(self, at: Followed, habits: Sequence[Habit], total: Offset) -> None:
+        self.at, self.habits, self.total = at, habits, total
+        self.known: dict[tuple[str, ...], Offset] = {}
+
+    def parts(self) -> dict[str, Offset]:
+        """What each habit changes, then interplay, what is unexplained, the sum, all at once, and the engine.
+
+        Each is switched on by itself in the reference with late hits, or on top of those it acts on; for what the
+        reference has no switch for, the engine is set against itself without it.
+        """
+        parts = {TIME: self.reference([])}
+        for habit in self.habits:
+            if habit.switches:
+                below = [each for each in self.habits if each.name in habit.on_top]
+                parts[habit.name] = self.reference([*below, habit]) - self.reference(below)
+            elif habit.without is not None:
+                parts[habit.name] = self.total - self.at.offset(self.at.played(habit.without()))
+        unswitched = [parts[habit.name] for habit in self.habits if not habit.switches]
+        summed, reached = added(parts.values()), added([self.reference(self.habits), *unswitched])
+        return parts | {
+            INTERPLAY: reached - summed, UNEXPLAINED: self.total - reached, SUM: summed, ALL: reached,
+            TOTAL: self.total,
+        }  # fmt: skip
+
+    def switched_off(self) -> dict[str, dict[str, float]]:
+        """part -> what switching it off changes in the engine, and in the reference with all the rest switched on."""
+        found = {}
+        for habit in self.habits:
+            if habit.switches and habit.without is not None:
+                others = [each for each in self.habits if each is not habit]
+                in_engine = self.total - self.at.offset(self.at.played(habit.without()))
+                in_reference = self.reference(self.habits) - self.reference(others)
+                found[habit.name] = {
+                    "off_engine_radii": in_engine.radii, "off_reference_radii": in_reference.radii,
+                    "off_apart_radii": (in_engine - in_reference).radii,
+                }  # fmt: skip
+        return found
+
+    def reference(self, habits: Sequence[Habit]) -> Offset:
+        """How far the reference with these habits is from the truth."""
+        names = tuple(habit.name for habit in self.habits if habit in habits)
+        if names not in self.known:
+            self.known[names] = self.at.offset(self.at.played(with_habits(habits)))
+        return self.known[names]
+
+
+def added(offsets: Iterable[Offset]) -> Offset:
+    """Their sum."""
+    first, *rest = offsets
+    for each in rest:
+        first = first + each
+    return first
