@@ -15,7 +15,7 @@ from reference_impl.exercise import collide, collide_wall, collide_walls, touchi
 from reference_impl.neighbours import Near, astray, look_around
 from reference_impl.state import Disks, World
 
-CROWD = 64  # disks, from which on the list is cheaper than all pairs
+CROWD = 64  # disks, from which on the list is cheaper than all pairs, even if a call is one step; if long, from 16 on
 EARLY = 0.8  # of the leash: the rest is for what the hits of a step move
 LOOK = 256  # disks a look at all neighbours in mid-step: more looks would cost more than asking all pairs
 NONE = -1  # in place of a number
