@@ -1,113 +1,221 @@
-"""The exercise's solver for many disks: the same steps, bit for bit, but only pairs near each other are asked.
+"""The exercise's solver for many disks: the same steps, bit for bit, but only what is near each other is asked.
 
-`exercise` is the solver; read that. This leaves out what cannot touch, by the list of `neighbours`.
+`exercise` is the solver; read that. This leaves out what cannot touch, by the list of `neighbours`, and divides by the
+masses once a call.
 """
 
-from numba import njit
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
 
 from reference_impl import exercise
-from reference_impl.exercise import collide, collide_wall, collide_walls, integrate, touching, touching_wall, wrap
+from reference_impl.compiled import compiled, kernel
+from reference_impl.exercise import collide, collide_wall, collide_walls, touching_wall, wrap
 from reference_impl.neighbours import Near, astray, look_around
 from reference_impl.state import Disks, World
 
-CROWD = 64  # disks, from which on the list is cheaper than all pairs
+CROWD = 64  # disks, from which on the list is cheaper than all pairs, even if a call is one step; if long, from 16 on
 EARLY = 0.8  # of the leash: the rest is for what the hits of a step move
 LOOK = 256  # disks a look at all neighbours in mid-step: more looks would cost more than asking all pairs
+NONE = -1  # in place of a number
+BLOCK = 256  # disks that fly at a time: few enough for the nearest cache
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """As `exercise.advance`, to the bit."""
     if len(disks.radius) < CROWD:
         return exercise.advance(disks, world, dt, count)
     hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
-    near = look_around(disks, world, dt)
-    for k in range(count):
-        near = step(disks, world, dt, k, hits, near)
+    advance_listed(disks, world, dt, count, hits)
     return hits
 
 
-@njit(cache=True, error_model="numpy")
-def step(disks: Disks, world: World, dt: float, k: int, hits: list, near: Near) -> Near:
-    """One step, as `exercise.step`; returns what is near now."""
-    integrate(disks, world, dt)
-    if any_astray(disks.position, near, EARLY):
-        near = look_around(disks, world, dt)
-
-    # From (i, j) on nothing has been asked yet. A pair that is pushed apart may leave the leash: look again, go on.
-    n, i, j, looks = len(disks.radius), 0, 0, 0
-    while near.listed and i < n and looks <= n // LOOK:
-        i, j = collide_near(disks, world, k, hits, near, i, j)
-        if i < n:
-            near = look_around(disks, world, dt)
-            looks += 1
-
-    if i < n:  # there is no list, or none that lasts
-        collide_rest(disks, world, k, hits, i, j)
-        collide_walls(disks, world, k, hits)
-    else:
-        collide_near_walls(disks, world, k, hits, near.walled)
-    wrap(disks.position, world)
-    return near
+@compiled
+def advance_listed(disks: Disks, world: World, dt: float, count: int, hits: list) -> int:
+    """Advance by near pairs, however few the disks are; returns in how many steps all pairs had to be asked."""
+    pull, n, unlisted = pull_on(disks, world, dt), len(disks.radius), 0
+    k, i, j, looks = 0, 0, 0, 0  # in step k nothing has been asked from the pair (i, j) on
+    if count > 0:
+        exercise.integrate(disks, world, dt)
+    while k < count:
+        near, began = look_around(disks, world, dt), k
+        if near.listed:
+            k, i, j = play(disks, world, dt, count, hits, pull, near, k, i, j)
+        looks = looks + 1 if k == began else 0
+        if k < count and (not near.listed or looks > n // LOOK):
+            collide_rest(disks, world, k, hits, i, j)
+            collide_walls(disks, world, k, hits)
+            wrap(disks.position, world)
+            k, i, j, looks, unlisted = k + 1, 0, 0, 0, unlisted + 1
+            if k < count:
+                exercise.integrate(disks, world, dt)
+    return unlisted
 
 
-@njit(cache=True, error_model="numpy")
-def any_astray(x, near: Near, part: float) -> bool:  # type: ignore[no-untyped-def]
-    """Whether any disk is farther from its home than this part of the leash."""
-    strays = 0  # all are counted: a loop without a way out is done in vectors
-    for i in range(len(x)):
-        strays += astray(x[i, 0], x[i, 1], near.home, i, part * near.leash)
-    return strays > 0
+class Pull(NamedTuple):
+    """What force, torque and gravity do in a step, and to whom; the same in every step of a call."""
+
+    kick: np.ndarray  # (2n,) m/s, x and y in turn
+    turn: np.ndarray  # (n,) rad/s
+    moving: np.ndarray  # (m, 2) who moves: the disks from .. to .., at most a block, without the static ones
 
 
-@njit(cache=True, error_model="numpy")
-def collide_near(disks: Disks, world: World, k: int, hits: list, near: Near, i: int, j: int) -> tuple[int, int]:
-    """Collide the near pairs from (i, j) on until a disk goes astray; returns the next pair, (n, n) after the last."""
-    x, home, leash = disks.position, near.home, near.leash
-    p = 0
-    while p < len(near.first) and (near.first[p] < i or (near.first[p] == i and near.second[p] < j)):
-        p += 1
-    p = next_touching(x, near.first, near.second, near.reach2, p)
-    while p < len(near.first):
-        a, b = int(near.first[p]), int(near.second[p])
-        impulse = collide(disks, a, b, world)
-        if impulse != 0.0:
-            hits.append((k, a, b, impulse))
-        if astray(x[a, 0], x[a, 1], home, a, leash) or astray(x[b, 0], x[b, 1], home, b, leash):
-            return a, b + 1
-        p = next_touching(x, near.first, near.second, near.reach2, p + 1)
-    return len(x), len(x)
+@compiled
+def pull_on(disks: Disks, world: World, dt: float) -> Pull:
+    """Rounded as in `exercise.integrate`."""
+    n, g = len(disks.mass), world.gravity
+    kick, turn, moving, runs = np.zeros(2 * n), np.zeros(n), np.zeros((n, 2), np.uint32), 0
+    for i in range(n):
+        if disks.mass[i] == inf:
+            continue
+        kick[2 * i] = (g[0] + disks.force[i, 0] / disks.mass[i]) * dt
+        kick[2 * i + 1] = (g[1] + disks.force[i, 1] / disks.mass[i]) * dt
+        turn[i] = disks.torque[i] / disks.inertia[i] * dt
+        if runs == 0 or moving[runs - 1, 1] != i or i % BLOCK == 0:
+            moving[runs, 0] = i
+            runs += 1
+        moving[runs - 1, 1] = i + 1
+    return Pull(kick, turn, moving[:runs].copy())
 
 
-@njit(cache=True, error_model="numpy")
-def next_touching(x, first, second, reach2, p: int) -> int:  # type: ignore[no-untyped-def]
-    """The number of the next near pair that is `touching`, from p on; their count if there is none."""
+@compiled
+def play(
+    disks: Disks, world: World, dt: float, count: int, hits: list, pull: Pull, near: Near, k: int, i: int, j: int
+) -> tuple[int, int, int]:
+    """Go on from the pair (i, j) of step k up to `count` or until a disk goes astray; returns where that is."""
+    pairs, p = len(near.first), first_from(near, i, j)
+    while True:
+        k, p = next_touch(disks, world, dt, count, pull, near, k, p)
+        if p == NONE:
+            return k, 0, 0
+        if p < pairs:
+            a, b = pair(near, p)
+            impulse = collide(disks, a, b, world)
+            if impulse != 0.0:
+                hits.append((k, a, b, impulse))
+            if off_leash(disks, near, a, b):
+                return k, a, b + 1
+            p += 1
+        else:
+            i, w = by_wall(near, p)
+            for later in range(w, len(world.walls)):  # as it is moved, it may touch one that it was not near
+                impulse = collide_wall(disks, i, later, world)
+                if impulse != 0.0:
+                    hits.append((k, i, -1 - later, impulse))
+            p = past(near, i, p)
+
+
+@kernel
+def next_touch(
+    disks: Disks, world: World, dt: float, count: int, pull: Pull, near: Near, k: int, p: int
+) -> tuple[int, int]:
+    """(step, number) of the next near pair that touches, from number p of step k on; walls are numbered after pairs.
+
+    Flies from step to step; (step, `NONE`) at the start of one where a disk is nearly off the leash, or of `count`.
+    """
+    pairs, walls = len(near.first), len(near.disk)
+    while True:
+        p = next_touching(disks, near, p)
+        if p >= pairs:
+            p = next_touching_wall(disks, world, near, p)
+        if p < pairs + walls:
+            return k, p
+        wrap(disks.position, world)
+        k, p = k + 1, 0
+        if k == count or fly(disks, dt, pull, near) > 0:
+            return k, NONE
+
+
+@kernel
+def fly(disks: Disks, dt: float, pull: Pull, near: Near) -> int:
+    """As `exercise.integrate`; returns how many disks are farther from home than `EARLY` of the leash.
+
+    One thing at a time and no way out of a loop, so that it is done in vectors; and in blocks, so that the next loop
+    finds in the nearest cache what the one before has left there.
+    """
+    x, v, angle, spin = disks.position.reshape(-1), disks.velocity.reshape(-1), disks.angle, disks.angular_velocity
+    home, leash, strays = near.home, EARLY * near.leash, 0
+    for run in range(len(pull.moving)):
+        begin, end = np.int64(pull.moving[run, 0]), np.int64(pull.moving[run, 1])
+        for c in range(2 * begin, 2 * end):
+            v[c] += pull.kick[c]
+            x[c] += v[c] * dt
+        for i in range(begin, end):
+            spin[i] += pull.turn[i]
+            angle[i] += spin[i] * dt
+        for i in range(begin, end):
+            strays += astray(x, home, i, leash)
+    return strays
+
+
+@kernel
+def next_touching(disks: Disks, near: Near, p: int) -> int:
+    """The number of the next near pair that is `touching`, from p on; their count or p if there is none."""
+    x, first, second, reach2 = disks.position.reshape(-1), near.first, near.second, near.reach2
     while p < len(first):
-        dx, dy = x[first[p], 0] - x[second[p], 0], x[first[p], 1] - x[second[p], 1]
+        a, b = 2 * np.int64(first[p]), 2 * np.int64(second[p])
+        dx, dy = x[a] - x[b], x[a + 1] - x[b + 1]
         if dx * dx + dy * dy < reach2[p]:
             break
         p += 1
     return p
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
+def next_touching_wall(disks: Disks, world: World, near: Near, p: int) -> int:
+    """The number of the next disk that is `touching_wall` with one near it, from p on; of the end if there is none."""
+    x, radius, pairs = disks.position, disks.radius, len(near.first)
+    while p < pairs + len(near.disk):
+        if touching_wall(x, radius, near.disk[p - pairs], world.walls, near.wall[p - pairs]):
+            break
+        p += 1
+    return p
+
+
+@kernel
+def first_from(near: Near, i: int, j: int) -> int:
+    """The number of the first near pair from (i, j) on."""
+    p = 0
+    while p < len(near.first) and (near.first[p] < i or (near.first[p] == i and near.second[p] < j)):
+        p += 1
+    return p
+
+
+@kernel
+def pair(near: Near, p: int):  # type: ignore[no-untyped-def]
+    """The two disks of a number."""
+    return np.int64(near.first[p]), np.int64(near.second[p])
+
+
+@kernel
+def by_wall(near: Near, p: int):  # type: ignore[no-untyped-def]
+    """Disk and wall of a number."""
+    return np.int64(near.disk[p - len(near.first)]), np.int64(near.wall[p - len(near.first)])
+
+
+@kernel
+def past(near: Near, i: int, p: int) -> int:
+    """The number after those of disk i and its walls."""
+    while p - len(near.first) < len(near.disk) and near.disk[p - len(near.first)] == i:
+        p += 1
+    return p
+
+
+@kernel
+def off_leash(disks: Disks, near: Near, a: int, b: int) -> bool:
+    """Whether one of two disks is."""
+    x = disks.position.reshape(-1)
+    return astray(x, near.home, a, near.leash) or astray(x, near.home, b, near.leash)
+
+
+@compiled
 def collide_rest(disks: Disks, world: World, k: int, hits: list, i: int, j: int) -> None:
     """Collide all pairs from (i, j) on, as the double loop of `exercise.step` does."""
     n = len(disks.radius)
     for a in range(i, n):
         for b in range(max(a + 1, j if a == i else 0), n):
-            if touching(disks.position, disks.radius, a, b):
-                impulse = collide(disks, a, b, world)
-                if impulse != 0.0:
-                    hits.append((k, a, b, impulse))
-
-
-@njit(cache=True, error_model="numpy")
-def collide_near_walls(disks: Disks, world: World, k: int, hits: list, walled) -> None:  # type: ignore[no-untyped-def]
-    """Those near a wall against all walls, as `exercise.collide_walls`; no other disk moves meanwhile."""
-    for i in walled:
-        for w in range(len(world.walls)):
-            if touching_wall(disks.position, disks.radius, i, world.walls, w):
-                impulse = collide_wall(disks, i, w, world)
-                if impulse != 0.0:
-                    hits.append((k, i, -1 - w, impulse))
+            impulse = collide(disks, a, b, world)
+            if impulse != 0.0:
+                hits.append((k, a, b, impulse))

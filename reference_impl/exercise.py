@@ -6,12 +6,11 @@ runs as plain Python and gives the same bits.
 
 from math import inf, sqrt
 
-from numba import njit
-
+from reference_impl.compiled import compiled, kernel
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, Disks, World
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the hits as (step, i, j, impulse in N s), wall w as j = -1 - w."""
     hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
@@ -20,43 +19,37 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     return hits
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
     """One step, as `performSimStep`: integrate all, collide every pair i < j in order, then the edges of the world."""
     integrate(disks, world, dt)
     n = len(disks.radius)
     for i in range(n):
         for j in range(i + 1, n):
-            # `collide` asks this again; asking here first spares the call for the many pairs far apart.
-            if touching(disks.position, disks.radius, i, j):
-                impulse = collide(disks, i, j, world)
-                if impulse != 0.0:
-                    hits.append((k, i, j, impulse))
+            impulse = collide(disks, i, j, world)
+            if impulse != 0.0:
+                hits.append((k, i, j, impulse))
     collide_walls(disks, world, k, hits)
     wrap(disks.position, world)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def integrate(disks: Disks, world: World, dt: float) -> None:
     """Task 1, symplectic Euler: velocities from force and torque, then positions from the NEW velocities."""
     x, v, g, force, torque = disks.position, disks.velocity, world.gravity, disks.force, disks.torque
     for i in range(len(disks.mass)):
         if disks.mass[i] == inf:
             continue
-        if force[i, 0] == 0.0 and force[i, 1] == 0.0 and torque[i] == 0.0:  # as most are: spare the divisions
-            v[i, 0] += g[0] * dt
-            v[i, 1] += g[1] * dt
-        else:
-            v[i, 0] += (g[0] + force[i, 0] / disks.mass[i]) * dt
-            v[i, 1] += (g[1] + force[i, 1] / disks.mass[i]) * dt
-            disks.angular_velocity[i] += torque[i] / disks.inertia[i] * dt
+        v[i, 0] += (g[0] + force[i, 0] / disks.mass[i]) * dt
+        v[i, 1] += (g[1] + force[i, 1] / disks.mass[i]) * dt
+        disks.angular_velocity[i] += torque[i] / disks.inertia[i] * dt
 
         x[i, 0] += v[i, 0] * dt
         x[i, 1] += v[i, 1] * dt
         disks.angle[i] += disks.angular_velocity[i] * dt
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def collide(disks: Disks, a: int, b: int, world: World) -> float:
     """Task 2, one pair; returns the impulse J in N s (positive: pushes apart), 0 where there is none."""
     x, v, mass = disks.position, disks.velocity, disks.mass
@@ -84,19 +77,17 @@ def collide(disks: Disks, a: int, b: int, world: World) -> float:
     return J
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def collide_walls(disks: Disks, world: World, k: int, hits: list) -> None:
     """Every disk against every wall, in order."""
     for i in range(len(disks.radius)):
         for w in range(len(world.walls)):
-            # As for the pairs: asked here first, to spare the call.
-            if touching_wall(disks.position, disks.radius, i, world.walls, w):
-                impulse = collide_wall(disks, i, w, world)
-                if impulse != 0.0:
-                    hits.append((k, i, -1 - w, impulse))
+            impulse = collide_wall(disks, i, w, world)
+            if impulse != 0.0:
+                hits.append((k, i, -1 - w, impulse))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def collide_wall(disks: Disks, i: int, w: int, world: World) -> float:
     """The same four parts for a disk and the nearest point of a wall, which acts as a static disk would."""
     x, v, mass = disks.position, disks.velocity, disks.mass
@@ -113,7 +104,7 @@ def collide_wall(disks: Disks, i: int, w: int, world: World) -> float:
     return J
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def touching(x, radius, a: int, b: int) -> bool:  # type: ignore[no-untyped-def]
     """Whether the centres are closer than the sum of the radii (both sides squared)."""
     dx, dy = x[a, 0] - x[b, 0], x[a, 1] - x[b, 1]
@@ -121,7 +112,7 @@ def touching(x, radius, a: int, b: int) -> bool:  # type: ignore[no-untyped-def]
     return dx * dx + dy * dy < reach * reach
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def touching_wall(x, radius, i: int, walls, w: int) -> bool:  # type: ignore[no-untyped-def]
     """Whether the nearest point of wall `w` is closer than the radius (both sides squared)."""
     px, py = nearest_point(walls, w, x[i, 0], x[i, 1])
@@ -129,7 +120,7 @@ def touching_wall(x, radius, i: int, walls, w: int) -> bool:  # type: ignore[no-
     return dx * dx + dy * dy < radius[i] * radius[i]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def direction(dx: float, dy: float) -> tuple[float, float, float]:
     """Length and unit vector of (dx, dy); equal centres have no direction, so they are parted along x."""
     distance = sqrt(dx * dx + dy * dy)
@@ -138,7 +129,7 @@ def direction(dx: float, dy: float) -> tuple[float, float, float]:
     return distance, dx / distance, dy / distance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def share_of_a(mass_a: float, mass_b: float, split: int) -> float:
     """The part of the overlap by which a moves, 0 to 1: free in the exercise, but a static disk never moves."""
     if split == BY_INVERSE_MASS or mass_a == inf or mass_b == inf:
@@ -146,7 +137,7 @@ def share_of_a(mass_a: float, mass_b: float, split: int) -> float:
     return 0.5 if split == EQUAL else 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def nearest_point(walls, w: int, x: float, y: float) -> tuple[float, float]:  # type: ignore[no-untyped-def]
     """The point of segment `w` nearest to (x, y)."""
     ax, ay = walls[w, 0, 0], walls[w, 0, 1]
@@ -155,14 +146,14 @@ def nearest_point(walls, w: int, x: float, y: float) -> tuple[float, float]:  # 
     return ax + along * ux, ay + along * uy
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def move(rows, i: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
     """Add `by` times n to row `i`."""
     rows[i, 0] += by * nx
     rows[i, 1] += by * ny
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def wrap(x, world: World) -> None:  # type: ignore[no-untyped-def]
     """As `projectObjects`: a centre beyond an edge of the box is set onto the opposite edge; its velocity stays."""
     for axis in range(2):

@@ -6,12 +6,11 @@ runs as plain Python and gives the same bits. It shares no kernel with `exercise
 
 from math import inf, sqrt
 
-from numba import njit
-
+from reference_impl.compiled import compiled
 from reference_impl.state import Disks, World
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the hits as (step, i, j, impulse in N s), wall w as j = -1 - w."""
     hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
@@ -20,7 +19,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     return hits
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
     """One step: move, accelerate, bounce off the walls, collide every pair i < j, then the edges of the world."""
     integrate(disks, world, dt)
@@ -36,7 +35,7 @@ def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
     wrap(x, world)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def integrate(disks: Disks, world: World, dt: float) -> None:
     """x += v dt with the OLD velocity, then v += F/m dt; the same for the angle."""
     x, v, g = disks.position, disks.velocity, world.gravity
@@ -52,7 +51,7 @@ def integrate(disks: Disks, world: World, dt: float) -> None:
         disks.angular_velocity[i] += disks.torque[i] / disks.inertia[i] * dt
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def bounce(disks: Disks, world: World, k: int, hits: list) -> None:
     """A wall flips the normal velocity of a disk that comes in, v' = -c_r v; the position stays as it is."""
     x, v, mass = disks.position, disks.velocity, disks.mass
@@ -72,7 +71,7 @@ def bounce(disks: Disks, world: World, k: int, hits: list) -> None:
             hits.append((k, i, -1 - w, mass[i] * change * distance))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def collide(disks: Disks, a: int, b: int, world: World) -> float:
     """Part an overlapping pair and exchange its normal velocities; returns the impulse in N s, or 0."""
     x, v = disks.position, disks.velocity
@@ -100,14 +99,14 @@ def collide(disks: Disks, a: int, b: int, world: World) -> float:
     return (1.0 + e) * (v1 - v2) / (w1 + w2)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def move(rows, i: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
     """Add `by` times n to row `i`."""
     rows[i, 0] += by * nx
     rows[i, 1] += by * ny
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def wrap(x, world: World) -> None:  # type: ignore[no-untyped-def]
     """A centre beyond an edge of the box is set onto the opposite edge; its velocity stays."""
     for i in range(len(x)):

@@ -9,8 +9,8 @@ from math import floor, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from reference_impl.compiled import compiled, kernel
 from reference_impl.state import Disks, World
 
 LASTS = 16  # steps of the fastest disk that a list is made for
@@ -23,15 +23,16 @@ class Near(NamedTuple):
     """What may touch as long as no disk is farther than `leash` from its home."""
 
     listed: bool  # False: too dense or too far out for a list, so everything may touch
-    home: np.ndarray  # (n, 2) m: where the disks were when this was found
+    home: np.ndarray  # (2n,) m: where the disks were when this was found, x and y in turn
     leash: float  # m
     first: np.ndarray  # (p,) the near pairs, first < second, in the order of the double loop
     second: np.ndarray  # (p,)
     reach2: np.ndarray  # (p,) m2: squared sum of the radii
-    walled: np.ndarray  # (b,) the disks near a wall, in order
+    disk: np.ndarray  # (b,) the disks near a wall, and
+    wall: np.ndarray  # (b,) which wall it is, in the order of their double loop
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def look_around(disks: Disks, world: World, dt: float) -> Near:
     """All pairs that are apart by less than a skin, and the disks within half a skin of a wall.
 
@@ -45,10 +46,11 @@ def look_around(disks: Disks, world: World, dt: float) -> Near:
     first, second = in_order(first, second, len(x))
     reach2 = (radius[first] + radius[second]) ** 2
     listed = len(cells.disk) > 0 and len(first) <= ROOM * len(x)
-    return Near(listed, x.copy(), 0.49 * skin, first, second, reach2, near_walls(x, radius, 0.5 * skin, world.walls))
+    disk, wall = near_walls(x, radius, 0.5 * skin, world.walls)
+    return Near(listed, x.copy().reshape(-1), 0.49 * skin, first, second, reach2, disk, wall)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def skin_for(disks: Disks, dt: float) -> float:
     """m: the thicker, the more pairs are asked in vain; the thinner, the sooner the list is out of date."""
     fastest = 0.0
@@ -60,10 +62,10 @@ def skin_for(disks: Disks, dt: float) -> float:
     return min(max(2.0 * LASTS * fastest * abs(dt), THIN * size), THICK * size)
 
 
-@njit(cache=True, error_model="numpy")
-def astray(x: float, y: float, home, i: int, leash: float) -> bool:  # type: ignore[no-untyped-def]
-    """Whether disk i at (x, y) is farther from its home than the leash."""
-    dx, dy = x - home[i, 0], y - home[i, 1]
+@kernel
+def astray(x, home, i: int, leash: float) -> bool:  # type: ignore[no-untyped-def]
+    """Whether disk i is farther from its home than the leash; x (2n,) m, as `home`: rows of two are no vectors."""
+    dx, dy = x[2 * i] - home[2 * i], x[2 * i + 1] - home[2 * i + 1]
     return dx * dx + dy * dy > leash * leash
 
 
@@ -81,7 +83,7 @@ class Cells(NamedTuple):
     place: np.ndarray  # (m, 3) m: x, y and radius, side by side as they are needed
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def sort_into_cells(x, radius, side: float) -> Cells:  # type: ignore[no-untyped-def]
     """A counting sort of the disks at x (n, 2) m by their cells of `side` m."""
     n, count = len(x), 16
@@ -110,7 +112,7 @@ def sort_into_cells(x, radius, side: float) -> Cells:  # type: ignore[no-untyped
     return Cells(row, start, disk, number, place)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def near_pairs(cells: Cells, skin: float):  # type: ignore[no-untyped-def]
     """(p,), (p,): the pairs that are apart by less than the skin, first < second, in no order."""
     n = cells.start[-3] if len(cells.disk) else 0
@@ -123,7 +125,7 @@ def near_pairs(cells: Cells, skin: float):  # type: ignore[no-untyped-def]
     return first[:count], second[:count]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def add_pairs(cells: Cells, skin: float, first, second, q: int, count: int) -> tuple[int, int]:  # type: ignore[no-untyped-def]
     """Write the pairs of the disks from q on behind the first `count`, as far as there is room; returns both anew."""
     start, disk, place, last = cells.start, cells.disk, cells.place, len(cells.start) - 4
@@ -145,20 +147,20 @@ def add_pairs(cells: Cells, skin: float, first, second, q: int, count: int) -> t
     return start[-3], count
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def longer(array):  # type: ignore[no-untyped-def]
     """The array (p,) with as much room again."""
     return np.concatenate((array, np.empty_like(array)))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def in_order(first, second, n: int):  # type: ignore[no-untyped-def]
     """The pairs in the order of the double loop: sorted by the second, then by the first, which keeps that order."""
     second, first = sorted_by(second, first, n)
     return sorted_by(first, second, n)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def sorted_by(key, other, n: int):  # type: ignore[no-untyped-def]
     """Both (p,) arrays by a counting sort of the keys, numbers below n; equal keys stay in order."""
     free = np.zeros(n + 1, np.uint32)
@@ -174,17 +176,16 @@ def sorted_by(key, other, n: int):  # type: ignore[no-untyped-def]
     return keys, others
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def near_walls(x, radius, margin: float, walls):  # type: ignore[no-untyped-def]
-    """(b,) the disks that are within the margin of the upright rectangle around a wall."""
-    found, count = np.empty(len(x), np.uint32), 0
+    """(b,), (b,): the disks, in order, that are within the margin of the upright rectangle around a wall, and which."""
+    disk, wall, count = np.empty(len(x) * len(walls), np.uint32), np.empty(len(x) * len(walls), np.uint32), 0
     for i in range(len(x)):
         reach = radius[i] + margin
         for w in range(len(walls)):
             left, right = min(walls[w, 0, 0], walls[w, 1, 0]), max(walls[w, 0, 0], walls[w, 1, 0])
             low, high = min(walls[w, 0, 1], walls[w, 1, 1]), max(walls[w, 0, 1], walls[w, 1, 1])
             if left - reach < x[i, 0] < right + reach and low - reach < x[i, 1] < high + reach:
-                found[count] = i
+                disk[count], wall[count] = i, w
                 count += 1
-                break
-    return found[:count].copy()
+    return disk[:count].copy(), wall[:count].copy()

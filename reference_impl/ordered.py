@@ -12,8 +12,8 @@ lower, a stack) the work is bounded: a bounce that would last less than a `REST`
 from math import inf, sqrt
 
 import numpy as np
-from numba import njit
 
+from reference_impl.compiled import compiled
 from reference_impl.state import Disks, World
 
 REST = 1 / 16  # of a step
@@ -21,7 +21,7 @@ MOST = 8  # hits a disk and step, on average
 NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the world
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the hits as (step, i, j, impulse in N s), wall w as j = -1 - w."""
     hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
@@ -31,7 +31,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     return hits
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def step(disks: Disks, world: World, pull, dt: float, k: int, hits: list) -> None:  # type: ignore[no-untyped-def]
     """One step: fly, then resolve meeting after meeting. `pull` (n, 2) m/s2 is what accelerates each disk now."""
     fly(disks, world, pull, dt)
@@ -48,7 +48,7 @@ def step(disks: Disks, world: World, pull, dt: float, k: int, hits: list) -> Non
                 hits.append((k, i, j, impulse))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def fly(disks: Disks, world: World, pull, dt: float) -> None:  # type: ignore[no-untyped-def]
     """x + v dt + a dt2 / 2 and v + a dt for all, as if nobody met; turning alike."""
     x, v, spin = disks.position, disks.velocity, disks.angular_velocity
@@ -64,7 +64,7 @@ def fly(disks: Disks, world: World, pull, dt: float) -> None:  # type: ignore[no
         spin[i] += turning * dt
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[no-untyped-def]
     """Move disk i, and keep what rounding cuts off for the next time (Kahan, Comm. ACM 8, 40, 1965).
 
@@ -75,7 +75,7 @@ def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[n
     remainder[i, axis] = way - (x[i, axis] - before)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def first_meeting(disks: Disks, world: World, pull, now: float, dt: float) -> tuple[float, int, int]:  # type: ignore[no-untyped-def]
     """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or the edge."""
     x, radius, mass, walls = disks.position, disks.radius, disks.mass, world.walls
@@ -108,7 +108,7 @@ def first_meeting(disks: Disks, world: World, pull, now: float, dt: float) -> tu
     return first, who, whom
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def longest_way(velocity, pull, dt: float) -> float:  # type: ignore[no-untyped-def]
     """m: no disk gets farther in a step."""
     fastest2, strongest2 = 0.0, 0.0
@@ -118,7 +118,7 @@ def longest_way(velocity, pull, dt: float) -> float:  # type: ignore[no-untyped-
     return (sqrt(fastest2) + sqrt(strongest2) * dt) * dt
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def path_to_disk(x, v, pull, radius, i: int, j: int):  # type: ignore[no-untyped-def]
     """How disk i moves as seen from disk j, which is a wall without length."""
     return (
@@ -127,7 +127,7 @@ def path_to_disk(x, v, pull, radius, i: int, j: int):  # type: ignore[no-untyped
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def path_to_wall(x, v, pull, radius, i: int, walls, w: int):  # type: ignore[no-untyped-def]
     """How disk i moves as seen from the start of wall w: place, velocity, acceleration; the wall, and the reach."""
     return (
@@ -136,7 +136,7 @@ def path_to_wall(x, v, pull, radius, i: int, walls, w: int):  # type: ignore[no-
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def contact(path, s: float) -> tuple[float, float, float, float]:  # type: ignore[no-untyped-def]
     """At s: the gap in m, how fast it opens in m/s, and the normal, from the nearest point of the other to the disk."""
     x, y, u, v, a, b, along, up, reach = path
@@ -149,7 +149,7 @@ def contact(path, s: float) -> tuple[float, float, float, float]:  # type: ignor
     return distance - reach, (u + a * s) * nx + (v + b * s) * ny, nx, ny
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def meeting(path, since: float) -> float:  # type: ignore[no-untyped-def]
     """The first s from `since` to 0 at which the gap is closed and closes on, or inf."""
     low, high = since, 0.0
@@ -164,7 +164,7 @@ def meeting(path, since: float) -> float:  # type: ignore[no-untyped-def]
     return low if contact(path, low)[0] <= 0.0 else root(path, low, high)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def halved(path, low: float, high: float, closing: bool) -> float:  # type: ignore[no-untyped-def]
     """Where the gap turns, to a 2^-50 of the step: its least or greatest value does not tell the difference."""
     for _ in range(50):
@@ -176,7 +176,7 @@ def halved(path, low: float, high: float, closing: bool) -> float:  # type: igno
     return high if closing else low
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def root(path, low: float, high: float) -> float:  # type: ignore[no-untyped-def]
     """Where a gap that is open at low and closed at high closes: Newton, halving where that would leave the bracket."""
     s = high
@@ -195,7 +195,7 @@ def root(path, low: float, high: float) -> float:  # type: ignore[no-untyped-def
     return s
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def collide(disks: Disks, world: World, pull, i: int, j: int, s: float, dt: float) -> float:  # type: ignore[no-untyped-def]
     """The impulse J = -(1 + e) (vi - vj).n / (1/mi + 1/mj) at s, and both on their new ways to the end; returns J."""
     x, v, e = disks.position, disks.velocity, world.restitution
@@ -216,7 +216,7 @@ def collide(disks: Disks, world: World, pull, i: int, j: int, s: float, dt: floa
     return J - hold * s
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def fly_anew(disks: Disks, pull, i: int, wx: float, wy: float, J: float, hold: float, s: float) -> None:  # type: ignore[no-untyped-def]
     """From s on, as if disk i had left with the impulse J and the force `hold` along n; (wx, wy) is n / mass."""
     for axis, w in enumerate((wx, wy)):
@@ -225,7 +225,7 @@ def fly_anew(disks: Disks, pull, i: int, wx: float, wy: float, J: float, hold: f
         pull[i, axis] += hold * w
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def carry_over(x, world: World, i: int) -> None:  # type: ignore[no-untyped-def]
     """A centre that is set onto the opposite edge as it leaves and flies on ends a box away."""
     for axis in range(2):

@@ -43,7 +43,7 @@ class World(NamedTuple):
 
 def make_disks(position, velocity, radius, mass, inertia=None, angle=None, angular_velocity=None) -> Disks:  # type: ignore[no-untyped-def]
     """Disks from copies of the given arrays; no force, no torque; solid disks (m r2 / 2) where no inertia is given."""
-    position, velocity, radius, mass = (np.array(a, dtype=float) for a in (position, velocity, radius, mass))
+    position, velocity, radius, mass = (np.array(a, float, order="C") for a in (position, velocity, radius, mass))
     zero = np.zeros(len(radius))
     return Disks(
         position=position,

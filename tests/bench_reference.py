@@ -1,22 +1,24 @@
-"""How fast the reference is beside the engines: `python -m tests.bench_reference [CSV]`, alone on the machine.
+"""How fast the reference is beside the engines: `python -m tests.bench_reference` prints and writes its figures.
 
 A gas of equal disks between walls (area fraction 0.3, e = 1, dt 1/240 s, kT = m = diameter = 1), played by every engine
 in turn, round by round in shuffled order: nothing is read and no hit is told while the clock runs, and Python calls the
 engine once a step where it cannot take many. Each engine's own state goes on from round to round. The clock is that of
-the thread, which does not run while others have the processor; they still take its caches.
+the thread, which does not run while others have the processor; they still take its caches: leave the machine alone.
+
+The figures go to tests/reference_figures.csv, each with the least or the most that is demanded of it;
+`uv run pytest tests/test_reference_figures.py` holds them to it, and with `-m slow` measures some ratios anew.
 """
 
 from __future__ import annotations
 
 import csv
-import os
-import platform
 import subprocess
 import sys
-from collections.abc import Callable
-from importlib.metadata import version
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from time import thread_time
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -26,23 +28,43 @@ from adapters.box2d_v3 import SUBSTEPS, Box2DV3
 from adapters.pymunk import Pymunk
 from adapters.reference import Reference
 from reference_impl import crowd, ordered
+from reports.machine import about, busy_cores
 from scenarios.model import Scene
 from tests.gases import boxed_asteroids, boxed_gas
+from tests.test_ordered import CASES, off
 
 Step = Callable[[int], object]  # advances so many steps
 DT, ROUNDS, LONG = 1 / 240, 15, 0.02  # s, rounds, s that a round of one engine takes at least
-FLOORS = {"pymunk:matched": 8, "pymunk:shipped": 8, "box2d:matched": 25, "box2d:shipped": 25, "box2d_v3:matched": 12,
-          "box2d_v3:shipped": 12}  # fmt: skip
-COLUMNS = ("scene", "engine", "N", "dt_s", "us_per_step", "iqr", "ratio", "machine", "versions")
+SIZES = (100, 1000, 10_000, 100_000)
+LEAST = {"pymunk": 8.0, "box2d": 25.0, "box2d_v3": 12.0}  # steps of the reference in one of theirs, of 1000 disks
+FIGURES = Path(__file__).parent / "reference_figures.csv"
+
+
+class Figure(NamedTuple):
+    """One number, and the least or the most that is demanded of it."""
+
+    scene: str
+    disks: int
+    what: str
+    value: float
+    iqr: float | None = None
+    unit: str = "1"
+    at_least: float | None = None
+    at_most: float | None = None
 
 
 def reference(variant, scene: Scene, dt: float) -> Step:
     """The compiled solver, whose hits are counted but not handed to Python."""
     engine = Reference(variant)
     engine.load(scene, dt)
+    return lambda count: silent(variant)(engine.disks, engine.world, dt, count)
+
+
+@cache
+def silent(variant):
+    """The variant's `advance`, which returns how many hits there were."""
     advance = variant.advance
-    silent = njit(lambda disks, world, count: len(advance(disks, world, dt, count)))
-    return lambda count: silent(engine.disks, engine.world, count)
+    return njit(lambda disks, world, dt, count: len(advance(disks, world, dt, count)))
 
 
 def pymunk(profile: str, scene: Scene, dt: float) -> Step:
@@ -110,25 +132,16 @@ def times(steps: dict[str, Step], warm: int) -> dict[str, np.ndarray]:
     return {name: np.array(values) for name, values in samples.items()}
 
 
-def rows(scene: str, n: int, dt: float, measured: dict[str, np.ndarray], base: str) -> list[dict[str, object]]:
-    """The table's rows: median and quartiles, and the ratio to `base` within each round, whose noise is shared."""
-    machine = f"{processor()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
-    versions = "; ".join(f"{name} {version(name)}" for name in ("pymunk", "box2d-py", "pyb2d3", "numba", "numpy"))
-    found = []
+def compared(scene: str, n: int, steps: dict[str, Step], least: dict[str, float]) -> Iterator[Figure]:
+    """What a step of each costs, and how many of the first go into it, within a round, whose noise is shared."""
+    measured = times(steps, 200)
+    base = next(iter(measured))
     for name, samples in measured.items():
         low, middle, high = np.quantile(samples, [0.25, 0.5, 0.75])
-        ratio = np.median(samples / measured[base])
-        values = (scene, name, n, f"{dt:.6g}", f"{middle:.4g}", f"{high - low:.2g}", f"{ratio:.3g}", machine, versions)
-        found.append(dict(zip(COLUMNS, values)))
-    return found
-
-
-def processor() -> str:
-    """The model of the processor."""
-    for line in Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []:
-        if line.startswith("model name"):
-            return line.split(":")[1].strip()
-    return platform.processor() or platform.machine()
+        yield Figure(scene, n, f"{name}, step", middle, high - low, "us")
+        if name != base:
+            ratio = float(np.median(samples / measured[base]))
+            yield Figure(scene, n, f"{name} over {base}", ratio, at_least=least.get(name.split(":")[0]))
 
 
 def added(n: int) -> float:
@@ -157,43 +170,61 @@ def memory(n: int) -> float:
     return float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
 
 
-def compared(scene: str, n: int, dt: float, steps: dict[str, Step], warm: int = 200) -> list[dict[str, object]]:
-    """Measure, print and return the rows of one scene."""
-    print(f"\n{scene}, N = {n}, dt = 1/{round(1 / dt)} s")
-    found = rows(scene, n, dt, times(steps, warm), next(iter(steps)))
-    for row in found:
-        floor = FLOORS.get(str(row["engine"]), "") if (n, scene) == (1000, "gas") else ""
-        print(f"  {row['engine']:26}{row['us_per_step']:>10} us  iqr {row['iqr']:>7}  x {row['ratio']:>6}  {floor}")
-    return found
+def gases() -> Iterator[Figure]:
+    """Everyone in gases of three sizes."""
+    for n in (20, 100, 1000):
+        yield from compared("gas", n, engines(boxed_gas(n, 0.3), DT), LEAST if n == 1000 else {})
+
+
+def sizes() -> Iterator[Figure]:
+    """What a disk costs among many, and what room it takes."""
+    sized = {str(n): reference(crowd, boxed_gas(n, 0.3), DT) for n in SIZES}
+    measured = {n: samples * 1e3 / n for n, samples in zip(SIZES, times(sized, 50).values())}
+    for n, samples in measured.items():
+        low, middle, high = np.quantile(samples, [0.25, 0.5, 0.75])
+        yield Figure("gas", n, "reference:exercise, disk and step", middle, high - low, "ns")
+    ratio = float(np.median(measured[SIZES[-1]] / measured[SIZES[0]]))
+    yield Figure("gas", SIZES[-1], f"disk and step over one of {SIZES[0]}", ratio, at_most=2.0)
+    yield Figure("gas", SIZES[-1], "memory a disk", memory(SIZES[-1]), unit="B", at_most=300.0)
+
+
+def in_order() -> Iterator[Figure]:
+    """`reference:ordered` in the box of the asteroids: its cost, and how far off it is in 20 of them."""
+    asteroids, dt = boxed_asteroids(0), 1 / 60
+    steps = {
+        "reference:ordered": reference(ordered, asteroids, dt),
+        "reference:exercise": reference(crowd, asteroids, dt),
+        "pymunk:matched": pymunk("matched", asteroids, dt),
+        "pymunk:shipped": pymunk("shipped", asteroids, dt),
+    }
+    least = {"reference": 1 / 1.5, "pymunk": 1.0}
+    yield from compared("asteroids in a box", 21, steps, least)
+    for e, gravity, t, rate in CASES:
+        errors = [off(boxed_asteroids(seed, e, gravity), t, rate) for seed in range(20)]
+        scene = f"asteroids in a box, e = {e}, g = {gravity}, {t:g} s at {rate} Hz"
+        most = 1e-9 if gravity == 0.0 else None
+        yield Figure(scene, 21, "median error", float(np.median(errors)), unit="m", at_most=most)
+        yield Figure(scene, 21, "largest error", max(errors), unit="m", at_most=1e-6)
+
+
+def header() -> str:
+    """Machine and versions, as comment lines."""
+    told = about("python -m tests.bench_reference", 0)
+    lines = {"started": told["started"], **told["machine"], **told["versions"], "busy cores": f"{busy_cores():.2f}"}
+    return "".join(f"# {key}: {value}\n" for key, value in lines.items())
 
 
 def main() -> None:
-    """Print the tables, and write them where the first argument says."""
-    table = []
-    for n in (20, 100, 1000):
-        scene = boxed_gas(n, 0.3)
-        table += compared("gas", n, DT, engines(scene, DT))
-    sizes = (100, 1000, 10_000, 100_000)
-    sized = {f"N = {n}": reference(crowd, boxed_gas(n, 0.3), DT) for n in sizes}
-    print("\nreference:exercise, ns a disk and step; at N = 100 000 at most twice that at N = 100")
-    measured = {n: samples * 1e3 / n for n, samples in zip(sizes, times(sized, 50).values())}
-    for n, samples in measured.items():
-        ratio = np.median(samples / measured[100])
-        print(f"  N = {n:7}{np.median(samples):10.1f} ns  x {ratio:.2f}")
-    print(f"\nN = 100 000: {memory(100_000):.0f} bytes a disk, 300 at most")
-    asteroids = boxed_asteroids(0)
-    steps = {
-        "reference:exercise": reference(crowd, asteroids, 1 / 60),
-        "reference:ordered": reference(ordered, asteroids, 1 / 60),
-        "pymunk:matched": pymunk("matched", asteroids, 1 / 60),
-        "pymunk:shipped": pymunk("shipped", asteroids, 1 / 60),
-    }
-    table += compared("asteroids in a box", 21, 1 / 60, steps)
-    if len(sys.argv) > 1:
-        with open(sys.argv[1], "w", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS)
-            writer.writeheader()
-            writer.writerows(table)
+    """Print the figures as they come, and write them."""
+    with FIGURES.open("w", newline="", encoding="utf-8") as file:
+        file.write(header())
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(Figure._fields)
+        for part in (gases, sizes, in_order):
+            for figure in part():
+                row = ["" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else cell for cell in figure]
+                table.writerow(row)
+                print("  ".join(map(str, row)), flush=True)
 
 
 if __name__ == "__main__":
