@@ -8,8 +8,8 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from reference_impl.compiled import compiled
 from reference_impl.exercise import direction, move, nearest_point
 from reference_impl.state import Disks, World
 
@@ -50,7 +50,7 @@ def no_contacts(n: int, walls: int, precision: type) -> Contacts:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def detect(disks: Disks, world: World, margin: float, skin: float, touching: bool, kept: Contacts) -> None:
     """Find all that are nearer than `margin`, pairs i < j first, then walls, which are thicker by `skin`.
 
@@ -78,7 +78,7 @@ def detect(disks: Disks, world: World, margin: float, skin: float, touching: boo
                 note(disks, world, skin, kept, i, -1 - w)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int) -> None:
     """One contact more, with the impulses it had in the last step."""
     contact, other = kept.rows[kept.found[0]], column(j, len(disks.radius))
@@ -91,13 +91,13 @@ def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int
     contact.impulse, contact.slide = kept.before[i, other, 0], kept.before[i, other, 1]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def column(j: int, n: int) -> int:
     """Where `before` keeps disk j, or wall -1 - j."""
     return j if j >= 0 else n - 1 - j
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
     """Sort the contacts into islands, which share no disk that moves, in the order in which a search finds them.
 
@@ -126,7 +126,7 @@ def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
                         high += 1
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
     """Sort the contacts by colours, none of which has a disk that moves twice.
 
@@ -150,7 +150,7 @@ def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
                 done += 1
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no-untyped-def]
     """Whether a disk of contact c that moves has another contact of this colour."""
     i, j = kept.rows[c].i, kept.rows[c].j
@@ -162,7 +162,7 @@ def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, float]:
     """m between the surfaces, and the normal, as they are now."""
     x, reach = disks.position, disks.radius[i]
@@ -175,7 +175,7 @@ def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, fl
     return distance - reach, nx, ny
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
     """m: the gap when it was found, before anything moved, and what both have moved along its normal since."""
     i, j = contact.i, contact.j
@@ -185,7 +185,7 @@ def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
     return gap
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
     """m/s along n, negative while they close in."""
     speed = v[i, 0] * nx + v[i, 1] * ny
@@ -194,13 +194,13 @@ def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[n
     return speed
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def inverse_mass(mass, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
     """1/kg, of the two together; a wall has none."""
     return 1.0 / mass[i] + (1.0 / mass[j] if j >= 0 else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def push_to_target(disks: Disks, contact, target: float, share: float, memory: float) -> None:  # type: ignore[no-untyped-def]
     """The impulse that gives a contact its target velocity, if it is a push in all.
 
@@ -213,7 +213,7 @@ def push_to_target(disks: Disks, contact, target: float, share: float, memory: f
     push_apart(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse - before)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def push_apart(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
     """Add `by` along n to row i and against n to row j, each by its inverse mass."""
     move(rows, i, nx, ny, by / mass[i])
@@ -221,7 +221,7 @@ def push_apart(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> N
         move(rows, j, nx, ny, -by / mass[j])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def rub(disks: Disks, contact, friction: float) -> None:  # type: ignore[no-untyped-def]
     """Stop the sliding of the surfaces where they touch, by at most `friction` times what presses."""
     i, j, spin, inertia = contact.i, contact.j, disks.angular_velocity, disks.inertia
@@ -237,7 +237,7 @@ def rub(disks: Disks, contact, friction: float) -> None:  # type: ignore[no-unty
     turn(disks, contact, contact.slide - before)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def turn(disks: Disks, contact, by: float) -> None:  # type: ignore[no-untyped-def]
     """N s more along the tangent, which turns both the same way round."""
     i, j, inertia = contact.i, contact.j, disks.inertia

@@ -8,8 +8,8 @@ from math import inf, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from reference_impl.compiled import compiled
 from reference_impl.contacts import (
     Contacts,
     by_colour,
@@ -59,7 +59,7 @@ class Switches(NamedTuple):
     push_speed: float = 0.0  # m/s, at which it pushes out at most
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def advance(disks: Disks, world: World, on: Switches, kept: Contacts, h: float, count: int) -> list:
     """Advance `count` steps, each move by `h` s; return the hits as `exercise.advance` does."""
     hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
@@ -74,7 +74,7 @@ def advance(disks: Disks, world: World, on: Switches, kept: Contacts, h: float, 
     return hits
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h: float, k: int, hits: list) -> None:
     """One stage."""
     if stage == ACCELERATE:
@@ -109,7 +109,7 @@ def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h:
         restitute(disks, kept)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def accelerate(disks: Disks, world: World, h: float) -> None:
     """v += a h of what can move; the turning alike."""
     for i in range(len(disks.mass)):
@@ -119,7 +119,7 @@ def accelerate(disks: Disks, world: World, h: float) -> None:
             disks.angular_velocity[i] += disks.torque[i] / disks.inertia[i] * h
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def move(disks: Disks, world: World, on: Switches, kept: Contacts, h: float) -> None:
     """x += v h + drift a h2, and what a nudge adds; the turning alike.
 
@@ -136,7 +136,7 @@ def move(disks: Disks, world: World, on: Switches, kept: Contacts, h: float) -> 
             disks.angle[i] += disks.angular_velocity[i] * h + more * disks.torque[i] / disks.inertia[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def pair_by_pair(disks: Disks, world: World, on: Switches, k: int, hits: list) -> None:
     """Task 2 of the exercise for one pair after the other, then the walls."""
     x, radius = disks.position, disks.radius
@@ -150,7 +150,7 @@ def pair_by_pair(disks: Disks, world: World, on: Switches, k: int, hits: list) -
                 meet(disks, world, on, i, -1 - w, k, hits)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def meet(disks: Disks, world: World, on: Switches, i: int, j: int, k: int, hits: list) -> None:
     """One pair, by the exercise; where nothing is to be projected, both are set back to where they met."""
     x, other = disks.position, max(j, 0)
@@ -168,7 +168,7 @@ def meet(disks: Disks, world: World, on: Switches, i: int, j: int, k: int, hits:
         hits.append((k, i, j, impulse))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
     """Fix, for every contact at once, the velocity it shall have: e times the closing speed; 0 for slow hits."""
     for c in range(kept.found[0]):
@@ -177,7 +177,7 @@ def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # typ
         contact.target = -restitution * speed if speed < -threshold else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def warm_start(disks: Disks, kept: Contacts) -> None:
     """Begin with the impulses that the contacts had last."""
     for c in range(kept.found[0]):
@@ -187,7 +187,7 @@ def warm_start(disks: Disks, kept: Contacts) -> None:
         turn(disks, contact, contact.slide)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def bounce(disks: Disks, on: Switches, kept: Contacts) -> None:
     """Sequential impulses: go through all contacts again and again; what was pushed may be taken back."""
     for _ in range(on.iterations):
@@ -196,7 +196,7 @@ def bounce(disks: Disks, on: Switches, kept: Contacts) -> None:
             push_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
     """Cut velocities that would move a disk by more than `most` m."""
     for i in range(len(v)):
@@ -206,7 +206,7 @@ def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
             v[i, 1] *= most / far
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def push_out(disks: Disks, world: World, on: Switches, kept: Contacts) -> None:
     """Undo a share of every overlap beyond the slop, some times in every island."""
     first = 0
@@ -221,7 +221,7 @@ def push_out(disks: Disks, world: World, on: Switches, kept: Contacts) -> None:
         first = end
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def push_out_island(disks: Disks, world: World, on: Switches, kept: Contacts, first: int, end: int) -> float:
     """Once through the contacts from `first` to before `end`; returns the smallest gap in m there was, at most 0."""
     worst = 0.0
@@ -235,7 +235,7 @@ def push_out_island(disks: Disks, world: World, on: Switches, kept: Contacts, fi
     return worst
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def nudge(mass, on: Switches, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
     """Give overlaps a velocity that lasts for the next move only, and undoes a share of what is beyond the slop."""
     for c in range(kept.found[0]):
@@ -250,7 +250,7 @@ def nudge(mass, on: Switches, kept: Contacts, h: float) -> None:  # type: ignore
             push_apart(kept.nudge, mass, i, j, nx, ny, contact.nudged - before)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def soften(disks: Disks, on: Switches, kept: Contacts, h: float, pushing: bool) -> None:
     """A damped spring a contact, solved for the end of the substep (E. Catto, Solver2D, 2024: soft step).
 
@@ -274,7 +274,7 @@ def soften(disks: Disks, on: Switches, kept: Contacts, h: float, pushing: bool) 
         rub(disks, contact, on.friction)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def restitute(disks: Disks, kept: Contacts) -> None:
     """One sweep that gives every contact which was pressed the velocity it was aimed at."""
     for c in range(kept.found[0]):
