@@ -19,6 +19,7 @@ from reports.folders import FolderTaken, found
 from reports.metrics import METRICS
 from reports.report import Report, make_report
 from reports.scenes import open_scene, with_steps
+from reports.tables import NotCompared
 from reports.terminal import Progress, print_summary
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 from scenarios.files import SceneFileError
@@ -46,6 +47,9 @@ def report_again(out: Path) -> NoReturn:
         refuse([f"{out}: {fault.filename or ''}: {fault.strerror or fault}"])
     except (ValueError, KeyError) as fault:
         refuse([f"{out}: the journal cannot be used: {fault}"])
+    except NotCompared as fault:
+        say(str(fault))
+        sys.exit(FAILED)
     finish(report, folder)
 
 

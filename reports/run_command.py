@@ -17,6 +17,7 @@ from reports.journal import JOURNAL, Journal
 from reports.report import make_report
 from reports.runner import NoScheduler, cluster
 from reports.suite import Means, OtherVersions, Plan, carry_out
+from reports.tables import NotCompared
 from reports.terminal import Progress
 from scenarios.catalogue import SCENARIOS
 
@@ -112,7 +113,7 @@ def carry_on(plan: Plan, means: Means, journal: Journal, out: Path) -> NoReturn:
     except KeyboardInterrupt:
         say(f"\nInterrupted. {what_is_kept(out)}")
         sys.exit(INTERRUPTED)
-    except (NoScheduler, OtherVersions) as fault:
+    except (NoScheduler, OtherVersions, NotCompared) as fault:
         say(f"{fault}. {what_is_kept(out)}")
         sys.exit(FAILED)
     except OSError as fault:

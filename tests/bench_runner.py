@@ -20,8 +20,9 @@ from reports.cells import Cell
 from reports.journal import Journal
 from reports.playing import play_here
 from reports.runner import run_all
-from reports.suite import Means, Plan, begin, keep_cell
+from reports.suite import Means, Plan, begin, carry_out, keep_cell
 from reports.tables import make_tables
+from reports.terminal import Progress
 from scenarios.catalogue import scenario
 from scenarios.files import write_scene_file
 from scenarios.model import Scenario
@@ -40,9 +41,9 @@ def played(scenarios: Mapping[str, Scenario], cells: list[Cell], workers: int, f
     with Journal(folder) as journal:
         begin(plan, journal, scenarios, len(tasks))
         for cell, result in run_all(tasks, workers, timeout=3600.0):
-            run = keep_cell(journal, scenarios[cell.scene], Means(workers), cell, result)
-            assert run.status == "ok", run.reason
-            inside += run.seconds
+            line = keep_cell(journal, scenarios[cell.scene], Means(workers), cell, result)
+            assert line["status"] == "ok", line["reason"]
+            inside += line["seconds"]
     return perf_counter() - started, inside
 
 
@@ -82,40 +83,66 @@ def overhead_of_small() -> None:
         print(f"small cells, {name:<18} {best * 1e3:5.2f} ms a cell beside the engine   (ceiling 5)")
 
 
-def tables_of_many(folder: Path) -> None:
-    """5004 cells: 139 scenes of two disks, 9 engines, 4 steps; then journal and tables, in processes of their own."""
-    scenes = {}
+class Clocked(Progress):
+    """Knows when the last cell had ended."""
+
+    def done(self, what: str, status: str = "ok", reason: str = "") -> None:
+        super().done(what, status, reason)
+        assert status == "ok", reason
+        self.last = perf_counter()
+
+
+def many_cells(folder: Path) -> None:
+    """5560 cells, 139 scenes of two disks, 10 engines, 4 steps: played, and their tables made once more; in processes
+    of their own, whose memory can be told."""
     for number in range(139):
         one = scenario("slow_hit")
         scene = replace(one.scene, velocity=one.scene.velocity * (1 + number / 100))
         path = folder / f"hit-{number}.toml"
         write_scene_file(replace(one, name=f"hit-{number}", scene=scene, duration=1.0, truth=None), path)
-        scenes[str(path)] = replace(one, name=f"hit-{number}", scene=scene, duration=1.0, truth=None)
-    cells = [Cell(path, 0, name, k) for path, one in scenes.items() for name in ENGINES for k in one.substeps]
+    for what in (play_many, tables_again):
+        words = [sys.executable, "-m", "tests.bench_runner", what.__name__, str(folder)]
+        print(subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout.strip())
+
+
+def play_many(folder: Path) -> None:
+    """Print how long a run of all scenes takes, and how long after its last cell the tables are there."""
+    scenes = sorted(str(path) for path in folder.glob("*.toml"))
     out = folder / "out"
     out.mkdir()
-    wall, inside = played(scenes, cells, 2, out)
-    print(f"{len(cells)} cells on 2 workers: {wall:.1f} s, of which {inside:.1f} s inside the engines")
-    for what in ("compared for the first time", "compared before"):
-        words = [sys.executable, "-m", "tests.bench_runner", str(out)]
-        print(f"  {what:<28}", subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip())
-
-
-def tables(folder: Path) -> None:
-    """Print how long journal and tables take and how much memory, here."""
+    plan = Plan(scenes, ENGINES, seed=0, dts=[], full=False, timings=0, command="bench")
     started = perf_counter()
-    archive = Archive.read(folder)
-    read = perf_counter()
-    make_tables(archive, lambda _: None)
-    made, most = perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-    print(f"journal {read - started:.2f} s, tables {made - read:.2f} s, {most:.0f} MB   (ceiling 3 s, 300 MB)")
+    with Journal(out) as journal, Clocked() as progress:
+        carry_out(plan, Means(workers=2), journal, progress)
+        archive = Archive.read(out)
+        make_tables(archive, lambda _: None)
+    made, inside = perf_counter(), sum(record["seconds"] for record in archive.records)
+    print(f"{len(archive.records)} cells on 2 workers: {made - started:.1f} s, {inside:.1f} s of them in the engines")
+    print(f"  tables {made - progress.last:.2f} s after the last cell (ceiling 3), {used()}")
+
+
+def tables_again(folder: Path) -> None:
+    """Print how long journal and tables take when all has been compared."""
+    started = perf_counter()
+    make_tables(Archive.read(folder / "out"), lambda _: None)
+    print(f"  journal and tables again {perf_counter() - started:.2f} s (ceiling 3), {used()}")
+
+
+def used() -> str:
+    """Processor time and memory of this process and of its workers."""
+    mine, theirs = (resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    seconds = [one.ru_utime + one.ru_stime for one in (mine, theirs)]
+    return (
+        f"processor {seconds[0]:.1f} s here and {seconds[1]:.1f} s in the workers, "
+        f"memory {mine.ru_maxrss / 1e3:.0f} MB here (ceiling 300) and {theirs.ru_maxrss / 1e3:.0f} MB in the largest"
+    )
 
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        tables(Path(sys.argv[1]))
+        {"play_many": play_many, "tables_again": tables_again}[sys.argv[1]](Path(sys.argv[2]))
     else:
         overhead_of_large()
         overhead_of_small()
         with tempfile.TemporaryDirectory() as where:
-            tables_of_many(Path(where))
+            many_cells(Path(where))
