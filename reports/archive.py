@@ -23,8 +23,7 @@ from adapters.play import Run
 from reports.journal import JOURNAL, lines_of
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
-FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html",
-         "limits.csv", "maps.csv", "laws.csv", "stability.html")  # fmt: skip
+FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html")
 FIELDS: dict[str, type | tuple[type, ...]] = {  # of the line of a cell
     "cell": str, "scene_hash": str, "scene": str, "seed": int, "substeps": int, "scenario": str, "engine": str,
     "profile": str, "dt_s": (int, float), "status": str, "reason": str, "step": int,

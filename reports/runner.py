@@ -99,12 +99,15 @@ def cluster_or(here: Executor, scheduler: str) -> Iterator[Executor]:
 
 def cluster(scheduler: str) -> Any:
     """A client of a dask scheduler that has workers; raises `NoScheduler` naming what is missing."""
+    if not re.fullmatch(r"(tcp|tls)://.+:\d+", scheduler):
+        raise NoScheduler(f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786")
     try:
         from distributed import Client
     except ImportError as missing:
-        raise NoScheduler(f"--scheduler needs {missing.name}: uv sync --extra cluster") from missing
-    if not re.fullmatch(r"(tcp|tls)://.+:\d+", scheduler):
-        raise NoScheduler(f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786")
+        raise NoScheduler(
+            f"--scheduler {scheduler}: many machines take the package {missing.name}, which is not installed; "
+            "uv sync --extra cluster, or pip install crosscheck2d[cluster]"
+        ) from missing
     for name in logging.root.manager.loggerDict:  # what matters is raised; each of distributed's has its own level
         if name.startswith("distributed"):
             logging.getLogger(name).setLevel(logging.CRITICAL)

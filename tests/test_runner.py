@@ -1,5 +1,6 @@
 """Cells in worker processes: what aborts, hangs, raises or eats takes nothing along, and says where it was."""
 
+import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,7 @@ from reports import playing
 from reports.archive import from_trail, load_trajectory, packed
 from reports.cells import Cell
 from reports.playing import Played, play_cell, play_here
-from reports.runner import run_all
+from reports.runner import NoScheduler, cluster, run_all
 from reports.worker_process import Failure
 from scenarios.catalogue import scenario
 from tests.control_engines import (
@@ -145,6 +146,22 @@ def test_no_engine_remembers_what_it_played(name: str):
 
     assert played["before"].file == played["after"].file
     assert not ENGINES[name].leaves_state
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("foo", "--scheduler foo: is no address; one is like tcp://192.168.0.7:8786"),
+        ("tcp://foo:1", "--scheduler tcp://foo:1: many machines take the package distributed, which is not installed"),
+    ],
+)
+def test_a_cluster_without_its_extra_is_one_clear_sentence(monkeypatch: pytest.MonkeyPatch, address: str, said: str):
+    """What is wrong with the address is said first; else what is missing, and how to get it."""
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(NoScheduler) as refusal:
+        cluster(address)
+
+    assert str(refusal.value).startswith(said)
 
 
 def test_a_trajectory_comes_back_from_its_file_bit_for_bit(tmp_path: Path):
