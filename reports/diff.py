@@ -16,7 +16,7 @@ from reports.archive import Archive
 from reports.comparison import COLUMNS
 from reports.metrics import METRICS
 
-# Measured on two cores under a load of 15 to 20 (no idler machine could be had) with 3 scenes and --timings 5. 8 runs of
+# Measured on two cores under a load of 15 to 20 (no idler machine could be had), 3 scenes and --timings 5. 8 runs of
 # one build set against each other, 280 verdicts from 4200 ratios of rounds: "worse" 4 times, as often with a factor of
 # 1.1 as with 1.35; 8 times when the factor was the median of the ratios, for other work lengthens a round, but seldom
 # all of them. Every engine made half as slow again, 240 verdicts: the factor is above 1.25 in 227, but found are 118:

@@ -40,6 +40,16 @@ def test_an_interrupted_run_can_be_reported_and_says_it_is_not_finished(small: P
     assert len(pd.read_csv(part / "runs.csv")) == 11
 
 
+def test_an_engine_that_was_asked_but_has_not_played_yet_does_not_spoil_the_page(small: Path, tmp_path: Path):
+    """Broken off after the first cell: the probes of all have ended, one player has a row."""
+    broken_off(small, tmp_path / "out", after=5)
+    done = crosscheck("report", "out", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert "Not finished: 1 cells have ended so far" in done.stdout
+    assert (tmp_path / "out.part" / "report.html").exists()
+
+
 def test_what_lost_its_trajectory_is_worse_and_is_played_again(small: Path, tmp_path: Path):
     """`diff` sees it, `run --resume` mends it."""
     shutil.copytree(small, tmp_path / "out")
