@@ -26,7 +26,7 @@ from reports.shares import (
     read_share,
     scenario_of,
     share_of,
-)  # fmt: skip
+)
 from reports.worker_process import Failure
 
 

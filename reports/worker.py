@@ -60,7 +60,7 @@ class Worker:
             self.connection.send_bytes(pickle.dumps(task))
             limit = STARTING
             while (answer := self.answer(limit)).startswith(CLOCK):
-                limit = float(answer.removeprefix(CLOCK)) or timeout
+                limit = max(float(answer.removeprefix(CLOCK)), timeout)
             return answer
         except (EOFError, ConnectionError):
             return self.death()

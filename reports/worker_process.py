@@ -39,7 +39,7 @@ def leave(parts: Sequence[Any]) -> None:
 
 
 def allow(seconds: float = 0.0) -> None:
-    """From now on this task may take `seconds`; 0: the time-out that it was given. Nothing outside a worker."""
+    """From now on this task may take `seconds`, or its time-out if that is longer; nothing outside a worker."""
     if _parent is not None:
         _parent.send_bytes(CLOCK + str(seconds).encode())
 

@@ -100,7 +100,7 @@ def test_the_clock_of_a_cell_starts_when_its_engine_is_loaded():
     ended = dict(run_all(cells(slow), workers=2, timeout=SLOW / 2))
     question = replace(scenario(SCENE), truth=None)
     stuck = {"stuck": partial(impatient, Cell(SCENE, 0, "stuck:control", 1), row(HangsInLoad), question)}
-    [(_, never)] = run_all(stuck, workers=1, timeout=100.0)
+    [(_, never)] = run_all(stuck, workers=1, timeout=1.0)
 
     assert ended["slow:control"].run.status == "ok"
     assert ended["hangs:control"].status == "timeout"

@@ -1,8 +1,11 @@
 """Tables made again are the tables made before, and are made anew where something has changed."""
 
 import ast
+import os
 import shutil
+import signal
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +13,11 @@ import pytest
 
 import reports
 from adapters.engines import ENGINES
-from reports import tables
+from reports import shares, tables
 from reports.archive import Archive
 from reports.cells import Cell
-from reports.journal import Journal
-from reports.shares import JUDGES, Gathering, compared, name_of
+from reports.journal import JOURNAL, Journal
+from reports.shares import JUDGES, Gathering, compared, name_of, share_of
 from reports.suite import Means, Plan, carry_out
 from reports.tables import NotCompared, comparisons_of, make_tables
 from reports.terminal import Progress
@@ -72,6 +75,32 @@ def test_a_share_that_is_not_there_or_not_whole_is_made_again(folder: Path, tmp_
 
     assert (copy / "deviations.csv").read_bytes() == whole
     assert {path.suffix for path in (copy / "compared").iterdir()} == {".csv"}
+
+
+def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """`kill -9` once, after the judge has changed: all is compared anew, nothing is played, and the bytes are the same."""
+    copy = Path(shutil.copytree(folder, tmp_path / "copy"))
+    before = make_tables(Archive.read(copy), silent).shares
+    whole = (copy / "deviations.csv").read_bytes()
+    journal = (copy / JOURNAL).read_bytes()
+    monkeypatch.setattr(shares, "judge", lambda: "another metric")
+    monkeypatch.setattr(tables, "share_of", partial(killed_once, tmp_path / "mark"))
+    after = make_tables(Archive.read(copy), silent).shares
+
+    assert (tmp_path / "mark").exists()
+    assert not {*before.values()} & {*after.values()}
+    assert (copy / "deviations.csv").read_bytes() == whole
+    assert (copy / JOURNAL).read_bytes() == journal
+
+
+def killed_once(mark: Path, folder: Path, records: list) -> bytes:
+    """In the worker: what the system does that has no memory left, the first time only."""
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return share_of(folder, records)
 
 
 def test_a_scene_is_compared_when_its_last_cell_has_ended_and_not_before(folder: Path):
