@@ -80,7 +80,7 @@ def test_a_share_that_is_not_there_or_not_whole_is_made_again(folder: Path, tmp_
 def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """`kill -9` once, after the judge has changed: all is compared anew, nothing is played, and the bytes are the same."""
+    """`kill -9` once, after the judge has changed: all is compared anew, nothing is played, the bytes are the same."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     before = make_tables(Archive.read(copy), silent).shares
     whole = (copy / "deviations.csv").read_bytes()
