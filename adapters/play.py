@@ -159,9 +159,9 @@ def reach(scenario: Scenario) -> float:
 
 def fault_of(state: State, farthest: float) -> str:
     """What is wrong with a state that cannot be gone on from, or ""; `farthest` in m from the origin."""
-    # Asked after every sample, so all is asked at once first: the largest of numbers is NaN if one of them is.
-    others = np.concatenate([state.velocity.ravel(), state.angle, state.angular_velocity])
-    if np.abs(state.position).max(initial=0.0) <= farthest and np.abs(others).max(initial=0.0) < np.inf:
+    # Asked after every sample, so sums of squares are asked first: they are finite only if every number is.
+    others = state.velocity, state.angle, state.angular_velocity
+    if np.vdot(state.position, state.position) <= farthest * farthest and sum(np.vdot(a, a) for a in others) < np.inf:
         return ""
     for name in ("position", "velocity", "angle", "angular_velocity"):
         values = getattr(state, name)

@@ -55,6 +55,7 @@ class Pymunk:
         for w, (start, end) in enumerate(scene.walls):
             self._add_shape(pymunk.Segment(self.space.static_body, tuple(start), tuple(end), 0.0), -1 - w)
         self.moving = np.flatnonzero(~scene.static)
+        self.start = np.column_stack([scene.position, scene.angle, scene.velocity, scene.angular_velocity])
         if self.listening:
             self.space.on_collision(None, None, post_solve=self._record)
         self.buffer = batch.Buffer()
@@ -126,12 +127,10 @@ class Pymunk:
         return np.frombuffer(self.buffer.float_buf()).reshape(-1, 6)[: len(self.moving)]
 
     def read(self) -> State:
-        """One bulk read; the buffer is copied."""
-        scene, rows = self.scene, self._rows()
-        state = State(*(np.array(a) for a in (scene.position, scene.velocity, scene.angle, scene.angular_velocity)))
-        state.position[self.moving], state.angle[self.moving] = rows[:, :2], rows[:, 2]
-        state.velocity[self.moving], state.angular_velocity[self.moving] = rows[:, 3:5], rows[:, 5]
-        return state
+        """One bulk read into a copy of the start, where what is static stays."""
+        rows = self.start.copy()
+        rows[self.moving] = self._rows()
+        return State(rows[:, :2], rows[:, 3:5], rows[:, 2], rows[:, 5])
 
     def hits(self) -> list[Hit]:
         """From `post_solve`."""

@@ -23,8 +23,7 @@ from adapters.play import Run
 from reports.journal import JOURNAL, lines_of
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
-FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html",
-         "limits.csv", "maps.csv", "laws.csv", "stability.html")  # fmt: skip
+FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html")
 FIELDS: dict[str, type | tuple[type, ...]] = {  # of the line of a cell
     "cell": str, "scene_hash": str, "scene": str, "seed": int, "substeps": int, "scenario": str, "engine": str,
     "profile": str, "dt_s": (int, float), "status": str, "reason": str, "step": int,
@@ -89,27 +88,6 @@ class Archive:
             folder, header, records, by_engine, known, timings, seconds if complete else float("nan"), complete
         )
 
-    def run(self, record: dict[str, Any], with_trajectory: bool = True) -> Run:
-        """The run behind a line, its trajectory read back if it has one and it is wanted."""
-        path = trajectory_file(self.folder, record["cell"])
-        status, reason, trajectory = record["status"], record["reason"], None
-        try:
-            trajectory = load_trajectory(path) if with_trajectory and path.exists() else None
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as fault:
-            status, reason = "error", f"{path.name} cannot be read: {fault}"
-        return Run(
-            engine=record["engine"],
-            profile=record["profile"],
-            scenario=record["scenario"],
-            dt=record["dt_s"],
-            status=status,
-            reason=reason,
-            trajectory=trajectory,
-            seconds=record["seconds"],
-            settings={name: tuple(pair) for name, pair in record["settings"].items()},
-            versions=record["versions"],
-        )
-
 
 def fault_of(line: Any) -> str:
     """What is wrong with a line of the journal, as the end of a sentence; "" if it can be used."""
@@ -127,6 +105,28 @@ def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
     path = trajectory_file(folder, record["cell"])
     lost = record["status"] == "ok" and not path.exists()
     return record | {"status": "error", "reason": f"{path.name} is missing"} if lost else record
+
+
+def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -> Run:
+    """The run behind a line, its trajectory read back if it has one and it is wanted."""
+    path = trajectory_file(folder, record["cell"])
+    status, reason, trajectory = record["status"], record["reason"], None
+    try:
+        trajectory = load_trajectory(path) if with_trajectory and path.exists() else None
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as fault:
+        status, reason = "error", f"{path.name} cannot be read: {fault}"
+    return Run(
+        engine=record["engine"],
+        profile=record["profile"],
+        scenario=record["scenario"],
+        dt=record["dt_s"],
+        status=status,
+        reason=reason,
+        trajectory=trajectory,
+        seconds=record["seconds"],
+        settings={name: tuple(pair) for name, pair in record["settings"].items()},
+        versions=record["versions"],
+    )
 
 
 def trajectory_file(folder: Path, key: str) -> Path:

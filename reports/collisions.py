@@ -80,7 +80,9 @@ def by_pair(hits: Collisions, resting: np.ndarray, end: float) -> ByPair:
     """The hits up to `end` s of pairs that are not `resting`."""
     key = pair_keys(hits)
     order = np.argsort(key, kind="stable")
-    order = order[(hits.t[order] <= end) & ~np.isin(key[order], resting)]
+    order = order[hits.t[order] <= end]
+    if len(resting):
+        order = order[~np.isin(key[order], resting)]
     return ByPair(key[order], hits.t[order], hits.i[order], hits.j[order])
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
@@ -19,6 +20,7 @@ from reports.folders import FolderTaken, found
 from reports.metrics import METRICS
 from reports.report import Report, make_report
 from reports.scenes import open_scene, with_steps
+from reports.tables import NotCompared
 from reports.terminal import Progress, print_summary
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 from scenarios.files import SceneFileError
@@ -37,16 +39,26 @@ def finish(report: Report, out: Path) -> NoReturn:
 def report_again(out: Path) -> NoReturn:
     """Tables and page from the journal in `out`."""
     try:
-        folder = found(out)
-        with Progress() as progress:
+        with refusing(str(out)), Progress() as progress:
+            folder = found(out)
             report = make_report(folder, progress.say)
+    except NotCompared as fault:
+        say(str(fault))
+        sys.exit(FAILED)
+    finish(report, folder)
+
+
+@contextmanager
+def refusing(named: str) -> Iterator[None]:
+    """What reads the folder of a run: exits 2 with one line that begins with `named` if it cannot be used."""
+    try:
+        yield
     except FolderTaken as fault:
         refuse([str(fault)])
     except OSError as fault:
-        refuse([f"{out}: {fault.filename or ''}: {fault.strerror or fault}"])
+        refuse([": ".join(filter(None, [named, fault.filename, fault.strerror or str(fault)]))])
     except (ValueError, KeyError) as fault:
-        refuse([f"{out}: the journal cannot be used: {fault}"])
-    finish(report, folder)
+        refuse([f"{named}: the journal cannot be used: {fault}"])
 
 
 def explain(what: str) -> None:

@@ -49,7 +49,7 @@ class Comparison:
 def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     """Every metric of every run against the laws, the truth and every other engine at the same dt."""
     scenario, truth = answered(scenario)
-    rows: list[dict] = []
+    rows: list[tuple] = []
     for run in runs:
         if run.status != "ok":  # what it played before it failed is kept in its file, but earns no score
             rows.append(_row(run, "status", Value(np.nan, note=f"{run.status}: {run.reason}"), "", "itself"))
@@ -79,7 +79,7 @@ def _opponents(run: Run, runs: Sequence[Run], truth: Trajectory | None) -> Itera
             yield other.name, other.trajectory
 
 
-def _measure(scenario: Scenario, run: Run, versus: str, other: Trajectory | None) -> list[dict]:
+def _measure(scenario: Scenario, run: Run, versus: str, other: Trajectory | None) -> list[tuple]:
     assert run.trajectory is not None
     kind = versus if versus in ("itself", "truth") else "engine"
     k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
@@ -103,6 +103,6 @@ def cut(trajectory: Trajectory, k: int) -> Trajectory:
     return replace(trajectory, **{name: getattr(trajectory, name)[:k] for name in names}, collisions=kept)
 
 
-def _row(run: Run, metric: str, value: Value, unit: str, versus: str) -> dict:
-    numbers = (value.disk, value.value, unit, versus, value.at, value.note)
-    return dict(zip(COLUMNS, (run.scenario, run.engine, run.profile, run.dt, metric, *numbers)))
+def _row(run: Run, metric: str, value: Value, unit: str, versus: str) -> tuple:
+    whose = (run.scenario, run.engine, run.profile, run.dt, metric)
+    return (*whose, value.disk, value.value, unit, versus, value.at, value.note)  # as `COLUMNS`

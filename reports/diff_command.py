@@ -88,4 +88,7 @@ def sentence(changed: Difference) -> str:
     said = f"{changed.worse} got worse." if changed.worse else "Nothing got worse."
     if not changed.timings:
         return f"{said} Timings were not compared: that takes two runs on one machine with --timings 5."
-    return f"{said} A time is called worse if its 99 % interval lies above 1 and its median above {FACTOR:g}."
+    return (
+        f"{said} A time is called worse if the 99 % interval of its rounds lies above 1, "
+        f"and the least of them has grown by more than ×{FACTOR:g}."
+    )

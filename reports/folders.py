@@ -10,6 +10,8 @@ from pathlib import Path
 from reports.archive import FILES, Archive
 from reports.journal import JOURNAL, Busy, Journal
 
+OF_A_RUN = FILES.__contains__, "no run of crosscheck made"
+
 
 class FolderTaken(Exception):
     """An output folder that may not be written to, and why."""
@@ -17,14 +19,14 @@ class FolderTaken(Exception):
 
 def part_of(out: Path) -> Path:
     """Where a run into `out` is while it lasts."""
-    return out.with_name(f"{out.name}.part")
+    return out.parent / f"{out.name}.part"
 
 
 def open_new(out: Path) -> Journal:
     """The journal of a new run into `out`; raises `FolderTaken`, or `OSError` where nothing can be written."""
-    may_write(out)
     part = part_of(out)
-    may_write(part)
+    for folder in (out, part):
+        may_write(folder, *OF_A_RUN)
     part.mkdir(parents=True, exist_ok=True)
     journal = held(part, out)
     if had := ended_in(part):
@@ -43,7 +45,7 @@ def open_again(out: Path) -> Journal:
         if not (out / JOURNAL).is_file():
             raise FolderTaken(f"--resume {out}: no run is there, neither finished nor interrupted ({part.name})")
         Archive.read(out)
-        may_write(out)
+        may_write(out, *OF_A_RUN)
         held(out, out).__exit__()
         out.rename(part)
     return held(part, out)
@@ -82,13 +84,13 @@ def replace_folder(made: Path, target: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def may_write(
-    target: Path, ours: Callable[[str], bool] = FILES.__contains__, strangers: str = "no run of crosscheck made",
-    option: str = "--out",
-) -> None:  # fmt: skip
-    """Raise `FolderTaken` unless `target`, named by `option`, is absent, empty, or holds only names that are `ours`."""
+def may_write(target: Path, ours: Callable[[str], bool], strangers: str, option: str = "--out") -> None:
+    """Raise `FolderTaken` unless `target`, named by `option`, is absent, empty, or holds only names that are `ours`.
+
+    Every command has its own files; of any other it is said that they are `strangers`, as the end of a sentence.
+    """
     if target == Path.cwd() or target in Path.cwd().parents:
-        raise FolderTaken(f"{option} {target}: is where you are; name another folder, or go elsewhere")
+        raise FolderTaken(f"{option} {target}: is where you are, or above it; name another folder, or go elsewhere")
     if target.is_file():
         raise FolderTaken(f"{option} {target}: is a file; name a folder that does not exist yet")
     strange = sorted(path.name for path in target.iterdir() if not ours(path.name)) if target.exists() else []

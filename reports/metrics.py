@@ -48,7 +48,7 @@ def momentum_apart(view: View) -> Value | None:
     """Root mean square distance of the momenta in calm samples, over the sum of m|v| at hand."""
     assert view.other is not None
     scene = view.scenario.scene
-    apart = np.linalg.norm(laws.momentum(view.played, scene) - laws.momentum(view.other, scene), axis=1)
+    apart = laws.lengths(laws.momentum(view.played, scene) - laws.momentum(view.other, scene))
     return Value(_rms(apart[view.calm]) / (scales.momentum(view.scenario) or 1.0))
 
 
@@ -116,22 +116,22 @@ def position_max_radii(view: View) -> Value | None:
 
 def velocity_rms(view: View) -> Value | None:
     """Root mean square difference of velocity over disks and calm samples."""
-    return Value(_rms(_velocity_apart(view)[view.calm]))
+    return Value(_rms(view.velocity_apart[view.calm]))
 
 
 def velocity_max(view: View) -> Value | None:
     """Largest difference of velocity of any disk in calm samples."""
-    return _largest_of_disks(np.where(view.calm[:, None], _velocity_apart(view), 0.0), view)
+    return _largest_of_disks(np.where(view.calm[:, None], view.velocity_apart, 0.0), view)
 
 
 def angle_rms(view: View) -> Value | None:
     """Root mean square difference of angle over disks and samples."""
-    return Value(_rms(_angle_apart(view)))
+    return Value(_rms(view.angle_apart))
 
 
 def angle_max(view: View) -> Value | None:
     """Largest difference of angle of any disk in any sample."""
-    return _largest_of_disks(_angle_apart(view), view)
+    return _largest_of_disks(view.angle_apart, view)
 
 
 def time_to_1pct_s(view: View) -> Value | None:
@@ -199,14 +199,6 @@ def _largest(series: Array | None, view: View) -> Value | None:
 def _largest_of_disks(values: Array, view: View) -> Value:
     k, disk = np.unravel_index(int(np.argmax(values)), values.shape)
     return Value(float(values[k, disk]), int(disk), float(view.played.t[k]))
-
-
-def _velocity_apart(view: View) -> Array:
-    return np.linalg.norm(view.played.velocity - view.other.velocity, axis=2)  # type: ignore[union-attr]
-
-
-def _angle_apart(view: View) -> Array:
-    return np.abs(view.played.angle - view.other.angle)  # type: ignore[union-attr]
 
 
 @dataclass(frozen=True)

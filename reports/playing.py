@@ -1,17 +1,26 @@
-"""What a worker does with a cell. It imports little: a worker that has to be replaced is soon there again."""
+"""What a worker does with a cell. It imports little: a worker that has to be replaced is soon there again.
+
+The clock of a cell (--timeout) starts when its first step is due. Before, the engine is imported, compiled and loaded,
+which on a machine that plays it for the first time, and is busy, takes longer than most cells.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
+from adapters.conformance import Finding, conform
 from adapters.engines import Row
 from adapters.play import Run, play, unwatched
+from adapters.probe import DT, plain
 from reports.archive import packed, parts_of
 from reports.cells import Cell, source_hash, versions
-from reports.worker_process import leave
+from reports.worker_process import allow, leave
 from scenarios.model import Scenario, State
+
+LOADING = 300.0  # s to import, compile and load an engine: up to 30 idle, all of them the first time
 
 
 class Played(NamedTuple):
@@ -36,16 +45,43 @@ def play_cell(cell: Cell, row: Row, scenario: Scenario, watch: Callable[[State],
         engine.close()
 
 
+class Begun:
+    """What looks on while a cell is played: at the start, when the engine is loaded, the clock of the cell begins."""
+
+    def __init__(self, then: Callable[[State], None] = unwatched) -> None:
+        self.begun, self.then = False, then
+
+    def __call__(self, state: State) -> None:
+        """Start the clock once, then do what is to be done with every state."""
+        if not self.begun:
+            self.begun = True
+            allow()
+        self.then(state)
+
+
 def play_here(cell: Cell, row: Row, scenario: Scenario) -> Played:
     """In the worker: play, leave every good state behind, and send back the run with its trajectory packed."""
-    run = play_cell(cell, row, scenario, watch=lambda state: leave(parts_of(state)))
+    allow(LOADING)
+    run = play_cell(cell, row, scenario, Begun(lambda state: leave(parts_of(state))))
     file, samples = (packed(run.trajectory), len(run.trajectory)) if run.trajectory else (b"", 0)
     return Played(replace(run, trajectory=None), samples, file, player())
 
 
 def time_here(cell: Cell, row: Row, scenario: Scenario) -> float:
     """In the worker: s inside the engine's `step`."""
-    return play_cell(cell, row, scenario).seconds
+    allow(LOADING)
+    return play_cell(cell, row, scenario, Begun()).seconds
+
+
+def conform_here(name: str, row: Row) -> list[Finding]:
+    """In the worker: what the probes find; before their clock starts the engine is loaded once, and so compiled."""
+    allow(LOADING)
+    with suppress(Exception):  # which the probes will meet again, and say
+        engine = row.make()
+        engine.load(plain(), DT)
+        engine.close()
+    allow()
+    return conform(name, row)
 
 
 def player() -> str:

@@ -13,15 +13,14 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from adapters.engines import ENGINES, Row, row_of
-from reports.archive import STATE, Archive, from_trail, load_trajectory, stored_scene, trajectory_file
-from reports.cells import Cell, scene_hash
+from reports.archive import STATE, Archive, from_trail, load_trajectory, trajectory_file
+from reports.cells import Cell
 from reports.exits import DONE, FAILED, refuse
 from reports.folders import FolderTaken, found
 from reports.playing import play_here
-from reports.scenes import open_scene
+from reports.scenes import played_scenario
 from reports.worker import Worker
 from reports.worker_process import Failure
-from scenarios.catalogue import SCENARIOS
 from scenarios.model import Scenario, Trajectory
 
 REMEMBERED = ", the last good state (what the engine remembers beside it begins anew)"
@@ -32,7 +31,7 @@ def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = EN
     try:
         archive = Archive.read(found(out))
         record = record_of(archive, name)
-        scenario = scenario_of(archive, record)
+        scenario = played_scenario(archive.folder, record)
         player = f"{record['engine']}:{record['profile']}"
         row = engines[player] if player in engines else row_of(player)
         before = recorded(archive, record)
@@ -73,15 +72,6 @@ def record_of(archive: Archive, name: str) -> dict[str, Any]:
     why = "is no cell" if not matching else f"begins {len(matching)} cells"
     hint = f"did you mean {named}?" if near else f"see the column cell of {archive.folder / 'runs.csv'}"
     raise ValueError(f"{name!r} {why} of {archive.folder}; {hint}")
-
-
-def scenario_of(archive: Archive, record: dict[str, Any]) -> Scenario:
-    """What was played; raises `ValueError` if the scene is another one now."""
-    scene = record["scene"] if record["scene"] in SCENARIOS else str(stored_scene(archive.folder, record["scenario"]))
-    scenario = open_scene(scene, record["seed"])
-    if scene_hash(scenario) != record["scene_hash"]:
-        raise ValueError(f"{record['scenario']} is not the scene any more that was played")
-    return scenario
 
 
 def continued(scenario: Scenario, substeps: int, before: Trajectory | None, k: int) -> Scenario:

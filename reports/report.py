@@ -37,11 +37,13 @@ class Report:
 def make_report(folder: Path, say: Callable[[str], None]) -> Report:
     """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what is being done."""
     archive = Archive.read(folder)
-    header, players = archive.header, archive.header["engines"]
+    header = archive.header
     tables = make_tables(archive, say)
     say("writing the page")
     comparisons = comparisons_of(archive, tables)
-    asked = [archive.conformance[name]["conformance"] for name in players if name in archive.conformance]
+    began = {run.name for comparison in comparisons for run in comparison.runs}  # an interrupt may come before
+    players = [name for name in header["engines"] if name in began and name in archive.conformance]
+    asked = [archive.conformance[name]["conformance"] for name in players]
     known = sorted(
         (line["known_answer"] for line in archive.known_answers),
         key=lambda row: (row["column"], row["dt_s"], row["made_by"]),

@@ -5,18 +5,20 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
 from adapters.engines import row_of
 from reports.archive import Archive
-from reports.commands import checked_engines, checked_scenes, finish
-from reports.exits import FAILED, INTERRUPTED, refuse, say
+from reports.commands import checked_engines, checked_scenes, finish, refusing
+from reports.exits import FAILED, broken_off, refuse, say
 from reports.folders import FolderTaken, open_again, open_new, part_of, replace_folder
 from reports.journal import JOURNAL, Journal
 from reports.report import make_report
 from reports.runner import NoScheduler, cluster
 from reports.suite import Means, OtherVersions, Plan, carry_out
+from reports.tables import NotCompared
 from reports.terminal import Progress
 from scenarios.catalogue import SCENARIOS
 
@@ -80,15 +82,9 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
         refuse(["--resume goes on with a run as it was asked for: it takes no scenarios, --engine, --dt, --full, "
                 "--seed, --timings and --out"])  # fmt: skip
     out = out.resolve()
-    try:
+    with refusing(f"--resume {out}"):
         journal = open_again(out)
         plan = plan_of(journal.path.parent)
-    except FolderTaken as fault:
-        refuse([str(fault)])
-    except OSError as fault:
-        refuse([f"--resume {out}: {fault.strerror or fault}"])
-    except (ValueError, KeyError) as fault:
-        refuse([f"--resume {out}: the journal cannot be used: {fault}"])
     carry_on(plan, means, journal, out)
 
 
@@ -105,18 +101,12 @@ def carry_on(plan: Plan, means: Means, journal: Journal, out: Path) -> NoReturn:
     """Carry out the plan, report, and put it all in its place; what was played is kept, whatever happens."""
     part = journal.path.parent
     try:
-        with journal, Progress() as progress:
+        with broken_off(part, partial(what_is_kept, out)), journal, Progress() as progress:
             carry_out(plan, means, journal, progress)
             report = make_report(part, progress.say)
             replace_folder(part, out)
-    except KeyboardInterrupt:
-        say(f"\nInterrupted. {what_is_kept(out)}")
-        sys.exit(INTERRUPTED)
-    except (NoScheduler, OtherVersions) as fault:
+    except (NoScheduler, OtherVersions, NotCompared) as fault:
         say(f"{fault}. {what_is_kept(out)}")
-        sys.exit(FAILED)
-    except OSError as fault:
-        say(f"cannot write to {part}: {fault.strerror or fault}. {what_is_kept(out)}")
         sys.exit(FAILED)
     finish(report, out)
 

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import logging
+import math
 import pickle
 import re
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Generator, Hashable, Iterator, Mapping
-from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor, as_completed
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from queue import SimpleQueue
 from typing import Any
 
 from reports.worker import ATTEMPTS, CREW, in_worker
 from reports.worker_process import Failure
 
 TIMEOUT = 60.0  # s a task may take
+AHEAD = 2  # tasks a worker of this machine has been given at most, so that what is urgent comes soon, and none waits
+
+Task = Callable[[], Any]
 
 
 class NoScheduler(Exception):
@@ -21,64 +27,54 @@ class NoScheduler(Exception):
 
 
 def run_all(
-    tasks: Mapping[Hashable, Callable[[], Any]],
+    tasks: Mapping[Hashable, Task],
     workers: int,
     timeout: float = TIMEOUT,
     memory: int = 0,
     scheduler: str = "",
     alone: Collection[Hashable] = frozenset(),
+    urgent: deque[Any] | None = None,
 ) -> Generator[tuple[Any, Any | Failure], None, None]:
     """Run picklable tasks, `workers` at once; yield (key, result or `Failure`) as each ends, every key once.
 
     A task may take `timeout` s and `memory` bytes (0: no limit); one that is in `alone` gets a process of its own.
-    With the address of a dask `scheduler` they run on its workers, as many at once as those have threads. Timings
-    are never taken beside anything else: for them `workers` is 1.
+    With the address of a dask `scheduler` they run on its workers, as many at once as those have threads. What the
+    caller puts into `urgent` meanwhile goes before what is left, and on this machine, whose files it may read.
+    Timings are never taken beside anything else: for them `workers` is 1.
 
     Raises:
         NoScheduler: nothing answers at `scheduler`, or not any more.
     """
-    left = dict(tasks)
-    with executor_of(workers, scheduler) as executor:
-        for attempt in range(ATTEMPTS):
-            for key, result in run_once(executor, left, timeout, memory, alone, last=attempt == ATTEMPTS - 1):
-                del left[key]
-                yield key, result
-
-
-def run_once(
-    executor: Executor,
-    tasks: Mapping[Any, Callable[[], Any]],
-    timeout: float,
-    memory: int,
-    alone: Collection[Hashable],
-    last: bool,
-) -> Generator[tuple[Any, Any | Failure], None, None]:
-    """As `run_all`; what was lost with the machine it ran on is left out, unless this is the last attempt."""
-    futures: dict[Future, Any] = {
-        executor.submit(in_worker, task, timeout, memory, key in alone): key for key, task in tasks.items()
-    }
-    for future in as_completed(futures):
-        try:
-            outcome = future.result()
-        except CancelledError as gone:
-            raise NoScheduler("the scheduler has gone") from gone
-        except Exception as error:  # not the task, whose faults are outcomes, but what carried it
-            if last:
-                yield futures[future], Failure("crashed", f"no machine could carry it out: {error}")
-            continue
-        yield futures[future], pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
+    waiting, urgent = deque(tasks.items()), deque[Any]() if urgent is None else urgent
+    under_way: dict[Future, tuple[Hashable, Task]] = {}
+    ended: SimpleQueue[Future] = SimpleQueue()
+    lost: Counter[Hashable] = Counter()
+    with threads(workers) as here, cluster_or(here, scheduler) as anywhere:
+        room = math.inf if scheduler else AHEAD * workers
+        while urgent or waiting or under_way:
+            while urgent or (waiting and len(under_way) < room):
+                executor, (key, task) = (here, urgent.popleft()) if urgent else (anywhere, waiting.popleft())
+                future = executor.submit(in_worker, task, timeout, memory, key in alone)
+                under_way[future] = key, task
+                future.add_done_callback(ended.put)
+            future = ended.get()
+            key, task = under_way.pop(future)
+            try:
+                outcome = future.result()
+            except CancelledError as gone:
+                raise NoScheduler("the scheduler has gone") from gone
+            except Exception as error:  # not the task, whose faults are outcomes, but what carried it
+                lost[key] += 1
+                if lost[key] < ATTEMPTS:
+                    waiting.append((key, task))
+                    continue
+                outcome = Failure("crashed", f"no machine could carry it out: {error}")
+            yield key, pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
 
 
 @contextmanager
-def executor_of(workers: int, scheduler: str) -> Iterator[Executor]:
-    """Threads of this machine, each with a worker process of its own, or those of a cluster; left, all are stopped."""
-    if scheduler:
-        with cluster(scheduler) as client, client.get_executor(pure=False) as executor:
-            try:
-                yield executor
-            finally:
-                executor.shutdown(wait=False)  # which with dask cancels what is left
-        return
+def threads(workers: int) -> Iterator[Executor]:
+    """Threads of this machine, each with a worker process of its own; left, all are stopped."""
     CREW.dismissed = False
     executor = ThreadPoolExecutor(workers)
     try:
@@ -88,14 +84,30 @@ def executor_of(workers: int, scheduler: str) -> Iterator[Executor]:
         CREW.dismiss()
 
 
+@contextmanager
+def cluster_or(here: Executor, scheduler: str) -> Iterator[Executor]:
+    """The threads of a cluster's workers, or those that are `here` if there is no `scheduler`."""
+    if not scheduler:
+        yield here
+        return
+    with cluster(scheduler) as client, client.get_executor(pure=False) as executor:
+        try:
+            yield executor
+        finally:
+            executor.shutdown(wait=False)  # which with dask cancels what is left
+
+
 def cluster(scheduler: str) -> Any:
     """A client of a dask scheduler that has workers; raises `NoScheduler` naming what is missing."""
+    if not re.fullmatch(r"(tcp|tls)://.+:\d+", scheduler):
+        raise NoScheduler(f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786")
     try:
         from distributed import Client
     except ImportError as missing:
-        raise NoScheduler(f"--scheduler needs {missing.name}: uv sync --extra cluster") from missing
-    if not re.fullmatch(r"(tcp|tls)://.+:\d+", scheduler):
-        raise NoScheduler(f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786")
+        raise NoScheduler(
+            f"--scheduler {scheduler}: many machines take the package {missing.name}, which is not installed; "
+            "uv sync --extra cluster, or pip install crosscheck2d[cluster]"
+        ) from missing
     for name in logging.root.manager.loggerDict:  # what matters is raised; each of distributed's has its own level
         if name.startswith("distributed"):
             logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -11,6 +11,7 @@ from reports import laws
 from scenarios.model import Array, Scenario, Trajectory
 
 
+@laws.once
 def momentum(scenario: Scenario) -> float:
     """kg m/s: sum of m |v|, each disk as fast as flight under gravity and thrust can make it."""
     return float(laws.moving_mass(scenario.scene) @ top_speed(scenario))
@@ -24,6 +25,7 @@ def angular_momentum(scenario: Scenario) -> float:
     return float((laws.moving_mass(scene) * reach) @ top_speed(scenario) + spin)
 
 
+@laws.once
 def energy(scenario: Scenario, truth: Trajectory | None = None) -> float:
     """J: the energy at hand: kinetic, and what each disk can gain by falling, and by one radius further.
 
@@ -45,6 +47,7 @@ def energy(scenario: Scenario, truth: Trajectory | None = None) -> float:
     return float(kinetic + (fall + scene.radius * g) @ m)
 
 
+@laws.once
 def top_speed(scenario: Scenario) -> Array:
     """(n,) m/s, of each disk in free flight under gravity and its thrusts, all along one line."""
     scene = scenario.scene

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from reports.archive import stored_scene
+from reports.cells import scene_hash
+from scenarios.catalogue import SCENARIOS
 from scenarios.catalogue import scenario as from_catalogue
 from scenarios.file_tables import MOST_STEPS
 from scenarios.files import read_scene_file
@@ -15,6 +19,21 @@ from scenarios.model import Scenario
 def open_scene(scene: str, seed: int) -> Scenario:
     """A scenario by catalogue name or file path; raises `KeyError` or `SceneFileError`."""
     return read_scene_file(Path(scene)) if scene.endswith(".toml") else from_catalogue(scene, seed)
+
+
+def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
+    """What was played, by the line of a cell in the run of `folder`.
+
+    Raises:
+        ValueError: the scene is another one now.
+    """
+    scene = record["scene"] if record["scene"] in SCENARIOS else str(stored_scene(folder, record["scenario"]))
+    scenario = open_scene(scene, record["seed"])
+    if scene_hash(scenario) != record["scene_hash"]:
+        raise ValueError(
+            f"{scenario.name} is not the scene any more that was played; crosscheck run --resume plays it again"
+        )
+    return scenario
 
 
 def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
-from adapters.conformance import conform, no_answer
+from adapters.conformance import no_answer
 from adapters.engines import Row
 from adapters.play import Run
 from reports.archive import Archive, from_trail, packed, stored_scene, trajectory_file
@@ -17,9 +19,10 @@ from reports.cells import Cell, content_key, scene_hash
 from reports.journal import Journal, plain
 from reports.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.machine import about
-from reports.playing import Played, play_here, player, time_here
+from reports.playing import Played, conform_here, play_here, player, time_here
 from reports.runner import TIMEOUT, run_all
 from reports.scenes import open_scene, with_steps
+from reports.shares import Gathering, keep_share
 from reports.terminal import Progress
 from reports.worker_process import Failure
 from scenarios.files import write_scene_file
@@ -85,23 +88,36 @@ def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) ->
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
     tasks = tasks_of(plan, scenarios)
     begin(plan, journal, scenarios, len(tasks))
-    missing = {task: tasks[task] for task in tasks.keys() - had(Archive.read(folder), means, scenarios)}
-    ordered = {task: missing[task] for task in tasks if task in missing}
-    alone = {task for task in ordered if isinstance(task, Cell) and plan.engines[task.engine].leaves_state}
-    progress.start(len(ordered), len(tasks))
+    archive = Archive.read(folder)
+    done = had(archive, means, scenarios)
+    missing = {task: work for task, work in tasks.items() if task not in done}
+    cells = [task for task in missing if isinstance(task, Cell)]
+    alone = {cell for cell in cells if plan.engines[cell.engine].leaves_state}
+    gathering = Gathering(archive, cells)
+    comparing: deque[Any] = deque(gathering.whole())
+    progress.start(len(missing), len(tasks))
     limits = means.timeout, means.memory
-    with closing(run_all(ordered, means.workers, *limits, means.scheduler, alone)) as results:
+    with closing(run_all(missing, means.workers, *limits, means.scheduler, alone, comparing)) as results:
         for task, result in results:
-            progress.done(*keep(journal, scenarios, means, task, result))
-    take_timings(plan, means, journal, scenarios, progress)
-    sweep(Archive.read(folder))
-    journal.append({"footer": {"tasks": len(tasks), "played": len(ordered), "seconds": progress.seconds}})
+            if isinstance(task, Cell):
+                line = keep_cell(journal, scenarios[task.scene], means, task, result)
+                said = f"{line['scenario']}  {task.engine}  dt {line['dt_s']:.4g} s"
+                progress.done(said, line["status"], line["reason"])
+                comparing.extend(gathering.ended(line))
+            elif isinstance(task, Path):
+                keep_share(task, result)
+            else:
+                progress.done(*keep_answer(journal, task, result))
+    archive = Archive.read(folder)
+    take_timings(archive, plan, means, journal, scenarios, progress)
+    sweep(archive)
+    journal.append({"footer": {"tasks": len(tasks), "played": len(missing), "seconds": progress.seconds}})
 
 
 def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
     """Make the folders, copy the scene files, write the header to the journal and to machine.json."""
     folder, header = journal.path.parent, plan.header() | {"tasks": tasks}
-    for name in ("trajectories", "scenes"):
+    for name in ("trajectories", "scenes", "compared"):
         (folder / name).mkdir(exist_ok=True)
     for scene in plan.scenes:
         if scene.endswith(".toml"):
@@ -112,7 +128,7 @@ def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks
 
 def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
     """What is to be done, by what it is: an engine's name (its probes), a `KnownAnswer`, or a `Cell`."""
-    tasks: dict[Any, Callable[[], Any]] = {name: partial(conform, name, row) for name, row in plan.engines.items()}
+    tasks: dict[Any, Callable[[], Any]] = {name: partial(conform_here, name, row) for name, row in plan.engines.items()}
     if KNOWN_SCENE in plan.scenes:
         tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
     for scene, scenario in scenarios.items():
@@ -141,15 +157,10 @@ def had(archive: Archive, means: Means, scenarios: Mapping[str, Scenario]) -> se
     return done
 
 
-def keep(
-    journal: Journal, scenarios: Mapping[str, Scenario], means: Means, task: Any, result: Any
-) -> tuple[str, str, str]:
-    """Write what a task gave into the folder; returns what to say of it, its status, and why."""
+def keep_answer(journal: Journal, task: KnownAnswer | str, result: Any) -> tuple[str, str, str]:
+    """Write what a known answer, or the probes of an engine, gave; returns what to say of it, its status, and why."""
     failure = result if isinstance(result, Failure) else None
     status, reason = (failure.status, failure.reason) if failure else ("ok", "")
-    if isinstance(task, Cell):
-        run = keep_cell(journal, scenarios[task.scene], means, task, result)
-        return f"{run.scenario}  {run.name}  dt {run.dt:.4g} s", run.status, run.reason
     if isinstance(task, KnownAnswer):
         line = {"known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}, "of": repr(task)}
         said = f"known answer: {task.column} at dt {task.dt_s:g} s"
@@ -161,8 +172,10 @@ def keep(
     return said, status, reason
 
 
-def keep_cell(journal: Journal, scenario: Scenario, means: Means, cell: Cell, result: Played | Failure) -> Run:
-    """Write the trajectory of a cell, then its line; returns its run."""
+def keep_cell(
+    journal: Journal, scenario: Scenario, means: Means, cell: Cell, result: Played | Failure
+) -> dict[str, Any]:
+    """Write the trajectory of a cell, then its line, which is returned."""
     played = failed(cell, scenario, result) if isinstance(result, Failure) else result
     run, samples = played.run, played.samples
     if played.played_by != player():
@@ -191,7 +204,7 @@ def keep_cell(journal: Journal, scenario: Scenario, means: Means, cell: Cell, re
         "versions": run.versions,
     }
     journal.append(record)
-    return run
+    return record
 
 
 def failed(cell: Cell, scenario: Scenario, failure: Failure) -> Played:
@@ -206,10 +219,14 @@ def failed(cell: Cell, scenario: Scenario, failure: Failure) -> Played:
 
 
 def take_timings(
-    plan: Plan, means: Means, journal: Journal, scenarios: Mapping[str, Scenario], progress: Progress
+    archive: Archive,
+    plan: Plan,
+    means: Means,
+    journal: Journal,
+    scenarios: Mapping[str, Scenario],
+    progress: Progress,
 ) -> None:
     """Time the middle step of every scenario on every engine that played it, round by round, nothing beside it."""
-    archive = Archive.read(journal.path.parent)
     tasks: dict[Any, Callable[[], Any]] = {}
     for turn in range(plan.timings):
         for record in archive.records:

@@ -2,34 +2,36 @@
 
 from __future__ import annotations
 
-import hashlib
+import os
 import shutil
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import cache
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.archive import Archive, stored_scene, trajectory_file
-from reports.cells import scene_hash, versions
-from reports.comparison import Comparison, answered, compare
+from reports.archive import Archive, run_of
+from reports.comparison import Comparison, answered
 from reports.journal import JOURNAL
-from reports.scenes import open_scene
-from scenarios.catalogue import SCENARIOS
-from scenarios.model import Scenario
+from reports.runner import run_all
+from reports.shares import (
+    Records,
+    compared,
+    in_order,
+    keep_share,
+    name_of,
+    path_of,
+    read_share,
+    scenario_of,
+    share_of,
+)
+from reports.worker_process import Failure
 
-JUDGES = (
-    "comparison",
-    "metrics",
-    "view",
-    "laws",
-    "collisions",
-    "violations",
-    "scales",
-)  # files by which runs are compared
-NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which nothing means NaN
+
+class NotCompared(Exception):
+    """The runs of a scene could not be set against its truth and each other, and why."""
 
 
 class Tables(NamedTuple):
@@ -37,12 +39,12 @@ class Tables(NamedTuple):
 
     Attributes:
         runs: runs.csv.
-        chunks: scene -> where its share of deviations.csv is.
+        shares: scene -> where its share of deviations.csv is.
         damaged: scene -> its comparison, where a file of a trajectory is gone or torn: no share of it is kept.
     """
 
     runs: pd.DataFrame
-    chunks: dict[str, Path]
+    shares: dict[str, Path]
     damaged: dict[str, Comparison]
 
 
@@ -51,26 +53,41 @@ def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
 
     Raises:
         ValueError: no cell has ended, or a scene is not the one that was played.
+        NotCompared: naming the scene and what was raised.
     """
     by_scene = ordered(archive)
     if not by_scene:
         raise ValueError(f"{archive.folder / JOURNAL}: no cell has ended yet, so there is nothing to report")
-    (archive.folder / "compared").mkdir(exist_ok=True)
-    chunks, damaged = {}, {}
-    for scene, records in by_scene.items():
-        chunks[scene] = chunk_of(archive, records)
-        if not chunks[scene].exists():
-            say(f"comparing {records[0]['scenario']}")
-            comparison = compare(scenario_of(archive, scene, records), [archive.run(record) for record in records])
-            if any(run.status != record["status"] for run, record in zip(comparison.runs, records)):
-                damaged[scene] = comparison
-            else:
-                comparison.table.to_csv(chunks[scene], index=False)
+    shares = {scene: path_of(archive.folder, records) for scene, records in by_scene.items()}
+    damaged = compare_missing(archive.folder, by_scene, shares, say)
     say("writing the tables")
-    write_deviations(archive.folder / "deviations.csv", chunks, damaged)
+    write_deviations(archive.folder / "deviations.csv", shares, damaged)
     runs = table_of_runs([record for records in by_scene.values() for record in records], archive, damaged)
     runs.to_csv(archive.folder / "runs.csv", index=False)
-    return Tables(runs, chunks, damaged)
+    return Tables(runs, shares, damaged)
+
+
+def compare_missing(
+    folder: Path, by_scene: Mapping[str, Records], shares: Mapping[str, Path], say: Callable[[str], None]
+) -> dict[str, Comparison]:
+    """Make the shares that are not kept, in worker processes; returns the comparisons of which none may be kept."""
+    (folder / "compared").mkdir(exist_ok=True)
+    missing = {scene: path for scene, path in shares.items() if not path.exists()}
+    for scene in missing:
+        scenario_of(folder, by_scene[scene])  # a scene that is another one now is found here
+    tasks: dict[Hashable, Any] = {scene: partial(share_of, folder, by_scene[scene]) for scene in missing}
+    damaged = {}
+    with closing(run_all(tasks, os.cpu_count() or 1)) as results:
+        for number, (scene, share) in enumerate(results, 1):
+            name = by_scene[scene][0]["scenario"]
+            say(f"comparing: {name}, {number} of {len(tasks)}")
+            if isinstance(share, Failure):
+                raise NotCompared(f"{name} could not be compared: {share.reason}")
+            if share:
+                keep_share(missing[scene], share)
+            else:
+                damaged[scene] = compared(folder, by_scene[scene])
+    return damaged
 
 
 def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
@@ -80,75 +97,34 @@ def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
         if scene in tables.damaged:
             comparisons.append(tables.damaged[scene])
             continue
-        scenario, truth = answered(scenario_of(archive, scene, records))
+        scenario, truth = answered(scenario_of(archive.folder, records))
         middle = scenario.substeps[len(scenario.substeps) // 2]
-        runs = [archive.run(record, with_trajectory=record["substeps"] == middle) for record in records]
-        comparisons.append(Comparison(scenario, truth, runs, read_chunk(tables.chunks[scene])))
+        runs = [run_of(archive.folder, record, with_trajectory=record["substeps"] == middle) for record in records]
+        comparisons.append(Comparison(scenario, truth, runs, read_share(tables.shares[scene])))
     return comparisons
 
 
 def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
     """Scene -> the lines of its cells, in the order of scenes and engines that was asked for, coarse dt first."""
-    players = archive.header["engines"]
     by_scene: dict[str, list[dict[str, Any]]] = {scene: [] for scene in archive.header["scenes"]}
-    for record in sorted(archive.records, key=lambda record: (players.index(name_of(record)), record["substeps"])):
+    for record in archive.records:
         by_scene[record["scene"]].append(record)
-    return {scene: records for scene, records in by_scene.items() if records}
+    players = archive.header["engines"]
+    return {scene: in_order(records, players) for scene, records in by_scene.items() if records}
 
 
-def name_of(record: dict[str, Any]) -> str:
-    """`engine:profile`."""
-    return f"{record['engine']}:{record['profile']}"
-
-
-def scenario_of(archive: Archive, scene: str, records: Sequence[dict[str, Any]]) -> Scenario:
-    """What was played, with the steps that were played; raises `ValueError` if the scene is another one now."""
-    stored = stored_scene(archive.folder, records[0]["scenario"])
-    scenario = open_scene(scene if scene in SCENARIOS else str(stored), records[0]["seed"])
-    if {record["scene_hash"] for record in records} != {scene_hash(scenario)}:
-        raise ValueError(
-            f"{scenario.name} is not the scene any more that was played; crosscheck run --resume plays it again"
-        )
-    return replace(scenario, substeps=tuple(sorted({record["substeps"] for record in records})))
-
-
-def chunk_of(archive: Archive, records: Sequence[dict[str, Any]]) -> Path:
-    """Where the table of a scenario is kept: named by all that decides it, the judge's source and the files too."""
-    sizes = []
-    for record in records:
-        path = trajectory_file(archive.folder, record["cell"])
-        sizes.append((record["cell"], record["status"], record["reason"], path.stat().st_size if path.exists() else -1))
-    digest = hashlib.sha256(repr((sizes, judge())).encode()).hexdigest()[:16]
-    return archive.folder / "compared" / f"{records[0]['scenario']}-{digest}.csv"
-
-
-@cache
-def judge() -> str:
-    """A hash over the source and versions by which runs are compared, so that a changed metric is measured again."""
-    root = Path(__file__).parent.parent
-    files = [root / "reports" / f"{name}.py" for name in JUDGES] + sorted((root / "scenarios").glob("*.py"))
-    source = b"".join(path.read_bytes() for path in files)
-    return hashlib.sha256(source + repr((versions(), pd.__version__)).encode()).hexdigest()
-
-
-def read_chunk(path: Path) -> pd.DataFrame:
-    """The table, bit for bit as it was written."""
-    empty = {column: [""] for column in NUMBERS}
-    return pd.read_csv(path, keep_default_na=False, na_values=empty)
-
-
-def write_deviations(path: Path, chunks: Mapping[str, Path], damaged: Mapping[str, Comparison]) -> None:
+def write_deviations(path: Path, shares: Mapping[str, Path], damaged: Mapping[str, Comparison]) -> None:
     """Put the scenes' shares one after the other, and delete those that are of something else."""
     with path.open("wb") as whole:
-        for number, (scene, chunk) in enumerate(chunks.items()):
+        for number, (scene, share) in enumerate(shares.items()):
             if scene in damaged:
                 whole.write(damaged[scene].table.to_csv(index=False, header=not number).encode())
                 continue
-            with chunk.open("rb") as part:
+            with share.open("rb") as part:
                 if number:
                     part.readline()  # the names of the columns
                 shutil.copyfileobj(part, whole)
-    for other in set((path.parent / "compared").iterdir()) - set(chunks.values()):
+    for other in set((path.parent / "compared").iterdir()) - set(shares.values()):
         other.unlink()
 
 

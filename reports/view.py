@@ -47,6 +47,18 @@ class View:
         return laws.deviation(self.played, self.other, self.scenario.scene)
 
     @cached_property
+    def velocity_apart(self) -> Array:
+        """(k, n) m/s between the two."""
+        assert self.other is not None
+        return laws.lengths(self.played.velocity - self.other.velocity)
+
+    @cached_property
+    def angle_apart(self) -> Array:
+        """(k, n) rad between the two."""
+        assert self.other is not None
+        return np.abs(self.played.angle - self.other.angle)
+
+    @cached_property
     def calm(self) -> np.ndarray:
         """(k,) False at samples within `TOUCHY` dt of a hit of the other; sample 0 always counts."""
         calm = np.ones(len(self.played), bool)

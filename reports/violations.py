@@ -26,7 +26,7 @@ def momentum(view: View) -> Array | None:
     expected = actual[0] + np.outer(played.t, laws.moving_mass(scene).sum() * scene.gravity)
     for thrust in view.scenario.thrusts:
         expected = expected + np.outer(time_on(thrust, played.t), thrust.force)
-    return np.linalg.norm(actual - expected, axis=1) / (scales.momentum(view.scenario) or 1.0)
+    return laws.lengths(actual - expected) / (scales.momentum(view.scenario) or 1.0)
 
 
 def angular_momentum(view: View) -> Array | None:

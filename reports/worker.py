@@ -17,9 +17,9 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from reports.worker_process import STARTED, Failure
+from reports.worker_process import CLOCK, Failure
 
-STARTING = 120.0  # s for Python to start and to import what a task needs, on a machine that is busy
+STARTING = 120.0  # s for Python to start and to import what a task is made of, on a machine that is busy
 ATTEMPTS = 3  # at a task whose worker was killed from outside
 OUTSIDE = {-signal.SIGKILL, -signal.SIGTERM, 0}  # exits that no engine makes by a fault of its own
 PRINTED = 65536  # bytes of what a task prints that are kept: faulthandler writes up to 100 lines a thread
@@ -49,21 +49,24 @@ class Worker:
         os.close(printing)
 
     def do(self, task: Callable[[], Any], timeout: float) -> bytes | Failure | None:
-        """What the task gave, pickled, or how it failed; None if it is to be tried again with another worker."""
+        """What the task gave, pickled, or how it failed; None if it is to be tried again with another worker.
+
+        The clock of `timeout` starts when the worker has the task, and anew when the task says so (`allow`).
+        """
         self.printed = b""
         os.ftruncate(self.trail, 0)
         os.lseek(self.trail, 0, os.SEEK_SET)
         try:
             self.connection.send_bytes(pickle.dumps(task))
-            answer = self.answer(STARTING)
-            if answer == STARTED:
-                answer = self.answer(timeout)
+            limit = STARTING
+            while (answer := self.answer(limit)).startswith(CLOCK):
+                limit = max(float(answer.removeprefix(CLOCK)), timeout)
             return answer
         except (EOFError, ConnectionError):
             return self.death()
         except TimeoutError:
             where = self.abort()
-            return Failure("timeout", f"stopped after {timeout:g} s{where}", self.left())
+            return Failure("timeout", f"stopped after {limit:g} s{where}", self.left())
 
     def answer(self, timeout: float) -> bytes:
         """The next message; what is printed meanwhile is kept. Raises `TimeoutError`, or `EOFError` if it died."""

@@ -14,11 +14,13 @@ from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
-STARTED = b"started"
+CLOCK = b"clock "  # before a number of s; no pickle begins so
+LONGEST = 1e6  # s, for what is stopped only with the run
 IDLE = 60.0  # s without a task after which a process leaves: workers on other machines outlive the run
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 _trail: int | None = None
+_parent: Connection | None = None
 
 
 class Failure(NamedTuple):
@@ -36,6 +38,12 @@ def leave(parts: Sequence[Any]) -> None:
             os.writev(_trail, list(parts))
 
 
+def allow(seconds: float = 0.0) -> None:
+    """From now on this task may take `seconds`, or its time-out if that is longer; nothing outside a worker."""
+    if _parent is not None:
+        _parent.send_bytes(CLOCK + str(seconds).encode())
+
+
 def serve(connection: Connection, memory: int) -> None:
     """Carry out tasks until there are none left; whatever a task raises is a `Failure`."""
     while connection.poll(IDLE):
@@ -45,7 +53,7 @@ def serve(connection: Connection, memory: int) -> None:
             return
         try:
             task = pickle.loads(packed)
-            connection.send_bytes(STARTED)
+            allow()
             answer = pickle.dumps(task())
         except MemoryError as error:
             error.__traceback__ = None  # lets go of the frames, and so of what they hold
@@ -74,11 +82,11 @@ def prepare(memory: int) -> None:
 
 def main(arguments: Sequence[Any]) -> None:
     """`python -m reports.worker_process CONNECTION TRAIL MEMORY`: two file descriptors and a number of bytes."""
-    global _trail
+    global _trail, _parent
     connection, trail, memory = (int(argument) for argument in arguments)
-    _trail = trail
+    _trail, _parent = trail, Connection(connection)
     prepare(memory)
-    serve(Connection(connection), memory)
+    serve(_parent, memory)
 
 
 if __name__ == "__main__":

@@ -4,10 +4,13 @@ import contextlib
 import os
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 from unittest import mock
 
+import pytest
 from typer.testing import CliRunner
 
 from reports.cli import app
@@ -34,3 +37,12 @@ def crosscheck(*words: str | Path, cwd: Path) -> Done:
     with contextlib.chdir(cwd), mock.patch.object(sys, "argv", argv):
         done = CliRunner().invoke(app, argv[1:], catch_exceptions=False)
     return Done(done.exit_code, done.stdout, done.stderr)
+
+
+def wait_for(done: Callable[[], bool]) -> None:
+    """Until it is done, for two minutes at most."""
+    for _ in range(2400):
+        if done():
+            return
+        time.sleep(0.05)
+    pytest.fail("nothing happened within two minutes")

@@ -6,6 +6,7 @@ import ctypes
 import os
 import signal
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from adapters.engines import Row
 from scenarios.model import State
 
 FATAL = 100  # the step
+SLOW = 4.0  # s
 
 
 class Controlled:
@@ -121,6 +123,29 @@ class IsKilled(Controlled):
 
     def misbehave(self):
         os.kill(os.getpid(), signal.SIGKILL)
+
+
+class LoadsSlowly(Controlled):
+    """As one that is compiled first: longer than the time-out that its test gives it."""
+
+    def load(self, scene, dt):
+        time.sleep(SLOW)
+        super().load(scene, dt)
+
+
+class LoadsSlowlyAndHangs(LoadsSlowly):
+    """The control of the one before."""
+
+    def misbehave(self):
+        time.sleep(1000)
+
+
+class HangsInLoad(Controlled):
+    """Before its first step is due."""
+
+    def load(self, scene, dt):
+        super().load(scene, dt)
+        ctypes.CDLL(None).sleep(1000)
 
 
 class Remembers(Controlled):

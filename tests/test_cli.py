@@ -1,13 +1,9 @@
 """The command line as people and scripts use it: files, words, exit status."""
 
 import json
-import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -17,7 +13,7 @@ from adapters.engines import ENGINES
 from reports.comparison import COLUMNS
 from reports.metrics import METRICS
 from scenarios.catalogue import SCENARIOS
-from tests.command_line import CROSSCHECK, crosscheck, process
+from tests.command_line import crosscheck, process
 
 SCENES = Path(__file__).parent / "scenes"
 SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference", "--engine", "pymunk:matched", "--dt", str(1 / 60)]
@@ -199,6 +195,24 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.txt"]
 
 
+@pytest.mark.parametrize(
+    ("words", "file", "said"),
+    [
+        (SMALL, "limits.csv", "holds limits.csv, which no run of crosscheck made"),
+        (["stability", "slow_hit"], "runs.csv", "holds runs.csv, which crosscheck stability did not make"),
+    ],
+)
+def test_a_folder_of_another_command_is_left_alone(words: list[str], file: str, said: str, tmp_path: Path):
+    """A run does not replace an atlas, nor an atlas a run."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / file).touch()
+    done = crosscheck(*words, "--out", "out", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert [path.name for path in tmp_path.rglob("*")] == ["out", file]
+
+
 @pytest.mark.slow
 def test_an_earlier_run_is_replaced_as_a_whole(small_run: Path):
     """The second run into a folder leaves nothing of the first behind, and no folder beside it."""
@@ -242,32 +256,7 @@ def test_a_scene_that_was_changed_after_it_was_played_is_not_reported(tmp_path: 
 def test_the_folder_one_is_in_is_not_replaced(tmp_path: Path):
     """Not the folder itself, and none above it."""
     (tmp_path / "a" / "b").mkdir(parents=True)
-    done = [crosscheck(*SMALL, "--out", out, cwd=tmp_path / "a" / "b") for out in (".", "..")]
+    done = [crosscheck(*SMALL, "--out", out, cwd=tmp_path / "a" / "b") for out in (".", "..", "/")]
 
-    assert [one.returncode for one in done] == [2, 2]
+    assert [one.returncode for one in done] == [2, 2, 2]
     assert all("is where you are" in one.stderr for one in done)
-
-
-@pytest.mark.slow
-def test_an_interrupt_keeps_what_was_played_and_says_how_to_go_on(tmp_path: Path):
-    """Ctrl-C: exit 130, no worker left behind, and the journal makes a report."""
-    words = [CROSSCHECK, "run", "galperin_314", "slow_hit", "--engine", "pymunk", "--out", "out", "--workers", "1"]
-    run = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    wait_for(lambda: any('"cell"' in path.read_text() for path in tmp_path.glob("out.part/journal.jsonl")))
-    os.killpg(run.pid, signal.SIGINT)
-    _, said = run.communicate(timeout=60)
-    command = said.splitlines()[-1].split("crosscheck ")[-1].split()
-
-    assert run.returncode == 130
-    assert crosscheck(*command, cwd=tmp_path).returncode == 0
-    with pytest.raises(ProcessLookupError):
-        os.killpg(run.pid, 0)
-
-
-def wait_for(done: Callable[[], bool]) -> None:
-    """Until it is done, for a minute at most."""
-    for _ in range(600):
-        if done():
-            return
-        time.sleep(0.1)
-    pytest.fail("nothing was played within a minute")

@@ -5,6 +5,7 @@ import random
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from statistics import median
 
 import pandas as pd
 import pytest
@@ -163,13 +164,19 @@ def test_timings_are_judged_on_one_machine_only(before: Path, after: Path, machi
 )
 def test_a_timing_is_worse_only_if_it_is_sure_and_large(ratios: list[float], verdict: str):
     """Two gates: the sign test's interval, and a factor."""
-    assert timing("any", sorted(ratios)).verdict == verdict
+    assert timing("any", sorted(ratios), median(ratios)).verdict == verdict
+
+
+def test_a_machine_that_is_busy_in_all_rounds_but_one_does_not_make_an_engine_slower():
+    """Sure, and large in the median: but the least time is as it was."""
+    assert timing("any", [1.0] + [3.0] * 19, 1.0).verdict == "same"
+    assert timing("any", [1.0] + [3.0] * 19, 1.5).verdict == "worse"
 
 
 def test_the_interval_holds_the_true_median_as_often_as_it_says():
     """Of 2000 samples of 20 from a lopsided distribution of median 1, at least 98.5 % of intervals hold it."""
     draw = random.Random(1)
-    found = [timing("any", sorted(draw.expovariate(0.6931471805599453) for _ in range(20))) for _ in range(2000)]
+    found = [timing("any", sorted(draw.expovariate(0.6931471805599453) for _ in range(20)), 1.0) for _ in range(2000)]
 
     assert isinstance(found[0], Timing)
     assert sum(one.low <= 1 <= one.high for one in found) / 2000 > 0.985

@@ -1,19 +1,33 @@
 """Cells in worker processes: what aborts, hangs, raises or eats takes nothing along, and says where it was."""
 
+import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from adapters.engines import ENGINES, Row
+from reports import playing
 from reports.archive import from_trail, load_trajectory, packed
 from reports.cells import Cell
 from reports.playing import Played, play_cell, play_here
-from reports.runner import run_all
+from reports.runner import NoScheduler, cluster, run_all
 from reports.worker_process import Failure
 from scenarios.catalogue import scenario
-from tests.control_engines import CONTROLS, FATAL, Controlled, Once, Remembers, row
+from tests.control_engines import (
+    CONTROLS,
+    FATAL,
+    SLOW,
+    Controlled,
+    HangsInLoad,
+    LoadsSlowly,
+    LoadsSlowlyAndHangs,
+    Once,
+    Remembers,
+    row,
+)  # fmt: skip
 
 SCENE = "slow_hit"  # 240 samples of 1/60 s; at one step a sample the 100th step is due after 99 of them
 GOOD = {f"good{i}:control": row(Controlled) for i in range(24)}
@@ -80,6 +94,27 @@ def test_what_died_leaves_every_good_state_before(ended, engine: str):
         assert getattr(trajectory, name).tobytes() == getattr(whole, name)[:FATAL].tobytes()
 
 
+def test_the_clock_of_a_cell_starts_when_its_engine_is_loaded():
+    """Loading that takes longer than the time-out is no fault; a hang after it is, and so is one that never loads."""
+    slow = {"slow:control": row(LoadsSlowly), "hangs:control": row(LoadsSlowlyAndHangs)}
+    ended = dict(run_all(cells(slow), workers=2, timeout=SLOW / 2))
+    question = replace(scenario(SCENE), truth=None)
+    stuck = {"stuck": partial(impatient, Cell(SCENE, 0, "stuck:control", 1), row(HangsInLoad), question)}
+    [(_, never)] = run_all(stuck, workers=1, timeout=1.0)
+
+    assert ended["slow:control"].run.status == "ok"
+    assert ended["hangs:control"].status == "timeout"
+    assert f"stopped after {SLOW / 2:g} s in misbehave" in ended["hangs:control"].reason
+    assert never.status == "timeout"
+    assert "stopped after 3 s in load" in never.reason
+
+
+def impatient(*words: Any) -> Played:
+    """In the worker: play, with little time to load."""
+    playing.LOADING = 3.0
+    return play_here(*words)
+
+
 def test_a_worker_that_is_killed_from_outside_is_no_fault_of_its_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """`kill -9` once: the cell is played again and is as good as any."""
     monkeypatch.setenv("CONTROL_MARK", str(tmp_path / "mark"))
@@ -111,6 +146,22 @@ def test_no_engine_remembers_what_it_played(name: str):
 
     assert played["before"].file == played["after"].file
     assert not ENGINES[name].leaves_state
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("foo", "--scheduler foo: is no address; one is like tcp://192.168.0.7:8786"),
+        ("tcp://foo:1", "--scheduler tcp://foo:1: many machines take the package distributed, which is not installed"),
+    ],
+)
+def test_a_cluster_without_its_extra_is_one_clear_sentence(monkeypatch: pytest.MonkeyPatch, address: str, said: str):
+    """What is wrong with the address is said first; else what is missing, and how to get it."""
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(NoScheduler) as refusal:
+        cluster(address)
+
+    assert str(refusal.value).startswith(said)
 
 
 def test_a_trajectory_comes_back_from_its_file_bit_for_bit(tmp_path: Path):

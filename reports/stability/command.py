@@ -14,9 +14,9 @@ from rich.table import Table
 
 from adapters.engines import ENGINES
 from reports.commands import checked_engines, unknown
-from reports.exits import DONE, FAILED, INTERRUPTED, refuse, say
+from reports.exits import DONE, FAILED, broken_off, refuse, say
 from reports.folders import FolderTaken, may_write, part_of, replace_folder
-from reports.journal import Busy, Journal
+from reports.journal import JOURNAL, Busy, Journal
 from reports.stability.atlas import Atlas, Plan, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
@@ -28,6 +28,8 @@ from reports.style import number
 from reports.terminal import Progress
 from scenarios.files import SceneFileError, read_scene_file
 
+FILES = (JOURNAL, "trajectories", "machine.json", "limits.csv", "maps.csv", "laws.csv", "stability.html")
+
 
 def find_limits(
     names: Sequence[str], vary: Sequence[str], engines: Sequence[str], full: bool, resume: bool, out: Path,
@@ -38,17 +40,17 @@ def find_limits(
     form = "full" if full else "quick"
     plan = Plan(cases, maps, touching, checked_engines(engines), form, workers or os.cpu_count() or 1, command)
     out = out.resolve()
+    part = part_of(out)
+    kept = f"What has ended is kept in {part}: ask again with --resume"
     try:
-        may_write(out)
-        out.parent.mkdir(parents=True, exist_ok=True)
+        may_write(out, FILES.__contains__, "crosscheck stability did not make")
+        part.mkdir(parents=True, exist_ok=True)
     except FolderTaken as fault:
         refuse([str(fault)])
     except OSError as fault:
         refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
-    part = part_of(out)
     try:
-        part.mkdir(parents=True, exist_ok=True)
-        with Journal(part) as journal, Progress() as progress:
+        with broken_off(part, lambda: kept), Journal(part) as journal, Progress() as progress:
             done = done_before(part, plan) if resume else set()
             if not done:
                 os.truncate(journal.path, 0)
@@ -58,12 +60,6 @@ def find_limits(
             replace_folder(part, out)
     except Busy:
         refuse([f"{out} is being written by another crosscheck; wait for it, or name another --out"])
-    except KeyboardInterrupt:
-        say(f"\nInterrupted. What has ended is kept in {part}: ask again with --resume")
-        sys.exit(INTERRUPTED)
-    except OSError as fault:
-        say(f"cannot write to {part}: {fault.strerror or fault}")
-        sys.exit(FAILED)
     finish(found, out)
 
 
