@@ -38,6 +38,10 @@ class Progress:
         """Say what is being done."""
         self.bar.update(self.task, description=what)
 
+    def note(self, sentence: str) -> None:
+        """A line that stays."""
+        self.bar.console.print(sentence, highlight=False, markup=False)
+
     def start(self, missing: int, total: int, what: str = "") -> None:
         """From now on count to `total`, of which some may be `missing` only."""
         self.counted, self.since = 0, perf_counter()

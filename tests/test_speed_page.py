@@ -18,9 +18,10 @@ from reports.cli import app
 from reports.machine import about
 from reports.speed import charts, figures, tables
 from reports.speed.effort import QUICK
-from reports.speed.measure import Measured, Plan, measure
+from reports.speed.measure import Measured, measure
 from reports.speed.page import write_page
 from reports.speed.pareto import FAILED, UNREACHABLE
+from reports.speed.plan import Plan
 from reports.speed.results import Results
 from reports.terminal import Progress
 from scenarios.catalogue import scenario
@@ -32,7 +33,7 @@ FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--
 SCENES = ("head_on_equal_e09", "asteroids")
 PLAYERS = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
 LITTLE = replace(QUICK, seeds=3, most_steps=1000, rounds=2, budget=0.0, sizes=(3, 10, 100, 1000), patience=1.0,
-    feature_scenes=("bouncing_ball_e1",))  # fmt: skip
+    feature_scenes=("bouncing_ball_e1",), dial_scenes=("slide_on_incline", "falling_box"))  # fmt: skip
 SAID = {"load": 0.0, "seconds": 1.0}
 
 
@@ -211,7 +212,7 @@ def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
         for plot in tab.locator(".plot").all():
             plot.scroll_into_view_if_needed()
             plot.locator(".main-svg").first.wait_for()
-        assert tab.locator(".plot").count() == 2 + 2 + 1 + 2 * len(SCENES)
+        assert tab.locator(".plot").count() == 2 + 2 + 3 + 1 + 2 * len(SCENES)
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
         assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
         browser.close()

@@ -71,6 +71,26 @@ def front_of(drawn: pd.DataFrame) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def dials(points: pd.DataFrame, tall: bool = False) -> go.Figure:
+    """Error against cost, a line a dial over its values, and one its engine over a ladder of dt."""
+    drawn = points[points.cost.notna() & np.isfinite(points.error)]
+    x_axis = log_axis(COST, drawn.cost.to_numpy(float))
+    y_axis = error_axis(drawn.error.to_numpy(float))
+    traces = []
+    for engine, profile, group in by_player(drawn):
+        what = profile.partition("+")[2]
+        values = group.change.tolist()
+        text = [(f"{what} {value}<br>" if what else "") + told(row) for value, row in zip(values, records(group))]
+        trace = line(engine, profile, group.cost, group.error.clip(lower=LOWEST), text)
+        if what:  # the first and the last are named
+            named = [value if k in (0, len(values) - 1) else "" for k, value in enumerate(values)]
+            trace |= {"mode": "lines+markers+text", "texttemplate": named, "textposition": "top center"}
+        traces.append(trace)
+    lost = points[~(points.cost.notna() & np.isfinite(points.error))]
+    traces += at_the_edge(lost, drawn, x_axis, y_axis)
+    return figure(traces, x_axis, y_axis, TALLEST if tall else TALL)
+
+
 def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
     """What each accuracy costs, a mark a player; above, who never gets there."""
     names = list(dict.fromkeys(zip(reached.engine, reached.profile)))
@@ -192,8 +212,6 @@ def told(row: dict[str, Any]) -> str:
     lines = [f"{at(row)}error {error} radii".strip()]
     if np.isfinite(row["cost"]):
         lines.append(f"{spread(row)} µs/s")
-    if np.isfinite(row["best"]):
-        lines.append(f"fastest {style.number(row['best'])} µs/s")
     if np.isfinite(row["idle"]):
         lines.append(f"as many steps without anything to do {style.number(row['idle'])} µs/s")
     if row["wrapping"] > 0:
@@ -202,8 +220,9 @@ def told(row: dict[str, Any]) -> str:
 
 
 def spread(row: dict[str, Any]) -> str:
-    """Median and quartiles of a cost."""
-    return f"{style.number(row['cost'])} ({style.number(row['low'])} to {style.number(row['high'])})"
+    """Median, quartiles and, of one scene's samples, the fastest of a cost."""
+    fastest = f", fastest {style.number(row['best'])}" if np.isfinite(row["best"]) else ""
+    return f"{style.number(row['cost'])} ({style.number(row['low'])} to {style.number(row['high'])}{fastest})"
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:

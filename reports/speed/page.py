@@ -15,7 +15,7 @@ from plotly.offline import get_plotlyjs
 from reports import style
 from reports.charts import Drawing
 from reports.page import SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
-from reports.speed import charts
+from reports.speed import charts, tables
 from reports.speed.order import ELSEWHERE, UNSTEADY
 from reports.speed.pareto import ACCURACIES
 from reports.speed.results import Results
@@ -43,10 +43,12 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
     environment.filters["number"] = style.number
-    looks = {name: style.look(*name.split(":", 1)) for name in (*results.names, style.TRUTH)}
+    names = (*results.names, *(dial.name for dial in results.plan.dials), style.TRUTH)
+    looks = {name: style.look(*name.split(":", 1)) for name in names}
     html = environment.get_template("speed.html.j2").render(
         names=results.names, looks=looks, about=about, pooled=pooled_section(results), sizes=sizes_section(results),
-        features=features_section(results), sections=[section_of(results, name) for name in results.scenes],
+        features=features_section(results), dials=dial_sections(results), dial_rows=charts.records(results.dials),
+        sections=[section_of(results, name) for name in results.scenes],
         noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
         driving=charts.records(results.driving), feature_rows=charts.records(results.features),
         left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
@@ -147,3 +149,24 @@ def features_section(results: Results) -> Section | None:
         ),
     }  # fmt: skip
     return section("features", "No more than a scene needs", "", drawings)
+
+
+def dial_sections(results: Results) -> list[Section]:
+    """What more iterations and substeps buy, and what smaller steps buy for the same time."""
+    if results.dials.empty:
+        return []
+    caption = (
+        "Dotted: one dt, and more iterations or substeps to the right, the first and the last named. Solid: the same "
+        "engine as matched, and smaller dt to the right."
+    )
+    count = results.dials.scenario.nunique()
+    pooled = Drawing("Pooled", f"{caption} Each coordinate the median over {count} scenes.",
+                     charts.dials(results.pooled_dials, tall=True))  # fmt: skip
+    each = {
+        str(scene): Drawing(str(scene), tables.asks_of(str(scene))[1], charts.dials(points))
+        for scene, points in results.dials.groupby("scenario", sort=False)
+    }
+    return [
+        section("dials", "More work in a step, or more steps", "", {"dials": pooled}),
+        section("dials-each", "The same, scene by scene", "", each),
+    ]

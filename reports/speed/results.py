@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 
 from reports.speed import models, tables
-from reports.speed.measure import Measured, Plan
+from reports.speed.measure import Measured
 from reports.speed.pareto import ACCURACIES, FAILED, UNREACHABLE
+from reports.speed.plan import PLAIN, Plan
 
 QUIET = 0.05  # how far from 1 an engine against itself may read
 
@@ -66,6 +67,21 @@ class Results:
     def pooled(self) -> pd.DataFrame:
         """See `tables.pooled`."""
         return tables.pooled(self.points)
+
+    @cached_property
+    def dials(self) -> pd.DataFrame:
+        """See `tables.dials`."""
+        return tables.dials(self.measured, self.plan.seed)
+
+    @cached_property
+    def pooled_dials(self) -> pd.DataFrame:
+        """As `pooled`, the ladders and the dials each by their own rungs; change: the value of the dial."""
+        ladders, turned = (self.dials[(self.dials.change == PLAIN) == plain] for plain in (True, False))
+        values = {dial.name: dial.values for dial in self.plan.dials}
+        dials = tables.pooled(turned)
+        names = dials.engine + ":" + dials.profile
+        change = [str(values[name][rung]) for name, rung in zip(names, dials.rung)]
+        return pd.concat([tables.pooled(ladders).assign(change=PLAIN), dials.assign(change=change)])
 
     @cached_property
     def pooled_reached(self) -> pd.DataFrame:
@@ -149,7 +165,7 @@ class Results:
             "speed_samples": self.measured.samples, "speed_errors": self.measured.errors, "speed": self.points,
             "speed_pooled": self.pooled, "speed_orders": self.orders, "speed_reached": self.reached,
             "speed_sizes": self.sizes, "speed_features": self.features, "speed_driving": self.driving,
-            "speed_noise": self.noise, "speed_models": self.models,
+            "speed_noise": self.noise, "speed_models": self.models, "speed_dials": self.dials,
         }  # fmt: skip
         for name, table in files.items():
             table.to_csv(folder / f"{name}.csv", index=False)
