@@ -101,12 +101,16 @@ def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Result
 def test_the_front_of_a_chart_is_the_event_driven_player(results: Results):
     """In a head-on hit it is both cheapest and exact, so that nobody else is on the front."""
     points = results.points[results.points.scenario == SCENES[0]]
-    front = next(trace for trace in charts.speed(points).data if trace.name == charts.FRONT)
+    drawn = {trace.name: trace for trace in charts.speed(points).data}
+    front, steps = drawn[charts.FRONT], drawn[charts.FRONT_OF_STEPS]
     mine = points[points.engine == "event_driven"]
 
     assert mine.error.max() < charts.LOWEST
-    assert set(front.y) == {charts.LOWEST}
-    assert min(front.x) == pytest.approx(mine.cost.min(), rel=1e-3)
+    assert len(front.x) == 3  # it, and the edge up and to the right of it
+    assert front.y[1] == front.y[2] == charts.LOWEST
+    assert front.x[0] == front.x[1] == pytest.approx(mine.cost.min(), rel=1e-3)
+    assert min(steps.x) > min(front.x)
+    assert min(steps.y) > charts.LOWEST
 
 
 def test_what_cannot_be_reached_is_above_what_costs(results: Results):

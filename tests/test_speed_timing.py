@@ -11,6 +11,7 @@ import pytest
 from reports.speed import ladder, sizes
 from reports.speed.timing import FEWEST_ROUNDS, WARM_UP, Sample, Spent, Timed, interleaved, summed_up
 from scenarios.catalogue import scenario
+from scenarios.model import Scene
 from tests.clockwork import Sleeper
 
 EACH = 1e-3
@@ -100,6 +101,24 @@ def test_what_grows_as_a_power_of_n_gives_the_power_and_stops_where_it_would_tak
     assert sizes.exponent(n, n**1.5) == pytest.approx((1.5, 1.5, 1.5))
     assert sizes.foreseen(course, 100_000) == pytest.approx(1e5**1.5)
     assert np.isnan(sizes.exponent(n[:3], n[:3])).all()
+
+
+def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
+    """A gas that loses energy falls asleep, so whoever took more steps of it would look cheaper."""
+    ages: list[int] = []
+
+    class Ageing(Sleeper):
+        def load(self, scene: Scene, dt: float) -> None:
+            super().load(scene, dt)
+            ages.append(0)
+
+        def step(self, count: int = 1) -> None:
+            ages[-1] += count
+
+    sizes.costs({"quick:own": partial(Ageing, 0.0)}, (10,), 12, 1.0, patience=1.0, seed=0)
+
+    assert len(ages) > 12
+    assert max(ages) <= sizes.FRESH + sizes.WARM_STEPS
 
 
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_told_of():

@@ -11,10 +11,11 @@ import plotly.graph_objects as go
 
 from reports import style
 from reports.charts import ZERO, decades, shortened
+from reports.speed.models import KINDS
 from reports.speed.pareto import ACCURACIES, FAILED, UNREACHABLE, front
 from scenarios.model import Array
 
-FRONT = "Pareto front"
+FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"
 COST, ERROR = "engine time (µs per simulated second)", "error (radii)"
 EDGE = 0.55  # decades between the last gridline and what is drawn at the edge
 LOWEST = 1e-7  # radii: what is smaller stands there, as a tenth of the finest accuracy asked for is as good as exact
@@ -26,7 +27,7 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis(COST, drawn.cost.to_numpy(float))
     y_axis = error_axis(drawn.error.to_numpy(float))
-    traces = [front_of(drawn)]
+    traces = fronts(drawn, x_axis, y_axis)
     for engine, profile, group in by_player(points):
         fine = group[group.cost.notna() & np.isfinite(group.error)]
         spreads = {} if tall else {
@@ -59,15 +60,28 @@ def at_the_edge(
     return traces
 
 
-def front_of(drawn: pd.DataFrame) -> dict[str, Any]:
-    """The points nobody beats, joined by a broad line behind everybody; what stands at `LOWEST` counts as equal."""
+def fronts(drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any]) -> list[dict[str, Any]]:
+    """Behind everybody, the front of all and, narrow, that of those who take steps; together where they are one."""
+    steps = drawn[~drawn.engine.isin(KINDS)]
+    return [front_of(drawn, FRONT, 9, x_axis, y_axis), front_of(steps, FRONT_OF_STEPS, 3, x_axis, y_axis)]
+
+
+def front_of(drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any], y_axis: dict[str, Any]) -> dict:
+    """The edge of what the points that nobody beats beat: all above and right of it is slower or worse than one.
+
+    What stands at `LOWEST` counts as equal.
+    """
     cost, error = drawn.cost.to_numpy(float), np.maximum(drawn.error.to_numpy(float), LOWEST)
     best = front(cost, error)
+    x, y = cost[best], error[best]
+    if best:
+        right, top = 10 ** x_axis["range"][1], 10 ** y_axis["range"][1]
+        x, y = np.array([x[0], *x, right]), np.array([top, *y, y[-1]])
     colour = style.look(style.TRUTH).light
     return {
-        "type": "scatter", "x": shortened(cost[best]), "y": shortened(error[best]), "name": FRONT,
-        "mode": "lines+markers", "line": {"color": colour, "width": 9, "shape": "hv"},
-        "marker": {"color": colour, "size": 20, "symbol": "circle"}, "opacity": 0.16, "hoverinfo": "skip",
+        "type": "scatter", "x": shortened(x), "y": shortened(y), "name": name, "mode": "lines+markers",
+        "line": {"color": colour, "width": width, "shape": "hv"}, "opacity": 0.16, "hoverinfo": "skip",
+        "marker": {"color": colour, "size": [0, *[20] * len(best), 0], "symbol": "circle", "line": {"width": 0}},
     }  # fmt: skip
 
 

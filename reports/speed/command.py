@@ -66,9 +66,7 @@ def run_speed(
         say(f"\nInterrupted. What has ended is kept in {part}: ask again with --resume")
         sys.exit(INTERRUPTED)
     except OSError as fault:
-        say(
-            f"cannot write to {part}: {fault.strerror or fault}; what was measured is kept there: ask again with --resume"
-        )
+        say(f"cannot write to {part}: {fault.strerror or fault}; --resume goes on with what was measured so far")
         sys.exit(FAILED)
     print_summary(results, str(out / PAGE))
     sys.exit(DONE)

@@ -76,7 +76,8 @@ def pooled_section(results: Results) -> Section:
         "speed": Drawing(
             "Error against cost",
             f"A point is one rung of the dt ladder, each of its coordinates the median over {count} scenes. "
-            "Down and left is better; nobody is both faster and better than the broad grey line. "
+            "Down and left is better; nobody is both faster and better than the broad grey line, and of those who take "
+            "steps nobody than the narrow one. "
             "A scene that a player failed counts as infinitely wrong.",
             charts.speed(results.pooled, tall=True),
         ),
