@@ -25,6 +25,7 @@ from reports.speed.plan import Plan
 from reports.speed.results import Results
 from reports.terminal import Progress
 from scenarios.catalogue import scenario
+from scenarios.oracle import CLOSED_FORM, HIT_BY_HIT
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
@@ -156,12 +157,37 @@ def test_float32_breaks_what_it_must(results: Results):
     assert abs(row.error_ratio.iloc[0] - 1) > 1e-3
 
 
+def test_a_dial_meets_its_engine_where_it_is_matched(results: Results):
+    """50 iterations are what pymunk has as matched: the same error, to the bit, and 1 of 1 where all are pooled."""
+    table = results.dials
+    here = table[(table.engine == "pymunk") & (table.scenario == "slide_on_incline")]
+    turned = here[here.change == "50"].iloc[0]
+    same = here[(here.change == "") & (here.dt_s == turned.dt_s)].iloc[0]
+    pooled = results.pooled_dials
+
+    assert turned.error == same.error
+    assert pooled[pooled.change == "50"].error.iloc[0] == 1.0
+    assert {dial.name for dial in results.plan.dials} == {"pymunk:matched+iterations"}
+    assert table[table.scenario == "falling_box"].seeds.eq(3).all()
+
+
+def test_a_line_a_dial_goes_over_all_its_values_from_cheap_to_dear(results: Results):
+    """Its ends are named; beside it the ladder of its engine, from four times its dt to an eighth of it."""
+    points = results.dials[results.dials.scenario == "falling_box"]
+    drawn = {trace.name: trace for trace in charts.dials(points).data}
+    dial = drawn["pymunk:matched+iterations"]
+
+    assert len(dial.x) == len(dial.y) == 8
+    assert (dial.texttemplate[0], dial.texttemplate[-1]) == ("1", "200")
+    assert len(drawn["pymunk:matched"].x) == 6
+
+
 def test_the_cheapest_model_is_named_for_every_scene(results: Results):
     """A closed form where the truth is one; the asteroids are answered hit by hit."""
     models = results.models.set_index("scenario")
 
-    assert models.loc[SCENES[0]].truth == "closed form"
-    assert models.loc["asteroids"].truth == "hit by hit, in many digits"
+    assert models.loc[SCENES[0]].truth == CLOSED_FORM
+    assert models.loc["asteroids"].truth == HIT_BY_HIT
     assert models.loc["asteroids"].player == "event_driven:float64"
     assert set(models.model) <= {"closed form", "hit to hit, float64"}
 

@@ -85,24 +85,38 @@ def front_of(drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any],
     }  # fmt: skip
 
 
-def dials(points: pd.DataFrame, tall: bool = False) -> go.Figure:
-    """Error against cost, a line a dial over its values, and one its engine over a ladder of dt."""
+def dials(points: pd.DataFrame, relative: bool = False) -> go.Figure:
+    """Error against cost, a line a dial over its values, and one its engine over a ladder of dt.
+
+    relative: both are over those of the engine as it is matched, at the dt at which the dial is turned.
+    """
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
-    x_axis = log_axis(COST, drawn.cost.to_numpy(float))
-    y_axis = error_axis(drawn.error.to_numpy(float))
+    x_axis = log_axis("time / time as matched" if relative else COST, drawn.cost.to_numpy(float))
+    y_axis = (log_axis("error / error as matched", drawn.error.to_numpy(float)) if relative
+              else error_axis(drawn.error.to_numpy(float)))  # fmt: skip
     traces = []
     for engine, profile, group in by_player(drawn):
         what = profile.partition("+")[2]
-        values = group.change.tolist()
-        text = [(f"{what} {value}<br>" if what else "") + told(row) for value, row in zip(values, records(group))]
-        trace = line(engine, profile, group.cost, group.error.clip(lower=LOWEST), text)
+        text = [turned(what, row, relative) for row in records(group)]
+        error = group.error if relative else group.error.clip(lower=LOWEST)
+        trace = line(engine, profile, group.cost, error, text)
         if what:  # the first and the last are named
+            values = group.change.tolist()
             named = [value if k in (0, len(values) - 1) else "" for k, value in enumerate(values)]
             trace |= {"mode": "lines+markers+text", "texttemplate": named, "textposition": "top center"}
+            trace["textfont"] = {"color": trace["line"]["color"], "size": 11}
         traces.append(trace)
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
-    traces += at_the_edge(lost, drawn, x_axis, y_axis)
-    return figure(traces, x_axis, y_axis, TALLEST if tall else TALL)
+    traces += [] if relative else at_the_edge(lost, drawn, x_axis, y_axis)
+    return figure(traces, x_axis, y_axis, TALLEST if relative else TALL)
+
+
+def turned(what: str, row: dict[str, Any], relative: bool) -> str:
+    """What hovering over a point of a dial says."""
+    value = f"{what} {row['change']}" if what else f"dt / {2.0 ** (row['rung'] - 2):g}" if relative else "dt"
+    if not relative:
+        return f"{value}<br>{told(row)}"
+    return f"{value}<br>{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
 
 
 def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:

@@ -156,13 +156,14 @@ def dial_sections(results: Results) -> list[Section]:
     """What more iterations and substeps buy, and what smaller steps buy for the same time."""
     if results.dials.empty:
         return []
-    caption = (
-        "Dotted: one dt, and more iterations or substeps to the right, the first and the last named. Solid: the same "
-        "engine as matched, and smaller dt to the right."
-    )
     count = results.dials.scenario.nunique()
-    pooled = Drawing("Pooled", f"{caption} Each coordinate the median over {count} scenes.",
-                     charts.dials(results.pooled_dials, tall=True))  # fmt: skip
+    pooled = Drawing(
+        "Pooled",
+        "Dotted: one dt, and more iterations or substeps to the right, the first and the last named. Solid: the same "
+        "engine as matched, from 4 times that dt to an eighth of it. Both over what it costs and how far it is off as "
+        f"matched, at that dt, where all lines meet; medians over {count} scenes.",
+        charts.dials(results.pooled_dials, relative=True),
+    )
     each = {
         str(scene): Drawing(str(scene), tables.asks_of(str(scene))[1], charts.dials(points))
         for scene, points in results.dials.groupby("scenario", sort=False)

@@ -106,11 +106,16 @@ class Plan:
 
     def turned(self, scene: str, seed: int) -> Iterator[Player]:
         """Every dial at every value at the dt the report shows, and its engine over a ladder of dt beside it."""
-        rungs = self.effort.ladder(ladder.open_scene(scene, seed))
+        here = middle(scene)
         for dial in self.dials:
-            yield Player(DIAL, scene, seed, dial.engine, PLAIN, row_of(dial.engine).make, rungs)
+            yield Player(DIAL, scene, seed, dial.engine, PLAIN, row_of(dial.engine).make, around(here))
             for value in dial.values:
-                yield Player(DIAL, scene, seed, dial.name, str(value), dial.at(value), (middle(scene),))
+                yield Player(DIAL, scene, seed, dial.name, str(value), dial.at(value), (here,))
+
+
+def around(here: int) -> tuple[int, ...]:
+    """Steps in a sample interval from a fourth of `here` to eight times as many."""
+    return tuple(here * 2**k // 4 for k in range(6) if here * 2**k % 4 == 0)
 
 
 def middle(scene: str) -> int:

@@ -12,7 +12,7 @@ import pandas as pd
 from reports.speed import models, tables
 from reports.speed.measure import Measured
 from reports.speed.pareto import ACCURACIES, FAILED, UNREACHABLE
-from reports.speed.plan import PLAIN, Plan
+from reports.speed.plan import Plan
 
 QUIET = 0.05  # how far from 1 an engine against itself may read
 
@@ -75,13 +75,8 @@ class Results:
 
     @cached_property
     def pooled_dials(self) -> pd.DataFrame:
-        """As `pooled`, the ladders and the dials each by their own rungs; change: the value of the dial."""
-        ladders, turned = (self.dials[(self.dials.change == PLAIN) == plain] for plain in (True, False))
-        values = {dial.name: dial.values for dial in self.plan.dials}
-        dials = tables.pooled(turned)
-        names = dials.engine + ":" + dials.profile
-        change = [str(values[name][rung]) for name, rung in zip(names, dials.rung)]
-        return pd.concat([tables.pooled(ladders).assign(change=PLAIN), dials.assign(change=change)])
+        """See `tables.pooled_dials`."""
+        return tables.pooled_dials(self.dials)
 
     @cached_property
     def pooled_reached(self) -> pd.DataFrame:

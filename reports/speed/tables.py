@@ -28,7 +28,7 @@ def points(measured: Measured, seed: int) -> pd.DataFrame:
 
 
 def dials(measured: Measured, seed: int) -> pd.DataFrame:
-    """As `points`: the dials over their values, rung by rung, and beside each its engine over a ladder of dt."""
+    """The columns of `summed`, and rung: the dials over their values, and their engines over a ladder of dt."""
     if not (measured.errors.kind == DIAL).any():
         return pd.DataFrame()
     found = summed(measured, DIAL, seed)
@@ -36,6 +36,22 @@ def dials(measured: Measured, seed: int) -> pd.DataFrame:
     names = found.engine + ":" + found.profile
     turned = [places.get(who, -1) for who in zip(names, found.change)]
     return found.assign(rung=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan)
+
+
+def pooled_dials(found: pd.DataFrame) -> pd.DataFrame:
+    """As `pooled`, of cost and error over those of the matched engine at the dt at which its dial is turned.
+
+    change is the value of the dial; a ladder of dt has none.
+    """
+    turned = found[found.change != PLAIN]
+    here = turned.groupby("scenario").dt_s.first().rename("here")
+    beside = found[(found.change == PLAIN) & (found.dt_s == found.scenario.map(here))]
+    keys = ["scenario", "engine"]
+    both = found.merge(beside[[*keys, "cost", "error"]], on=keys, suffixes=("", "_here"))
+    for of in ("cost", "error"):
+        both[of] /= both[f"{of}_here"]
+    parts = [pooled(group).assign(change=str(change)) for (_, change), group in both.groupby(["profile", "change"])]
+    return pd.concat(parts).sort_values("rung", kind="stable")
 
 
 def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
