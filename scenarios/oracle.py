@@ -103,7 +103,7 @@ def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:
 
 
 def answered_by(scenario: Scenario) -> str:
-    """The cheapest model that answers it exactly, which is what it has for its truth: one of the three above."""
+    """The cheapest model that answers it and is no player, which the harness takes for its truth: one of the three."""
     if scenario.truth is None:
         return NOTHING
     return HIT_BY_HIT if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM

@@ -55,7 +55,7 @@ QUICK = Effort(
         "free_fall", "head_on_equal_e09", "oblique_e1", "bouncing_ball_e1", "line_gas", "cradle_with_gaps",
         "ship_thrust", "asteroids",
     ),
-    seeds=16, most_steps=4_000, rounds=5, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000), patience=0.1,
+    seeds=16, most_steps=4_000, rounds=5, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000, 3000), patience=0.1,
     dial_scenes=("column_of_ten", "line_gas", "falling_box", "slide_on_incline"),
 )  # fmt: skip
 FULL = Effort(
