@@ -63,7 +63,7 @@ def places(text: str, points: list[list[float]]) -> list[tuple[Box, list[float]]
         points[::-1], FAR, ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (1, 1), (-1, -1), (-1, 1))
     ):
         left = x + far if right > 0 else x - far - wide if right < 0 else x - wide / 2
-        top = y + far - 4 if down > 0 else y - far - HIGH + 4 if down < 0 else y - HIGH / 2
+        top = y + far if down > 0 else y - far - HIGH if down < 0 else y - HIGH / 2
         found.append((Box(left, top, left + wide, top + HIGH), [x, y]))
     return found
 

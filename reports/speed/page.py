@@ -98,6 +98,9 @@ def section_of(results: Results, scene: str) -> Section:
     reached = results.reached[results.reached.scenario == scene]
     seeds = int(points.seeds.max())
     spread = f" The error is the median over {seeds} draws, its bar the 95 % bootstrap interval." if seeds > 1 else ""
+    noise = results.noise_summary(scene)
+    low, high = (style.number(noise.get(end, np.nan)) for end in ("low", "high"))
+    floor = f" Noise floor: half of the players read {low} to {high} against themselves." if noise["pairs"] else ""
     wrapping = (points.wrapping > 0).any()
     apart = (
         " Setting disks onto the opposite edge, which an engine without such an edge leaves to Python, is not in it: "
@@ -108,7 +111,8 @@ def section_of(results: Results, scene: str) -> Section:
     drawings = {
         "speed": Drawing(
             "Error against cost",
-            f"A point is one dt; halving it goes right.{spread} Time: median of the rounds, bars the quartiles.{apart}",
+            f"A point is one dt; halving it goes right.{spread} Time: median of the rounds, bars the quartiles."
+            f"{floor}{apart}",
             charts.speed(points),
         ),
         "matched": Drawing(
