@@ -66,7 +66,7 @@ def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(tmp_path: Path, mo
     assert first.returncode == 130
     assert "ask again with --resume" in first.stderr
     assert second.returncode == 0, second.stderr
-    assert "1 task had ended" in second.stderr
+    assert "that had ended: 1" in second.stderr
     assert len(pd.read_csv(tmp_path / "out" / "speed_errors.csv")) == len(QUICK.ladder(scenario("free_fall")))
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 

@@ -113,10 +113,10 @@ def dials(points: pd.DataFrame, relative: bool = False) -> go.Figure:
 
 def turned(what: str, row: dict[str, Any], relative: bool) -> str:
     """What hovering over a point of a dial says."""
-    value = f"{what} {row['change']}" if what else f"dt / {2.0 ** (row['rung'] - 2):g}" if relative else "dt"
+    value = f"{what} {row['change']}<br>" if what else f"dt / {2.0 ** (row['rung'] - 2):g}<br>" if relative else ""
     if not relative:
-        return f"{value}<br>{told(row)}"
-    return f"{value}<br>{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
+        return value + told(row)
+    return f"{value}{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
 
 
 def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:

@@ -89,7 +89,7 @@ def carry_out(plan: Plan, command: str, journal: Journal, resume: bool) -> tuple
     with Progress() as progress:
         kept = Kept(journal, asked | decides, resume)
         if resume:
-            progress.note(f"{len(kept)} task{'s' * (len(kept) != 1)} had ended")
+            progress.note(f"tasks of the same plan and versions that had ended: {len(kept)}")
         results = Results(plan, measure(plan, progress, kept))
         progress.say("writing the tables and the page")
         return results, header | {"seconds": progress.seconds, "load": results.measured.busy}
