@@ -1,7 +1,7 @@
 """The figures in the repository and the README's picture: uv run python .ci/benchmarks.py, alone on the machine.
 
-It takes some ten minutes on two cores, says so, and goes on where it was interrupted. With --check it measures a few
-ratios anew, in a few seconds, and says, by its exit status too, whether they are still what is kept.
+It takes about a quarter of an hour on two cores, says so, and goes on where it was interrupted. With --check it
+measures a few ratios anew, in a few seconds, and says, by its exit status too, whether they are still what is kept.
 """
 
 import subprocess
