@@ -10,15 +10,15 @@ from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).parent.parent))  # the tests are not installed
 
-from labels import named
+from labels import MARGIN, named
 
 from reports.game.command import FIRST
 from reports.game.server import Game, application
 from reports.lessons.pages import ROUTES
 from tests.browsing import chromium, served
 
-DRAW = """(annotations) => Plotly.relayout(document.querySelector('#pooled .plot'),
-  { annotations, 'font.size': 13, autosize: true })"""
+DRAW = """([annotations, right]) => Plotly.relayout(document.querySelector('#pooled .plot'),
+  { annotations, 'margin.r': right, 'font.size': 13, autosize: true })"""
 SEE = """() => {
   const { data, _fullLayout: { xaxis, yaxis, _size } } = document.querySelector('#pooled .plot');
   const lines = data.map((trace) => ({
@@ -46,9 +46,9 @@ def pooled_chart(browser: Browser, page: str) -> None:
     tab.goto(Path(page).resolve().as_uri())
     tab.add_style_tag(content="#index,.legend{display:none!important}.stage{grid-template-columns:1fr!important}")
     tab.locator("#pooled .chart .main-svg").first.wait_for()
-    tab.evaluate(DRAW, [])  # anew, to the width that it has without the legend
+    tab.evaluate(DRAW, [[], MARGIN])  # anew, to the width that it has without the legend
     seen = tab.evaluate(SEE)
-    tab.evaluate(DRAW, named(seen["lines"], (seen["width"], seen["height"])))
+    tab.evaluate(DRAW, [named(seen["lines"], (seen["width"], seen["height"])), MARGIN])
     clip(tab, "speed.png", "#pooled .chart", "#pooled .chart")
 
 
