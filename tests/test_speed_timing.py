@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,6 +10,8 @@ import pandas as pd
 import pytest
 
 from reports.speed import ladder, sizes
+from reports.speed.effort import QUICK
+from reports.speed.estimate import READY, all_rounds
 from reports.speed.timing import FEWEST_ROUNDS, WARM_UP, Sample, Spent, Timed, interleaved, summed_up
 from scenarios.catalogue import scenario
 from scenarios.model import Scene
@@ -74,6 +77,15 @@ def test_what_is_slow_sits_out_the_rounds_left_but_not_the_first():
 
     assert rounds["9.0"] == list(range(WARM_UP, FEWEST_ROUNDS))
     assert rounds["0.1"] == list(range(WARM_UP, 8))
+
+
+@pytest.mark.parametrize("run", [0.0019, 0.0099, 0.03, 9.0])
+def test_the_estimate_counts_the_rounds_that_are_taken(run: float):
+    """All of them, those that the budget is enough for, and those that are always taken."""
+    effort = replace(QUICK, rounds=8, budget=0.05)
+    samples = interleaved([fixed(run)], effort.rounds, effort.budget, seed=0)
+
+    assert all_rounds(run, effort) == pytest.approx(len(samples) * (run + READY))
 
 
 def test_a_sample_is_filled_with_runs_and_told_per_unit():

@@ -57,8 +57,8 @@ def seconds_to_time(player: Player, reach: Reach, effort: Effort) -> float:
 def all_rounds(run: float, effort: Effort) -> float:
     """s, of samples of one run of so many s, or more to fill them, as `timing.interleaved` takes them."""
     sample = max(run, LEAST)
-    rounds = min(effort.rounds, max(FEWEST_ROUNDS, ceil(effort.budget / sample)))
-    return (rounds - WARM_UP) * (sample + READY)
+    rounds = min(effort.rounds - WARM_UP, max(FEWEST_ROUNDS - WARM_UP, ceil(effort.budget / sample)))
+    return rounds * (sample + READY)
 
 
 def seconds_of_sizes(effort: Effort) -> float:
