@@ -1,10 +1,11 @@
-"""What an engine costs with one thing more, or one less, than its matched profile: a row a feature."""
+"""What an engine costs with one thing more, or one less, than its matched profile: a row a feature, or a dial."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
+from types import FunctionType, SimpleNamespace
 from typing import Any
 
 from adapters.engine import Engine
@@ -61,11 +62,21 @@ def _float32() -> Engine:
     return Reference(crowd, precision=np.float32)
 
 
-def _all_pairs() -> Engine:
+def _always_listing() -> Engine:
     from adapters.reference import Reference
-    from reference_impl import exercise
 
-    return Reference(exercise)
+    return Reference(listing())
+
+
+@cache
+def listing() -> Any:
+    """The reference's solver for crowds with a list of neighbours for the fewest disks, too: the same source."""
+    from numba import njit
+
+    from reference_impl import crowd
+
+    advance = FunctionType(crowd.advance.py_func.__code__, vars(crowd) | {"CROWD": 0})
+    return SimpleNamespace(__name__="crowd", advance=njit(error_model="numpy")(advance))
 
 
 def _rows(engine: str, make: Callable[..., Engine], changes: dict[str, dict[str, Any]]) -> list[Feature]:
@@ -74,7 +85,7 @@ def _rows(engine: str, make: Callable[..., Engine], changes: dict[str, dict[str,
 
 FEATURES: tuple[Feature, ...] = (
     Feature("reference:exercise", "kept in float32", _float32),
-    Feature("reference:exercise", "all pairs, never a list", _all_pairs),
+    Feature("reference:exercise", "broad phase, always", _always_listing),
     *_rows("pymunk:matched", changed_pymunk, {
         "10 iterations, not 50": {"iterations": 10},
         "200 iterations, not 50": {"iterations": 200},
@@ -103,3 +114,38 @@ FEATURES: tuple[Feature, ...] = (
 )  # fmt: skip
 """What an engine cannot be changed in is not here: pymunk has no CCD and always starts warm, Box2D 3.1 hides its
 warm start, and no outside engine lets its broad phase be switched off."""
+
+
+@dataclass(frozen=True)
+class Dial:
+    """What an engine lets one spend time on instead of smaller steps.
+
+    Attributes:
+        engine: the row of `ENGINES` it is turned in, `engine:profile`.
+        what: the number that is turned.
+        change: the engine by its parameters.
+        parameter: the name of that number among them.
+        values: from cheap to dear.
+    """
+
+    engine: str
+    what: str
+    change: Callable[..., Engine]
+    parameter: str
+    values: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """The engine and a profile that says what is turned, as `reports.style` knows it."""
+        return f"{self.engine}+{self.what}"
+
+    def at(self, value: int) -> Callable[[], Engine]:
+        """How to make the engine with this value."""
+        return partial(self.change, **{self.parameter: value})
+
+
+DIALS: tuple[Dial, ...] = (
+    Dial("pymunk:matched", "iterations", changed_pymunk, "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
+    Dial("box2d:matched", "iterations", changed_box2d, "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
+    Dial("box2d_v3:matched", "substeps", changed_box2d_v3, "substeps", (1, 2, 4, 8, 16)),
+)

@@ -191,13 +191,14 @@ def speed(
     scenes: Scenes = None,
     engine: Engines = None,
     full: Annotated[bool, typer.Option("--full", help="All scenarios, finer steps, more rounds, more disks.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Keep what an interrupted run in --out has ended.")] = False,
     seed: Seed = 0,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("reports/out/speed"),
 ) -> None:
     """Set error against time for every engine: leave the machine alone meanwhile."""
     from reports.speed.command import run_speed
 
-    run_speed(scenes or [], engine or [], full, seed, out, "crosscheck " + shlex.join(sys.argv[1:]))
+    run_speed(scenes or [], engine or [], full, resume, seed, out, "crosscheck " + shlex.join(sys.argv[1:]))
 
 
 @app.command()

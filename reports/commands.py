@@ -24,6 +24,7 @@ from reports.tables import NotCompared
 from reports.terminal import Progress, print_summary
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 from scenarios.files import SceneFileError
+from scenarios.oracle import answered_by
 
 
 def finish(report: Report, out: Path) -> NoReturn:
@@ -80,8 +81,8 @@ def explain(what: str) -> None:
 
 
 def _line(name: str) -> str:
-    drawn = " (drawn from --seed)" if name in DRAWN else ""
-    return scenario(name).asks + drawn
+    one = scenario(name)
+    return f"{one.asks} ({answered_by(one)}{'; drawn from --seed' if name in DRAWN else ''})"
 
 
 def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int) -> list[str]:

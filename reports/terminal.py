@@ -15,9 +15,11 @@ from adapters.play import STATUSES
 from reports import overview
 from reports.report import Report
 
+QUIET = 30.0  # s between two lines where there is no terminal that a bar could be drawn on
+
 
 class Progress:
-    """A bar that says what runs, how long one takes and how long all will."""
+    """A bar that says what runs, how long one takes and how long all will; in a log, a line now and then."""
 
     def __init__(self) -> None:
         self.bar = Bar(
@@ -38,9 +40,14 @@ class Progress:
         """Say what is being done."""
         self.bar.update(self.task, description=what)
 
+    def note(self, sentence: str) -> None:
+        """A line that stays."""
+        self.bar.console.print(sentence, highlight=False, markup=False)
+
     def start(self, missing: int, total: int, what: str = "") -> None:
         """From now on count to `total`, of which some may be `missing` only."""
         self.counted, self.since = 0, perf_counter()
+        self.told, self.missing = self.since, missing
         what = what or "starting workers (the first run compiles: some 20 s more)"
         self.bar.reset(self.task, total=total, completed=total - missing, description=what, each="")
 
@@ -50,7 +57,11 @@ class Progress:
             why = f" ({reason})" if status not in ("unsupported", "ok") else ""
             self.bar.console.print(f"  {what}: {status}{why}", style="yellow", highlight=False, markup=False)
         self.counted += 1
-        each = (perf_counter() - self.since) / self.counted
+        now = perf_counter()
+        each = (now - self.since) / self.counted
+        if not self.bar.console.is_terminal and now - self.told > QUIET:
+            self.told = now
+            self.note(f"{what}: {self.counted} of {self.missing}, {each:.2g} s each")
         self.bar.update(self.task, description=what, advance=1, each=f"{each:.2g} s each")
 
     @property

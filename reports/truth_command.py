@@ -16,7 +16,7 @@ from reports.scenes import open_scene
 from reports.style import number
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
-from scenarios.oracle import OracleTruth, TruthRecord
+from scenarios.oracle import CLOSED_FORM, OracleTruth, TruthRecord
 
 SHOWN = 10  # hits at the start and at the end
 HEADINGS = ("t, s", "disk", "other", "impulse, N s", "cos of impact angle")
@@ -56,7 +56,7 @@ def record_of(scenario: Scenario) -> TruthRecord:
         valid_until=truth.valid_until,
         error_bound=truth.error_bound,
         bits=53,
-        method="closed form",
+        method=CLOSED_FORM,
         reason=truth.reason,
     )
 

@@ -24,6 +24,7 @@ LEAST_GAIN = 1.05  # times as far must half as many bits again reach, or more wi
 SPARE, LEFT = 1.3, 64  # times as many bits as the rate so far asks for, and so many to be left for the accuracy
 MOST_DISKS = 200
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
+CLOSED_FORM, HIT_BY_HIT, NOTHING = "closed form", "hit by hit, in many digits", "nothing"
 ACCURACY = 1e-12  # m; two precisions that differ by more have parted
 
 
@@ -99,6 +100,13 @@ def parting(scenario: Scenario, record: TruthRecord, scene: Scene) -> float:
 def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:
     """Times (k,) s -> the exact `Trajectory` of `scenario` at those: see `OracleTruth`."""
     return OracleTruth(scenario)
+
+
+def answered_by(scenario: Scenario) -> str:
+    """The cheapest model that answers it and is no player, which the harness takes for its truth: one of the three."""
+    if scenario.truth is None:
+        return NOTHING
+    return HIT_BY_HIT if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
 
 
 def with_oracle(scenario: Scenario) -> Scenario:

@@ -18,12 +18,14 @@ from reports.cli import app
 from reports.machine import about
 from reports.speed import charts, figures, tables
 from reports.speed.effort import QUICK
-from reports.speed.measure import Measured, Plan, measure
+from reports.speed.measure import Measured, measure
 from reports.speed.page import write_page
 from reports.speed.pareto import FAILED, UNREACHABLE
+from reports.speed.plan import Plan
 from reports.speed.results import Results
 from reports.terminal import Progress
 from scenarios.catalogue import scenario
+from scenarios.oracle import CLOSED_FORM, HIT_BY_HIT
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
@@ -32,7 +34,8 @@ FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--
 SCENES = ("head_on_equal_e09", "asteroids")
 PLAYERS = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
 LITTLE = replace(QUICK, seeds=3, most_steps=1000, rounds=2, budget=0.0, sizes=(3, 10, 100, 1000), patience=1.0,
-    feature_scenes=("bouncing_ball_e1",), budget_scenes=("head_on_equal_e09",))  # fmt: skip
+    feature_scenes=("bouncing_ball_e1",), dial_scenes=("slide_on_incline", "falling_box"),
+    budget_scenes=("head_on_equal_e09",))  # fmt: skip
 SAID = {"load": 0.0, "seconds": 1.0}
 
 
@@ -100,12 +103,16 @@ def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Result
 def test_the_front_of_a_chart_is_the_event_driven_player(results: Results):
     """In a head-on hit it is both cheapest and exact, so that nobody else is on the front."""
     points = results.points[results.points.scenario == SCENES[0]]
-    front = next(trace for trace in charts.speed(points).data if trace.name == charts.FRONT)
+    drawn = {trace.name: trace for trace in charts.speed(points).data}
+    front, steps = drawn[charts.FRONT], drawn[charts.FRONT_OF_STEPS]
     mine = points[points.engine == "event_driven"]
 
     assert mine.error.max() < charts.LOWEST
-    assert set(front.y) == {charts.LOWEST}
-    assert min(front.x) == pytest.approx(mine.cost.min(), rel=1e-3)
+    assert len(front.x) == 3  # it, and the edge up and to the right of it
+    assert front.y[1] == front.y[2] == charts.LOWEST
+    assert front.x[0] == front.x[1] == pytest.approx(mine.cost.min(), rel=1e-3)
+    assert min(steps.x) > min(front.x)
+    assert min(steps.y) > charts.LOWEST
 
 
 def test_what_cannot_be_reached_is_above_what_costs(results: Results):
@@ -151,12 +158,37 @@ def test_float32_breaks_what_it_must(results: Results):
     assert abs(row.error_ratio.iloc[0] - 1) > 1e-3
 
 
+def test_a_dial_meets_its_engine_where_it_is_matched(results: Results):
+    """50 iterations are what pymunk has as matched: the same error, to the bit, and 1 of 1 where all are pooled."""
+    table = results.dials
+    here = table[(table.engine == "pymunk") & (table.scenario == "slide_on_incline")]
+    turned = here[here.change == "50"].iloc[0]
+    same = here[(here.change == "") & (here.dt_s == turned.dt_s)].iloc[0]
+    pooled = results.pooled_dials
+
+    assert turned.error == same.error
+    assert pooled[pooled.change == "50"].error.iloc[0] == 1.0
+    assert {dial.name for dial in results.plan.dials} == {"pymunk:matched+iterations"}
+    assert table[table.scenario == "falling_box"].seeds.eq(3).all()
+
+
+def test_a_line_a_dial_goes_over_all_its_values_from_cheap_to_dear(results: Results):
+    """Its ends are named; beside it the ladder of its engine, from four times its dt to an eighth of it."""
+    points = results.dials[results.dials.scenario == "falling_box"]
+    drawn = {trace.name: trace for trace in charts.dials(points).data}
+    dial = drawn["pymunk:matched+iterations"]
+
+    assert len(dial.x) == len(dial.y) == 8
+    assert (dial.texttemplate[0], dial.texttemplate[-1]) == ("1", "200")
+    assert len(drawn["pymunk:matched"].x) == 6
+
+
 def test_the_cheapest_model_is_named_for_every_scene(results: Results):
     """A closed form where the truth is one; the asteroids are answered hit by hit."""
     models = results.models.set_index("scenario")
 
-    assert models.loc[SCENES[0]].truth == "closed form"
-    assert models.loc["asteroids"].truth == "hit by hit, in many digits"
+    assert models.loc[SCENES[0]].truth == CLOSED_FORM
+    assert models.loc["asteroids"].truth == HIT_BY_HIT
     assert models.loc["asteroids"].player == "event_driven:float64"
     assert set(models.model) <= {"closed form", "hit to hit, float64"}
 
@@ -211,7 +243,7 @@ def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
         for plot in tab.locator(".plot").all():
             plot.scroll_into_view_if_needed()
             plot.locator(".main-svg").first.wait_for()
-        assert tab.locator(".plot").count() == 2 + 2 + 1 + 2 * len(SCENES)
+        assert tab.locator(".plot").count() == 2 + 2 + 3 + 1 + 2 * len(SCENES)
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
         assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with habits: three players; two switched off
         assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0

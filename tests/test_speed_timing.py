@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,8 +10,11 @@ import pandas as pd
 import pytest
 
 from reports.speed import ladder, sizes
+from reports.speed.effort import QUICK
+from reports.speed.estimate import READY, all_rounds
 from reports.speed.timing import FEWEST_ROUNDS, WARM_UP, Sample, Spent, Timed, interleaved, summed_up
 from scenarios.catalogue import scenario
+from scenarios.model import Scene
 from tests.clockwork import Sleeper
 
 EACH = 1e-3
@@ -75,6 +79,15 @@ def test_what_is_slow_sits_out_the_rounds_left_but_not_the_first():
     assert rounds["0.1"] == list(range(WARM_UP, 8))
 
 
+@pytest.mark.parametrize("run", [0.0019, 0.0099, 0.03, 9.0])
+def test_the_estimate_counts_the_rounds_that_are_taken(run: float):
+    """All of them, those that the budget is enough for, and those that are always taken."""
+    effort = replace(QUICK, rounds=8, budget=0.05)
+    samples = interleaved([fixed(run)], effort.rounds, effort.budget, seed=0)
+
+    assert all_rounds(run, effort) == pytest.approx(len(samples) * (run + READY))
+
+
 def test_a_sample_is_filled_with_runs_and_told_per_unit():
     """Runs of 0.1 ms fill 1 ms with ten; the cost is per unit of amount, of which a run has two."""
     sample = interleaved([fixed(1.01e-4)], 1, 1.0, seed=0)[0]
@@ -100,6 +113,24 @@ def test_what_grows_as_a_power_of_n_gives_the_power_and_stops_where_it_would_tak
     assert sizes.exponent(n, n**1.5) == pytest.approx((1.5, 1.5, 1.5))
     assert sizes.foreseen(course, 100_000) == pytest.approx(1e5**1.5)
     assert np.isnan(sizes.exponent(n[:3], n[:3])).all()
+
+
+def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
+    """A gas that loses energy falls asleep, so whoever took more steps of it would look cheaper."""
+    ages: list[int] = []
+
+    class Ageing(Sleeper):
+        def load(self, scene: Scene, dt: float) -> None:
+            super().load(scene, dt)
+            ages.append(0)
+
+        def step(self, count: int = 1) -> None:
+            ages[-1] += count
+
+    sizes.costs({"quick:own": partial(Ageing, 0.0)}, (10,), 12, 1.0, patience=1.0, seed=0)
+
+    assert len(ages) > 12
+    assert max(ages) <= sizes.FRESH + sizes.WARM_STEPS
 
 
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_told_of():

@@ -11,10 +11,11 @@ import plotly.graph_objects as go
 
 from reports import style
 from reports.charts import ZERO, decades, shortened
+from reports.speed.models import KINDS
 from reports.speed.pareto import ACCURACIES, FAILED, UNREACHABLE, front
 from scenarios.model import Array
 
-FRONT = "Pareto front"
+FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"
 COST, ERROR = "engine time (µs per simulated second)", "error (radii)"
 EDGE = 0.55  # decades between the last gridline and what is drawn at the edge
 LOWEST = 1e-7  # radii: what is smaller stands there, as a tenth of the finest accuracy asked for is as good as exact
@@ -26,7 +27,7 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis(COST, drawn.cost.to_numpy(float))
     y_axis = error_axis(drawn.error.to_numpy(float))
-    traces = [front_of(drawn)]
+    traces = fronts(drawn, x_axis, y_axis)
     for engine, profile, group in by_player(points):
         fine = group[group.cost.notna() & np.isfinite(group.error)]
         spreads = {} if tall else {
@@ -59,16 +60,63 @@ def at_the_edge(
     return traces
 
 
-def front_of(drawn: pd.DataFrame) -> dict[str, Any]:
-    """The points nobody beats, joined by a broad line behind everybody; what stands at `LOWEST` counts as equal."""
+def fronts(drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any]) -> list[dict[str, Any]]:
+    """Behind everybody, the front of all and, narrow, that of those who take steps; together where they are one."""
+    steps = drawn[~drawn.engine.isin(KINDS)]
+    return [front_of(drawn, FRONT, 9, x_axis, y_axis), front_of(steps, FRONT_OF_STEPS, 3, x_axis, y_axis)]
+
+
+def front_of(drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any], y_axis: dict[str, Any]) -> dict:
+    """The edge of what the points that nobody beats beat: all above and right of it is slower or worse than one.
+
+    What stands at `LOWEST` counts as equal.
+    """
     cost, error = drawn.cost.to_numpy(float), np.maximum(drawn.error.to_numpy(float), LOWEST)
     best = front(cost, error)
+    x, y = cost[best], error[best]
+    if best:
+        right, top = 10 ** x_axis["range"][1], 10 ** y_axis["range"][1]
+        x, y = np.array([x[0], *x, right]), np.array([top, *y, y[-1]])
     colour = style.look(style.TRUTH).light
     return {
-        "type": "scatter", "x": shortened(cost[best]), "y": shortened(error[best]), "name": FRONT,
-        "mode": "lines+markers", "line": {"color": colour, "width": 9, "shape": "hv"},
-        "marker": {"color": colour, "size": 20, "symbol": "circle"}, "opacity": 0.16, "hoverinfo": "skip",
+        "type": "scatter", "x": shortened(x), "y": shortened(y), "name": name, "mode": "lines+markers",
+        "line": {"color": colour, "width": width, "shape": "hv"}, "opacity": 0.16, "hoverinfo": "skip",
+        "marker": {"color": colour, "size": [0, *[20] * len(best), 0], "symbol": "circle", "line": {"width": 0}},
     }  # fmt: skip
+
+
+def dials(points: pd.DataFrame, relative: bool = False) -> go.Figure:
+    """Error against cost, a line a dial over its values, and one its engine over a ladder of dt.
+
+    relative: both are over those of the engine as it is matched, at the dt at which the dial is turned.
+    """
+    drawn = points[points.cost.notna() & np.isfinite(points.error)]
+    x_axis = log_axis("time / time as matched" if relative else COST, drawn.cost.to_numpy(float))
+    y_axis = (log_axis("error / error as matched", drawn.error.to_numpy(float)) if relative
+              else error_axis(drawn.error.to_numpy(float)))  # fmt: skip
+    traces = []
+    for engine, profile, group in by_player(drawn):
+        what = profile.partition("+")[2]
+        text = [turned(what, row, relative) for row in records(group)]
+        error = group.error if relative else group.error.clip(lower=LOWEST)
+        trace = line(engine, profile, group.cost, error, text)
+        if what:  # the first and the last are named
+            values = group.change.tolist()
+            named = [value if k in (0, len(values) - 1) else "" for k, value in enumerate(values)]
+            trace |= {"mode": "lines+markers+text", "texttemplate": named, "textposition": "top center"}
+            trace["textfont"] = {"color": trace["line"]["color"], "size": 11}
+        traces.append(trace)
+    lost = points[~(points.cost.notna() & np.isfinite(points.error))]
+    traces += [] if relative else at_the_edge(lost, drawn, x_axis, y_axis)
+    return figure(traces, x_axis, y_axis, TALLEST if relative else TALL)
+
+
+def turned(what: str, row: dict[str, Any], relative: bool) -> str:
+    """What hovering over a point of a dial says."""
+    value = f"{what} {row['change']}<br>" if what else f"dt / {2.0 ** (row['rung'] - 2):g}<br>" if relative else ""
+    if not relative:
+        return value + told(row)
+    return f"{value}{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
 
 
 def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
@@ -124,9 +172,11 @@ def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
     rows = list(dict.fromkeys(zip(table.engine, table.profile, table.change)))[::-1]
     values = table[ratio].to_numpy(float)
     known = np.append(values[np.isfinite(values) & (values > 0)], [0.9, 1.1])
+    low, high = np.log10(known.min()) - 0.1, np.log10(known.max()) + 0.1
+    ticks = TICKS if high - low < 2 else TICKS[::3]  # on a phone there is no room for more
     x_axis: dict[str, Any] = {
-        "title": title, "type": "log", "range": [np.log10(known.min()) - 0.1, np.log10(known.max()) + 0.1],
-        "tickvals": TICKS, "ticktext": [style.number(tick) for tick in TICKS],
+        "title": title, "type": "log", "range": [low, high],
+        "tickvals": ticks, "ticktext": [style.number(tick) for tick in ticks],
     }  # fmt: skip
     y_axis = {
         "title": "", "tickvals": list(range(len(rows))), "range": [-0.7, len(rows) - 0.3],
@@ -149,7 +199,7 @@ def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
     return figure(traces, x_axis, y_axis, 110 + PER_ROW * len(rows))
 
 
-TICKS = sorted(a * 10.0**b for b in range(-8, 9) for a in (1, 2, 5) if a == 1 or -1 <= b <= 0)
+TICKS = [a * 10.0**b for b in range(-8, 9) for a in (1, 2, 5)]
 
 
 def line(engine: str, profile: str, x: Any, y: Any, text: Sequence[str], more: dict[str, Any] | None = None) -> dict:
@@ -192,8 +242,6 @@ def told(row: dict[str, Any]) -> str:
     lines = [f"{at(row)}error {error} radii".strip()]
     if np.isfinite(row["cost"]):
         lines.append(f"{spread(row)} µs/s")
-    if np.isfinite(row["best"]):
-        lines.append(f"fastest {style.number(row['best'])} µs/s")
     if np.isfinite(row["idle"]):
         lines.append(f"as many steps without anything to do {style.number(row['idle'])} µs/s")
     if row["wrapping"] > 0:
@@ -202,8 +250,9 @@ def told(row: dict[str, Any]) -> str:
 
 
 def spread(row: dict[str, Any]) -> str:
-    """Median and quartiles of a cost."""
-    return f"{style.number(row['cost'])} ({style.number(row['low'])} to {style.number(row['high'])})"
+    """Median, quartiles and, of one scene's samples, the fastest of a cost."""
+    fastest = f", fastest {style.number(row['best'])}" if np.isfinite(row["best"]) else ""
+    return f"{style.number(row['cost'])} ({style.number(row['low'])} to {style.number(row['high'])}{fastest})"
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:

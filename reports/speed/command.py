@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
@@ -16,14 +17,17 @@ from rich.table import Table
 
 from reports import style
 from reports.commands import checked_engines, checked_scenes
-from reports.exits import DONE, FAILED, INTERRUPTED, refuse, say
-from reports.folders import FolderTaken, may_write, replace_folder
+from reports.exits import DONE, FAILED, broken_off, refuse, say
+from reports.folders import FolderTaken, held, may_write, part_of, replace_folder
+from reports.journal import JOURNAL, Journal
 from reports.machine import about
 from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
-from reports.speed.measure import Plan, measure
+from reports.speed.kept import Kept
+from reports.speed.measure import measure
 from reports.speed.page import write_page
 from reports.speed.pareto import ACCURACIES, UNREACHABLE
+from reports.speed.plan import Plan
 from reports.speed.results import Results
 from reports.terminal import Progress
 
@@ -32,55 +36,65 @@ SHORT = {UNREACHABLE: "never"}
 
 
 def run_speed(
-    scenes: Sequence[str], engines: Sequence[str], full: bool, seed: int, out: Path, command: str
+    scenes: Sequence[str], engines: Sequence[str], full: bool, resume: bool, seed: int, out: Path, command: str
 ) -> NoReturn:
-    """Measure and report into `out`; exits 0, 1 (nothing could be measured), 2 or 130."""
+    """Measure and report into `out`, or go on with what was interrupted there; exits 0, 1 (no result), 2 or 130."""
     effort = FULL if full else QUICK
     named = checked_scenes(scenes, [], False, seed)  # none named: all that the effort has, sizes and features besides
     effort = replace(effort, scenes=tuple(named)) if named else effort
     plan = Plan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
     out = out.resolve()
-    part = out.with_name(f"{out.name}.part-{os.getpid()}")
+    part = part_of(out)
     try:
-        may_write(out, is_ours, "crosscheck speed did not make")
-        part.mkdir(parents=True)
+        for folder in (out, part):
+            may_write(folder, is_ours, "crosscheck speed did not make")
+        part.mkdir(parents=True, exist_ok=True)
     except FolderTaken as fault:
         refuse([str(fault)])
     except OSError as fault:
         refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
     try:
-        results, header = carry_out(plan, command)
-        if not results.measured.errors.size:
-            part.rmdir()
-            for what, why in results.left_out:
-                say(f"{what}: {why}")
-            say("no scene that was asked for has an exact answer, so there is no error to set against time")
-            sys.exit(FAILED)
-        write_all(part, results, header)
-        replace_folder(part, out)
-    except KeyboardInterrupt:
-        say("\nInterrupted. Nothing was written: times of a part of the rounds compare nothing.")
-        if not any(part.iterdir()):
-            part.rmdir()
-        sys.exit(INTERRUPTED)
-    except OSError as fault:
-        say(f"cannot write to {part}: {fault.strerror or fault}")
-        sys.exit(FAILED)
+        with (
+            broken_off(part, lambda: f"What has ended is kept in {part}: ask again with --resume"),
+            held(part, out) as journal,
+        ):
+            results, header = carry_out(plan, command, journal, resume)
+            if not results.measured.errors.size:
+                nothing_measured(part, results)
+            write_all(part, results, header)
+            replace_folder(part, out)
+    except FolderTaken as fault:
+        refuse([str(fault)])
     print_summary(results, str(out / PAGE))
     sys.exit(DONE)
 
 
-def carry_out(plan: Plan, command: str) -> tuple[Results, dict[str, Any]]:
+def nothing_measured(part: Path, results: Results) -> NoReturn:
+    """Leave nothing behind, and say why there is no answer to set a time against; exits 1."""
+    shutil.rmtree(part)
+    for what, why in results.left_out:
+        say(f"{what}: {why}")
+    say("no scene that was asked for has an exact answer, so there is no error to set against time")
+    sys.exit(FAILED)
+
+
+def carry_out(plan: Plan, command: str, journal: Journal, resume: bool) -> tuple[Results, dict[str, Any]]:
     """All that was measured, and the header that tables and page carry."""
     header = about(command, plan.seed)
+    asked = {"scenes": plan.scenes, "engines": plan.engines, "effort": asdict(plan.effort), "whole": plan.whole}
+    decides = {key: header[key] for key in ("seed", "versions", "machine")}
     with Progress() as progress:
-        results = Results(plan, measure(plan, progress))
+        kept = Kept(journal, asked | decides, resume)
+        if resume:
+            progress.note(f"tasks of the same plan and versions that had ended: {len(kept)}")
+        results = Results(plan, measure(plan, progress, kept))
+        progress.say("writing the tables and the page")
         return results, header | {"seconds": progress.seconds, "load": results.measured.busy}
 
 
 def is_ours(name: str) -> bool:
     """Whether a file of that name is of this command."""
-    return name.startswith("speed") or name == "machine.json"
+    return name.startswith("speed") or name in ("machine.json", JOURNAL)
 
 
 def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:

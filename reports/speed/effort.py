@@ -22,6 +22,7 @@ class Effort:
         budget: s of timing for one engine at one dt in one scene, beyond the first rounds.
         sizes: numbers of disks.
         patience: s a step may take before an engine drops out of the sizes.
+        dial_scenes: what iterations and substeps are turned up in: a stack, a crowd, a slide, and hits in a row.
         feature_scenes: what changed engines are measured in: three disks, a hit that thresholds matter to, one disk
             under gravity, many hits, and a stack at rest.
         budget_scenes: those in which it is asked what the errors are made of.
@@ -34,6 +35,7 @@ class Effort:
     budget: float
     sizes: tuple[int, ...]
     patience: float
+    dial_scenes: tuple[str, ...]
     budget_scenes: tuple[str, ...]
     feature_scenes: tuple[str, ...] = (
         "disk_between_static_disks", "slow_hit", "bouncing_ball_e1", "line_gas", "column_of_ten",
@@ -43,11 +45,11 @@ class Effort:
         """The seeds a scene is drawn from; one where it is not drawn."""
         return list(range(seed, seed + self.seeds)) if scene in DRAWN else [seed]
 
-    def ladder(self, scenario: Scenario) -> list[int]:
+    def ladder(self, scenario: Scenario) -> tuple[int, ...]:
         """Steps in a sample interval, doubling from the scenario's own coarsest."""
         first = scenario.substeps[0]
         rungs = [first * 2**k for k in range(MOST_RUNGS)]
-        return [k for n, k in enumerate(rungs) if n < FEWEST_RUNGS or k * scenario.samples <= self.most_steps]
+        return tuple(k for n, k in enumerate(rungs) if n < FEWEST_RUNGS or k * scenario.samples <= self.most_steps)
 
 
 QUICK = Effort(
@@ -55,13 +57,16 @@ QUICK = Effort(
         "free_fall", "head_on_equal_e09", "oblique_e1", "bouncing_ball_e1", "line_gas", "cradle_with_gaps",
         "ship_thrust", "asteroids",
     ),
-    seeds=16, most_steps=5_000, rounds=5, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000), patience=0.1,
+    seeds=16, most_steps=4_000, rounds=5, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000, 3000), patience=0.1,
+    dial_scenes=("column_of_ten", "falling_box", "slide_on_incline"),
     budget_scenes=(
         "free_fall", "head_on_equal_e09", "oblique_e1", "slow_hit", "mass_ratios", "wall_to_wall", "bouncing_ball_e1",
         "disk_between_static_disks", "line_gas", "cradle_with_gaps", "column_of_ten", "asteroids", "gas_of_100",
     ),
 )  # fmt: skip
 FULL = Effort(
-    scenes=tuple(SCENARIOS), seeds=16, most_steps=64_000, rounds=15, budget=0.5,
-    sizes=(3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000), patience=1.0, budget_scenes=tuple(SCENARIOS),
+    scenes=tuple(SCENARIOS), seeds=16, most_steps=16_000, rounds=15, budget=0.5,
+    sizes=(3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000), patience=1.0,
+    dial_scenes=("column_of_ten", "cradle_touching", "line_gas", "gas_of_100", "slide_on_incline"),
+    budget_scenes=tuple(SCENARIOS),
 )  # fmt: skip

@@ -5,56 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import chain
+from itertools import groupby
 from typing import Any
 
 import pandas as pd
 
 from adapters.engines import row_of
-from adapters.features import FEATURES, Feature
 from adapters.habits import HABITS
 from reports.machine import busy_cores
 from reports.runner import run_all
 from reports.speed import budget, ladder, models, sizes
-from reports.speed.effort import Effort
+from reports.speed.estimate import estimate
+from reports.speed.kept import Kept
+from reports.speed.plan import PLAIN, SCENE, Plan, Player, Reach, middle
 from reports.speed.timing import Sample
 from reports.terminal import Progress
 from reports.worker_process import Failure
 from scenarios.catalogue import DRAWN
 
 HANGS, ALL_ROUNDS = 600.0, 3600.0  # s a ladder and a timing may take: against what hangs, no limit of what is measured
-SCENE, FEATURE, SIZE, IDLE = "scene", "feature", "size", "idle"
-PLAIN = ""  # the change of an engine that is not changed
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What is asked for: scenes and engines by name, how much, from which seed, with how many workers.
-
-    whole: not only these scenes, but the changed engines and the numbers of disks, too.
-    """
-
-    scenes: Sequence[str]
-    engines: Sequence[str]
-    effort: Effort
-    seed: int
-    workers: int
-    whole: bool = True
-
-    @property
-    def features(self) -> list[Feature]:
-        """The rows of `FEATURES` for the engines that are asked for."""
-        return [feature for feature in FEATURES if self.whole and feature.engine in self.engines]
-
-    @property
-    def feature_scenes(self) -> tuple[str, ...]:
-        """Where the changed engines are measured, if any are."""
-        return self.effort.feature_scenes if self.features else ()
-
-    @property
-    def budget_scenes(self) -> tuple[str, ...]:
-        """Where errors are taken apart: in the scenes asked for, if any are."""
-        return self.effort.budget_scenes if self.whole else tuple(self.scenes)
+SIZE, IDLE, TRUTH = "size", "idle", "truth"
 
 
 @dataclass
@@ -65,7 +35,7 @@ class Measured:
         errors: kind, change, and the columns of `ladder.errors_of`.
         budget: the columns of `budget.budget_of`.
         samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, singly, round, place, cost, wrapping, runs;
-            cost in s per simulated second for scenes and features, in s a step for sizes and idle worlds.
+            cost in s per simulated second in a scene, in s a step for sizes and idle worlds.
         truths: as `models.closed_form` gives them.
         left_out: (what, reason) of what could not be measured.
         busy: cores that others kept busy when the timing began.
@@ -81,69 +51,60 @@ class Measured:
     busy: float = float("nan")
 
 
-def measure(plan: Plan, progress: Progress) -> Measured:
-    """Both passes of all that is planned."""
+def measure(plan: Plan, progress: Progress, kept: Kept | None = None) -> Measured:
+    """Both passes of all that is planned; what is `kept` of an interrupted measurement is not done again."""
     measured = Measured()
-    reaches = reach(plan, measured, progress)
-    scenes = [scene for scene in plan.scenes if reaches.get((scene, plan.seed))]
-    if scenes:
-        measure_errors(plan, scenes, reaches, measured, progress)
-        measure_budget(plan, reaches, measured, progress)
-        measure_times(plan, scenes, measured, progress)
+    reach = find_reach(plan, measured, progress)
+    players = list(plan.players(reach))
+    if any(player.kind == SCENE for player in players):
+        progress.note(estimate(plan, players, reach))
+        played = measure_errors(plan, players, measured, progress, kept)
+        measure_budget(plan, reach, measured, progress, kept)
+        measure_times(plan, played, measured, progress, kept)
     return measured
 
 
-def reach(plan: Plan, measured: Measured, progress: Progress) -> dict[tuple[str, int], int]:
+def find_reach(plan: Plan, measured: Measured, progress: Progress) -> Reach:
     """(scene, seed) -> how many sample intervals have an exact answer; those that have none are told of."""
-    wanted = dict.fromkeys((*plan.scenes, *plan.feature_scenes))
-    draws = [(scene, seed) for scene in wanted for seed in plan.effort.seeds_of(scene, plan.seed)]
-    draws += [(scene, plan.seed) for scene in plan.budget_scenes if scene not in wanted]
-    found = {}
-    drawn = {draw: partial(ladder.reach_of, *draw) for draw in draws if draw[0] in DRAWN}  # these may take seconds each
-    answers = [(draw, ladder.reach_of(*draw)) for draw in draws if draw not in drawn]
-    for (scene, seed), result in chain(answers, done(drawn, plan.workers, progress, "exact answer")):
-        found[scene, seed], why = (0, result.reason) if isinstance(result, Failure) else result
+    drawn = {draw: partial(ladder.reach_of, *draw) for draw in plan.draws if draw[0] in DRAWN}  # these may take long
+    results = {draw: ladder.reach_of(*draw) for draw in plan.draws if draw not in drawn}
+    results |= done(drawn, plan.workers, progress, "exact answer")
+    reach = {}
+    for (scene, seed), result in results.items():
+        reach[scene, seed], why = (0, result.reason) if isinstance(result, Failure) else result
         if why:
             measured.left_out.append((f"{scene}, seed {seed}", f"no exact answer: {why}"))
-    return found
+    return reach
 
 
-def measure_errors(plan: Plan, scenes: Sequence[str], reaches: Mapping[tuple[str, int], int],
-                   measured: Measured, progress: Progress) -> None:  # fmt: skip
-    """How far off every engine is in every scene at every dt of its ladder, and every changed engine at one dt."""
-    tasks: dict[tuple, Callable[[], list[dict]]] = {}
-    for scene in scenes:
-        for seed in plan.effort.seeds_of(scene, plan.seed):
-            if reaches[scene, seed]:
-                rungs = plan.effort.ladder(ladder.open_scene(scene, seed))
-                for name in plan.engines:
-                    make = row_of(name).make
-                    tasks[scene, seed, name, PLAIN] = partial(ladder.errors_of, scene, seed, name, make, rungs)
-    for scene, name, change, make in changed(plan):
-        rungs = [middle(scene)]
-        tasks[scene, plan.seed, name, change, FEATURE] = partial(ladder.errors_of, scene, plan.seed, name, make, rungs)
-    results = dict(done(tasks, plan.workers, progress, "error"))
+def measure_errors(
+    plan: Plan, players: Sequence[Player], measured: Measured, progress: Progress, kept: Kept | None
+) -> list[Player]:
+    """How far off all players are; returns those of the first seed, at the steps that they played to their end."""
+    tasks = {player.task: player.errors for player in players}
+    results = dict(done(tasks, plan.workers, progress, "error", kept=kept))
     rows: list[dict[str, Any]] = []
-    for key, task in tasks.items():
-        failed = isinstance(results[key], Failure)
-        kind = FEATURE if key[-1] == FEATURE else SCENE
-        for row in rung_by_rung(task, plan.workers) if failed else results[key]:
-            rows.append({"kind": kind, "change": key[3]} | row)
+    played = []
+    for player in players:
+        result = results[player.task]
+        found = rung_by_rung(player, plan.workers) if isinstance(result, Failure) else result
+        rows += ({"kind": player.kind, "change": player.change} | row for row in found)
+        if player.seed == plan.seed:
+            well = tuple(row["substeps"] for row in found if row["status"] == "ok")
+            played.append(player._replace(rungs=well))
     measured.errors = pd.DataFrame(rows)
+    return played
 
 
-def rung_by_rung(task: Callable[[], list[dict]], workers: int) -> list[dict]:
+def rung_by_rung(player: Player, workers: int) -> list[dict]:
     """A ladder whose worker died or hung once more, each rung by itself, so that the others are kept."""
-    assert isinstance(task, partial)
-    scene, seed, name, make, rungs = task.args
-    tasks = {k: partial(ladder.errors_of, scene, seed, name, make, [k]) for k in rungs}
     rows: list[dict[str, Any]] = []
-    for k, result in run_all(tasks, workers, HANGS):
+    for k, result in run_all({k: player._replace(rungs=(k,)).errors for k in player.rungs}, workers, HANGS):
         if isinstance(result, Failure):
-            engine, profile = name.split(":")
-            scenario = ladder.open_scene(scene, seed)
+            engine, profile = player.name.split(":")
+            scenario = ladder.open_scene(player.scene, player.seed)
             result = [{
-                "scenario": scenario.name, "seed": seed, "engine": engine, "profile": profile,
+                "scenario": scenario.name, "seed": player.seed, "engine": engine, "profile": profile,
                 "dt_s": scenario.dt(k), "substeps": k, "status": result.status, "reason": result.reason,
                 "error_radii": float("inf"), "change_radii": float("nan"),
             }]  # fmt: skip
@@ -151,120 +112,117 @@ def rung_by_rung(task: Callable[[], list[dict]], workers: int) -> list[dict]:
     return sorted(rows, key=lambda row: row["substeps"])
 
 
-def measure_budget(plan: Plan, reaches: Mapping[tuple[str, int], int], measured: Measured, progress: Progress) -> None:
+def measure_budget(plan: Plan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None) -> None:
     """What the errors are made of, of the engines whose habits are known, at the middle dt."""
     tasks = {
-        (scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
-        for scene in plan.budget_scenes for name in plan.engines if name in HABITS and reaches[scene, plan.seed]
+        ("budget", scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
+        for scene in plan.budget_scenes for name in plan.engines if name in HABITS and reach[scene, plan.seed]
     }  # fmt: skip
-    results = dict(done(tasks, plan.workers, progress, "parts of the error"))
-    for key, result in results.items():
+    results = dict(done(tasks, plan.workers, progress, "parts of the error", kept=kept))
+    for task, result in results.items():
         if isinstance(result, Failure):
-            measured.left_out.append((f"error budget of {' '.join(key)}", f"{result.status}: {result.reason}"))
-    rows = [row for key in tasks if not isinstance(results[key], Failure) for row in results[key]]
+            measured.left_out.append((f"error budget of {' '.join(task[1:])}", f"{result.status}: {result.reason}"))
+    rows = [row for task in tasks if not isinstance(results[task], Failure) for row in results[task]]
     measured.budget = pd.DataFrame(rows, columns=budget.COLUMNS)
 
 
-def measure_times(plan: Plan, scenes: Sequence[str], measured: Measured, progress: Progress) -> None:
+def measure_times(
+    plan: Plan, played: Sequence[Player], measured: Measured, progress: Progress, kept: Kept | None
+) -> None:
     """What everything costs that was played to its end: one process, one thing at a time."""
-    effort, seed, played = plan.effort, plan.seed, measured.errors
-    played = played[(played.status == "ok") & (played.seed == seed)]
-    makes = {name: row_of(name).make for name in plan.engines}
-    often: dict[str, Any] = {"rounds": effort.rounds, "budget": effort.budget}
-    tasks: dict[tuple, Callable[[], Any]] = {}
-    for scene in scenes:
-        name = ladder.open_scene(scene, seed).name
-        rows = played[(played.kind == SCENE) & (played.scenario == name)]
-        tasks[SCENE, scene] = partial(ladder.times_of, scene, seed, copies(rows, makes), **often)
-        tasks["truth", scene] = partial(models.closed_form, scene, seed)
-    for scene in plan.feature_scenes:
-        players = {
-            ((name, change), middle(scene), 0): make
-            for at, name, change, make in changed(plan)
-            if at == scene and len(of_change(played, scene, name, change))
-        }
-        tasks[FEATURE, scene] = partial(ladder.times_of, scene, seed, players, **often)
-    if plan.whole:
-        tasks[(SIZE,)] = partial(sizes.costs, makes, effort.sizes, patience=effort.patience, seed=seed, **often)
-    tasks[(IDLE,)] = partial(sizes.driving, makes, seed=seed, **often)
-    rows_of_samples: list[dict[str, Any]] = []
-    truths = []
     measured.busy = busy_cores()
-    for key, result in done(tasks, 1, progress, "time", ALL_ROUNDS):
+    rows: list[dict[str, Any]] = []
+    truths = []
+    for task, result in done(timings(plan, played), 1, progress, "time", ALL_ROUNDS, kept):
+        kind = task[1]
         if isinstance(result, Failure):
-            measured.left_out.append((f"timing of {' '.join(key)}", f"{result.status}: {result.reason}"))
-        elif key[0] == "truth":
+            measured.left_out.append((f"timing of {' '.join(task[1:])}", f"{result.status}: {result.reason}"))
+        elif kind == TRUTH:
             truths.append(result)
+        elif kind == SIZE:
+            rows += result["samples"]
+            measured.stopped = {(name, n): why for name, n, why in result["stopped"]}
         else:
-            if key[0] == SIZE:
-                result, measured.stopped = result
-            rows_of_samples += (sample_row(key, sample) for sample in result)
-    measured.samples, measured.truths = pd.DataFrame(rows_of_samples), pd.DataFrame(truths)
+            rows += result
+    measured.samples, measured.truths = pd.DataFrame(rows), pd.DataFrame(truths)
 
 
-def copies(rows: pd.DataFrame, makes: Mapping[str, Callable]) -> dict[tuple[str, int, int], Callable]:
-    """(name, substeps, copy) -> engine; at its middle dt each takes part twice, which gives the noise floor."""
-    players = {}
-    for (engine, profile), ladder_rows in rows.groupby(["engine", "profile"], sort=False):
-        rungs = ladder_rows.substeps.tolist()
-        for k in rungs:
-            for copy in (0, 1) if k == rungs[len(rungs) // 2] else (0,):
-                players[f"{engine}:{profile}", int(k), copy] = makes[f"{engine}:{profile}"]
-    return players
+def timings(plan: Plan, played: Sequence[Player]) -> dict[tuple, Callable[[], Any]]:
+    """The tasks of the second pass: all players of a kind in a scene in one, as they are compared."""
+    often: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
+    makes = {name: row_of(name).make for name in plan.engines}
+    tasks: dict[tuple, Callable[[], Any]] = {}
+    for (kind, scene), group in groupby(played, key=lambda one: one[:2]):
+        tasks["time", kind, scene] = partial(scene_rows, kind, scene, plan.seed, in_turns(list(group)), often)
+        if kind == SCENE:
+            tasks["time", TRUTH, scene] = partial(models.closed_form, scene, plan.seed)
+    if plan.whole:
+        tasks["time", SIZE] = partial(size_rows, makes, plan, often)
+    tasks["time", IDLE] = partial(idle_rows, makes, plan.seed, often)
+    return tasks
 
 
-def changed(plan: Plan) -> Iterable[tuple[str, str, str, Callable]]:
-    """(scene, engine, change, make) of every feature and of the engines they are set against, the plain ones first."""
-    for scene in plan.feature_scenes:
-        for name in dict.fromkeys(feature.engine for feature in plan.features):
-            yield scene, name, PLAIN, row_of(name).make
-        for feature in plan.features:
-            yield scene, feature.engine, feature.change, feature.make
+def in_turns(players: Sequence[Player]) -> dict[tuple[tuple[str, str], int, int], Callable]:
+    """((name, change), substeps, copy) -> engine.
+
+    On a ladder of a scene each takes part twice at its middle dt, which gives the noise floor.
+    """
+    all_of_them = {}
+    for player in players:
+        for k in player.rungs:
+            twice = player.kind == SCENE and k == player.rungs[len(player.rungs) // 2]
+            for copy in (0, 1) if twice else (0,):
+                all_of_them[(player.name, player.change), k, copy] = player.make
+    return all_of_them
 
 
-def of_change(rows: pd.DataFrame, scene: str, name: str, change: str) -> pd.DataFrame:
-    """The rows of one changed engine in one scene."""
-    engine, profile = name.split(":")
-    return rows[
-        (rows.kind == FEATURE) & (rows.scenario == scene) & (rows.engine == engine)
-        & (rows.profile == profile) & (rows.change == change)
-    ]  # fmt: skip
+def scene_rows(kind: str, scene: str, seed: int, players: Mapping, often: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of `Measured.samples` of players as `in_turns` gives them."""
+    scenario, rows = ladder.open_scene(scene, seed), []
+    for sample in ladder.times_of(scene, seed, players, **often):
+        (name, change), k, copy = sample.key
+        told = {"scenario": scenario.name, "change": change, "dt_s": scenario.dt(k), "copy_of": copy}
+        rows.append(sample_row(kind, name, sample, **told))
+    return rows
 
 
-def middle(scene: str) -> int:
-    """Steps in a sample interval at the dt the report shows."""
-    rungs = ladder.open_scene(scene, 0).substeps
-    return rungs[len(rungs) // 2]
+def size_rows(makes: Mapping[str, Callable], plan: Plan, often: Mapping[str, Any]) -> dict[str, list]:
+    """samples: rows of `Measured.samples` for every number of disks; stopped: (name, disks, why)."""
+    found, stopped = sizes.costs(makes, plan.effort.sizes, patience=plan.effort.patience, seed=plan.seed, **often)
+    rows = [sample_row(SIZE, sample.key[0], sample, n=sample.key[1]) for sample in found]
+    return {"samples": rows, "stopped": [(name, n, why) for (name, n), why in stopped.items()]}
 
 
-def sample_row(key: tuple, sample: Sample) -> dict[str, Any]:
+def idle_rows(makes: Mapping[str, Callable], seed: int, often: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of `Measured.samples` of worlds without anything to do."""
+    found = sizes.driving(makes, seed=seed, **often)
+    return [sample_row(IDLE, sample.key[0], sample, singly=sample.key[1]) for sample in found]
+
+
+def sample_row(kind: str, name: str, sample: Sample, **told: Any) -> dict[str, Any]:
     """A sample as a row of `Measured.samples`."""
-    kind, scenario, change, n, singly, copy, dt = key[0], "", PLAIN, 0, False, 0, float("nan")
-    if kind in (SCENE, FEATURE):
-        opened = ladder.open_scene(key[1], 0)
-        who, substeps, copy = sample.key
-        scenario, dt = opened.name, opened.dt(substeps)
-        name, change = (who, PLAIN) if kind == SCENE else who
-    elif kind == SIZE:
-        name, n = sample.key
-    else:
-        name, singly = sample.key
     engine, profile = name.split(":")
-    return {
-        "kind": kind, "scenario": scenario, "engine": engine, "profile": profile, "change": change, "dt_s": dt,
-        "n": n, "copy_of": copy, "singly": singly, "round": sample.round, "place": sample.place,
-        "cost": sample.cost, "wrapping": sample.wrapping, "runs": sample.runs,
+    unknown = {"scenario": "", "change": PLAIN, "dt_s": float("nan"), "n": 0, "copy_of": 0, "singly": False}
+    return {"kind": kind, "engine": engine, "profile": profile} | unknown | told | {
+        "round": sample.round, "place": sample.place, "cost": sample.cost, "wrapping": sample.wrapping,
+        "runs": sample.runs,
     }  # fmt: skip
 
 
 def done(
-    tasks: Mapping, workers: int, progress: Progress, what: str, patience: float = HANGS
+    tasks: Mapping, workers: int, progress: Progress, what: str, patience: float = HANGS, kept: Kept | None = None
 ) -> Iterable[tuple[Any, Any]]:
-    """Run the tasks and say so; results as they come."""
-    if not tasks:
+    """Run the tasks and say so; results as they come, first those that are kept already."""
+    left = {task: do for task, do in tasks.items() if kept is None or task not in kept}
+    if kept is not None:
+        yield from ((task, kept[task]) for task in tasks if task not in left)
+    if not left:
         return
-    progress.start(len(tasks), len(tasks), what)
-    for key, result in run_all(tasks, workers, patience):
-        failed = result if isinstance(result, Failure) else ("ok", "")
-        progress.done(f"{what}: {' '.join(str(part) for part in key)}", *failed[:2])
-        yield key, result
+    progress.start(len(left), len(tasks), what)
+    for task, result in run_all(left, workers, patience):
+        failed = isinstance(result, Failure)
+        if kept is not None and not failed:
+            kept.add(task, result)
+        told = " ".join(str(part) for part in task if part not in (what, PLAIN))
+        progress.done(f"{what}: {told}", *(result[:2] if failed else ("ok", "")))
+        yield task, result

@@ -15,7 +15,7 @@ from plotly.offline import get_plotlyjs
 from reports import style
 from reports.charts import Drawing
 from reports.page import SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
-from reports.speed import budget_tables, charts
+from reports.speed import budget_tables, charts, tables
 from reports.speed.budget import TOTALS, UNEXPLAINED
 from reports.speed.order import ELSEWHERE, UNSTEADY
 from reports.speed.pareto import ACCURACIES
@@ -44,10 +44,12 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
     environment.filters["number"] = style.number
-    looks = {name: style.look(*name.split(":", 1)) for name in (*results.names, style.TRUTH)}
+    names = (*results.names, *(dial.name for dial in results.plan.dials), style.TRUTH)
+    looks = {name: style.look(*name.split(":", 1)) for name in names}
     html = environment.get_template("speed.html.j2").render(
         names=results.names, looks=looks, about=about, pooled=pooled_section(results), sizes=sizes_section(results),
-        features=features_section(results), sections=[section_of(results, name) for name in results.scenes],
+        features=features_section(results), dials=dial_sections(results), dial_rows=charts.records(results.dials),
+        sections=[section_of(results, name) for name in results.scenes],
         noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
         driving=charts.records(results.driving), feature_rows=charts.records(results.features),
         left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
@@ -76,7 +78,8 @@ def pooled_section(results: Results) -> Section:
         "speed": Drawing(
             "Error against cost",
             f"A point is one rung of the dt ladder, each of its coordinates the median over {count} scenes. "
-            "Down and left is better; nobody is both faster and better than the broad grey line. "
+            "Down and left is better; nobody is both faster and better than the broad grey line, and of those who take "
+            "steps nobody than the narrow one. "
             "A scene that a player failed counts as infinitely wrong.",
             charts.speed(results.pooled, tall=True),
         ),
@@ -97,6 +100,9 @@ def section_of(results: Results, scene: str) -> Section:
     reached = results.reached[results.reached.scenario == scene]
     seeds = int(points.seeds.max())
     spread = f" The error is the median over {seeds} draws, its bar the 95 % bootstrap interval." if seeds > 1 else ""
+    noise = results.noise_summary(scene)
+    low, high = (style.number(noise.get(end, np.nan)) for end in ("low", "high"))
+    floor = f" Noise floor: half of the players read {low} to {high} against themselves." if noise["pairs"] else ""
     wrapping = (points.wrapping > 0).any()
     apart = (
         " Setting disks onto the opposite edge, which an engine without such an edge leaves to Python, is not in it: "
@@ -107,7 +113,8 @@ def section_of(results: Results, scene: str) -> Section:
     drawings = {
         "speed": Drawing(
             "Error against cost",
-            f"A point is one dt; halving it goes right.{spread} Time: median of the rounds, bars the quartiles.{apart}",
+            f"A point is one dt; halving it goes right.{spread} Time: median of the rounds, bars the quartiles."
+            f"{floor}{apart}",
             charts.speed(points),
         ),
         "matched": Drawing(
@@ -161,3 +168,25 @@ def features_section(results: Results) -> Section | None:
         ),
     }  # fmt: skip
     return section("features", "No more than a scene needs", "", drawings)
+
+
+def dial_sections(results: Results) -> list[Section]:
+    """What more iterations and substeps buy, and what smaller steps buy for the same time."""
+    if results.dials.empty:
+        return []
+    count = results.dials.scenario.nunique()
+    pooled = Drawing(
+        "Pooled",
+        "Dotted: one dt, and more iterations or substeps to the right, the first and the last named. Solid: the same "
+        "engine as matched, from 4 times that dt to an eighth of it. Both over what it costs and how far it is off as "
+        f"matched, at that dt, where all lines meet; medians over {count} scenes.",
+        charts.dials(results.pooled_dials, relative=True),
+    )
+    each = {
+        str(scene): Drawing(str(scene), tables.asks_of(str(scene))[1], charts.dials(points))
+        for scene, points in results.dials.groupby("scenario", sort=False)
+    }
+    return [
+        section("dials", "More work in a step, or more steps", "", {"dials": pooled}),
+        section("dials-each", "The same, scene by scene", "", each),
+    ]

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 
 from reports.speed import models, tables
-from reports.speed.measure import Measured, Plan
+from reports.speed.measure import Measured
 from reports.speed.pareto import ACCURACIES, FAILED, UNREACHABLE
+from reports.speed.plan import Plan
 
 QUIET = 0.05  # how far from 1 an engine against itself may read
 
@@ -66,6 +67,16 @@ class Results:
     def pooled(self) -> pd.DataFrame:
         """See `tables.pooled`."""
         return tables.pooled(self.points)
+
+    @cached_property
+    def dials(self) -> pd.DataFrame:
+        """See `tables.dials`."""
+        return tables.dials(self.measured, self.plan.seed)
+
+    @cached_property
+    def pooled_dials(self) -> pd.DataFrame:
+        """See `tables.pooled_dials`."""
+        return tables.pooled_dials(self.dials)
 
     @cached_property
     def pooled_reached(self) -> pd.DataFrame:
@@ -149,7 +160,8 @@ class Results:
             "speed_samples": self.measured.samples, "speed_errors": self.measured.errors, "speed": self.points,
             "speed_pooled": self.pooled, "speed_orders": self.orders, "speed_reached": self.reached,
             "speed_sizes": self.sizes, "speed_features": self.features, "speed_driving": self.driving,
-            "speed_noise": self.noise, "speed_models": self.models, "speed_budget": self.measured.budget,
+            "speed_noise": self.noise, "speed_models": self.models, "speed_dials": self.dials,
+            "speed_budget": self.measured.budget,
         }  # fmt: skip
         for name, table in files.items():
             table.to_csv(folder / f"{name}.csv", index=False)

@@ -17,6 +17,7 @@ from scenarios.placing import box, lay_out
 Make = Callable[[], Engine]
 DT, RADIUS, COVERED = 1 / 240, 0.5, 0.3
 WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3  # of one sample: as many steps as fill 2 ms, less than a time slice
+FRESH = 400  # steps, after which a gas is begun again: where hits take energy it falls asleep, and costs nothing
 FIT_FROM = 100  # disks: below it the fixed cost of a step hides how it grows
 IDLE_STEPS = 1000
 STOPPED = "stopped: a step would take longer than {:g} s"
@@ -45,45 +46,50 @@ def costs(players: Mapping[str, Make], sizes: Sequence[int], rounds: int, budget
     left_out: dict[tuple[str, int], str] = {}
     course: dict[str, list[tuple[int, float]]] = {name: [] for name in players}
     for n in sizes:
-        awake: dict[str, tuple[Engine, int]] = {}
+        awake: dict[str, _Going] = {}
         for name, make in players.items():
             if foreseen(course[name], n) > patience:
                 left_out[name, n] = STOPPED.format(patience)
                 continue
             try:
-                awake[name] = warmed(make(), gas(n, seed))
+                awake[name] = _Going(make(), gas(n, seed))
             except Unsupported as refusal:
                 left_out[name, n] = f"refused: {refusal}"
-        what = [Timed((name, n), _Going(engine, steps), steps) for name, (engine, steps) in awake.items()]
+        what = [Timed((name, n), going, going.steps) for name, going in awake.items()]
         here = interleaved(what, rounds, budget, seed)
-        for name, (engine, _) in awake.items():
+        for name, going in awake.items():
             course[name].append((n, min(sample.cost for sample in here if sample.key == (name, n))))
-            engine.close()
+            going.engine.close()
         samples += here
     return samples, left_out
 
 
 class _Going:
-    """More steps of a gas that is already going: every sample goes on where the one before left off."""
+    """A gas that is already going: every sample goes on where the one before left off, or begins again."""
 
-    def __init__(self, engine: Engine, steps: int) -> None:
-        self.engine, self.steps = engine, steps
+    def __init__(self, engine: Engine, scene: Scene) -> None:
+        """Find out how many steps fill a sample."""
+        self.engine, self.scene = engine, scene
+        engine.listening = False
+        self.begin()
+        self.steps = 1
+        each = min(self().seconds for _ in range(WARM_STEPS))
+        self.steps = int(np.clip(SAMPLE / each, 1, MOST_STEPS))
+
+    def begin(self) -> None:
+        """Load, which may compile, and take a first step; not timed."""
+        self.engine.load(self.scene, DT)
+        self.engine.step(1)
+        self.taken = 1
 
     def __call__(self) -> Spent:
+        if self.taken + self.steps > FRESH + WARM_STEPS:
+            self.begin()
         started = perf_counter()
         self.engine.step(self.steps)
-        return Spent(perf_counter() - started)
-
-
-def warmed(engine: Engine, scene: Scene) -> tuple[Engine, int]:
-    """The engine, loaded and a few steps on, and how many steps fill a sample."""
-    engine.listening = False
-    engine.load(scene, DT)
-    engine.step(1)
-    started = perf_counter()
-    engine.step(WARM_STEPS)
-    each = (perf_counter() - started) / WARM_STEPS
-    return engine, int(np.clip(SAMPLE / each, 1, MOST_STEPS))
+        seconds = perf_counter() - started
+        self.taken += self.steps
+        return Spent(seconds)
 
 
 def foreseen(course: Sequence[tuple[int, float]], n: int) -> float:

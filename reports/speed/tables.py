@@ -8,10 +8,12 @@ import numpy as np
 import pandas as pd
 
 from adapters.engines import ENGINES
+from adapters.features import DIALS
 from reports.speed.ladder import open_scene
-from reports.speed.measure import FEATURE, IDLE, PLAIN, SCENE, SIZE, Measured
+from reports.speed.measure import IDLE, SIZE, Measured
 from reports.speed.order import Order, median_interval, order_of
 from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, cost_to_reach
+from reports.speed.plan import DIAL, FEATURE, PLAIN, SCENE
 from reports.speed.sizes import exponent
 from reports.speed.timing import summed_up
 
@@ -20,37 +22,71 @@ POOLED = "pooled"
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario, player and dt.
+    """A row a scenario, player and dt: the columns of `summed`, and rung (0: coarsest)."""
+    found = summed(measured, SCENE, seed)
+    return found.assign(rung=doublings(found))
 
-    Columns: scenario, engine, profile, dt_s, rung (0: coarsest), seeds, failed (how many), status and reason (of the
+
+def dials(measured: Measured, seed: int) -> pd.DataFrame:
+    """The columns of `summed`, and rung: the dials over their values, and their engines over a ladder of dt."""
+    if not (measured.errors.kind == DIAL).any():
+        return pd.DataFrame()
+    found = summed(measured, DIAL, seed)
+    places = {(dial.name, str(value)): k for dial in DIALS for k, value in enumerate(dial.values)}
+    names = found.engine + ":" + found.profile
+    turned = [places.get(who, -1) for who in zip(names, found.change)]
+    return found.assign(rung=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan)
+
+
+def pooled_dials(found: pd.DataFrame) -> pd.DataFrame:
+    """As `pooled`, of cost and error over those of the matched engine at the dt at which its dial is turned.
+
+    change is the value of the dial; a ladder of dt has none.
+    """
+    turned = found[found.change != PLAIN]
+    here = turned.groupby("scenario").dt_s.first().rename("here")
+    beside = found[(found.change == PLAIN) & (found.dt_s == found.scenario.map(here))]
+    keys = ["scenario", "engine"]
+    both = found.merge(beside[[*keys, "cost", "error"]], on=keys, suffixes=("", "_here"))
+    for of in ("cost", "error"):
+        both[of] /= both[f"{of}_here"]
+    parts = [pooled(group).assign(change=str(change)) for (_, change), group in both.groupby(["profile", "change"])]
+    return pd.concat(parts).sort_values("rung", kind="stable")
+
+
+def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
+    """A row a scenario, player, change and dt of one kind.
+
+    Columns: scenario, engine, profile, change, dt_s, substeps, seeds, failed (how many), status and reason (of the
     first that failed), error (median over the seeds, radii; inf where it failed) and its 95 % interval error_low,
     error_high; cost (median, µs per simulated second; nan where not timed), its quartiles low and high, best,
     wrapping, rounds.
     """
-    errors = measured.errors[measured.errors.kind == SCENE]
-    rows = []
-    for (scenario, engine, profile, dt, rung), group in errors.groupby(
-        ["scenario", *WHO, "dt_s", "substeps"], sort=False
-    ):
+    errors = measured.errors[measured.errors.kind == kind]
+    keys, rows = ["scenario", *WHO, "change", "dt_s", "substeps"], []
+    for key, group in errors.groupby(keys, sort=False):
         values, failed = group.error_radii.to_numpy(float), group[group.status != "ok"]
         low, high = median_interval(values, seed)
-        rows.append({
-            "scenario": scenario, "engine": engine, "profile": profile, "dt_s": dt, "rung": rung,
+        rows.append(dict(zip(keys, key)) | {
             "seeds": len(group), "failed": len(failed), "status": "ok" if failed.empty else failed.status.iloc[0],
             "reason": "" if failed.empty else failed.reason.iloc[0],
             "error": float(np.percentile(values, 50, method="higher" if np.isinf(values).any() else "linear")),
             "error_low": low, "error_high": high,
         })  # fmt: skip
-    found = pd.DataFrame(rows)
-    found["rung"] = np.log2(found.rung / found.groupby("scenario").rung.transform("min")).round().astype(int)
-    return found.merge(times(measured), on=["scenario", *WHO, "dt_s"], how="left")
+    return pd.DataFrame(rows).merge(times(measured, kind), on=keys[:-1], how="left")
 
 
-def times(measured: Measured) -> pd.DataFrame:
-    """scenario, engine, profile, dt_s, cost, low, high, best, wrapping (µs per simulated second), rounds."""
+def doublings(found: pd.DataFrame) -> pd.Series:
+    """How often the steps of a row have been halved from the scenario's coarsest."""
+    coarsest = found.groupby("scenario").substeps.transform("min")
+    return (found.substeps / coarsest).map(np.log2).round().astype(int)
+
+
+def times(measured: Measured, kind: str) -> pd.DataFrame:
+    """scenario, engine, profile, change, dt_s, cost, low, high, best, wrapping (µs per simulated second), rounds."""
     samples = measured.samples
-    plain = samples[(samples.kind == SCENE) & (samples.copy_of == 0)]
-    return in_us(summed_up(plain, ["scenario", *WHO, "dt_s"]))
+    first = samples[(samples.kind == kind) & (samples.copy_of == 0)]
+    return in_us(summed_up(first, ["scenario", *WHO, "change", "dt_s"]))
 
 
 def in_us(table: pd.DataFrame) -> pd.DataFrame:
@@ -166,7 +202,7 @@ def features(measured: Measured) -> pd.DataFrame:
         return pd.DataFrame()
     keys = ["scenario", *WHO, "change"]
     table = errors[[*keys, "status", "reason", "error_radii"]].merge(
-        in_us(summed_up(samples, keys))[[*keys, "cost", "low", "high"]], on=keys, how="left"
+        in_us(summed_up(samples, keys))[[*keys, "cost", "low", "high", "best"]], on=keys, how="left"
     )
     plain = table[table.change == PLAIN][["scenario", *WHO, "error_radii", "cost"]]
     both = table[table.change != PLAIN].merge(plain, on=["scenario", *WHO], suffixes=("", "_plain"))

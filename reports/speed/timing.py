@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 LEAST = 1e-3  # s a sample lasts at least: some 10 000 ticks of the clock, so that reading it weighs nothing
-MOST_RUNS = 100  # in one sample, as making ready takes time, too
+MOST_RUNS = 20  # in one sample, as making ready takes time, too
 FEWEST_ROUNDS = 3  # of a run so long that its time is used up earlier
 WARM_UP = -1  # the round that is stored, but not counted
 

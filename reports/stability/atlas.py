@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.journal import JOURNAL, Journal, lines_of, plain
+from reports.journal import JOURNAL, Journal, lines_of, numbers, plain
 from reports.machine import about
 from reports.runner import run_all
 from reports.stability.cases import CASES
@@ -168,13 +168,8 @@ def read(folder: Path) -> Atlas:
 
 def limit_from(record: dict[str, Any]) -> Limit:
     """The limit of a line of the journal, where what is not finite is text."""
-    trials = tuple(Trial(**numbers(trial)) for trial in record["trials"])
-    return Limit(**numbers(record) | {"trials": trials})
-
-
-def numbers(record: dict[str, Any]) -> dict[str, Any]:
-    """The record with "nan", "inf" and "-inf" as numbers again."""
-    return {key: float(value) if value in ("nan", "inf", "-inf") else value for key, value in record.items()}
+    known = numbers(record)
+    return Limit(**known | {"trials": tuple(Trial(**trial) for trial in known["trials"])})
 
 
 def done_before(folder: Path, plan: Plan) -> set[Task]:

@@ -1,0 +1,70 @@
+"""How long a measurement will take where nothing else runs: a rough sum over the steps of everybody."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+
+from adapters.engines import ENGINES
+from adapters.habits import HABITS
+from reports.speed import ladder
+from reports.speed.effort import Effort
+from reports.speed.plan import SCENE, Plan, Player, Reach
+from reports.speed.timing import FEWEST_ROUNDS, LEAST, WARM_UP
+from scenarios.model import Scenario
+
+# s, means over the players: of a step, of each disk in it, of pushing in Python, of wrapping each disk there; of
+# reading all and each disk once; of making ready for a sample. On the machine of `figures.csv`; elsewhere half or twice
+# as much.
+STEP, STEP_DISK, PUSH, WRAP_DISK = 1.0e-6, 0.17e-6, 16e-6, 0.75e-6
+READ, READ_DISK, READY = 20e-6, 1.5e-6, 1.5e-3
+LISTENING = 1.5  # times a step where hits are heard of, too
+STARTING = 12.0  # s until the workers have imported and compiled
+APART = 0.2  # s, to take the error of one engine in one scene apart
+PAGE = 8.0  # s
+
+
+def estimate(plan: Plan, players: Sequence[Player], reach: Reach) -> str:
+    """A sentence on how much there is to do and about how long it takes on an idle machine."""
+    apart = APART * len(plan.budget_scenes) * len(set(plan.engines) & set(HABITS))
+    playing = (apart + sum(seconds_to_play(player, reach) for player in players)) / plan.workers
+    timed = [player for player in players if player.seed == plan.seed]
+    timing = sum(seconds_to_time(player, reach, plan.effort) for player in timed)
+    timing += seconds_of_sizes(plan.effort) * plan.whole
+    whole = STARTING + playing + timing + PAGE
+    length = f"{ceil(whole / 60)} minutes" if whole > 90 else f"{ceil(whole / 10) * 10} s"
+    return f"{len(players)} ladders of steps to play and {len(timed)} to time: about {length} where nothing else runs"
+
+
+def step_of(scenario: Scenario) -> float:
+    """s, of one step of a scene, in Python included."""
+    n = scenario.scene.n
+    wrapping = n * WRAP_DISK if scenario.scene.wrap is not None else 0.0
+    return STEP + n * STEP_DISK + (PUSH if scenario.thrusts else 0.0) + wrapping
+
+
+def seconds_to_play(player: Player, reach: Reach) -> float:
+    """s, of all rungs, read at every sample."""
+    scenario, samples = ladder.open_scene(player.scene, player.seed), reach[player.scene, player.seed]
+    reading = len(player.rungs) * samples * (READ + scenario.scene.n * READ_DISK)
+    return sum(player.rungs) * samples * LISTENING * step_of(scenario) + reading
+
+
+def seconds_to_time(player: Player, reach: Reach, effort: Effort) -> float:
+    """s, of all rounds of all rungs; the middle one is there twice on a ladder of a scene."""
+    scenario, samples = ladder.open_scene(player.scene, player.seed), reach[player.scene, player.seed]
+    rungs = [all_rounds(samples * k * step_of(scenario), effort) for k in player.rungs]
+    return sum(rungs) + (rungs[len(rungs) // 2] if player.kind == SCENE else 0.0)
+
+
+def all_rounds(run: float, effort: Effort) -> float:
+    """s, of samples of one run of so many s, or more to fill them, as `timing.interleaved` takes them."""
+    sample = max(run, LEAST)
+    rounds = min(effort.rounds - WARM_UP, max(FEWEST_ROUNDS - WARM_UP, ceil(effort.budget / sample)))
+    return rounds * (sample + READY)
+
+
+def seconds_of_sizes(effort: Effort) -> float:
+    """s, for the numbers of disks; who is slow drops out. Making ready takes as long as some twenty steps."""
+    steps = [STEP + n * STEP_DISK for n in effort.sizes]
+    return len(ENGINES) * sum(all_rounds(step, effort) + 20 * step for step in steps)

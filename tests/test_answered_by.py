@@ -1,0 +1,68 @@
+"""Each scene names the cheapest model that answers it, and the harness takes that one for its truth."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import pytest
+
+from scenarios import oracle
+from scenarios.catalogue import SCENARIOS, scenario
+from scenarios.oracle import CLOSED_FORM, HIT_BY_HIT, NOTHING, answered_by, computed
+
+MODELS = {name: answered_by(scenario(name)) for name in SCENARIOS}
+
+
+def never(*_: object) -> None:
+    """Stands for the oracle where it must not be asked."""
+    raise AssertionError("followed hit by hit")
+
+
+@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model == CLOSED_FORM])
+def test_a_scene_that_names_a_closed_form_is_answered_without_following_a_hit(
+    name: str, monkeypatch: pytest.MonkeyPatch
+):
+    """Neither computed nor looked up."""
+    monkeypatch.setattr(oracle, "computed", never)
+    monkeypatch.setattr(oracle, "look_up", never)
+    one = scenario(name)
+
+    assert one.truth is not None
+    assert len(one.truth(one.times)) >= 2
+
+
+def test_a_scene_that_is_followed_hit_by_hit_says_so(monkeypatch: pytest.MonkeyPatch):
+    """Negative control: there the oracle is asked, and there are such scenes."""
+    monkeypatch.setattr(oracle, "look_up", never)
+    followed = [name for name, model in MODELS.items() if model == HIT_BY_HIT]
+
+    assert {"asteroids", "gas_of_100", "cradle_touching"} <= set(followed)
+    for name in followed:
+        one = scenario(name)
+        assert one.truth is not None
+        with pytest.raises(AssertionError, match="followed hit by hit"):
+            one.truth(one.times)
+
+
+def test_every_scene_names_a_model():
+    """Those without an answer are none of this catalogue."""
+    assert NOTHING not in MODELS.values()
+
+
+@pytest.mark.parametrize("name", ["head_on_unequal_e09", "bouncing_ball_e1", "cradle_with_gaps", "line_gas"])
+def test_the_closed_form_is_cheaper_than_following_the_hits(name: str):
+    """By more than a busy machine can hide: each at its fastest of three."""
+    one = scenario(name)
+    assert one.truth is not None
+
+    assert fastest(lambda: one.truth(one.times[[0, -1]])) < 0.5 * fastest(lambda: computed(one))
+
+
+def fastest(ask) -> float:  # type: ignore[no-untyped-def]
+    """s, of three times."""
+    took = []
+    for _ in range(3):
+        started = perf_counter()
+        ask()
+        took.append(perf_counter() - started)
+    return min(took)

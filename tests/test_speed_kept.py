@@ -1,0 +1,76 @@
+"""What a measurement has got is kept as it ends, and a log is told now and then how far it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from reports import terminal
+from reports.journal import Journal
+from reports.speed import ladder, measure
+from reports.speed.effort import QUICK
+from reports.speed.kept import Kept
+from reports.speed.measure import done
+from reports.terminal import Progress
+from scenarios.catalogue import scenario
+from tests.command_line import crosscheck
+
+
+def test_what_has_ended_is_not_measured_again(tmp_path: Path):
+    """A journal of the same plan gives back every number, infinities too; one of another plan gives none."""
+    rows = [{"error_radii": np.inf, "change_radii": np.nan, "reason": "no"}]
+    with Journal(tmp_path) as journal:
+        Kept(journal, {"seed": 0}, resume=False).add(("error", "scene", 1), rows)
+    with Journal(tmp_path) as journal:
+        again = Kept(journal, {"seed": 0}, resume=True)
+        with Progress() as progress:
+            found = dict(done({("error", "scene", 1): fails}, 1, progress, "error", kept=again))
+
+        assert len(again) == 1
+        assert found["error", "scene", 1][0]["error_radii"] == np.inf
+        assert np.isnan(found["error", "scene", 1][0]["change_radii"])
+        assert len(Kept(journal, {"seed": 1}, resume=True)) == 0
+
+
+def fails() -> None:
+    """Must not be called."""
+    raise AssertionError("done again")
+
+
+@pytest.mark.parametrize(("quiet", "lines"), [(0.0, 2), (1e9, 0)])
+def test_a_log_gets_a_line_now_and_then(
+    quiet: float, lines: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """A bar is not drawn into a file, and a line a task would be too many: so much time lies between two."""
+    monkeypatch.setattr(terminal, "QUIET", quiet)
+    with Progress() as progress:
+        progress.start(2, 2, "error")
+        progress.done("error: free_fall")
+        progress.done("error: slow_hit")
+
+    assert capsys.readouterr().err.count(" of 2, ") == lines
+
+
+def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Ctrl-C where the times begin: exit 130. Asked again with --resume, no error is looked for a second time."""
+    words = ("speed", "free_fall", "--engine", "reference:exercise", "--out", "out")
+    with monkeypatch.context() as patch:
+        patch.setattr(measure, "measure_times", interrupted)
+        first = crosscheck(*words, cwd=tmp_path)
+    monkeypatch.setattr(ladder, "errors_of", fails)
+    second = crosscheck(*words, "--resume", cwd=tmp_path)
+
+    assert first.returncode == 130
+    assert "ask again with --resume" in first.stderr
+    assert second.returncode == 0, second.stderr
+    assert "that had ended: 2" in second.stderr  # a ladder, and what its error is made of
+    assert len(pd.read_csv(tmp_path / "out" / "speed_errors.csv")) == len(QUICK.ladder(scenario("free_fall")))
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def interrupted(*_: object) -> None:
+    """As Ctrl-C does."""
+    raise KeyboardInterrupt
