@@ -82,7 +82,7 @@ def test_what_a_file_does_is_the_status_of_its_cell(
         assert old in text
         text = text.replace(old, new)
     (tmp_path / "Exercise.js").write_text(text)
-    engine = engine_file(tmp_path / "Exercise.js").make()
+    engine = engine_file(tmp_path / "Exercise.js", patience=1.0).make()
     question = scenario(scene)
     played = play(engine, "x:own", question, question.dt(question.substeps[-1]))
     engine.close()
