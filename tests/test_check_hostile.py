@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -253,6 +257,32 @@ def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endle
                 solver.evaluated("code", 0.2, may_repeat)
         else:
             assert solver.evaluated("code", 0.2, may_repeat) == answer
+
+
+def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Path):
+    """V8 stops the loop after its limit; nobody is there to hear it, and no process is left behind."""
+    (tmp_path / "Exercise.js").write_text("while (true) {}")
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "adapters.solver_worker"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    worker.stdout.close()
+    worker.stdin.write(json.dumps(str(tmp_path / "Exercise.js")).encode() + b"\n")
+    worker.stdin.close()
+    try:
+        worker.wait(SECONDS)
+    finally:
+        worker.kill()
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path):
+    """Nobody writes into it, so that reading it would never end."""
+    os.mkfifo(tmp_path / "Exercise.js")
+
+    with pytest.raises(NotASolver, match=r"Exercise\.js: is no file; name an Exercise\.js or a solver\.py"):
+        read_solver(tmp_path / "Exercise.js")
 
 
 @pytest.mark.parametrize("name", REFUSED)
