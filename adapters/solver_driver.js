@@ -17,8 +17,13 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   // The same asteroids every time. (Park & Miller, CACM 31, 1192, 1988.)
   Math.random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
   original["Math.random"] = Math.random;
-  for (const name of ["Date", "Temporal", "Intl", "setTimeout", "clearTimeout", "__timer_manager", "WebAssembly",
-                      "SharedArrayBuffer", "Atomics"]) Reflect.deleteProperty(globalThis, name);
+  for (const name of ["Date", "Temporal", "Intl", "WebAssembly", "SharedArrayBuffer", "Atomics"]) {
+    Reflect.deleteProperty(globalThis, name);
+  }
+  globalThis.__timer_manager = undefined;  // this one and the next two cannot be deleted
+  for (const name of ["setTimeout", "clearTimeout"]) {
+    globalThis[name] = () => { throw new ReferenceError(name + " is not defined"); };
+  }
   const quiet = () => undefined;
   globalThis.console = { log: quiet, info: quiet, warn: quiet, error: quiet, debug: quiet, table: quiet, assert: quiet };
 
@@ -76,6 +81,9 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   const text = (x) => (typeof x === "number" ? "" + x : "NaN");
 
   function row(s) {
+    if (!s.position || !s.velocity || !s.force) {
+      throw new TypeError("a sphere is left with a position, velocity or force that has no x and y");
+    }
     return "[" + text(s.position.x) + "," + text(s.position.y) + "," + text(s.velocity.x) + "," + text(s.velocity.y)
       + "," + text(s.force.x) + "," + text(s.force.y) + "," + text(s.alpha) + "," + text(s.angularVelocity)
       + "," + text(s.torque) + "," + text(s.mass) + "," + text(s.MoI) + "," + text(s.size) + "]";

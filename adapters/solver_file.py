@@ -64,6 +64,8 @@ def read_solver(path: Path) -> SolverText:
     if kind is None:
         raise NotASolver(f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file")
     try:
+        if path.exists() and not path.is_file():
+            raise NotASolver(f"{path}: is no file; name an Exercise.js or a solver.py")  # a pipe would be waited for
         size = path.stat().st_size
         if size > LARGEST:
             raise NotASolver(f"{path}: has {size / 1e6:.1f} MB; a solver has a few kilobytes, at most 1 MB is read")

@@ -46,7 +46,10 @@ NAMES = frozenset(vars(sphere_of([0.0] * 12)))
 
 def row_of(s: Any) -> list[float]:
     """The 12 numbers of a sphere; NaN where it holds none."""
-    vectors = (s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y)
+    try:
+        vectors = (s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y)
+    except AttributeError:
+        raise AttributeError("a sphere is left with a position, velocity or force that has no x and y") from None
     return [number(x) for x in (*vectors, s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size)]
 
 

@@ -105,6 +105,17 @@ def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):
     assert "Came:" in sentences[0]
 
 
+def test_the_numbers_beside_an_unknown_mistake_are_those_of_a_pair_that_is_wrong(tmp_path: Path):
+    """Of five pairs the first comes out right: what came is not what was expected."""
+    text = (CORRECT[0].parent / "plain.js").read_text()
+    assert "var vn = (" in text
+    (tmp_path / "solver.js").write_text(text.replace("var vn = (", "var vn = parseInt("))
+    (row,) = (row for row in check_solver(tmp_path / "solver.js") if row.name == "impulse")
+
+    assert row.cause.startswith("unknown: it is right for some pairs")
+    assert row.got.split()[0] != row.expected.split()[0]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "task", "cause"),
     [

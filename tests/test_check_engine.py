@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from adapters import student
 from adapters.play import play
 from adapters.student import engine_file
 from scenarios.catalogue import scenario
@@ -73,10 +72,9 @@ UNCLOSED = {"projectObjects();\n}": "projectObjects();"}
     ],
 )
 def test_what_a_file_does_is_the_status_of_its_cell(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changes: dict[str, str], scene: str, status: str, reason: str
+    tmp_path: Path, changes: dict[str, str], scene: str, status: str, reason: str
 ):
     """Played by its own e, refused, diverged, stopped, thrown: a row says which and why, and nothing else is lost."""
-    monkeypatch.setattr(student, "STEP_LIMIT", 1.0)
     text = RIGHT.read_text()
     for old, new in changes.items():
         assert old in text

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -78,6 +82,7 @@ LOADING = {
     "import.js": ("import { vec2 } from './gl-matrix.js';\n" + JS, "plain script, which has no modules; leave it out"),
     "module.js": (JS + "module.exports = { integrate };", "module is not defined: the exercise's page loads"),
     "page.js": ("document.title = 'mine';\n" + JS, "document is not defined: a solver is run without page"),
+    "timer.js": (JS + "setTimeout(initScene, 1);", "setTimeout is not defined: a solver is run without page, network"),
     "unclosed.js": (JS[:-3], "SyntaxError"),
     "throws.js": (JS + "\n  nothing.x = 1;\n", "ReferenceError: nothing is not defined (line 93, column 3)"),
     "endless_load.py": ("while True: pass\n" + PY, "does not come back within 3 s while it is loaded"),
@@ -109,6 +114,7 @@ def test_a_file_that_cannot_be_loaded_is_one_row_that_says_why_and_where(results
     assert len(first(rows)) < 500
 
 
+LEFT = "a sphere is left with a position, velocity or force that has no x and y"
 CALLS = {
     "endless_integrate.js": (within(JS, "integrate", "while (true) {}"), "integrate: does not come back within 1 s"),
     "endless_collide.js": (within(JS, "sphereSphereCollisionHandling", "for (;;);"), "does not come back within 1 s"),
@@ -141,6 +147,8 @@ CALLS = {
         .replace("s.SIG_IGN)\n", "s.SIG_IGN)\n    while True: pass\n"),
         "had to be stopped",
     ),
+    "tuple.py": (within(PY, "integrate", "    sphere.position = (1.0, 2.0); return"), LEFT),
+    "null.js": (within(JS, "integrate", "sphere.position = null; return;"), LEFT),
     "awaits.py": (PY.replace("def integrate", "async def integrate"), "runs nothing: it is an async def"),
     "yields.py": (within(PY, "integrate", "    yield"), "runs nothing: it is an async def"),
     "sleeps.py": (within(PY, "integrate", "    import time; time.sleep(100)"), "does not come back within 1 s"),
@@ -253,6 +261,32 @@ def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endle
                 solver.evaluated("code", 0.2, may_repeat)
         else:
             assert solver.evaluated("code", 0.2, may_repeat) == answer
+
+
+def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Path):
+    """V8 stops the loop after its limit; nobody is there to hear it, and no process is left behind."""
+    (tmp_path / "Exercise.js").write_text("while (true) {}")
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "adapters.solver_worker"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    worker.stdout.close()
+    worker.stdin.write(json.dumps(str(tmp_path / "Exercise.js")).encode() + b"\n")
+    worker.stdin.close()
+    try:
+        worker.wait(SECONDS)
+    finally:
+        worker.kill()
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path):
+    """Nobody writes into it, so that reading it would never end."""
+    os.mkfifo(tmp_path / "Exercise.js")
+
+    with pytest.raises(NotASolver, match=r"Exercise\.js: is no file; name an Exercise\.js or a solver\.py"):
+        read_solver(tmp_path / "Exercise.js")
 
 
 @pytest.mark.parametrize("name", REFUSED)

@@ -18,16 +18,16 @@ def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Fi
     """The rows of (c) and (d)."""
     if not finite(answers, "v"):
         return [*no_number(answers, restitution.own), bystanders(answers)]
-    name, question = next(iter(HITS.items()))
-    after = answers[name].last
-    hit, came = hit_of(question.balls, after), changes(question.balls, after)
     e = found.e if found else restitution.own
+    name = next(iter(HITS if found else wrong_hits(answers, e) or HITS))  # numbers that show what is wrong
+    balls, after = QUESTIONS[name].balls, answers[name].last
+    hit, came = hit_of(balls, after), changes(balls, after)
     P = IMPULSES[""](hit, e)
     acts = acting(hit, found, P)
     fine_c = found is not None and not found.impulse
-    impulse = found.impulse if found else partly(answers, e)
+    impulse = restitution.mistake or (found.impulse if found else partly(answers, e))
     update = found.update if found and found.task == "2d" else ""
-    mistake = (found.mistake if found else "") or impulse
+    mistake = impulse or (found.mistake if found else "")
     spoilt = "2d" if fine_c else "2c"  # the part in which lies what spoils energy and restitution
     got, lost = hit.ma * came[0], energy(hit, came)
     across, gained = float(got @ tangent(hit)), hit.ma * came[0] + hit.mb * came[1]
@@ -90,14 +90,21 @@ def partly(answers: dict[str, Answer], e: float) -> str:
     """Where no single mistake gives all hits: whether some of them are right, or the order of A and B matters."""
     if symmetry(answers, "").verdict == "fault":
         return UNALIKE
+    wrong = wrong_hits(answers, e)
+    if 0 < len(wrong) < len(HITS):
+        names = ", ".join(name.removeprefix("hit/") for name in wrong)
+        return f"unknown: it is right for some pairs and wrong for others ({names})"
+    return ""
+
+
+def wrong_hits(answers: dict[str, Answer], e: float) -> list[str]:
+    """The questions of `HITS` whose velocities are not those of the formula."""
     wrong = []
     for name, question in HITS.items():
         h = hit_of(question.balls, answers[name].last)
         if not near(UPDATES[""].change(h, IMPULSES[""](h, e), e), changes(question.balls, answers[name].last)):
-            wrong.append(name.removeprefix("hit/"))
-    if 0 < len(wrong) < len(HITS):
-        return f"unknown: it is right for some pairs and wrong for others ({', '.join(wrong)})"
-    return ""
+            wrong.append(name)
+    return wrong
 
 
 def acting(hit: Hit, found: Finding | None, right: Array) -> Array:

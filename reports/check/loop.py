@@ -46,6 +46,7 @@ def loop_rows(process: SolverProcess, faulty: bool, begun: object) -> list[Row]:
         rows = [not_asked("all spheres", "loop", "the functions that it calls have faults of their own")]
     else:
         rows = [integrated(asked["free"], came["free"], came["alone"]), pairs(asked, came)]
+        rows += [wrapping(asked["edges in a step"], came["edges in a step"], came["edges"])] if has["wrap"] else []
     if has["wrap"]:
         rows += edges(asked["edges"], came["edges"], start, process.surface == "exercise")
     return rows
@@ -72,6 +73,8 @@ def worlds(n: int, wraps: bool) -> dict[str, Question]:
             spheres[k + 1] = plain[k + 1]._replace(x=place, v=(0.2, 0.3))
         spheres[0] = plain[0]._replace(x=(5.4, 0.5))
         found["edges"] = Question(tuple(spheres), (("wrap",),), world=True)
+        resting = tuple(b._replace(v=(0.0, 0.0)) for b in spheres)
+        found["edges in a step"] = Question(resting, step, world=True)
     return found
 
 
@@ -119,6 +122,16 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> Row:
     )
     return judged("pairs", "loop", "Does a step let every pair collide, the ufo with each asteroid too?", got, "yes",
                   not silent and not others, cause)  # fmt: skip
+
+
+def wrapping(question: Question, came: Answer, alone: Answer) -> Row:
+    """A step sets who is beyond an edge where projectObjects does; all are at rest, so that only this moves them."""
+    wrong = [k for k, (a, b) in enumerate(zip(came.last, alone.last)) if not near(a.x, b.x)]
+    got = f"{name_of(wrong[0])} is at {shown(came.last[wrong[0]].x)} m" if wrong else "yes"
+    expected = f"at {shown(alone.last[wrong[0]].x)} m, where projectObjects sets it" if wrong else "yes"
+    stayed = all(near(a.x, b.x) for b, a in zip(question.balls, came.last))
+    return judged("edges in a step", "loop", "Does a step set who is beyond an edge where projectObjects does?", got,
+                  expected, not wrong, "performSimStep does not call projectObjects" if stayed else "")  # fmt: skip
 
 
 def name_of(*spheres: int) -> str:

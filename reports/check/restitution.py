@@ -14,7 +14,7 @@ EXERCISE = 0.9
 COMMENTS = re.compile(r"/\*.*?\*/|//[^\n]*|#[^\n]*", re.DOTALL)
 NAMED = re.compile(
     r"\b(e|eps|epsilon|cor|restitution|elasticity|bounciness|bounce|coeff\w*|c_?r)\b"
-    r"\s*(?::\s*\w+\s*)?[:=]\s*(\d*\.?\d+)",
+    r"\s*(?::\s*\w+\s*)?[:=]\s*(-?\d*\.?\d+)",
     re.IGNORECASE,
 )
 NUMBER = re.compile(r"(?<![\w.])\d*\.?\d+(?![\w.])")
@@ -32,12 +32,14 @@ class Restitution:
     Attributes:
         own: the value written into it, or the exercise's if none is found.
         named: whether it is written in, by a name or as a number.
+        absurd: whether what came is no number from 0 to 1, and a name such as e or restitution gets it.
         came: parting over closing speed of two equal spheres that meet head-on at 2 m/s.
         slow, fast: the same at 2 mm/s and at 200 m/s.
     """
 
     own: float
     named: bool
+    absurd: bool
     came: float
     slow: float
     fast: float
@@ -52,6 +54,11 @@ class Restitution:
     def played(self) -> float | None:
         """The value that whole scenes are judged by; None if no number from 0 to 1 makes sense."""
         return next((e for e in (self.came, self.own) if 0 <= e <= 1), None)
+
+    @property
+    def mistake(self) -> str:
+        """What is wrong with the number that is written in, "" if nothing is."""
+        return f"e = {shown(self.came)} is written into the file; it must be from 0 to 1" if self.absurd else ""
 
     def row(self, mistake: str) -> Row:
         """0.9 is right, another number is a note if the file says so, and a fault if it says something else.
@@ -80,18 +87,22 @@ class Restitution:
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
     """What the file's text says and what its hits give."""
     came, slow, fast = (parting(answers[name], name) for name in ("even", "slow", "fast"))
-    found = written(text)
+    named, found = named_in(text), written(text)
+    absurd = not 0 <= came <= 1 and any(near(e, came) for e in named)
     # A file may hold several such numbers, and use one of them.
     own = next((e for e in found if near(e, came)), found[0] if found else EXERCISE)
-    return Restitution(own, bool(found), came, slow, fast)
+    return Restitution(own, bool(found), absurd, came, slow, fast)
+
+
+def named_in(text: str) -> list[float]:
+    """The numbers that a name such as e or restitution gets."""
+    return [float(value) for _, value in NAMED.findall(code_of(text))]
 
 
 def written(text: str) -> list[float]:
     """What may be the e of a file: numbers that a name such as e or restitution gets; 0.9 if that or 1.9 occurs."""
-    code = code_of(text)
-    named = [float(value) for _, value in NAMED.findall(code) if 0 <= float(value) <= 1]
-    numbers = [float(x) for x in NUMBER.findall(code)]
-    return named + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
+    numbers = [float(x) for x in NUMBER.findall(code_of(text))]
+    return [e for e in named_in(text) if 0 <= e <= 1] + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
 
 
 def parting(answer: Answer, name: str) -> float:
