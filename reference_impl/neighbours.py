@@ -13,7 +13,7 @@ import numpy as np
 from reference_impl.compiled import compiled, kernel
 from reference_impl.state import Disks, World
 
-LASTS = 16  # steps of the fastest disk that a list is made for
+LASTS = 16  # steps of the fastest disk that a list is made for, unless fewer are left
 THIN, THICK = 0.125, 2.0  # the skin in mean radii: at least, so that a crowd at rest may fall; at most
 FAR = 2.0**31  # cells from the origin, up to where rounding cannot put a disk into the wrong one
 ROOM = 32  # near pairs a disk, beyond which a list is given up
@@ -33,25 +33,24 @@ class Near(NamedTuple):
 
 
 @compiled
-def look_around(disks: Disks, world: World, dt: float) -> Near:
-    """All pairs that are apart by less than a skin, and the disks within half a skin of a wall.
+def look_around(disks: Disks, world: World, dt: float, left: int) -> Near:
+    """All pairs that are apart by less than a skin, and the disks within half a skin of a wall; `left` steps to go.
 
     Both disks of a pair may use up half of the skin. The leash is a little less than that: 2 % of the skin are more
     than what rounding makes of all the distances.
     """
     x, radius = disks.position, disks.radius
-    skin = skin_for(disks, dt)
+    skin = skin_for(disks, dt, left)
     cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))  # wider than needed by more than rounding
     first, second = near_pairs(cells, skin)
-    first, second = in_order(first, second, len(x))
-    reach2 = (radius[first] + radius[second]) ** 2
+    first, second, reach2 = in_order(first, second, radius)
     listed = len(cells.disk) > 0 and len(first) <= ROOM * len(x)
     disk, wall = near_walls(x, radius, 0.5 * skin, world.walls)
     return Near(listed, x.copy().reshape(-1), 0.49 * skin, first, second, reach2, disk, wall)
 
 
 @kernel
-def skin_for(disks: Disks, dt: float) -> float:
+def skin_for(disks: Disks, dt: float, left: int) -> float:
     """m: the thicker, the more pairs are asked in vain; the thinner, the sooner the list is out of date."""
     fastest = 0.0
     for i in range(len(disks.mass)):
@@ -59,7 +58,7 @@ def skin_for(disks: Disks, dt: float) -> float:
         if speed > fastest:
             fastest = speed
     size = disks.radius.mean()
-    return min(max(2.0 * LASTS * fastest * abs(dt), THIN * size), THICK * size)
+    return min(max(2.0 * min(LASTS, left) * fastest * abs(dt), THIN * size), THICK * size)
 
 
 @kernel
@@ -90,24 +89,24 @@ def sort_into_cells(x, radius, side: float) -> Cells:  # type: ignore[no-untyped
     while count < n:
         count *= 2
     row = int(sqrt(count)) | 1
-    of, start = np.empty(n, np.uint32), np.zeros(count + 3, np.int64)
+    of, start = np.empty(n, np.uint32), np.zeros(count + 3, np.uint32)
     for i in range(n):
         a, b = x[i, 0] / side, x[i, 1] / side
         if not (abs(a) < FAR and abs(b) < FAR):
             return Cells(row, start, of[:0], of[:0], np.empty((0, 3)))
         of[i] = (floor(a) + floor(b) * row) & (count - 1)
-        start[of[i] + 1] += 1
-    for c in range(count):
-        start[c + 1] += start[c]
-    start[count + 1 :] = n + start[1:3]
+        start[of[i] + 2] += 1
+    for c in range(2, count + 2):
+        start[c] += start[c - 1]  # of the cell before, until that one is filled
 
-    m, free = int(start[-1]), start.copy()
+    m = n + np.int64(start[3])
     disk, number, place = np.empty(m, np.uint32), np.empty(m, np.uint32), np.empty((m, 3))
     for i in range(n):
-        q = free[of[i]]
-        free[of[i]] += 1
+        q = start[of[i] + 1]
+        start[of[i] + 1] += 1
         disk[q], number[q] = i, of[i]
         place[q, 0], place[q, 1], place[q, 2] = x[i, 0], x[i, 1], radius[i]
+    start[count + 1 :] = n + start[1:3]
     disk[n:], place[n:] = disk[: m - n], place[: m - n]
     return Cells(row, start, disk, number, place)
 
@@ -154,26 +153,37 @@ def longer(array):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def in_order(first, second, n: int):  # type: ignore[no-untyped-def]
-    """The pairs in the order of the double loop: sorted by the second, then by the first, which keeps that order."""
-    second, first = sorted_by(second, first, n)
-    return sorted_by(first, second, n)
+def in_order(first, second, radius):  # type: ignore[no-untyped-def]
+    """The pairs in the order of the double loop, and their reach2: a counting sort by the first, then row by row."""
+    n = len(radius)
+    end = np.zeros(n + 1, np.uint32)  # of the row of a disk; while it fills, where the next one goes
+    for i in first:
+        end[i + 1] += 1
+    for i in range(n):
+        end[i + 1] += end[i]
+    ordered, reach2 = np.empty_like(second), np.empty(len(second))
+    for p in range(len(first)):
+        ordered[end[first[p]]] = second[p]
+        end[first[p]] += 1
+    begin = 0
+    for i in range(n):
+        for p in range(begin, end[i]):
+            insert(ordered, begin, p)
+            first[p] = i
+        for p in range(begin, end[i]):
+            reach2[p] = (radius[i] + radius[ordered[p]]) ** 2
+        begin = end[i]
+    return first, ordered, reach2
 
 
-@compiled
-def sorted_by(key, other, n: int):  # type: ignore[no-untyped-def]
-    """Both (p,) arrays by a counting sort of the keys, numbers below n; equal keys stay in order."""
-    free = np.zeros(n + 1, np.uint32)
-    for k in key:
-        free[k + 1] += 1
-    for k in range(n):
-        free[k + 1] += free[k]
-    keys, others = np.empty_like(key), np.empty_like(other)
-    for p in range(len(key)):
-        q = free[key[p]]
-        free[key[p]] += 1
-        keys[q], others[q] = key[p], other[p]
-    return keys, others
+@kernel
+def insert(row, begin: int, p: int) -> None:  # type: ignore[no-untyped-def]
+    """Put the number at p where it belongs among those before it, which are sorted from `begin` on."""
+    number = row[p]
+    while p > begin and row[p - 1] > number:
+        row[p] = row[p - 1]
+        p -= 1
+    row[p] = number
 
 
 @compiled
