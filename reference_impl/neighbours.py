@@ -43,7 +43,8 @@ def look_around(disks: Disks, world: World, dt: float, left: int) -> Near:
     skin = skin_for(disks, dt, left)
     cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))  # wider than needed by more than rounding
     first, second = near_pairs(cells, skin)
-    first, second, reach2 = in_order(first, second, radius)
+    first, second = in_order(first, second, len(x))
+    reach2 = (radius[first] + radius[second]) ** 2
     listed = len(cells.disk) > 0 and len(first) <= ROOM * len(x)
     disk, wall = near_walls(x, radius, 0.5 * skin, world.walls)
     return Near(listed, x.copy().reshape(-1), 0.49 * skin, first, second, reach2, disk, wall)
@@ -153,37 +154,26 @@ def longer(array):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def in_order(first, second, radius):  # type: ignore[no-untyped-def]
-    """The pairs in the order of the double loop, and their reach2: a counting sort by the first, then row by row."""
-    n = len(radius)
-    end = np.zeros(n + 1, np.uint32)  # of the row of a disk; while it fills, where the next one goes
-    for i in first:
-        end[i + 1] += 1
-    for i in range(n):
-        end[i + 1] += end[i]
-    ordered, reach2 = np.empty_like(second), np.empty(len(second))
-    for p in range(len(first)):
-        ordered[end[first[p]]] = second[p]
-        end[first[p]] += 1
-    begin = 0
-    for i in range(n):
-        for p in range(begin, end[i]):
-            insert(ordered, begin, p)
-            first[p] = i
-        for p in range(begin, end[i]):
-            reach2[p] = (radius[i] + radius[ordered[p]]) ** 2
-        begin = end[i]
-    return first, ordered, reach2
+def in_order(first, second, n: int):  # type: ignore[no-untyped-def]
+    """The pairs in the order of the double loop: sorted by the second, then by the first, which keeps that order."""
+    second, first = sorted_by(second, first, n)
+    return sorted_by(first, second, n)
 
 
-@kernel
-def insert(row, begin: int, p: int) -> None:  # type: ignore[no-untyped-def]
-    """Put the number at p where it belongs among those before it, which are sorted from `begin` on."""
-    number = row[p]
-    while p > begin and row[p - 1] > number:
-        row[p] = row[p - 1]
-        p -= 1
-    row[p] = number
+@compiled
+def sorted_by(key, other, n: int):  # type: ignore[no-untyped-def]
+    """Both (p,) arrays by a counting sort of the keys, numbers below n; equal keys stay in order."""
+    free = np.zeros(n + 1, np.uint32)
+    for k in key:
+        free[k + 1] += 1
+    for k in range(n):
+        free[k + 1] += free[k]
+    keys, others = np.empty_like(key), np.empty_like(other)
+    for p in range(len(key)):
+        q = free[key[p]]
+        free[key[p]] += 1
+        keys[q], others[q] = key[p], other[p]
+    return keys, others
 
 
 @compiled

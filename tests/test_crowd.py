@@ -127,6 +127,15 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
     assert (near.reach2 == 1.0).all()
 
 
+def test_a_list_is_made_for_the_steps_that_are_left_but_not_for_more_than_it_pays():
+    """Its leash is as long as the fastest disk needs; longer, a call of few steps would ask many pairs in vain."""
+    scene, dt = boxed_gas(500, 0.3), DT / 4
+    disks, world = make_disks(scene.position, scene.velocity, scene.radius, scene.mass), World()
+    leash = {left: look_around(disks, world, dt, left).leash for left in (2, 4, 8, LASTS, 2 * LASTS)}
+    assert leash[8] == 2 * leash[4] == 4 * leash[2] > 0.0
+    assert leash[LASTS] == leash[2 * LASTS] == 2 * leash[8]
+
+
 @pytest.mark.parametrize("far", [1e12, 1e300, np.inf, np.nan])
 def test_a_disk_lost_in_space_leaves_no_list_but_the_same_bits(far):
     """Nobody can say in which cell it is."""
