@@ -37,10 +37,11 @@ def advance_listed(disks: Disks, world: World, dt: float, count: int, hits: list
     """Advance by near pairs, however few the disks are; returns in how many steps all pairs had to be asked."""
     pull, n, unlisted = pull_on(disks, world, dt), len(disks.radius), 0
     k, i, j, looks = 0, 0, 0, 0  # in step k nothing has been asked from the pair (i, j) on
+    here = disks.position.reshape(-1)  # in place of homes while there is no list: nobody is far from where it is
     if count > 0:
-        exercise.integrate(disks, world, dt)
+        fly(disks, dt, pull, here, inf)
     while k < count:
-        near, began = look_around(disks, world, dt), k
+        near, began = look_around(disks, world, dt, count - k), k
         if near.listed:
             k, i, j = play(disks, world, dt, count, hits, pull, near, k, i, j)
         looks = looks + 1 if k == began else 0
@@ -50,7 +51,8 @@ def advance_listed(disks: Disks, world: World, dt: float, count: int, hits: list
             wrap(disks.position, world)
             k, i, j, looks, unlisted = k + 1, 0, 0, 0, unlisted + 1
             if k < count:
-                exercise.integrate(disks, world, dt)
+                fly(disks, dt, pull, here, inf)
+    turn(disks, dt, count, pull)
     return unlisted
 
 
@@ -124,30 +126,38 @@ def next_touch(
             return k, p
         wrap(disks.position, world)
         k, p = k + 1, 0
-        if k == count or fly(disks, dt, pull, near) > 0:
+        if k == count or fly(disks, dt, pull, near.home, EARLY * near.leash) > 0:
             return k, NONE
 
 
 @kernel
-def fly(disks: Disks, dt: float, pull: Pull, near: Near) -> int:
-    """As `exercise.integrate`; returns how many disks are farther from home than `EARLY` of the leash.
+def fly(disks: Disks, dt: float, pull: Pull, home, leash: float) -> int:  # type: ignore[no-untyped-def]
+    """As `exercise.integrate`, but for the angles; returns how many disks are then farther from home than the leash.
 
     One thing at a time and no way out of a loop, so that it is done in vectors; and in blocks, so that the next loop
     finds in the nearest cache what the one before has left there.
     """
-    x, v, angle, spin = disks.position.reshape(-1), disks.velocity.reshape(-1), disks.angle, disks.angular_velocity
-    home, leash, strays = near.home, EARLY * near.leash, 0
+    x, v, strays = disks.position.reshape(-1), disks.velocity.reshape(-1), 0
     for run in range(len(pull.moving)):
         begin, end = np.int64(pull.moving[run, 0]), np.int64(pull.moving[run, 1])
         for c in range(2 * begin, 2 * end):
             v[c] += pull.kick[c]
             x[c] += v[c] * dt
         for i in range(begin, end):
-            spin[i] += pull.turn[i]
-            angle[i] += spin[i] * dt
-        for i in range(begin, end):
             strays += astray(x, home, i, leash)
     return strays
+
+
+@kernel
+def turn(disks: Disks, dt: float, count: int, pull: Pull) -> None:
+    """The angles and spins of all steps, at last, as no hit asks for them: a block is fetched once for all of them."""
+    angle, spin = disks.angle, disks.angular_velocity
+    for run in range(len(pull.moving)):
+        begin, end = np.int64(pull.moving[run, 0]), np.int64(pull.moving[run, 1])
+        for _ in range(count):
+            for i in range(begin, end):
+                spin[i] += pull.turn[i]
+                angle[i] += spin[i] * dt
 
 
 @kernel

@@ -13,7 +13,7 @@ import numpy as np
 from reference_impl.compiled import compiled, kernel
 from reference_impl.state import Disks, World
 
-LASTS = 16  # steps of the fastest disk that a list is made for
+LASTS = 16  # steps of the fastest disk that a list is made for, unless fewer are left
 THIN, THICK = 0.125, 2.0  # the skin in mean radii: at least, so that a crowd at rest may fall; at most
 FAR = 2.0**31  # cells from the origin, up to where rounding cannot put a disk into the wrong one
 ROOM = 32  # near pairs a disk, beyond which a list is given up
@@ -33,14 +33,14 @@ class Near(NamedTuple):
 
 
 @compiled
-def look_around(disks: Disks, world: World, dt: float) -> Near:
-    """All pairs that are apart by less than a skin, and the disks within half a skin of a wall.
+def look_around(disks: Disks, world: World, dt: float, left: int) -> Near:
+    """All pairs that are apart by less than a skin, and the disks within half a skin of a wall; `left` steps to go.
 
     Both disks of a pair may use up half of the skin. The leash is a little less than that: 2 % of the skin are more
     than what rounding makes of all the distances.
     """
     x, radius = disks.position, disks.radius
-    skin = skin_for(disks, dt)
+    skin = skin_for(disks, dt, left)
     cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))  # wider than needed by more than rounding
     first, second = near_pairs(cells, skin)
     first, second = in_order(first, second, len(x))
@@ -51,7 +51,7 @@ def look_around(disks: Disks, world: World, dt: float) -> Near:
 
 
 @kernel
-def skin_for(disks: Disks, dt: float) -> float:
+def skin_for(disks: Disks, dt: float, left: int) -> float:
     """m: the thicker, the more pairs are asked in vain; the thinner, the sooner the list is out of date."""
     fastest = 0.0
     for i in range(len(disks.mass)):
@@ -59,7 +59,7 @@ def skin_for(disks: Disks, dt: float) -> float:
         if speed > fastest:
             fastest = speed
     size = disks.radius.mean()
-    return min(max(2.0 * LASTS * fastest * abs(dt), THIN * size), THICK * size)
+    return min(max(2.0 * min(LASTS, left) * fastest * abs(dt), THIN * size), THICK * size)
 
 
 @kernel
@@ -90,24 +90,24 @@ def sort_into_cells(x, radius, side: float) -> Cells:  # type: ignore[no-untyped
     while count < n:
         count *= 2
     row = int(sqrt(count)) | 1
-    of, start = np.empty(n, np.uint32), np.zeros(count + 3, np.int64)
+    of, start = np.empty(n, np.uint32), np.zeros(count + 3, np.uint32)
     for i in range(n):
         a, b = x[i, 0] / side, x[i, 1] / side
         if not (abs(a) < FAR and abs(b) < FAR):
             return Cells(row, start, of[:0], of[:0], np.empty((0, 3)))
         of[i] = (floor(a) + floor(b) * row) & (count - 1)
-        start[of[i] + 1] += 1
-    for c in range(count):
-        start[c + 1] += start[c]
-    start[count + 1 :] = n + start[1:3]
+        start[of[i] + 2] += 1
+    for c in range(2, count + 2):
+        start[c] += start[c - 1]  # of the cell before, until that one is filled
 
-    m, free = int(start[-1]), start.copy()
+    m = n + np.int64(start[3])
     disk, number, place = np.empty(m, np.uint32), np.empty(m, np.uint32), np.empty((m, 3))
     for i in range(n):
-        q = free[of[i]]
-        free[of[i]] += 1
+        q = start[of[i] + 1]
+        start[of[i] + 1] += 1
         disk[q], number[q] = i, of[i]
         place[q, 0], place[q, 1], place[q, 2] = x[i, 0], x[i, 1], radius[i]
+    start[count + 1 :] = n + start[1:3]
     disk[n:], place[n:] = disk[: m - n], place[: m - n]
     return Cells(row, start, disk, number, place)
 

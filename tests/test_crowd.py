@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numba import njit
 
 from reference_impl import crowd, exercise
-from reference_impl.neighbours import look_around
+from reference_impl.neighbours import LASTS, look_around
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
 from tests.gases import boxed_gas
 
@@ -97,7 +97,7 @@ def test_a_disk_pushed_off_its_leash_in_mid_step_is_looked_after_at_once():
     world, first, other, stale = World(), heap(), heap(), heap()
     hits = exercise.advance(first, world, DT, 1)
     exercise.integrate(other, world, DT)
-    near = look_around(other, world, DT)
+    near = look_around(other, world, DT, 1)
     assert near.listed
     assert until_astray(other, world, near) == 0
 
@@ -106,7 +106,7 @@ def test_a_disk_pushed_off_its_leash_in_mid_step_is_looked_after_at_once():
     assert told == hits
 
     exercise.integrate(stale, world, DT)
-    kept = look_around(stale, world, DT)._replace(leash=np.inf)
+    kept = look_around(stale, world, DT, 1)._replace(leash=np.inf)
     assert until_astray(stale, world, kept) == 1
     assert not same(first, stale)
 
@@ -116,7 +116,8 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
     """Counted the slow way, in a gas around the origin, where cells have negative numbers."""
     scene = boxed_gas(500, packing)
     position = scene.position - scene.position.mean(axis=0)
-    near = look_around(make_disks(position, scene.velocity, scene.radius, scene.mass), World(walls=scene.walls), DT)
+    disks = make_disks(position, scene.velocity, scene.radius, scene.mass)
+    near = look_around(disks, World(walls=scene.walls), DT, LASTS)
     skin = near.leash / 0.49
     apart = np.hypot(*(position[:, None] - position).transpose(2, 0, 1)) - 1.0
     wanted = np.argwhere(np.triu(apart < skin, 1))
@@ -124,6 +125,15 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
     assert 0.1 < skin <= 1.0
     assert np.stack([near.first, near.second], 1).tolist() == wanted.tolist()
     assert (near.reach2 == 1.0).all()
+
+
+def test_a_list_is_made_for_the_steps_that_are_left_but_not_for_more_than_it_pays():
+    """Its leash is as long as the fastest disk needs; longer, a call of few steps would ask many pairs in vain."""
+    scene, dt = boxed_gas(500, 0.3), DT / 4
+    disks, world = make_disks(scene.position, scene.velocity, scene.radius, scene.mass), World()
+    leash = {left: look_around(disks, world, dt, left).leash for left in (2, 4, 8, LASTS, 2 * LASTS)}
+    assert leash[8] == 2 * leash[4] == 4 * leash[2] > 0.0
+    assert leash[LASTS] == leash[2 * LASTS] == 2 * leash[8]
 
 
 @pytest.mark.parametrize("far", [1e12, 1e300, np.inf, np.nan])
@@ -143,7 +153,7 @@ def test_a_disk_lost_in_space_leaves_no_list_but_the_same_bits(far):
 def test_disks_all_in_one_place_are_not_listed():
     """Every pair is near: a list would be as long as the double loop, and hold memory besides."""
     disks = make_disks(np.zeros((300, 2)), np.zeros((300, 2)), np.ones(300), np.ones(300))
-    assert not look_around(disks, World(), DT).listed
+    assert not look_around(disks, World(), DT, 1).listed
 
 
 @pytest.mark.parametrize("n", [crowd.CROWD - 1, crowd.CROWD, 1000])
