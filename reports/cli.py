@@ -157,7 +157,9 @@ def check(
 
 @app.command()
 def play(
-    flight: Annotated[Path | None, typer.Argument(metavar="[FLIGHT.toml]", help="Fly a saved flight again.")] = None,
+    flight: Annotated[
+        Path | None, typer.Argument(metavar="[FLIGHT.toml]", parser=place, help="Fly a saved flight again.")
+    ] = None,
     engine: Engines = None,
     port: Port = 8000,
     opens: Opens = False,

@@ -18,6 +18,8 @@ from reports.game.session import Session
 from scenarios.closed_forms import world_pushes
 from scenarios.exercise import SHIP as START
 from scenarios.files import read_scene_file, scene_text
+from scenarios.model import Scenario
+from scenarios.placing import lay_out
 
 EVENTS = [  # frame, key, down: a turn, a push across it, a renewed push, both keys of a pair
     (8, "a", True), (24, "w", True), (40, "w", True), (56, "a", False), (72, "w", False), (80, "s", True),
@@ -280,3 +282,19 @@ def test_spin_is_part_of_the_energy():
     assert told["energy"] == pytest.approx(sum(each), rel=1e-14)
     assert told["momentum"] == pytest.approx((scene.mass @ scene.velocity).tolist(), rel=1e-13)
     assert 0 < pi / 4 * 0.3**4 * scene.angular_velocity[1] ** 2 < told["energy"]
+
+
+def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
+    """The earth, the way back to the start and "You won" belong to the exercise's field, not to every wrap."""
+    scene = lay_out(
+        position=[[3.0, 1.5]], velocity=[[1.0, 0.0]], radius=[0.25], mass=[1.0], restitution=1.0, wrap=[[0, 0], [4, 3]]
+    )
+    scenario = Scenario("through-the-edge", "Does it come back?", "", scene, 6.0, 0.125)
+    session = Session(["reference:exercise"], scenario)
+    session.flight.advance(scenario.samples)
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", scenario, session.flight.dt)
+    told = session.now()
+
+    assert run.trajectory is not None
+    assert session.flight.solid.state.position.tolist() == run.trajectory.position[-1].tolist()
+    assert (told["left_at"], told["won"], session.field()["earth"]) == (-1, False, None)

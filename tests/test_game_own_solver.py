@@ -194,3 +194,34 @@ def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
     assert (started.returncode, out) == (0, "Stopped.\n")
     assert [line for line in complaints.splitlines() if "is taken" not in line] == []
     assert took < 10 * PATIENCE
+
+
+def test_any_name_of_a_folder_will_do(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Spaces, umlauts, quotes, brackets: the solver flies, and can be left out and made solid again."""
+    folder = tmp_path / 'Übung "zwei" <b>]'
+    folder.mkdir()
+    with page_of(browser, solver(folder), monkeypatch) as page:
+        page.locator("[name=solid][value='reference:exercise']").check()
+        page.wait_for_function("() => game.field.engines[0] === 'reference:exercise'")
+        page.locator("tr[data-engine$=':own'] [name=flies]").uncheck()
+        page.wait_for_function("() => game.field.engines.length === 1")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["Exercise.js"], "Exercise.js: is a solver and no flight; fly it by --engine Exercise.js"),
+        ([""], '"": is not there; name a file'),
+        ([word for k in range(17) for word in ("--engine", f"{k}.js")], "--engine: 17 engines; at most 16 fly at once"),
+    ],
+)
+def test_what_is_asked_wrongly_is_told(words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """One line, exit 2, before anything is served: not a page that cannot begin."""
+    monkeypatch.setattr(command, "serve", lambda *_: pytest.fail("it was served"))
+    solver(tmp_path)
+    for k in range(17):
+        shutil.copy(SOLVER, tmp_path / f"{k}.js")
+    done = crosscheck("play", *words, cwd=tmp_path)
+
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert said in done.stderr

@@ -270,3 +270,18 @@ def test_the_page_tells_its_frame_time(page: Page):
     fly(page, 30)
 
     assert re.search(r"\d+ pictures a second.* engines take \d+\.\d ms", page.locator("#pace").inner_text())
+
+
+def test_a_page_of_an_earlier_server_is_loaded_anew(browser: Browser):
+    """Started again with other engines on the same port, as after a change of one's solver: the new ones fly."""
+    game = Game(["reference:exercise", "pymunk:shipped"])
+    with served(application(game)) as url:
+        page, heard = opened(browser, url, reduced_motion="reduce")
+        page.wait_for_function("() => game.field")
+        game.engines, game.mark = ["reference:exercise", "box2d:shipped"], "later"
+        page.evaluate("game.socket.close()")
+        page.wait_for_function("() => document.body.dataset.server === 'later' && window.game?.field", timeout=10_000)
+        flown, ticked = page.evaluate("[game.field.engines, game.rows.filter((row) => !row.matches('.off')).length]")
+        page.context.close()
+
+    assert (flown, ticked, heard) == (["reference:exercise", "box2d:shipped"], 2, [])

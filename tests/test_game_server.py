@@ -23,7 +23,16 @@ from adapters.box2d_v3 import Box2DV3
 from adapters.engines import ENGINES
 from reports.game.command import play_game
 from reports.game.flight import field_scenario
-from reports.game.server import MOST_A_SECOND, MOST_FAULTS, MOST_TABS, Game, application, config_of, taken_socket
+from reports.game.server import (
+    MOST_A_SECOND,
+    MOST_FAULTS,
+    MOST_TABS,
+    Game,
+    application,
+    config_of,
+    serve,
+    taken_socket,
+)  # fmt: skip
 from tests.test_flight import bits, flown
 
 FLOWN = ["reference:exercise", "pymunk:shipped"]
@@ -244,3 +253,14 @@ def test_bad_input_is_told_and_nothing_is_served(
 
     assert exit.value.code == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_missing_browser_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    """By --open on a machine without one; it is served all the same."""
+    served_on: list[int] = []
+    monkeypatch.setattr("webbrowser.open", lambda _: False)
+    monkeypatch.setattr(uvicorn.Server, "run", lambda _, sockets: served_on.append(sockets[0].close()))
+    serve(application(Game(FLOWN)), 8700, "/", True)
+
+    assert "--open: no browser was found here; open http://localhost:87" in capsys.readouterr().err
+    assert len(served_on) == 1

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import base64
 import json
+import signal
 import zlib
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -115,3 +118,20 @@ def test_a_page_that_cannot_be_made_leaves_the_old_one(tmp_path: Path, monkeypat
 
     assert done.returncode == 130
     assert path.read_text() == whole
+
+
+def test_ctrl_c_is_heard_even_where_an_engine_swallows_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Python drops what is raised in a callback from C, as pymunk's: the export ends after that run, with 130."""
+
+    def deaf(_: object, done: Callable[[], None], __: object) -> str:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        done()
+        return ""
+
+    monkeypatch.setattr(command, "offline", deaf)
+    done = crosscheck("lesson", "order", "--export", tmp_path / "order.html", cwd=tmp_path)
+
+    assert done.returncode == 130
+    assert list(tmp_path.iterdir()) == []
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -195,3 +195,35 @@ def test_what_cannot_be_shown_is_told(url: str, path: str, status: int, said: st
 
     assert refusal.value.code == status
     assert said in refusal.value.read().decode()
+
+
+def test_a_slider_that_is_dragged_asks_for_where_it_stops(browser: Browser, url: str):
+    """Not for every place it passes: a lesson that takes a second would answer half a minute later."""
+    page, heard = opened(browser, f"{url}/horizon", viewport={"width": 1280, "height": 900})
+    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.locator(".sliders input").first.focus()
+    page.evaluate(
+        """for (let k = 0; k < 12; k++) {
+          lesson.sliders[0].value = k % 3;
+          lesson.sliders[0].dispatchEvent(new Event("input"));
+        }"""
+    )
+    page.evaluate("lesson.ready")
+    at = page.evaluate("lesson.at")
+    page.context.close()
+
+    assert len(asked) == 2  # the first place, and the last
+    assert asked[-1].endswith(f"?at={at}")
+    assert heard == []
+
+
+def test_what_departs_is_seen_to_depart(monkeypatch: pytest.MonkeyPatch):
+    """As many digits as it takes: 20 beside a stated 20 would be no departure."""
+    monkeypatch.setattr(conventions, "ENGINES", {"box2d_v3:shipped": ENGINES["box2d_v3:shipped"]})
+    rows = conventions.table()
+
+    departing = [(row.expected, *row.got["box2d_v3:shipped"]) for row in rows]
+    assert [verdict for _, _, verdict in departing].count("departs") > 3
+    assert all(expected != got for expected, got, verdict in departing if verdict == "departs")

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 
 from adapters.engines import ENGINES, OWN, Row
 from adapters.play import fault_of
+from adapters.solver_file import KINDS
 from adapters.student import engine_file
 from reports.commands import checked_engines
 from reports.exits import refuse
 from reports.game.flight import FRAME, field_scenario
+from reports.game.messages import MOST_ENGINES
 from reports.game.server import Game, application, serve
 from reports.lessons.pages import ROUTES
 from scenarios.files import SceneFileError, read_scene_file
@@ -25,6 +28,8 @@ FIRST = ("reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:
 def play_game(flight: Path | None, engines: Sequence[str], port: int, opens: bool) -> None:
     """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is none."""
     chosen = checked_engines(engines) if engines else list(FIRST)
+    if len(chosen) > MOST_ENGINES:
+        refuse([f"--engine: {len(chosen)} engines; at most {MOST_ENGINES} fly at once: name fewer"])
     file = read_flight(flight) if flight else None
     # A solver's file is a row like any other while it flies; one that cannot fly at all is told before.
     ENGINES.update(own_rows([name for name in chosen if name.endswith(OWN)]))
@@ -63,6 +68,8 @@ def grounded(row: Row) -> str:
 
 def read_flight(path: Path) -> Scenario:
     """The scenario in a scene file; exits 2 with a line a fault."""
+    if path.suffix.lower() in KINDS:
+        refuse([f"{path}: is a solver and no flight; fly it by --engine {shlex.quote(str(path))}"])
     try:
         scenario = read_scene_file(path)
     except SceneFileError as error:

@@ -13,7 +13,7 @@ from adapters.engines import ENGINES
 from adapters.play import RUNAWAY, advance, fault_of, first_hits, reach, weight_impulse
 from reports.game.parting import Parting, Touches, parting
 from reports.game.pilot import SHIP, Pilot
-from scenarios.exercise import SOURCE, asteroid_field
+from scenarios.exercise import HIGH, LOW, SOURCE, asteroid_field
 from scenarios.model import Array, Scenario, State
 
 FRAME = 1 / 64  # s; a power of two, so that every instant of a saved flight is a whole number of steps without rounding
@@ -68,14 +68,17 @@ class Flyer:
 class Flight:
     """A scenario flown by the engines `names`, of which the first is the solid one; keys steer unless it is a replay.
 
-    The ship that leaves a field with a wrap is set back to its start, at rest, at the end of that step, as in the
-    exercise, and in each engine by itself: the engine is loaded anew with all else as it is.
+    The ship that leaves the exercise's field is set back to its start, at rest, at the end of that step, as in the
+    exercise, and in each engine by itself: the engine is loaded anew with all else as it is. In any other scene with a
+    wrap disk 0 wraps like the rest, as it does in `play`.
     """
 
     def __init__(self, scenario: Scenario, names: Sequence[str], replayed: bool = False) -> None:
         self.scenario, self.replayed = scenario, replayed
         self.substeps = scenario.substeps[len(scenario.substeps) // 2]
         self.dt = scenario.dt(self.substeps)
+        wrap = scenario.scene.wrap
+        self.is_game = wrap is not None and np.array_equal(wrap, [LOW, HIGH])
         self.farthest = RUNAWAY * reach(scenario)
         self.pilot = Pilot(scenario.scene, scenario.sample_interval)
         self.frame, self.left_at, self.won_at = 0, -1, -1
@@ -130,9 +133,9 @@ class Flight:
 
     def may_leave(self, state: State) -> bool:
         """Whether the ship is so near an edge that a frame may carry it beyond."""
-        if self.scenario.scene.wrap is None:
+        if not self.is_game:
             return False
-        low, high = self.scenario.scene.wrap
+        low, high = np.array([LOW, HIGH])
         room = self.scenario.scene.radius[SHIP] + 2 * np.abs(state.velocity[SHIP]) * self.scenario.sample_interval
         return bool(((state.position[SHIP] < low + room) | (state.position[SHIP] > high - room)).any())
 
@@ -157,11 +160,9 @@ class Flight:
             self.set_back(flyer)
 
     def ship_left(self, before: State, after: State) -> bool:
-        """Whether the ship was set onto the opposite edge."""
-        if self.scenario.scene.wrap is None:
-            return False
-        low, high = self.scenario.scene.wrap
-        return bool((np.abs(after.position[SHIP] - before.position[SHIP]) > (high - low) / 2).any())
+        """Whether the ship was set onto the opposite edge of the game's field."""
+        jump = np.abs(after.position[SHIP] - before.position[SHIP])
+        return self.is_game and bool((jump > (np.array(HIGH) - LOW) / 2).any())
 
     def set_back(self, flyer: Flyer) -> None:
         """The ship to its start, all else as it is."""
@@ -195,7 +196,7 @@ class Flight:
         ship = self.solid.state
         apart, speed = ship.position[SHIP] - np.array(EARTH), ship.velocity[SHIP]
         near = float(apart @ apart) < EARTH_SIZE and float(speed @ speed) < CALM
-        return self.scenario.scene.wrap is not None and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
+        return self.is_game and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
 
     def measures(self, flyer: Flyer) -> dict[str, Any]:
         """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid one's m, hits."""

@@ -38,6 +38,7 @@ class Game {
   }
 
   open(field) {
+    if (field.server && field.server !== document.body.dataset.server) { location.reload(); return; }  // started anew: other engines, or another flight
     Object.assign(this, { field, frames: [field.first, field.first], waiting: 0, owed: 0 });
     this.stopped.clear();
     this.gone.clear();
@@ -202,7 +203,7 @@ class Game {
     this.send({ do: "fly", engines, ...numbers });
   }
 
-  box(name) { return document.querySelector(`[name=flies][value="${name}"]`); }
+  box(name) { return document.querySelector(`[name=flies][value="${CSS.escape(name)}"]`); }
 
   key(key, down) {
     if (down) this.down.add(key); else this.down.delete(key);

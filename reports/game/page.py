@@ -12,11 +12,11 @@ from reports.style import look
 from scenarios.model import Scenario
 
 
-def game_page(engines: Sequence[str], file: Scenario | None) -> str:
-    """The page, which begins with these engines; `file`: the flight it shows again."""
+def game_page(engines: Sequence[str], file: Scenario | None, mark: str) -> str:
+    """The page, which begins with these engines; `file`: the flight it shows again; `mark`: its server's."""
     looks = {name: look(*name.split(":", 1)) for name in ENGINES}
     return render(
         "game/game.html.j2", ["game/field.js", "game/game.js"], ["game/game.css"], connects=True,
-        rows=ENGINES, flown=list(engines), steps={k: FRAME / k for k in SUBSTEPS}, file=file, looks=looks,
+        rows=ENGINES, flown=list(engines), steps={k: FRAME / k for k in SUBSTEPS}, file=file, looks=looks, mark=mark,
         apart=APART, looks_json=looks_as_json(looks),
     )  # fmt: skip

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
+from secrets import token_hex
 from time import monotonic
 from urllib.parse import urlsplit
 
@@ -57,15 +58,16 @@ class Allowance:
 
 @dataclass
 class Game:
-    """What every tab begins with, and how many are open."""
+    """What every tab begins with, how many are open, and by what a page knows its own server from a later one."""
 
     engines: Sequence[str]
     file: Scenario | None = None
     tabs: int = 0
+    mark: str = field(default_factory=lambda: token_hex(8))
 
     async def page(self, _: Request) -> HTMLResponse:
         """The page."""
-        return HTMLResponse(game_page(self.engines, self.file))
+        return HTMLResponse(game_page(self.engines, self.file, self.mark))
 
     async def fly(self, socket: WebSocket) -> None:
         """A tab, as long as it keeps the rules."""
@@ -81,6 +83,7 @@ class Game:
         try:
             session = await run_in_threadpool(Session, self.engines, self.file)
             with suppress(WebSocketDisconnect):
+                await socket.send_text(as_json(session.field() | {"server": self.mark}))
                 await converse(socket, session)
         finally:
             if session is not None:
@@ -101,7 +104,6 @@ async def converse(socket: WebSocket, session: Session) -> None:
     time, keeps its own tab waiting and no other.
     """
     allowance, faults = Allowance(MOST_A_SECOND), 0
-    await socket.send_text(as_json(session.field()))
     while True:
         event = await socket.receive()
         if event["type"] == "websocket.disconnect":
@@ -158,8 +160,8 @@ def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
         print(f"Port {port} is taken: this is on {found}.", file=sys.stderr)
     url = f"http://localhost:{found}{path}"
     print(f"{url}  (Ctrl-C stops it)", flush=True)
-    if opens:
-        webbrowser.open(url)
+    if opens and not webbrowser.open(url):
+        print(f"--open: no browser was found here; open {url} yourself.", file=sys.stderr)
     server = uvicorn.Server(config_of(app))
     logging.getLogger("uvicorn.error").addFilter(is_news)
     with suppress(KeyboardInterrupt):

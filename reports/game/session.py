@@ -54,11 +54,10 @@ class Session:
         """What stays as it is during a flight, and its first frame."""
         flight = self.flight
         scene = flight.scenario.scene
-        game = scene.wrap is not None
         return {
             "kind": "field", "name": flight.scenario.name, "radius": scene.radius.tolist(),
             "wrap": scene.wrap.ravel().tolist() if scene.wrap is not None else None,
-            "walls": scene.walls.reshape(-1, 4).tolist(), "earth": [*EARTH, EARTH_SIZE] if game else None,
+            "walls": scene.walls.reshape(-1, 4).tolist(), "earth": [*EARTH, EARTH_SIZE] if flight.is_game else None,
             "interval": flight.scenario.sample_interval, "dt": flight.dt, "replayed": flight.replayed,
             "engines": [flyer.name for flyer in flight.flyers], "duration": flight.scenario.duration,
             "first": self.now(),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -81,8 +83,26 @@ def write_pages(pages: Mapping[Path, Lesson], links: Links) -> None:
     runs = sum(len(lesson.grid) for lesson in pages.values())
     with Progress() as progress:
         progress.start(runs, runs, "starting")
-        for path, lesson in pages.items():
-            put(path, offline(lesson, partial(progress.done, f"{lesson.number} {lesson.title}"), links))
+        with stoppable(progress.done) as done:
+            for path, lesson in pages.items():
+                put(path, offline(lesson, partial(done, f"{lesson.number} {lesson.title}"), links))
+
+
+@contextmanager
+def stoppable(done: Callable[[str], None]) -> Iterator[Callable[[str], None]]:
+    """`done`, which ends all on Ctrl-C: raised within an engine's callback it would be lost, so it waits for a run."""
+    asked: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+
+    def checked(what: str) -> None:
+        if asked:
+            raise KeyboardInterrupt
+        done(what)
+
+    try:
+        yield checked
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def put(path: Path, text: str) -> None:

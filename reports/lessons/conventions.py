@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from adapters.conformance import PROBES, conform
+from adapters.conformance import PROBES, Finding, conform
 from adapters.engines import ENGINES
 from reports.style import number
 
@@ -30,6 +30,14 @@ def table() -> list[Convention]:
     for probe in ASKED:
         answers = {name: found[probe] for name, found in findings.items() if probe in found}
         expected = "by its order" if probe == "free_flight" else number(next(iter(answers.values())).expected)
-        got = {name: (number(each.got), each.verdict) for name, each in answers.items()}
+        got = {name: (reading(each), each.verdict) for name, each in answers.items()}
         rows.append(Convention(PROBES[probe].asked, expected, got))
     return rows
+
+
+def reading(found: Finding) -> str:
+    """What an engine gave, with as many digits as it takes to see that it departs from what is expected."""
+    digits = range(3, 10) if found.verdict == "departs" else [3]
+    return next(
+        (text for d in digits if (text := number(found.got, d)) != number(found.expected, d)), number(found.got)
+    )

@@ -21,7 +21,8 @@ class Lesson {
 
   moved(slider) {
     this.say(slider, JSON.parse(slider.dataset.shown)[slider.value]);
-    this.ready = this.ask(this.at);
+    this.asking ??= this.ask().finally(() => { this.asking = null; });  // one at a time; it goes on to where the slider is by then
+    this.ready = this.asking;
   }
 
   say(slider, text) {
@@ -29,15 +30,19 @@ class Lesson {
     slider.setAttribute("aria-valuetext", text);
   }
 
-  // A slider that moves on before its answer is there leaves it unused.
-  async ask(at) {
+  // Until the answer is that to where the sliders are: those passed meanwhile are never asked for.
+  async ask() {
     document.querySelector(".stage-lesson").classList.add("busy");
     const fault = document.querySelector(".fault");
     try {
-      const shown = this.grid ? (await this.grid)[at] : await (await fetch(`${this.place}?at=${at}`)).json();
-      if (at !== this.at) return;
-      fault.textContent = shown.fault ?? "";
-      if (!shown.fault) await this.show(shown);
+      let at, shown;
+      do {
+        at = this.at;
+        shown = this.grid ? (await this.grid)[at] : await (await fetch(`${this.place}?at=${at}`)).json();
+        if (at !== this.at) continue;
+        fault.textContent = shown.fault ?? "";
+        if (!shown.fault) await this.show(shown);
+      } while (at !== this.at);
     } catch {
       fault.textContent = "The server is not there: start it again with crosscheck lesson.";
     }
