@@ -34,10 +34,7 @@ def play_game(flight: Path | None, engines: Sequence[str], port: int, opens: boo
     # A solver's file is a row like any other while it flies; one that cannot fly at all is told before.
     ENGINES.update(own_rows([name for name in chosen if name.endswith(OWN)]))
     game = Game(chosen, file)
-    try:
-        serve(application(game, ROUTES), port, "/", opens)
-    except OSError as fault:
-        refuse([f"--port {port}: {fault}; name another"])
+    serve(application(game, ROUTES), port, "/", opens)
 
 
 def own_rows(names: Sequence[str]) -> dict[str, Row]:

@@ -25,6 +25,7 @@ from starlette.responses import HTMLResponse
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from reports.exits import refuse
 from reports.game.messages import MOST_BYTES
 from reports.game.page import game_page
 from reports.game.session import Session, as_json
@@ -149,12 +150,11 @@ def taken_socket(port: int) -> socket.socket:
 
 
 def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
-    """Serve until Ctrl-C; say where, and open a browser there if asked.
-
-    Raises:
-        OSError: if there is no port.
-    """
-    listening = taken_socket(port)
+    """Serve until Ctrl-C; say where, and open a browser there if asked; exits 2 if there is no port."""
+    try:
+        listening = taken_socket(port)
+    except OSError as fault:
+        refuse([f"--port {port}: {fault}; name another"])
     found = listening.getsockname()[1]
     if found != port:
         print(f"Port {port} is taken: this is on {found}.", file=sys.stderr)

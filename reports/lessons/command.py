@@ -30,10 +30,7 @@ def open_lesson(name: str, port: int, opens: bool, export: Path | None) -> None:
     if export is not None:
         write_one(name, export) if name else write_all(export)
         return
-    try:
-        serve(application(Game(list(FIRST)), ROUTES), port, f"/lesson/{name}".rstrip("/"), opens)
-    except OSError as fault:
-        refuse([f"--port {port}: {fault}; name another"])
+    serve(application(Game(list(FIRST)), ROUTES), port, f"/lesson/{name}".rstrip("/"), opens)
 
 
 def write_one(name: str, path: Path) -> None:
