@@ -103,6 +103,7 @@ LOADING = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOADING)
 def test_a_file_that_cannot_be_loaded_is_one_row_that_says_why_and_where(results: Results, name: str):
     """The row "loads" is a fault; its cause has line and column of the user's file where the language tells."""
@@ -166,12 +167,14 @@ CALLS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CALLS)
 def test_a_function_that_fails_is_named_with_what_it_does(results: Results, name: str):
     """The first sentence says which function, and what happened."""
     assert CALLS[name][1] in first(rows_of(results, name))
 
 
+@pytest.mark.slow
 def test_a_function_that_never_comes_back_does_not_hide_the_other(results: Results):
     """An endless integrate leaves the collision function to be judged."""
     assert {row.verdict for row in rows_of(results, "endless_integrate.js") if row.task == "2c"} == {"right", "note"}
@@ -191,6 +194,7 @@ REPLACED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", REPLACED)
 def test_a_built_in_that_is_replaced_is_named_and_fools_nobody(results: Results, what: str):
     """The answers still come from the spheres, not from what the file made of the language."""
@@ -223,6 +227,7 @@ HARMLESS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HARMLESS)
 def test_what_does_no_harm_is_no_fault(results: Results, name: str):
     """Marks, line ends, encodings and prints change nothing."""
@@ -289,6 +294,7 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path):
         read_solver(tmp_path / "Exercise.js")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_no_text_is_refused_in_a_sentence(results: Results, name: str):
     """`NotASolver` names the file and what is wrong with it."""

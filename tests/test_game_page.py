@@ -252,6 +252,7 @@ def test_with_reduced_motion_nothing_moves_by_itself(page: Page):
     assert "starts the flight" in page.locator("#banner").inner_text()
 
 
+@pytest.mark.slow
 def test_the_frame_time_is_measured_by_a_command():
     """`python -m tests.bench_game` prints a row for each thing timed, and how fast the flight goes."""
     words = [sys.executable, "-m", "tests.bench_game", "1"]

@@ -94,6 +94,7 @@ def test_what_died_leaves_every_good_state_before(ended, engine: str):
         assert getattr(trajectory, name).tobytes() == getattr(whole, name)[:FATAL].tobytes()
 
 
+@pytest.mark.slow
 def test_the_clock_of_a_cell_starts_when_its_engine_is_loaded():
     """Loading that takes longer than the time-out is no fault; a hang after it is, and so is one that never loads."""
     slow = {"slow:control": row(LoadsSlowly), "hangs:control": row(LoadsSlowlyAndHangs)}
