@@ -74,12 +74,9 @@ def momentum(comparison: Comparison) -> Drawing:
     if comparison.truth is None:
         why = "Walls, static disks or turning pushes take up momentum, and no exact answer says how much."
         return Drawing("Momentum", why, None)
-    scene, lines = comparison.scenario.scene, []
+    scale, lines = scales.momentum(comparison.scenario) or 1.0, []
     for run, view in views(comparison, comparison.truth):
-        assert view.other is not None
-        apart = np.linalg.norm(laws.momentum(view.played, scene) - laws.momentum(view.other, scene), axis=1)
-        scale = scales.momentum(comparison.scenario) or 1.0
-        lines.append(Line(run, view.played.t, np.where(view.calm, apart / scale, np.nan)))
+        lines.append(Line(run, view.played.t, np.where(view.calm, view.momentum_apart / scale, np.nan)))
     caption = (
         "Walls and static disks take up momentum, so no law is broken here: how far the momentum is from the truth's, "
         f"over the Σ m|v| at hand{HITS}. A late hit is a spike."

@@ -22,13 +22,19 @@ def part_of(out: Path) -> Path:
     return out.parent / f"{out.name}.part"
 
 
-def open_new(out: Path) -> Journal:
-    """The journal of a new run into `out`; raises `FolderTaken`, or `OSError` where nothing can be written."""
+def open_part(out: Path, ours: Callable[[str], bool], strangers: str) -> Journal:
+    """The journal of what will be `out`, where that is while it is made; raises as `may_write`, or `OSError`."""
     part = part_of(out)
     for folder in (out, part):
-        may_write(folder, *OF_A_RUN)
+        may_write(folder, ours, strangers)
     part.mkdir(parents=True, exist_ok=True)
-    journal = held(part, out)
+    return held(part, out)
+
+
+def open_new(out: Path) -> Journal:
+    """The journal of a new run into `out`; raises `FolderTaken`, or `OSError` where nothing can be written."""
+    journal = open_part(out, *OF_A_RUN)
+    part = journal.path.parent
     if had := ended_in(part):
         raise FolderTaken(
             f"{part} holds an interrupted run, in which {had} cells have ended: to go on with it, crosscheck run "

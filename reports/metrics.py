@@ -46,10 +46,7 @@ def energy_apart(view: View) -> Value | None:
 
 def momentum_apart(view: View) -> Value | None:
     """Root mean square distance of the momenta in calm samples, over the sum of m|v| at hand."""
-    assert view.other is not None
-    scene = view.scenario.scene
-    apart = laws.lengths(laws.momentum(view.played, scene) - laws.momentum(view.other, scene))
-    return Value(_rms(apart[view.calm]) / (scales.momentum(view.scenario) or 1.0))
+    return Value(_rms(view.momentum_apart[view.calm]) / (scales.momentum(view.scenario) or 1.0))
 
 
 def energy_loss_error(view: View) -> Value | None:

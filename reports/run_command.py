@@ -11,9 +11,9 @@ from typing import NoReturn
 
 from adapters.engines import row_of
 from reports.archive import Archive
-from reports.commands import checked_engines, checked_scenes, finish, refusing
+from reports.commands import checked_engines, checked_scenes, finish, open_out, refusing
 from reports.exits import FAILED, broken_off, refuse, say
-from reports.folders import FolderTaken, open_again, open_new, part_of, replace_folder
+from reports.folders import open_again, open_new, part_of, replace_folder
 from reports.journal import JOURNAL, Journal
 from reports.report import make_report
 from reports.runner import NoScheduler, cluster
@@ -47,13 +47,7 @@ def run_plan(
         command=command,
     )
     out = out.resolve()
-    try:
-        journal = open_new(out)
-    except FolderTaken as fault:
-        refuse([str(fault)])
-    except OSError as fault:
-        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
-    carry_on(plan, means, journal, out)
+    carry_on(plan, means, open_out(out, open_new), out)
 
 
 def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means:

@@ -53,6 +53,13 @@ class View:
         return laws.lengths(self.played.velocity - self.other.velocity)
 
     @cached_property
+    def momentum_apart(self) -> Array:
+        """(k,) kg m/s between the momenta of the two."""
+        assert self.other is not None
+        scene = self.scenario.scene
+        return laws.lengths(laws.momentum(self.played, scene) - laws.momentum(self.other, scene))
+
+    @cached_property
     def angle_apart(self) -> Array:
         """(k, n) rad between the two."""
         assert self.other is not None

@@ -54,11 +54,11 @@ def served(app: Starlette) -> Iterator[str]:
 
 
 def opened(browser: Browser, url: str, **context: Any) -> tuple[Page, list[str]]:
-    """The page at `url`, and what it complained of or asked of other machines; a file may ask for nothing at all."""
+    """The page at `url`, and what it said on the console or asked of other machines; a file may ask for nothing."""
     page = browser.new_context(**context).new_page()
     heard: list[str] = []
     page.route(lambda each: not belongs(each, url), lambda route: (heard.append(route.request.url), route.abort())[1])
-    page.on("console", lambda message: heard.append(message.text) if message.type in ("error", "warning") else None)
+    page.on("console", lambda message: heard.append(message.text))
     page.on("pageerror", lambda error: heard.append(str(error)))
     page.goto(url)
     return page, heard

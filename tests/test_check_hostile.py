@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from time import monotonic, process_time
-from unittest import mock
+from time import monotonic
 
 import pytest
-from py_mini_racer import JSTimeoutException
 
-from adapters.solver_file import NotASolver, read_solver
-from adapters.solver_js import JavaScriptSolver
+from adapters.solver_file import NotASolver
 from reports.check.rows import Row
 from reports.check.solver import check_solver
 from reports.check.verdict import FileCheck
+
+pytestmark = pytest.mark.slow  # waits for what hangs, twice for each function
 
 Results = dict[str, list[Row] | NotASolver]
 SECONDS = 16.0  # for one file on a busy machine: two calls that are stopped late, a process that starts
@@ -103,7 +97,6 @@ LOADING = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", LOADING)
 def test_a_file_that_cannot_be_loaded_is_one_row_that_says_why_and_where(results: Results, name: str):
     """The row "loads" is a fault; its cause has line and column of the user's file where the language tells."""
@@ -167,14 +160,12 @@ CALLS = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CALLS)
 def test_a_function_that_fails_is_named_with_what_it_does(results: Results, name: str):
     """The first sentence says which function, and what happened."""
     assert CALLS[name][1] in first(rows_of(results, name))
 
 
-@pytest.mark.slow
 def test_a_function_that_never_comes_back_does_not_hide_the_other(results: Results):
     """An endless integrate leaves the collision function to be judged."""
     assert {row.verdict for row in rows_of(results, "endless_integrate.js") if row.task == "2c"} == {"right", "note"}
@@ -194,7 +185,6 @@ REPLACED = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("what", REPLACED)
 def test_a_built_in_that_is_replaced_is_named_and_fools_nobody(results: Results, what: str):
     """The answers still come from the spheres, not from what the file made of the language."""
@@ -227,7 +217,6 @@ HARMLESS = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", HARMLESS)
 def test_what_does_no_harm_is_no_fault(results: Results, name: str):
     """Marks, line ends, encodings and prints change nothing."""
@@ -244,57 +233,6 @@ REFUSED = {
 }
 
 
-def busy(spent: float) -> Iterator[str | Exception]:
-    """An engine that is stopped after `spent` s of processor time, then answers."""
-    until = process_time() + spent
-    while process_time() < until:
-        pass
-    yield JSTimeoutException()
-    yield "7"
-
-
-def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endless_one_is_not(tmp_path: Path):
-    """What V8 was stopped in counts only if it has run for its time; a step cannot be asked twice."""
-    (tmp_path / "Exercise.js").write_text(JS)
-    solver = JavaScriptSolver(read_solver(tmp_path / "Exercise.js"))
-
-    for spent, may_repeat, answer in ((0.0, True, "7"), (0.2, True, None), (0.0, False, None)):
-        solver.engine = mock.Mock()
-        solver.engine.eval.side_effect = busy(spent)
-        if answer is None:
-            with pytest.raises(JSTimeoutException):
-                solver.evaluated("code", 0.2, may_repeat)
-        else:
-            assert solver.evaluated("code", 0.2, may_repeat) == answer
-
-
-def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Path):
-    """V8 stops the loop after its limit; nobody is there to hear it, and no process is left behind."""
-    (tmp_path / "Exercise.js").write_text("while (true) {}")
-    worker = subprocess.Popen(
-        [sys.executable, "-m", "adapters.solver_worker"],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-    assert worker.stdin is not None
-    assert worker.stdout is not None
-    worker.stdout.close()
-    worker.stdin.write(json.dumps(str(tmp_path / "Exercise.js")).encode() + b"\n")
-    worker.stdin.close()
-    try:
-        worker.wait(SECONDS)
-    finally:
-        worker.kill()
-
-
-def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path):
-    """Nobody writes into it, so that reading it would never end."""
-    os.mkfifo(tmp_path / "Exercise.js")
-
-    with pytest.raises(NotASolver, match=r"Exercise\.js: is no file; name an Exercise\.js or a solver\.py"):
-        read_solver(tmp_path / "Exercise.js")
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_no_text_is_refused_in_a_sentence(results: Results, name: str):
     """`NotASolver` names the file and what is wrong with it."""

@@ -11,19 +11,19 @@ from xml.etree import ElementTree
 
 import jsonschema
 import pytest
-from playwright.sync_api import Error, Page, sync_playwright
+from playwright.sync_api import Browser
 
 from adapters.solver_process import SolverProcess
 from reports.check import command
 from reports.check.machine import SCHEMA
 from reports.check.smallest import Smallest, smallest_scene
 from reports.check.verdict import check_file
+from tests.browsing import opened
 from tests.command_line import CROSSCHECK, crosscheck, process
 from tests.solvers.mutants import CORRECT, MUTANTS
 
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
 WRONG = next(mutant for mutant in MUTANTS if mutant.name == "mass_sum.js")
-CHROMIUM = shutil.which("chromium")
 
 
 @pytest.fixture(scope="module")
@@ -169,31 +169,21 @@ def test_a_right_solver_has_no_failing_scene():
         assert smallest_scene(process, 0.9) is None
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 @pytest.mark.parametrize("width", [1280, 400])
-def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(folder: Path, smallest: Smallest, width: int):
+def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
+    browser: Browser, folder: Path, smallest: Smallest, width: int
+):
     """Opened from the file, at two widths: both layers move, nothing overflows, no error, no request."""
     from reports.check.page import write_page
 
     page_path = folder / "page.html"
     write_page(page_path, check_file(folder / "ben" / "Exercise.js"), smallest)
-    with sync_playwright() as playwright:
-        try:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
-        except Error as error:
-            pytest.skip(f"Chromium does not start: {error}")
-        page: Page = browser.new_page(viewport={"width": width, "height": 800})
-        heard: list[str] = []
-        page.on("console", lambda message: heard.append(message.text))
-        page.on("pageerror", lambda error: heard.append(str(error)))
-        page.on("request", lambda request: heard.append(request.url) if request.url.startswith("http") else None)
-        page.goto(page_path.as_uri())
-        page.wait_for_function("players.smallest")
-        at_end = "name => { players.smallest.seek(1); return players.smallest.positions(name); }"
-        shown = {name: page.evaluate(at_end, name) for name in ("Exercise.js:own", "truth")}
-        fits = page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-        title = page.locator("h1").inner_text()
-        browser.close()
+    page, heard = opened(browser, page_path.as_uri(), viewport={"width": width, "height": 800})
+    page.wait_for_function("players.smallest")
+    at_end = "name => { players.smallest.seek(1); return players.smallest.positions(name); }"
+    shown = {name: page.evaluate(at_end, name) for name in ("Exercise.js:own", "truth")}
+    fits = page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    title = page.locator("h1").inner_text()
 
     assert heard == []
     assert fits

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from playwright.sync_api import ConsoleMessage, Request, sync_playwright
+from playwright.sync_api import Browser
 from typer.testing import CliRunner
 
 from adapters.features import FEATURES
@@ -26,11 +25,10 @@ from reports.speed.results import Results
 from reports.terminal import Progress
 from scenarios.catalogue import scenario
 from scenarios.oracle import CLOSED_FORM, HIT_BY_HIT
+from tests.browsing import opened, overhang
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
-CHROMIUM = shutil.which("chromium")
-FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
 SCENES = ("head_on_equal_e09", "asteroids")
 PLAYERS = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
 LITTLE = replace(QUICK, seeds=3, most_steps=1000, rounds=2, budget=0.0, sizes=(3, 10, 100, 1000), patience=1.0,
@@ -225,31 +223,20 @@ def test_the_kept_figures_have_every_ratio_that_is_gated():
 
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (400, "dark")])
 def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
-    results: Results, tmp_path: Path, width: int, scheme: str
+    browser: Browser, results: Results, tmp_path: Path, width: int, scheme: str
 ):
     """No request but for itself, no word on the console, nothing wider than the page, a figure in every place."""
-    if CHROMIUM is None:
-        pytest.skip("needs Debian's chromium")
     page = tmp_path / "speed.html"
     write_page(page, results, about("crosscheck speed", 0) | SAID)
-    asked: list[Request] = []
-    said: list[ConsoleMessage] = []
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        tab = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)  # type: ignore[arg-type]
-        tab.on("request", lambda request: asked.append(request))
-        tab.on("console", lambda message: said.append(message))
-        tab.goto(page.as_uri())
-        for plot in tab.locator(".plot").all():
-            plot.scroll_into_view_if_needed()
-            plot.locator(".main-svg").first.wait_for()
-        assert tab.locator(".plot").count() == 2 + 2 + 3 + 1 + 2 * len(SCENES)
-        assert tab.evaluate("document.documentElement.scrollWidth") <= width
-        assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with habits: three players; two switched off
-        assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
-        browser.close()
-    assert [request.url for request in asked if not request.url.startswith(("file:", "data:", "blob:"))] == []
-    assert [message.text for message in said] == []
+    tab, heard = opened(browser, page.as_uri(), viewport={"width": width, "height": 900}, color_scheme=scheme)
+    for plot in tab.locator(".plot").all():
+        plot.scroll_into_view_if_needed()
+        plot.locator(".main-svg").first.wait_for()
+    assert tab.locator(".plot").count() == 2 + 2 + 3 + 1 + 2 * len(SCENES)
+    assert overhang(tab) <= 0
+    assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with habits: three players; two switched off
+    assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
+    assert heard == []
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from adapters.engines import row_of
 from adapters.habits import FLIGHT, Habit, habits_of, with_habits
 from adapters.play import Run, play
 from reports import laws, scales
+from reports.comparison import cut
 from reports.speed.ladder import held
 from reports.view import View
 from scenarios.model import Array, Scenario, Trajectory
@@ -100,11 +101,9 @@ def followed(scene: str, seed: int, substeps: int) -> Followed:
     assert late is not None
     off = (laws.deviation(late, truth, scenario.scene) / scenario.scene.radius).max(axis=1)
     last = max(int(np.append(np.flatnonzero(off > LIMIT), len(off))[0]) - 1, 1)
-    cut = {
-        name: getattr(truth, name)[: last + 1] for name in ("t", "position", "velocity", "angle", "angular_velocity")
-    }
     shorter = replace(scenario, duration=last * scenario.sample_interval)
-    return Followed(shorter, replace(truth, **cut), whole.dt)
+    # All hits are kept: one just after the end is near to the last samples, too.
+    return Followed(shorter, replace(cut(truth, last + 1), collisions=truth.collisions), whole.dt)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
@@ -16,9 +17,9 @@ from rich.console import Console
 from rich.table import Table
 
 from reports import style
-from reports.commands import checked_engines, checked_scenes
-from reports.exits import DONE, FAILED, broken_off, refuse, say
-from reports.folders import FolderTaken, held, may_write, part_of, replace_folder
+from reports.commands import checked_engines, checked_scenes, open_out
+from reports.exits import DONE, FAILED, broken_off, say
+from reports.folders import open_part, replace_folder
 from reports.journal import JOURNAL, Journal
 from reports.machine import about
 from reports.speed import figures
@@ -44,27 +45,14 @@ def run_speed(
     effort = replace(effort, scenes=tuple(named)) if named else effort
     plan = Plan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
     out = out.resolve()
-    part = part_of(out)
-    try:
-        for folder in (out, part):
-            may_write(folder, is_ours, "crosscheck speed did not make")
-        part.mkdir(parents=True, exist_ok=True)
-    except FolderTaken as fault:
-        refuse([str(fault)])
-    except OSError as fault:
-        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
-    try:
-        with (
-            broken_off(part, lambda: f"What has ended is kept in {part}: ask again with --resume"),
-            held(part, out) as journal,
-        ):
-            results, header = carry_out(plan, command, journal, resume)
-            if not results.measured.errors.size:
-                nothing_measured(part, results)
-            write_all(part, results, header)
-            replace_folder(part, out)
-    except FolderTaken as fault:
-        refuse([str(fault)])
+    journal = open_out(out, partial(open_part, ours=is_ours, strangers="crosscheck speed did not make"))
+    part = journal.path.parent
+    with broken_off(part, lambda: f"What has ended is kept in {part}: ask again with --resume"), journal:
+        results, header = carry_out(plan, command, journal, resume)
+        if not results.measured.errors.size:
+            nothing_measured(part, results)
+        write_all(part, results, header)
+        replace_folder(part, out)
     print_summary(results, str(out / PAGE))
     sys.exit(DONE)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -13,10 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import ENGINES
-from reports.commands import checked_engines, unknown
+from reports.commands import checked_engines, open_out, unknown
 from reports.exits import DONE, FAILED, broken_off, refuse, say
-from reports.folders import FolderTaken, may_write, part_of, replace_folder
-from reports.journal import JOURNAL, Busy, Journal
+from reports.folders import open_part, replace_folder
+from reports.journal import JOURNAL
 from reports.stability.atlas import Atlas, Plan, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
@@ -40,26 +41,17 @@ def find_limits(
     form = "full" if full else "quick"
     plan = Plan(cases, maps, touching, checked_engines(engines), form, workers or os.cpu_count() or 1, command)
     out = out.resolve()
-    part = part_of(out)
+    journal = open_out(out, partial(open_part, ours=FILES.__contains__, strangers="crosscheck stability did not make"))
+    part = journal.path.parent
     kept = f"What has ended is kept in {part}: ask again with --resume"
-    try:
-        may_write(out, FILES.__contains__, "crosscheck stability did not make")
-        part.mkdir(parents=True, exist_ok=True)
-    except FolderTaken as fault:
-        refuse([str(fault)])
-    except OSError as fault:
-        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
-    try:
-        with broken_off(part, lambda: kept), Journal(part) as journal, Progress() as progress:
-            done = done_before(part, plan) if resume else set()
-            if not done:
-                os.truncate(journal.path, 0)
-            carry_out(plan, journal, done, progress)
-            progress.say("writing the tables and the page")
-            found = write_files(part)
-            replace_folder(part, out)
-    except Busy:
-        refuse([f"{out} is being written by another crosscheck; wait for it, or name another --out"])
+    with broken_off(part, lambda: kept), journal, Progress() as progress:
+        done = done_before(part, plan) if resume else set()
+        if not done:
+            os.truncate(journal.path, 0)
+        carry_out(plan, journal, done, progress)
+        progress.say("writing the tables and the page")
+        found = write_files(part)
+        replace_folder(part, out)
     finish(found, out)
 
 
