@@ -23,7 +23,9 @@ NAMES = (
 )  # fmt: skip
 FLIGHT, RESTITUTION, IMPULSE, FRICTION, SKIN, PUSH_OUT, DIGITS, SWEPT = NAMES
 # Exact flight; what overlaps at the end of a step gets its impulse there and then; nothing is moved out of it.
-LATE: dict[str, Any] = {"order": ("move", "accelerate", "pair_by_pair"), "alpha": 0.5, "project": False}
+LATE: dict[str, Any] = {
+    "order": ("move", "accelerate", "pairs", "walls"), "alpha": 0.5, "project": False, "project_walls": False,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -59,8 +61,13 @@ def with_habits(habits: Sequence[Habit]) -> Switched:
     return Switched(**switches)
 
 
-def _reference(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Habit]:
-    return [Habit(PUSH_OUT, {"project": True})]
+def _exercise(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Habit]:
+    return [Habit(PUSH_OUT, {"project": True, "project_walls": True})]
+
+
+def _lesson(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Habit]:
+    # Walls come first, and flip a velocity without moving the disk.
+    return [Habit(IMPULSE, {"order": ("move", "accelerate", "walls", "pairs")}), Habit(PUSH_OUT, {"project": True})]
 
 
 def _pymunk(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Habit]:
@@ -140,7 +147,8 @@ def _box2d_v3_shipped(told: Mapping[str, Any], _scene: Scene, _dt: float) -> lis
 
 
 HABITS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Habit]]] = {
-    "reference:exercise": _reference,
+    "reference:exercise": _exercise,
+    "reference:lesson": _lesson,
     "pymunk:shipped": _pymunk_shipped,
     "pymunk:matched": partial(_pymunk, profile="matched"),
     "box2d:shipped": _box2d_shipped,

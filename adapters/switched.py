@@ -14,8 +14,8 @@ from reference_impl.contacts import no_contacts
 from reference_impl.switched import STAGES, Switches
 from scenarios.model import Scene
 
-EXERCISE = ("accelerate", "move", "pair_by_pair")
-POSITION_FIRST = ("move", "pair_by_pair", "accelerate")
+EXERCISE = ("accelerate", "move", "pairs", "walls")
+POSITION_FIRST = ("move", "pairs", "walls", "accelerate")
 # Collide where they are, then aim at a velocity after gravity, then move (Box2D 2.3, b2Island::Solve).
 BOX2D = ("detect", "by_island", "accelerate", "aim", "warm_start", "bounce", "cap", "move", "push_out")
 # Move, collide there, aim at a velocity before gravity; the push-out moves in the next step (Munk2D, cpSpaceStep).

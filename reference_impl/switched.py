@@ -1,6 +1,6 @@
 """The exercise's solver with a switch for everything that engines do otherwise: an engine is an order of stages.
 
-Every stage is a function below, and `Switches` holds the numbers they take. Accelerate, move, pair by pair is the
+Every stage is a function below, and `Switches` holds the numbers they take. Accelerate, move, pairs, walls is the
 exercise, to the bit. It asks all pairs and is for some hundred disks. Compiled by numba, as `exercise` is.
 """
 
@@ -28,11 +28,11 @@ from reference_impl.exercise import collide, collide_wall, touching, touching_wa
 from reference_impl.state import Disks, World
 
 STAGES = (
-    "accelerate", "move", "pair_by_pair", "detect", "by_island", "by_colour", "aim", "warm_start", "bounce", "cap",
+    "accelerate", "move", "pairs", "walls", "detect", "by_island", "by_colour", "aim", "warm_start", "bounce", "cap",
     "push_out", "nudge", "soften", "relax", "restitute",
 )  # fmt: skip
 (
-    ACCELERATE, MOVE, PAIR_BY_PAIR, DETECT, BY_ISLAND, BY_COLOUR, AIM, WARM_START, BOUNCE, CAP,
+    ACCELERATE, MOVE, PAIRS, WALLS, DETECT, BY_ISLAND, BY_COLOUR, AIM, WARM_START, BOUNCE, CAP,
     PUSH_OUT, NUDGE, SOFTEN, RELAX, RESTITUTE,
 ) = range(len(STAGES))  # fmt: skip
 
@@ -43,7 +43,8 @@ class Switches(NamedTuple):
     order: np.ndarray  # the stages of a step, as places in STAGES
     drift: float = 0.0  # of a h2, by which `move` goes farther than v h
     threshold: float = 0.0  # m/s: closing speeds up to which a hit is inelastic
-    project: bool = True  # pair by pair: an overlap is undone at once
+    project: bool = True  # of `pairs`: an overlap is undone at once
+    project_walls: bool = True  # of `walls`
     iterations: int = 8  # of `bounce`
     friction: float = 0.0  # of `bounce`, `soften` and `relax`
     push_share: float = 0.0  # of the overlap beyond the slop: undone by each of push_iterations, or by `nudge`
@@ -81,8 +82,10 @@ def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h:
         accelerate(disks, world, h)
     elif stage == MOVE:
         move(disks, world, on, kept, h)
-    elif stage == PAIR_BY_PAIR:
-        pair_by_pair(disks, world, on, k, hits)
+    elif stage == PAIRS:
+        pairs(disks, world, on, k, hits)
+    elif stage == WALLS:
+        walls(disks, world, on, k, hits)
     elif stage == DETECT:
         detect(disks, world, on.margin, on.skin, on.touching, kept)
     elif stage == BY_ISLAND:
@@ -137,13 +140,19 @@ def move(disks: Disks, world: World, on: Switches, kept: Contacts, h: float) -> 
 
 
 @compiled
-def pair_by_pair(disks: Disks, world: World, on: Switches, k: int, hits: list) -> None:
-    """Task 2 of the exercise for one pair after the other, then the walls."""
+def pairs(disks: Disks, world: World, on: Switches, k: int, hits: list) -> None:
+    """Task 2 of the exercise for one pair of disks after the other."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for j in range(i + 1, len(radius)):
             if touching(x, radius, i, j):
                 meet(disks, world, on, i, j, k, hits)
+
+
+@compiled
+def walls(disks: Disks, world: World, on: Switches, k: int, hits: list) -> None:
+    """The same for one disk and wall after the other."""
+    x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for w in range(len(world.walls)):
             if touching_wall(x, radius, i, world.walls, w):
@@ -160,7 +169,7 @@ def meet(disks: Disks, world: World, on: Switches, i: int, j: int, k: int, hits:
     if on.threshold > 0.0 and closing(disks.velocity, i, j, nx, ny) >= -on.threshold:
         law = World(0.0, world.gravity, world.walls, world.low, world.high, world.split, world.approaching_only)
     impulse = collide(disks, i, j, law) if j >= 0 else collide_wall(disks, i, -1 - j, law)
-    if not on.project:
+    if not (on.project if j >= 0 else on.project_walls):
         x[i, 0], x[i, 1] = xi, yi
         if j >= 0:
             x[j, 0], x[j, 1] = xj, yj

@@ -43,7 +43,7 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
     place = at("slow_hit", "box2d:shipped", 5)
     limits_of.cache_clear()
     with monkeypatch.context() as patch:
-        patch.setitem(players.PLAYERS, "box2d:shipped", Player(changed_box2d))
+        patch.setitem(players.PLAYERS, "box2d:shipped", Player("box2d:shipped", changed_box2d))
         without = dict(LESSON.at(place).facts)["box2d:shipped"]
     limits_of.cache_clear()
 

@@ -101,7 +101,7 @@ def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
 
 
 def test_every_engine_is_explained_to_a_thousandth_in_a_hit_and_a_bounce():
-    """All seven with known habits; float32 alone leaves less than a thousandth of an engine's error."""
+    """All eight with known habits; float32 alone leaves less than a thousandth of an engine's error."""
     scenes = ("head_on_equal_e09", "wall_to_wall")
     rows = pd.DataFrame([row for scene in scenes for name in HABITS for row in budget_of(scene, 0, name, 4)])
     wide = rows.pivot(index=["scenario", "engine", "profile"], columns="part", values="position_radii")

@@ -12,7 +12,7 @@ import pytest
 from reports.stability.cases import CASES
 from reports.stability.cases_alone import ball, far, on_spring, oscillator
 from reports.stability.limits import QUICK, Limit, Search
-from reports.stability.players import play_as
+from reports.stability.players import PLAYERS, play_as
 from reports.stability.predicates import apex_drift
 from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, answers, law_of, named
 from scenarios.model import Trajectory
@@ -133,7 +133,7 @@ def test_float32_is_off_by_6_percent_at_10_km(player: str):
 )
 def test_a_push_read_off_the_positions_makes_an_oscillator_grow_as_published(player: str, factor: float):
     """E / E0 after 400 steps at w dt = 0.05, engine_facts section 5."""
-    played: Trajectory | None = on_spring(player, oscillator(0.05, 0, 1))[1].trajectory
+    played: Trajectory | None = on_spring(PLAYERS[player], oscillator(0.05, 0, 1))[1].trajectory
     assert played is not None
     energy = (played.velocity**2 + played.position**2).sum(axis=(1, 2)) / 2
 

@@ -25,7 +25,7 @@ from reports.stability.cases_gas import gas
 from reports.stability.cases_hits import at_speed
 from reports.stability.failures import AFTER, BEFORE, keep_failure, kept_failure, near, part_of
 from reports.stability.limits import FULL, QUICK, Case, Limit, Search, Trial
-from reports.stability.players import play_as
+from reports.stability.players import Player, play_as
 from reports.stability.predicates import Predicate, Reading, judge
 from reports.stability.reasons import explained
 from reports.worker_process import Failure
@@ -55,7 +55,7 @@ def case(reading: Callable[[float, int], float], values: tuple[float, ...], **mo
     def scene(x: float, run: int, _of: int) -> Scenario:
         return Scenario("made-up", "?", "", replace(SCENE, velocity=[[reading(x, run), 0]]), 1.0, 1.0, (1,))
 
-    def play(_: str, scenario: Scenario) -> tuple[Scenario, Run]:
+    def play(_: Player, scenario: Scenario) -> tuple[Scenario, Run]:
         start = scenario.scene.state
         arrays = [np.array([a, a]) for a in (start.position, start.velocity, start.angle, start.angular_velocity)]
         return scenario, Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
@@ -65,7 +65,7 @@ def case(reading: Callable[[float, int], float], values: tuple[float, ...], **mo
 
 def limit_of(one: Case, form: Any = FULL) -> Limit:
     """The limit of a player that does not matter."""
-    return Search(one, "made:up", form).limit()
+    return Search(one, "reference:exercise", form).limit()
 
 
 UP, DOWN = (1.0, 3.0, 10.0, 30.0, 100.0), (100.0, 30.0, 10.0, 3.0, 1.0)
@@ -122,7 +122,7 @@ def test_what_works_only_where_it_is_harsh_is_called_so():
 def test_one_run_in_sixteen_is_enough_to_fail_and_is_the_one_that_is_kept():
     """The fraction that failed stands beside the limit; one run alone would have seen nothing."""
     rare = case(lambda x, run: 2.0 if run == 11 and x > 17 else 0.5, UP, drawn=True)
-    search = Search(rare, "made:up", FULL)
+    search = Search(rare, "reference:exercise", FULL)
     found = search.limit()
     failing = found.failing
 

@@ -16,7 +16,8 @@ from reports.lessons.lesson import Chart, Curve, Lesson, Settings, Shown, Slider
 from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Search, Trial, players_of
 from reports.stability.overview import bracket, why
-from reports.stability.reasons import explained
+from reports.stability.players import PLAYERS
+from reports.stability.reasons import explained, tried_out
 from reports.style import TRUTH, number
 from scenarios.model import Array, Scenario, Trajectory
 
@@ -65,14 +66,15 @@ SEEN = {
 def limits_of(name: str) -> list[Limit]:
     """The limits of a case on every player, searched now, with their reasons, which players with one switch test."""
     case = CASES[name]
-    return explained([Search(case, player, QUICK).limit() for player in players_of(case)])
+    searches = [Search(case, player, QUICK) for player in players_of(case)]
+    return explained([tried_out(search, search.limit()) for search in searches])
 
 
 def run_at(case: Case, player: str, value: float) -> tuple[Trial, Scenario, Run]:
     """All runs of a player at a value, and of them the first that fails, or the last, which has the worst phase."""
     search, count = Search(case, player, QUICK), case.runs(QUICK)
     trial = search.played(value)
-    return trial, *(search.seen.get(value) or case.play(player, case.scene(value, count - 1, count)))
+    return trial, *(search.seen.get(value) or case.play(PLAYERS[player], case.scene(value, count - 1, count)))
 
 
 def show_limits(settings: Settings) -> Shown:

@@ -19,11 +19,10 @@ from reports.journal import JOURNAL, Journal, lines_of, numbers, plain
 from reports.machine import about
 from reports.runner import run_all
 from reports.stability.cases import CASES
-from reports.stability.cures import cure_of
 from reports.stability.failures import keep_failure
 from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Search, Trial, players_of
 from reports.stability.maps import MAPS, MapOf, map_of
-from reports.stability.reasons import explained
+from reports.stability.reasons import explained, tried_out
 from reports.stability.touching import TOUCHING, LawOf, law_of
 from reports.stability.vary import case_of_file
 from reports.terminal import Progress
@@ -86,9 +85,7 @@ def found_limit(task: Task, folder: Path) -> Limit:
     """Search, and save the first failing run next to the limit."""
     started = process_time()
     search = Search(case_named(task.name), task.player, FORMS[task.form])
-    limit = replace(search.limit(), case=task.name)
-    if task.name not in CASES:  # nobody knows beforehand why it fails
-        limit = replace(limit, cured=cure_of(search, limit))
+    limit = tried_out(search, replace(search.limit(), case=task.name))
     keep_failure(search, limit, folder)
     return replace(limit, seconds=process_time() - started)
 

@@ -9,7 +9,7 @@ import numpy as np
 from adapters.engine import Unsupported
 from adapters.play import Run, fault_of, gather
 from reports.stability.limits import Case
-from reports.stability.players import PLAYERS
+from reports.stability.players import Player
 from reports.stability.predicates import ANGLE_OFF, APEX_DRIFTS, SCALED_APART, SPRING_GROWS, STRAYS
 from scenarios.closed_forms import Hit, answer, bouncing, flight, pair
 from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
@@ -98,13 +98,14 @@ def oscillator(x: float, _run: int, _of: int) -> Scenario:
     return Scenario("oscillator", "Does it keep its swing?", "cos w t", scene, OSCILLATION * x, x, (1,), truth=truth)
 
 
-def on_spring(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
+def on_spring(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
     """Play a disk whose push -x N is read off its position before every step, as a user of an engine writes it."""
-    engine = PLAYERS[player].make()
+    engine = player.make()
     states: list[State] = []
-    status, reason = "ok", ""
+    status, reason, settings = "ok", "", {}
     try:
         engine.load(scenario.scene, scenario.sample_interval)
+        settings = engine.settings()
         states.append(engine.read())
         for _ in range(scenario.samples):
             engine.push(0, -states[-1].position[0], 0.0)
@@ -117,9 +118,11 @@ def on_spring(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
         status, reason = "unsupported", str(refusal)
     finally:
         engine.close()
-    name, profile = player.split(":")
+    name, profile = player.name.split(":")
     trajectory = gather(scenario, states, NO_COLLISIONS) if states else None
-    return scenario, Run(name, profile, scenario.name, scenario.sample_interval, status, reason, trajectory)
+    return scenario, Run(
+        name, profile, scenario.name, scenario.sample_interval, status, reason, trajectory, settings=settings
+    )
 
 
 DECADES = (1.0, 10.0, 100.0, 1e3, 3e3, 1e4, 3e4, 1e5, 1e6, 1e7, 1e8)

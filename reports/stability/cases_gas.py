@@ -9,7 +9,7 @@ from numpy.random import Generator, default_rng
 
 from adapters.play import Run
 from reports.stability.limits import Case
-from reports.stability.players import play_as
+from reports.stability.players import Player, played
 from reports.stability.predicates_gas import ENERGY_DRIFTS, GAS_PARTS, MOMENTUM_DRIFTS, TEMPERATURES_PART, WRONG_GAS
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
 from scenarios.placing import box, lay_out
@@ -105,15 +105,15 @@ def against(other: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
     return replace(scenario, truth=lambda _: beside), run
 
 
-def reversed_order(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
+def reversed_order(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
     """The same gas inserted in the opposite order, beside the gas in its own order."""
     scene = scenario.scene
     names = ("position", "velocity", "radius", "mass", "angle", "angular_velocity", "inertia")
     turned = replace(scenario, scene=replace(scene, **{name: getattr(scene, name)[::-1] for name in names}))
-    run = play_as(player, turned)
+    run = played(player, turned)
     if run.trajectory is not None:
         run = replace(run, trajectory=renumbered(run.trajectory, scene.n))
-    return against(play_as(player, scenario), run, scenario)
+    return against(played(player, scenario), run, scenario)
 
 
 def renumbered(played: Trajectory, n: int) -> Trajectory:
@@ -129,9 +129,9 @@ def renumbered(played: Trajectory, n: int) -> Trajectory:
     )  # fmt: skip
 
 
-def restarted(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
+def restarted(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
     """The gas stopped half way, read, and loaded into a new engine, beside the gas played through."""
-    whole = play_as(player, scenario)
+    whole = played(player, scenario)
     if whole.status != "ok" or whole.trajectory is None:
         return scenario, whole
     half = scenario.samples // 2
@@ -141,7 +141,7 @@ def restarted(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
         angular_velocity=state.angular_velocity,
     )  # fmt: skip
     left = (scenario.samples - half) * scenario.sample_interval
-    rest = play_as(player, replace(scenario, scene=fresh, duration=left))
+    rest = played(player, replace(scenario, scene=fresh, duration=left))
     if rest.status != "ok" or rest.trajectory is None:
         return scenario, rest
     before, after = whole.trajectory, rest.trajectory

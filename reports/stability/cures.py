@@ -12,6 +12,7 @@ import numpy as np
 from reports.stability.limits import NOT_KNOWN, Limit, Search
 from reports.stability.players import play_as
 from reports.stability.predicates import judge
+from reports.stability.twins import HITS_WAIT, told
 from reports.stability.vary import at_offset, at_scale, at_tempo
 from scenarios.model import Scenario
 
@@ -77,7 +78,7 @@ class Cure(NamedTuple):
         return fnmatch(player, self.players) and fnmatch(varied, self.varied)
 
 
-HITS_WAIT = "a hit waits for the end of its step"
+SAYS_SO = "it says so"
 CURES = {
     "at_home": Cure("box2d*", "offset", "positions are float32, too coarse so far out", "at the origin", at_home),
     "faster": Cure(
@@ -132,15 +133,17 @@ def cure_of(search: Search, limit: Limit) -> str:
     return ""
 
 
-def why_own(limit: Limit) -> tuple[str, str]:
-    """Why a scene of one's own fails, and how that was tested: "" if it was not."""
-    failing, varied = limit.failing, limit.case.rsplit(":", 1)[-1]
+def why_played(limit: Limit, varied: str) -> tuple[str, str]:
+    """Why a scene fails for which no reason was written down beforehand, and how that was tested: "" if it was not."""
+    failing = limit.failing
     if failing is None:
         return "", ""
     if cure := CURES.get(limit.cured):
         return cure.tells, f"works {cure.how}"
+    if limit.twin:
+        return told(limit)
     if failing.broken == "refused":
-        return "the player refuses it", "it says so"
+        return "the player refuses it", SAYS_SO
     if varied == "dt" and failing.broken in ("penetration", "escape"):
         return HITS_WAIT, ""
     tried = [cure.how for cure in CURES.values() if cure.fits(limit.player, varied)]

@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import isfinite, nan, sqrt
 
 from adapters.play import Run
-from reports.stability.players import PLAYERS, play_as
+from reports.stability.players import PLAYERS, Player, played
 from reports.stability.predicates import Predicate, Reading, judge
 from scenarios.model import Scenario
 
@@ -31,9 +31,9 @@ FULL = Form("full", runs=16, ratio=1.01, every=1)
 FORMS = {form.name: form for form in (QUICK, FULL)}
 
 
-def alone(player: str, scenario: Scenario) -> tuple[Scenario, Run]:
+def once(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
     """One run, judged by the scenario's own truth or by the laws of physics."""
-    return scenario, play_as(player, scenario)
+    return scenario, played(player, scenario)
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Case:
     drawn: bool = False
     whole: bool = False
     also: tuple[str, ...] = ()
-    play: Callable[[str, Scenario], tuple[Scenario, Run]] = alone
+    play: Callable[[Player, Scenario], tuple[Scenario, Run]] = once
     quick_values: tuple[float, ...] = ()
     refines: bool = True
     ratio: float = 1.0
@@ -128,7 +128,8 @@ class Limit:
         trials: every value tried, from gentle to harsh.
         monotone: False if it works again beyond a value at which it fails.
         seconds: of processor time that the search took.
-        cured: of a scene of one's own, the change of `CURES` with which the failing run works.
+        cured: the change of `CURES` with which the failing run works; "" if none was found, or looked for.
+        twin: the habits with which the reference has this limit, as `twin_of`; "" likewise.
         reason, source, tested: why, where that stands, and how it was tested: "" is a likely reason.
     """
 
@@ -141,6 +142,7 @@ class Limit:
     trials: tuple[Trial, ...]
     monotone: bool = True
     cured: str = ""
+    twin: str = ""
     reason: str = ""
     source: str = ""
     tested: str = ""
@@ -220,7 +222,7 @@ class Search:
         readings: list[Reading] = []
         first = -1
         for run_number in range(count):
-            scenario, run = case.play(self.player, case.scene(value, run_number, count))
+            scenario, run = case.play(PLAYERS[self.player], case.scene(value, run_number, count))
             reading = judge(case.predicate, scenario, run)
             readings.append(reading)
             if reading.failed and first < 0:

@@ -14,8 +14,9 @@ from scenarios.model import Scenario, Scene
 
 
 class Player(NamedTuple):
-    """How to make an engine, and what is switched in it; "" for a row of `ENGINES`."""
+    """A name, engine:profile; how to make its engine; and what is switched in it: "" for a row of `ENGINES`."""
 
+    name: str
     make: Callable[[], Engine]
     switch: str = ""
 
@@ -46,26 +47,36 @@ def with_bullets(make: Callable[..., Engine]) -> Callable[[], Any]:
     return lambda: Switched(make(continuous=True), fly)
 
 
-PLAYERS: dict[str, Player] = {name: Player(row.make) for name, row in ENGINES.items()} | {
-    "pymunk:matched+ten_iterations": Player(partial(changed_pymunk, iterations=10), "10 iterations for 50"),
-    "pymunk:matched+push_out": Player(
-        partial(changed_pymunk, collision_bias=(1 - 0.1) ** 60), "overlaps pushed out as shipped"
+BULLETS = "continuous collision, what moves is a bullet"
+SWITCHED = (
+    Player("pymunk:matched+ten_iterations", partial(changed_pymunk, iterations=10), "10 iterations for 50"),
+    Player(
+        "pymunk:matched+push_out", partial(changed_pymunk, collision_bias=(1 - 0.1) ** 60),
+        "overlaps pushed out as shipped",
     ),
-    "box2d:matched+bullets": Player(with_bullets(changed_box2d), "continuous collision, what moves is a bullet"),
-    "box2d_v3:matched+bullets": Player(with_bullets(changed_box2d_v3), "continuous collision, what moves is a bullet"),
-    "box2d_v3:matched+16_substeps": Player(partial(changed_box2d_v3, substeps=16), "16 substeps for 4"),
+    Player("box2d:matched+bullets", with_bullets(changed_box2d), BULLETS),
+    Player("box2d_v3:matched+bullets", with_bullets(changed_box2d_v3), BULLETS),
+    Player("box2d_v3:matched+16_substeps", partial(changed_box2d_v3, substeps=16), "16 substeps for 4"),
+)  # fmt: skip
+PLAYERS: dict[str, Player] = {
+    player.name: player for player in (*(Player(name, row.make) for name, row in ENGINES.items()), *SWITCHED)
 }
 
 
-def play_as(player: str, scenario: Scenario) -> Run:
+def played(player: Player, scenario: Scenario) -> Run:
     """Play a scenario at its only step size; the engine is closed again. A library that is missing is a refusal."""
     dt = scenario.dt(scenario.substeps[0])
     try:
-        engine = PLAYERS[player].make()
+        engine = player.make()
     except ImportError as missing:
-        name, profile = player.split(":")
+        name, profile = player.name.split(":")
         return Run(name, profile, scenario.name, dt, "unsupported", f"{missing.name or missing} cannot be imported")
     try:
-        return play(engine, player, scenario, dt)
+        return play(engine, player.name, scenario, dt)
     finally:
         engine.close()
+
+
+def play_as(player: str, scenario: Scenario) -> Run:
+    """`played` by a key of `PLAYERS`."""
+    return played(PLAYERS[player], scenario)

@@ -8,9 +8,11 @@ from fnmatch import fnmatch
 from math import atan, pi, sqrt
 from typing import NamedTuple
 
+from adapters.habits import DIGITS, IMPULSE, PUSH_OUT, RESTITUTION
 from reports.stability.cases import CASES
-from reports.stability.cures import why_own
-from reports.stability.limits import NEVER_FAILS, Limit
+from reports.stability.cures import SAYS_SO, cure_of, why_played
+from reports.stability.limits import NEVER_FAILS, Limit, Search
+from reports.stability.twins import LATE, told, twin_of
 
 NEAR = 1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a hit lost by degrees
 
@@ -24,6 +26,7 @@ class Reason(NamedTuple):
         source: where it is written down.
         predicts: the limit that follows from it.
         switch: a player that differs in this thing only, or in little else, and must get farther.
+        habit: of `adapters.habits`, or `LATE`: what it speaks of, and a twin that has the limit must do.
     """
 
     cases: str
@@ -32,6 +35,7 @@ class Reason(NamedTuple):
     source: str
     predicts: float | None = None
     switch: str = ""
+    habit: str = ""
 
 
 DISCRETE = "contacts are looked for at the ends of steps only, and lost once the centres have passed each other"
@@ -57,7 +61,9 @@ def growth_limit(share: float) -> float:
 REASONS = (
     # One hit.
     *(
-        Reason(case, player, DISCRETE, GEOMETRY, limit, f"{player}+bullets" if player.startswith("box2d") else "")
+        Reason(
+            case, player, DISCRETE, GEOMETRY, limit, f"{player}+bullets" if player.startswith("box2d") else "", LATE
+        )
         for case, limit in (
             ("tunnelling_head_on", 2.0), ("tunnelling_offset", 2 * sqrt(1 - 0.49)), ("tunnelling_thin_wall", 1.0),
             ("tunnelling_thick_wall", 11.0), ("grazing", 1 - sqrt(1 - 0.01)),
@@ -65,50 +71,52 @@ REASONS = (
         for player in ("reference:*", "pymunk:*", "box2d:matched", "box2d_v3:matched")
         if (case, player) != ("grazing", "box2d_v3:matched")
     ),
-    Reason("tunnelling_*", "*", DISCRETE + "; disks are not swept unless one is a bullet", "Box2D manual, bullets"),
-    Reason("grazing", "*", DISCRETE + "; the chord of a grazing hit is shorter than v dt", GEOMETRY),
+    Reason("tunnelling_*", "*", DISCRETE + "; disks are not swept unless one is a bullet", "Box2D manual, bullets",
+           habit=LATE),
+    Reason("grazing", "*", DISCRETE + "; the chord of a grazing hit is shorter than v dt", GEOMETRY,
+           habit=LATE),
     Reason(
         "near_miss", "box2d_v3:*", "a contact counts from a gap of four slops on, with a normal fixed before the step",
-        "Box2D 3.1 src/constants.h: B2_SPECULATIVE_DISTANCE", None, "box2d_v3:matched",
+        "Box2D 3.1 src/constants.h: B2_SPECULATIVE_DISTANCE", None, "box2d_v3:matched", IMPULSE,
     ),
     *(
-        Reason(case, f"{box}:shipped", THRESHOLD, source, limit, f"{box}:matched")
+        Reason(case, f"{box}:shipped", THRESHOLD, source, limit, f"{box}:matched", RESTITUTION)
         for case, limit in (("slow_hit", 1.0), ("scale_down", 0.25))
         for box, source in THRESHOLDS.items()
     ),
     Reason(
         "restitution", "pymunk:shipped", "the elasticities of the two shapes are multiplied: e on every shape gives e2",
-        "Munk2D src/cpArbiter.c, cpArbiterUpdate", 1 - (1 + sqrt(1 - 0.04)) / 2, "pymunk:matched",
+        "Munk2D src/cpArbiter.c, cpArbiterUpdate", 1 - (1 + sqrt(1 - 0.04)) / 2, "pymunk:matched", RESTITUTION,
     ),
     # One disk, or two.
-    Reason("bounce_drift", "pymunk:shipped", "v dt exceeds the radius, and the floor is missed", GEOMETRY),
+    Reason("bounce_drift", "pymunk:shipped", "v dt exceeds the radius, and the floor is missed", GEOMETRY, habit=LATE),
     Reason(
         "bounce_drift", "pymunk:matched+push_out", "the push out of the floor adds height",
-        "Munk2D src/cpSpaceStep.c, collision_bias", None, "pymunk:matched",
+        "Munk2D src/cpSpaceStep.c, collision_bias", None, "pymunk:matched", PUSH_OUT,
     ),
-    Reason("bounce_drift", "pymunk:matched", "v dt exceeds the radius, and the floor is missed", GEOMETRY),
+    Reason("bounce_drift", "pymunk:matched", "v dt exceeds the radius, and the floor is missed", GEOMETRY, habit=LATE),
     *(
         Reason(
             "bounce_drift", player, "the velocity after gravity is reflected: every bounce gains |v| dt of height",
-            "order of operations in a step: gravity, then restitution", 0.005,
+            "order of operations in a step: gravity, then restitution", 0.005, "", IMPULSE,
         )
         for player in ("box2d:*", "reference:lesson")
     ),
     Reason(
         "bounce_drift", "reference:exercise", "the ball is set onto the floor before its velocity is reflected",
-        "exercise 11, task 2: project, then impulse",
+        "exercise 11, task 2: project, then impulse", habit=PUSH_OUT,
     ),
     Reason(
         "bounce_drift", "box2d_v3:shipped", "the soft contact takes about |v| dt of height a bounce",
-        "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched",
+        "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched", IMPULSE,
     ),
     Reason(
         "bounce_drift", "box2d_v3:matched*", "the soft contact takes about |v| dt / substeps of height a bounce",
-        "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched+16_substeps",
+        "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched+16_substeps", IMPULSE,
     ),
     Reason(
         "scale_up", "box2d:shipped", "nothing moves by more than 2 units a step: the velocity is cut",
-        B2_SETTINGS + "b2_maxTranslation", 30.0, "box2d:matched",
+        B2_SETTINGS + "b2_maxTranslation", 30.0, "box2d:matched", IMPULSE,
     ),
     Reason(
         "scale_up", "box2d_v3:shipped", "nothing is faster than 400 m/s: the velocity is cut",
@@ -116,7 +124,7 @@ REASONS = (
     ),
     Reason(
         "far_from_origin", "box2d*", "positions are float32: beyond 4096 m a step of 1/240 m is 9 last places, not 8.5",
-        "IEEE 754", 4096.0,
+        "IEEE 754", 4096.0, "", DIGITS,
     ),
     Reason("spin", "box2d:shipped", QUARTER, B2_SETTINGS + "b2_maxRotation", pi / 2 / 0.98),
     Reason("spin", "box2d:matched", QUARTER + "; refused", B2_SETTINGS + "b2_maxRotation", pi / 2),
@@ -156,26 +164,30 @@ REASONS = (
                "reference_impl/ordered.py")
         for case in ("column", "heavy_on_light", "pile_comes_to_rest")
     ),
+    Reason("dt_*", "reference:ordered", "the hits of a step are bounded, and what is left shows as overlap",
+           "reference_impl/ordered.py"),
     Reason("overlap_recovery", "reference:ordered", "overlaps that no hit made are not pushed out",
            "reference_impl/ordered.py"),
     Reason("column", "reference:*", "each pair is projected once a step, without regard to the others",
-           "exercise 11, task 2"),
+           "exercise 11, task 2", habit=PUSH_OUT),
     Reason("heavy_on_light", "reference:*", "each pair is projected once a step, without regard to the others",
-           "exercise 11, task 2"),
+           "exercise 11, task 2", habit=PUSH_OUT),
     Reason("column", "pymunk:*", "overlaps are pushed out by a share a step, down to a slop a contact",
-           "Munk2D src/cpArbiter.c, cpArbiterPreStep"),
+           "Munk2D src/cpArbiter.c, cpArbiterPreStep", habit=PUSH_OUT),
     Reason("heavy_on_light", "pymunk:shipped", "10 sequential impulses do not carry a heavy disk on a light one",
-           "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched"),
+           "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched", IMPULSE),
     Reason("heavy_on_light", "*", "sequential impulses converge as slowly as the masses are unequal",
-           "Catto, Iterative dynamics with temporal coherence, 2005"),
+           "Catto, Iterative dynamics with temporal coherence, 2005", habit=IMPULSE),
     Reason("column", "*", "every contact may keep its slop, and soft ones give way as the load grows",
-           "Box2D, b2_linearSlop; contact softness in 3.1"),
+           "Box2D, b2_linearSlop; contact softness in 3.1", habit=PUSH_OUT),
     Reason("overlap_recovery", "pymunk:shipped", "overlaps up to a slop of 0.1 m, here 0.4 radii, are left",
-           "Munk2D src/cpSpace.c, collisionSlop", 0.02, "pymunk:matched"),
+           "Munk2D src/cpSpace.c, collisionSlop", 0.02, "pymunk:matched", PUSH_OUT),
     Reason("overlap_recovery", "box2d:shipped", "overlaps up to a slop of 5 mm, here 0.02 radii, are left",
-           B2_SETTINGS + "b2_linearSlop", 0.02, "box2d:matched"),
-    Reason("overlap_*", "*", "an overlap is pushed out by a share a step", "the engine's position correction"),
-    Reason("overfull_box", "*", "disks are pushed beyond a wall, and from there on outwards", "walls have two sides"),
+           B2_SETTINGS + "b2_linearSlop", 0.02, "box2d:matched", PUSH_OUT),
+    Reason("overlap_*", "*", "an overlap is pushed out by a share a step", "the engine's position correction",
+           habit=PUSH_OUT),
+    Reason("overfull_box", "*", "disks are pushed beyond a wall, and from there on outwards", "walls have two sides",
+           habit=PUSH_OUT),
     Reason("*_comes_to_rest", "box2d:matched", "without a threshold a lying disk chatters at e g dt / (1 - e)",
            "fixed point of v' = e (v + g dt)", None, "box2d:shipped"),
     Reason("*_comes_to_rest", "box2d:shipped", "chatter above the threshold of 1 m/s goes on for ever",
@@ -184,34 +196,33 @@ REASONS = (
            "fixed point of v' = e (v + g dt)"),
     # Gases.
     *(
-        Reason(case, f"{box}:shipped", f"{THRESHOLD}; friction", source, None, f"{box}:matched")
+        Reason(case, f"{box}:shipped", f"{THRESHOLD}; friction", source, None, f"{box}:matched", RESTITUTION)
         for case in ("dense_gas", "fast_gas", "long_gas", "heavy_in_gas", "equipartition", "thermometer")
         for box, source in THRESHOLDS.items()
     ),
     *(
-        Reason(case, "box2d_v3:*", SWEEP, "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask")
+        Reason(case, "box2d_v3:*", SWEEP, "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask", habit=IMPULSE)
         for case in ("dense_gas", "fast_gas", "long_gas", "heavy_in_gas", "equipartition", "thermometer")
     ),
     Reason("dense_gas", "pymunk:shipped", "10 sequential impulses do not solve a cluster of contacts",
-           "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched"),
+           "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched", IMPULSE),
     *(
         Reason(case, "pymunk:*", "10 sequential impulses do not solve a cluster of contacts",
-               "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched")
+               "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched", IMPULSE)
         for case in ("fast_gas", "long_gas")
     ),
-    Reason("long_wrapped_gas", "box2d*", "impulses are rounded to float32, and what is left over adds up", "IEEE 754"),
+    Reason("long_wrapped_gas", "box2d*", "impulses are rounded to float32, and what is left over adds up", "IEEE 754",
+           habit=DIGITS),
     Reason("*_gas", "box2d:matched", "parting contacts aim at 0 and closing ones at e v in one solve",
-           "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp"),
+           "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp", habit=IMPULSE),
     Reason("*_gas", "*", "sequential impulses do not solve a cluster of contacts in a step",
-           "Catto, Iterative dynamics with temporal coherence, 2005"),
-    Reason("thermometer", "*", FINDS_LATE, "penetration and return: one dt a hit"),
+           "Catto, Iterative dynamics with temporal coherence, 2005", habit=IMPULSE),
+    Reason("thermometer", "*", FINDS_LATE, "penetration and return: one dt a hit", habit=LATE),
     Reason("equipartition", "*", "energy is lost at unequal rates by light and heavy disks", "e < 1 in some hits"),
     Reason("insertion_order", "*", "sums and contacts are taken in the order of insertion, and chaos magnifies it",
            "Lyapunov exponent of the gas"),
     Reason("restart", "*", "the impulses and contacts of the last step are not part of the state that can be read",
            "warm starting; contact caches"),
-    # The suite.
-    Reason("dt_*", "*", "hits are found at the ends of steps, with overlaps up to v dt", "geometry"),
 )  # fmt: skip
 
 
@@ -222,6 +233,18 @@ def reason_of(limit: Limit) -> Reason | None:
     return next((r for r in REASONS if fnmatch(limit.case, r.cases) and fnmatch(limit.player, r.players)), None)
 
 
+def tried_out(search: Search, limit: Limit) -> Limit:
+    """The limit with what was found by playing its failing run again: a twin that has it, too, or what cures it.
+
+    Where a reason is written down, only a twin can bear it out; on a scene of one's own a cure is the better news.
+    """
+    if limit.case in CASES:
+        limit = replace(limit, twin=twin_of(search, limit))
+        return limit if limit.twin or reason_of(limit) else replace(limit, cured=cure_of(search, limit))
+    limit = replace(limit, cured=cure_of(search, limit))
+    return limit if limit.cured else replace(limit, twin=twin_of(search, limit))
+
+
 def explained(limits: Sequence[Limit]) -> list[Limit]:
     """The limits with their reasons, each tested by what it predicts, or by the limit of its switch."""
     by_name = {(limit.case, limit.player): limit for limit in limits}
@@ -229,18 +252,26 @@ def explained(limits: Sequence[Limit]) -> list[Limit]:
 
 
 def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit:
-    """The limit with its reason and with how that was tested: "" if it was not, or did not hold."""
-    if limit.case not in CASES:
-        text, tested = why_own(limit)
-        return replace(limit, reason=text, tested=tested)
+    """The limit with its reason and with how that was tested: "" if it was not, or did not hold.
+
+    What a twin of the player shows stands above a reason that speaks of something else, and holds by nothing else.
+    """
     reason = reason_of(limit)
     if reason is None:
-        return limit
+        varied = CASES[limit.case].parameter if limit.case in CASES else limit.case.rsplit(":", 1)[-1]
+        text, tested = why_played(limit, varied)
+        return replace(limit, reason=text, tested=tested)
     tests = []
     if reason.predicts is not None and brackets(limit, reason.predicts):
         tests.append(f"predicts {reason.predicts:.4g}")
     if reason.switch != limit.player and (other := by_name.get((limit.case, reason.switch))) and farther(other, limit):
         tests.append(f"{reason.switch} gets farther")
+    if limit.failing is not None and limit.failing.broken == "refused":
+        tests.append(SAYS_SO)
+    if limit.twin and (reason.habit in limit.twin.split(", ") or not tests):
+        text, shown = told(limit)
+        reason = reason if reason.habit in limit.twin.split(", ") else Reason(reason.cases, reason.players, text, "")
+        tests.append(shown)
     return replace(limit, reason=reason.text, source=reason.source, tested="; ".join(tests))
 
 

@@ -1,0 +1,138 @@
+"""Which habits of a player suffice for its limit: the reference with these alone works and fails where the player does.
+
+What an engine does otherwise than exact flight with late hits is a table of habits (`adapters.habits`), each of them a
+switch of `reference_impl.switched`. A twin is the reference with some; one that has the player's limit shows the cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from functools import partial
+from math import isnan
+
+from adapters.habits import (
+    DIGITS,
+    FLIGHT,
+    FRICTION,
+    HABITS,
+    IMPULSE,
+    PUSH_OUT,
+    RESTITUTION,
+    SKIN,
+    Habit,
+    habits_of,
+    with_habits,
+)
+from reports.stability.limits import Case, Limit, Search
+from reports.stability.players import Player
+from reports.stability.predicates import Reading, judge
+from scenarios.model import Scenario
+
+LATE = "late hits"  # a twin without any habit
+HITS_WAIT = "a hit waits for the end of its step"
+NEAR = 2.0  # where a player works nowhere, its twin must read as much as it does, to this factor
+
+SENTENCES = (
+    (LATE, "*", HITS_WAIT),
+    (FLIGHT, "*", "under a push a step of flight goes another way than v dt + a dt2 / 2"),
+    (RESTITUTION, "pymunk:*", "the elasticities of the two shapes are multiplied: e on every shape gives e2"),
+    (RESTITUTION, "box2d*", "hits that close at less than 1 m/s are played as inelastic"),
+    (IMPULSE, "*", "the contacts of a step get their impulses together, in the engine's own order of stages"),
+    (PUSH_OUT, "reference:*", "an overlap is undone at once, so that disks move that have hit nothing yet"),
+    (PUSH_OUT, "*", "overlaps are pushed out bit by bit, beside the motion"),
+    (FRICTION, "*", "friction takes speed along the contact"),
+    (SKIN, "*", "walls are thicker than they are drawn"),
+    (DIGITS, "*", "numbers are float32"),
+)  # fmt: skip
+
+
+def twin_of(search: Search, limit: Limit) -> str:
+    """The fewest habits whose twin has the limit, as text; `LATE` for none of them; "" if no twin has it, or none is.
+
+    First late hits alone, then every habit by itself (with those it acts on), then all less what is not needed.
+    """
+    twins = Twins.of(search, limit)
+    if twins is None:
+        return ""
+    for habits in twins.simple():
+        if twins.alike(habits):
+            return ", ".join(habit.name for habit in habits) or LATE
+    if not twins.habits or not twins.alike(twins.habits):
+        return ""
+    return ", ".join(habit.name for habit in twins.needed())
+
+
+@dataclass(frozen=True)
+class Twins:
+    """A case with the scenarios that fail and work next to a limit, the player's habits, and what is read off its run.
+
+    Attributes:
+        good: None where the player works nowhere.
+    """
+
+    case: Case
+    bad: Scenario
+    good: Scenario | None
+    habits: list[Habit]
+    reading: Reading
+
+    @staticmethod
+    def of(search: Search, limit: Limit) -> Twins | None:
+        """None where nothing failed or was played at all, or nothing is known of the player."""
+        seen, failing, (name, *switched) = search.failure(limit), limit.failing, search.player.split("+")
+        if seen is None or failing is None or seen[1].trajectory is None or name not in HABITS:
+            return None
+        judged, run = seen
+        bad, good = (
+            None if isnan(value) else search.case.scene(value, failing.first, failing.runs)
+            for value in (limit.fails_at, limit.works_at)
+        )
+        assert bad is not None
+        known = [] if switched else habits_of(name, run.settings, bad.scene, bad.dt(bad.substeps[0]))
+        habits = [habit for habit in known if habit.switches]
+        return Twins(search.case, bad, good, habits, judge(search.case.predicate, judged, run))
+
+    def simple(self) -> Iterator[list[Habit]]:
+        """None, then each with those it acts on."""
+        yield []
+        for habit in self.habits:
+            yield [*(each for each in self.habits if each.name in habit.on_top), habit]
+
+    def needed(self) -> Sequence[Habit]:
+        """All habits less those without which, one after the other, the twin still has the limit."""
+        left = list(self.habits)
+        for habit in self.habits:
+            fewer = [each for each in left if each is not habit and habit.name not in each.on_top]
+            if self.alike(fewer):
+                left = fewer
+        return left
+
+    def alike(self, habits: Sequence[Habit]) -> bool:
+        """Whether the twin breaks what the player breaks where that fails, and works where it works."""
+        reading = self.read(self.bad, habits)
+        if not reading.failed or reading.broken != self.reading.broken:
+            return False
+        if self.good is not None:
+            return not self.read(self.good, habits).failed
+        return 1 / NEAR <= reading.value / self.reading.value <= NEAR
+
+    def read(self, scenario: Scenario, habits: Sequence[Habit]) -> Reading:
+        """What the predicate reads off the twin's run, or runs."""
+        twin = Player("reference:twin", partial(with_habits, habits))
+        return judge(self.case.predicate, *self.case.play(twin, scenario))
+
+
+def told(limit: Limit) -> tuple[str, str]:
+    """The reason that the twin gives, and how it was tested."""
+    names = limit.twin.split(", ")
+    sentences = [next(text for habit, who, text in SENTENCES if habit == name and fnmatch(limit.player, who))
+                 for name in names]  # fmt: skip
+    only = "late hits and nothing else" if limit.twin == LATE else f"the player's {listed(names)} alone"
+    return "; ".join(sentences), f"the reference with {only} has this limit"
+
+
+def listed(names: Sequence[str]) -> str:
+    """a, b and c."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

@@ -1,0 +1,126 @@
+"""A twin is the reference with some of a player's habits: it has the player's limit if it has the cause, else not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import nan
+from typing import Any
+
+import pytest
+
+from adapters.features import changed_pymunk
+from adapters.habits import FLIGHT, FRICTION, HABITS, PUSH_OUT, RESTITUTION, habits_of
+from reports.stability.cases import CASES
+from reports.stability.limits import QUICK, Limit, Search, Trial
+from reports.stability.players import PLAYERS, Player, play_as
+from reports.stability.reasons import explained
+from reports.stability.twins import HITS_WAIT, LATE, Twins, told, twin_of
+from scenarios.catalogue import scenario
+
+
+@cache
+def found(case: str, player: str) -> tuple[Search, Limit]:
+    """The limit of a player, and the search that remembers its failing run."""
+    search = Search(CASES[case], player, QUICK)
+    return search, search.limit()
+
+
+@pytest.mark.parametrize(
+    ("case", "player", "habits"),
+    [
+        ("dt_head_on_equal_e09", "pymunk:matched", LATE),  # one hit, nothing pulls
+        ("dt_head_on_equal_e09", "box2d_v3:matched", LATE),
+        ("dt_wall_to_wall", "reference:lesson", LATE),
+        ("dt_wall_to_wall", "reference:exercise", PUSH_OUT),  # each time it is set onto the wall
+        ("dt_wall_to_wall", "pymunk:shipped", RESTITUTION),
+        ("slow_hit", "box2d:shipped", RESTITUTION),  # its threshold of 1 m/s
+        ("slow_hit", "box2d_v3:shipped", RESTITUTION),
+        ("restitution", "pymunk:shipped", RESTITUTION),  # e2 for e
+        ("far_from_origin", "box2d:matched", "float32"),
+        ("bounce_drift", "reference:exercise", PUSH_OUT),
+        ("bounce_drift", "reference:lesson", FLIGHT),  # explicit Euler
+    ],
+)
+def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, player: str, habits: str):
+    """Mechanisms with a closed form or a setting of their own."""
+    assert twin_of(*found(case, player)) == habits
+
+
+def test_a_twin_without_the_cause_does_not_have_the_limit():
+    """Negative control: neither late hits alone, nor all of the engine's habits but the threshold."""
+    search, limit = found("slow_hit", "box2d:shipped")
+    twins = Twins.of(search, limit)
+    assert twins is not None
+    others = [habit for habit in twins.habits if habit.name != RESTITUTION]
+
+    assert twins.alike(twins.habits)
+    assert not twins.alike([])
+    assert not twins.alike(others)
+    assert [habit.name for habit in twins.needed()] == [RESTITUTION]
+
+
+def test_a_cause_that_no_habit_names_gives_no_twin(monkeypatch: pytest.MonkeyPatch):
+    """pymunk with a bug of its own, half of every elasticity, under the name of one that has none."""
+
+    def halved() -> Any:
+        engine = changed_pymunk()
+        load = engine.load
+        engine.load = lambda scene, dt: load(replace(scene, restitution=scene.restitution / 2), dt)
+        return engine
+
+    monkeypatch.setitem(PLAYERS, "pymunk:matched", Player("pymunk:matched", halved))
+    search = Search(CASES["slow_hit"], "pymunk:matched", QUICK)
+    limit = search.limit()
+
+    assert limit.verdict == "never works"
+    assert twin_of(search, limit) == ""
+
+
+def test_where_a_player_works_nowhere_a_twin_must_read_as_much_as_it_does():
+    """Failing anywhere proves nothing of one that fails everywhere: its number has to come out."""
+    search, limit = found("dt_wall_to_wall", "pymunk:shipped")
+    twins = Twins.of(search, limit)
+    assert twins is not None
+    far = replace(twins, reading=twins.reading._replace(value=3 * twins.reading.value))
+
+    assert limit.verdict == "never works"
+    assert twins.alike(twins.habits)
+    assert not far.alike(twins.habits)
+
+
+@pytest.mark.parametrize("player", ["reference:ordered", "event_driven:float64"])
+def test_of_a_player_whose_habits_nobody_knows_there_is_no_twin(player: str):
+    """Late hits would be no news of one whose hits are not late."""
+    search = Search(CASES["overlap_recovery"], player, QUICK)
+    assert twin_of(search, search.limit()) == ""
+
+
+def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_twin():
+    """And where it speaks of what the twin has, it stays, and says how it was tested."""
+    failing = Trial(10.0, 1, 1, 2.0, 0)
+    limit = Limit("column", "pymunk:matched", "quick", "limit", 5.0, 10.0, (failing,))
+    [kept, other, untested] = explained(
+        [replace(limit, twin=f"{FLIGHT}, {PUSH_OUT}"), replace(limit, twin=FRICTION), limit]
+    )
+
+    assert "pushed out by a share a step" in kept.reason
+    assert kept.tested == "the reference with the player's flight and push-out alone has this limit"
+    assert other.reason == "friction takes speed along the contact"
+    assert other.source == ""
+    assert untested.why.startswith("likely: overlaps are pushed out")
+
+
+@pytest.mark.parametrize("player", HABITS)
+def test_every_habit_has_words(player: str):
+    """All of a player's for which the reference has a switch."""
+    one = scenario("head_on_equal_e09")
+    settings = play_as(player, replace(one, substeps=(4,))).settings
+    names = [habit.name for habit in habits_of(player, settings, one.scene, one.dt(4)) if habit.switches]
+    limit = Limit("slow_hit", player, "quick", "never works", nan, 1.0, ())
+
+    assert told(replace(limit, twin=LATE))[0] == HITS_WAIT
+    assert len(names) >= 2
+    for name in names:
+        assert told(replace(limit, twin=name))[0] not in ("", HITS_WAIT)
+    assert told(replace(limit, twin=", ".join(names)))[0].count("; ") >= len(names) - 1
