@@ -74,7 +74,10 @@ def _pymunk(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> 
     from adapters.pymunk import Pymunk
 
     # Its bounce reverses whatever speed a contact has, also one at which the two part (cpArbiterPreStep).
-    impulse = {"order": PYMUNK, "iterations": told["iterations"], "threshold": -np.inf}
+    impulse = {
+        "order": PYMUNK, "iterations": told["iterations"], "threshold": -np.inf,
+        "memory": told["collision_persistence"],
+    }  # fmt: skip
     push = {"push_share": 1.0 - told["collision_bias"] ** dt, "slop": told["collision_slop"]}
     return [
         Habit(IMPULSE, impulse),

@@ -22,7 +22,9 @@ class Pymunk:
 
     `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; 50 iterations, because 10
     lose energy in a dense gas; slop 1 % of the smallest radius, because the default 0.1 is a length in
-    the scene's units; at e = 1 no push-out, because it adds energy.
+    the scene's units; contacts are forgotten as soon as they part, because one that touches again within three steps
+    inherits an impulse that it is not given again, but that is told, and may be taken back: energy is lost so;
+    at e = 1 no push-out, because it adds energy.
 
     Changed one at a time by `features.py`: `turning` False gives every disk an infinite inertia, `spatial_hash`
     (cell in m, count) replaces the tree of the broad phase, `settings` are attributes of the space.
@@ -68,6 +70,7 @@ class Pymunk:
             "elasticity": float(np.sqrt(scene.restitution)),
             "iterations": 50,
             "collision_slop": float(0.01 * scene.radius.min()),
+            "collision_persistence": 1,
         }
         return asked | ({"collision_bias": 1.0} if scene.restitution == 1 else {}) | self.changed
 
@@ -145,7 +148,14 @@ class Pymunk:
             "friction": shape.friction,
             **{
                 name: getattr(self.space, name)
-                for name in ("iterations", "collision_slop", "collision_bias", "damping", "sleep_time_threshold")
+                for name in (
+                    "iterations",
+                    "collision_slop",
+                    "collision_bias",
+                    "collision_persistence",
+                    "damping",
+                    "sleep_time_threshold",
+                )
             },
         }
         return {name: (self.asked.get(name), value) for name, value in resolved.items()}

@@ -22,6 +22,7 @@ CONTACT = np.dtype([
     ("strongest", "f8"),  # N s, of the impulses that one solve added
     ("nudged", "f8"),  # N s, of `switched.nudge`
     ("island", "i8"), ("colour", "i8"),  # from 1; 0: none yet
+    ("late", "b1"),  # whether its impulses are those of a step before the last
 ])  # fmt: skip
 
 
@@ -33,7 +34,7 @@ class Contacts(NamedTuple):
     start: np.ndarray  # (n, 2) m: where the disks were at the start of the step
     moved: np.ndarray  # (n, 2) m: what they have moved since
     nudge: np.ndarray  # (n, 2) m/s: what the next move adds to the velocity
-    before: np.ndarray  # (n, n + w, 3): impulse, slide, colour of the pair in the last step, 0 if it was no contact
+    before: np.ndarray  # (n, n + w, 4): impulse, slide, colour, and how many steps ago that was; 0 if long ago
 
 
 def no_contacts(n: int, walls: int, precision: type) -> Contacts:
@@ -46,23 +47,18 @@ def no_contacts(n: int, walls: int, precision: type) -> Contacts:
         start=place,
         moved=np.zeros_like(place),
         nudge=np.zeros((n, 2)),
-        before=np.zeros((n, n + walls, 3)),
+        before=np.zeros((n, n + walls, 4)),
     )
 
 
 @compiled
-def detect(disks: Disks, world: World, margin: float, skin: float, touching: bool, kept: Contacts) -> None:
+def detect(disks: Disks, world: World, margin: float, skin: float, touching: bool, memory: int, kept: Contacts) -> None:
     """Find all that are nearer than `margin`, pairs i < j first, then walls, which are thicker by `skin`.
 
-    If `touching`, also what is just as near.
+    If `touching`, also what is just as near. A pair has the impulses it last had, if not more than `memory` steps ago.
     """
     n = len(disks.radius)
-    kept.before[:] = 0.0
-    for c in range(kept.found[0]):
-        contact = kept.rows[c]
-        kept.before[contact.i, column(contact.j, n), 0] = contact.impulse
-        kept.before[contact.i, column(contact.j, n), 1] = contact.slide
-        kept.before[contact.i, column(contact.j, n), 2] = contact.colour
+    remember(memory, kept)
     kept.found[0] = 0
     for i in range(n):
         for j in range(i + 1, n):
@@ -79,8 +75,24 @@ def detect(disks: Disks, world: World, margin: float, skin: float, touching: boo
 
 
 @compiled
+def remember(memory: int, kept: Contacts) -> None:
+    """Keep what the contacts of the last step had, and of the others what is not too old."""
+    rows, columns = kept.before.shape[:2]
+    for i in range(rows):
+        for other in range(columns):
+            if kept.before[i, other, 3] > 0.0:
+                kept.before[i, other, 3] += 1.0
+                if kept.before[i, other, 3] > memory:
+                    kept.before[i, other, :] = 0.0
+    for c in range(kept.found[0]):
+        contact = kept.rows[c]
+        had = kept.before[contact.i, column(contact.j, rows)]
+        had[0], had[1], had[2], had[3] = contact.impulse, contact.slide, contact.colour, 1.0
+
+
+@compiled
 def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int) -> None:
-    """One contact more, with the impulses it had in the last step."""
+    """One contact more, with the impulses it last had."""
     contact, other = kept.rows[kept.found[0]], column(j, len(disks.radius))
     kept.found[0] += 1
     contact.i, contact.j = i, j
@@ -89,6 +101,7 @@ def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int
     contact.target = contact.strongest = 0.0
     contact.island, contact.colour = 0, int(kept.before[i, other, 2])
     contact.impulse, contact.slide = kept.before[i, other, 0], kept.before[i, other, 1]
+    contact.late = kept.before[i, other, 3] > 1.0
 
 
 @compiled

@@ -54,6 +54,7 @@ class Switches(NamedTuple):
     cap: float = inf  # m, by which a disk moves at most; its velocity is cut
     margin: float = 0.0  # m, from which on two are a contact
     touching: bool = False  # whether they are at just this distance
+    memory: int = 1  # steps, for which a contact that is lost keeps its impulses
     skin: float = 0.0  # m, by which walls are thicker than they are
     hertz: float = 30.0  # of `soften`: the stiffness of a contact
     damping: float = 10.0  # its damping ratio
@@ -87,7 +88,7 @@ def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h:
     elif stage == WALLS:
         walls(disks, world, on, k, hits)
     elif stage == DETECT:
-        detect(disks, world, on.margin, on.skin, on.touching, kept)
+        detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
     elif stage == BY_ISLAND:
         by_island(disks.mass, kept)
     elif stage == BY_COLOUR:
@@ -188,9 +189,14 @@ def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # typ
 
 @compiled
 def warm_start(disks: Disks, kept: Contacts) -> None:
-    """Begin with the impulses that the contacts had last."""
+    """Begin with the impulses that the contacts had in the last step.
+
+    What one had before that is not given, but counts as if it were, and may be taken back (Munk2D, cpArbiterUpdate).
+    """
     for c in range(kept.found[0]):
         contact = kept.rows[c]
+        if contact.late:
+            continue
         i, j, nx, ny = contact.i, contact.j, contact.nx, contact.ny
         push_apart(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse)
         turn(disks, contact, contact.slide)
