@@ -144,8 +144,12 @@ def world_force(thrust: Thrust, engine: Engine) -> Array:
     """(2,) N in the world frame; a body-frame force is turned by the disk's angle at the start of the step."""
     if thrust.frame == "world":
         return thrust.force
-    angle = engine.read().angle[thrust.disk]
-    x, y = thrust.force
+    return turned(thrust.force, engine.read().angle[thrust.disk])
+
+
+def turned(force: Array, angle: float) -> Array:
+    """(2,) N, turned by `angle` rad."""
+    x, y = force
     return np.array([cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y])
 
 

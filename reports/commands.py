@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
@@ -17,7 +17,6 @@ from adapters.solver_file import KINDS, NotASolver
 from adapters.student import engine_file
 from reports.exits import DONE, FAILED, refuse, say
 from reports.folders import FolderTaken, found
-from reports.journal import Journal
 from reports.metrics import METRICS
 from reports.report import Report, make_report
 from reports.scenes import open_scene, with_steps
@@ -50,12 +49,15 @@ def report_again(out: Path) -> NoReturn:
     finish(report, folder)
 
 
-def open_out(out: Path, opening: Callable[[Path], Journal]) -> Journal:
-    """The journal of what a command makes into `out`; exits 2 if that may not, or cannot, be written."""
+@contextmanager
+def opening(out: Path) -> Iterator[None]:
+    """What opens the folder that a command makes: exits 2 if it may not, or cannot, be written or gone on with."""
     try:
-        return opening(out)
+        yield
     except FolderTaken as fault:
         refuse([str(fault)])
+    except ValueError as fault:
+        refuse([f"{fault}; name another --out, or delete it"])
     except OSError as fault:
         refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
 

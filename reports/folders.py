@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 from reports.archive import FILES, Archive
 from reports.journal import JOURNAL, Busy, Journal
@@ -36,12 +37,31 @@ def open_new(out: Path) -> Journal:
     journal = open_part(out, *OF_A_RUN)
     part = journal.path.parent
     if had := ended_in(part):
-        raise FolderTaken(
+        leave(
+            journal,
             f"{part} holds an interrupted run, in which {had} cells have ended: to go on with it, crosscheck run "
-            f"--resume {out}; to begin anew, name another --out, or delete it"
+            f"--resume {out}; to begin anew, name another --out, or delete it",
         )
     os.truncate(journal.path, 0)
     return journal
+
+
+def may_go_on(journal: Journal, had: int, fits: bool, resume: bool) -> None:
+    """Raise `FolderTaken` where `had` results of an interrupted command would be lost: not asked for, or none fits."""
+    holds = f"{journal.path.parent} holds {had} results of an interrupted run"
+    if had and not resume:
+        leave(
+            journal,
+            f"{holds}: to go on with it, ask again with --resume; to begin anew, name another --out, or delete it",
+        )
+    if had and not fits:
+        leave(journal, f"{holds} of something else, or by other versions: name another --out, or delete it")
+
+
+def leave(journal: Journal, why: str) -> NoReturn:
+    """Give the journal back as it is, and raise `FolderTaken`."""
+    with journal:
+        raise FolderTaken(why)
 
 
 def open_again(out: Path) -> Journal:

@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from adapters.engines import row_of
 from reports.archive import Archive
-from reports.commands import checked_engines, checked_scenes, finish, open_out, refusing
+from reports.commands import checked_engines, checked_scenes, finish, opening, refusing
 from reports.exits import FAILED, broken_off, refuse, say
 from reports.folders import open_again, open_new, part_of, replace_folder
 from reports.journal import JOURNAL, Journal
@@ -47,7 +47,9 @@ def run_plan(
         command=command,
     )
     out = out.resolve()
-    carry_on(plan, means, open_out(out, open_new), out)
+    with opening(out):
+        journal = open_new(out)
+    carry_on(plan, means, journal, out)
 
 
 def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means:

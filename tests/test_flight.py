@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import pi, sqrt
+from math import cos, pi, sin, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from reports.game.flight import EARTH, FRAME, Flight, field_scenario
 from reports.game.messages import read_message
 from reports.game.pilot import SHIP
 from reports.game.session import Session
+from scenarios.catalogue import SCENARIOS
 from scenarios.closed_forms import world_pushes
 from scenarios.exercise import SHIP as START
 from scenarios.files import read_scene_file, scene_text
@@ -298,3 +299,17 @@ def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
     assert run.trajectory is not None
     assert session.flight.solid.state.position.tolist() == run.trajectory.position[-1].tolist()
     assert (told["left_at"], told["won"], session.field()["earth"]) == (-1, False, None)
+
+
+def test_the_flame_is_against_a_push_that_turns_with_the_ship():
+    """In a replayed scene whose push is in the ship's own frame; the page draws what it is told."""
+    whole = SCENARIOS["body_frame_thrust"]()
+    session = Session(["reference:exercise"], whole)
+    [push] = whole.thrusts
+    x, y = push.force
+    session.flight.advance(20)
+    angle = float(session.flight.solid.state.angle[SHIP])
+
+    assert push.frame == "body"
+    assert abs(angle) > 0.1
+    assert session.push()[:2] == pytest.approx([cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y])

@@ -255,6 +255,23 @@ def test_bad_input_is_told_and_nothing_is_served(
     assert said in capsys.readouterr().err
 
 
+def test_a_port_that_nobody_may_have_is_not_called_taken(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """As 80, unless one is an administrator; another is not tried in its place."""
+
+    class Kept(socket.socket):
+        def bind(self, _: object) -> None:
+            raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(socket, "socket", Kept)
+    with pytest.raises(SystemExit) as exit:
+        serve(application(Game(FLOWN)), 80, "/", False)
+
+    assert exit.value.code == 2
+    assert "--port 80: the system keeps it for administrators" in capsys.readouterr().err
+
+
 def test_a_missing_browser_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     """By --open on a machine without one; it is served all the same."""
     served_on: list[int] = []

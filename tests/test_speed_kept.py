@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from reports import terminal
+from reports.folders import FolderTaken
 from reports.journal import Journal
 from reports.speed import ladder, measure
 from reports.speed.effort import QUICK
@@ -20,7 +21,7 @@ from tests.command_line import crosscheck
 
 
 def test_what_has_ended_is_not_measured_again(tmp_path: Path):
-    """A journal of the same plan gives back every number, infinities too; one of another plan gives none."""
+    """A journal of the same plan gives back every number, infinities too; one of another plan is not lost to it."""
     rows = [{"error_radii": np.inf, "change_radii": np.nan, "reason": "no"}]
     with Journal(tmp_path) as journal:
         Kept(journal, {"seed": 0}, resume=False).add(("error", "scene", 1), rows)
@@ -32,7 +33,12 @@ def test_what_has_ended_is_not_measured_again(tmp_path: Path):
         assert len(again) == 1
         assert found["error", "scene", 1][0]["error_radii"] == np.inf
         assert np.isnan(found["error", "scene", 1][0]["change_radii"])
-        assert len(Kept(journal, {"seed": 1}, resume=True)) == 0
+    with pytest.raises(FolderTaken, match="holds 1 results of an interrupted run of something else"):
+        Kept(Journal(tmp_path), {"seed": 1}, resume=True)
+    with pytest.raises(FolderTaken, match="ask again with --resume"):
+        Kept(Journal(tmp_path), {"seed": 0}, resume=False)
+    with Journal(tmp_path) as journal:  # nothing was lost by asking, and the lock is free
+        assert len(Kept(journal, {"seed": 0}, resume=True)) == 1
 
 
 def fails() -> None:
@@ -55,16 +61,19 @@ def test_a_log_gets_a_line_now_and_then(
 
 
 def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Ctrl-C where the times begin: exit 130. Asked again with --resume, no error is looked for a second time."""
+    """Ctrl-C where the times begin: exit 130. With --resume no error is looked for a second time; else none is lost."""
     words = ("speed", "free_fall", "--engine", "reference:exercise", "--out", "out")
     with monkeypatch.context() as patch:
         patch.setattr(measure, "measure_times", interrupted)
         first = crosscheck(*words, cwd=tmp_path)
+    unasked = crosscheck(*words, cwd=tmp_path)
     monkeypatch.setattr(ladder, "errors_of", fails)
     second = crosscheck(*words, "--resume", cwd=tmp_path)
 
     assert first.returncode == 130
     assert "ask again with --resume" in first.stderr
+    assert unasked.returncode == 2
+    assert "holds 2 results of an interrupted run" in unasked.stderr
     assert second.returncode == 0, second.stderr
     assert "that had ended: 2" in second.stderr  # a ladder, and what its error is made of
     assert len(pd.read_csv(tmp_path / "out" / "speed_errors.csv")) == len(QUICK.ladder(scenario("free_fall")))

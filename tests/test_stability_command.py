@@ -13,6 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from reports import cli
+from reports.journal import JOURNAL
 from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
@@ -85,6 +86,21 @@ def test_what_has_ended_is_not_played_again(atlas: Path):
     other.mkdir()
     (other / "journal.jsonl").write_text("\n".join([json.dumps(header), *journal[1:]]) + "\n")
     assert done_before(other, plan) == set()
+
+
+def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_else(atlas: Path, tmp_path: Path):
+    """Without --resume, or with it for other cases, it is refused, and the journal stays as it was."""
+    part = tmp_path / "out.part"
+    shutil.copytree(atlas, part)
+    before = (part / JOURNAL).read_bytes()
+    players = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
+    again = crosscheck("stability", "slow_hit", *players, "--out", "out", cwd=tmp_path)
+    other = crosscheck("stability", "spin", *players, "--out", "out", "--resume", cwd=tmp_path)
+
+    assert (again.returncode, other.returncode) == (2, 2)
+    assert "out.part holds 10 results of an interrupted run: to go on with it, ask again with --resume" in again.stderr
+    assert "interrupted run of something else, or by other versions" in other.stderr
+    assert (part / JOURNAL).read_bytes() == before
 
 
 @pytest.mark.parametrize(

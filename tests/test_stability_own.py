@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from reports.stability.cures import CURES, cure_of, faster, larger, slower, smaller, why_played
+from reports.stability.explain import explained
 from reports.stability.limits import NOT_KNOWN, QUICK, Limit, Search
 from reports.stability.players import play_as
-from reports.stability.reasons import explained
 from reports.stability.vary import case_of_file, varied
 from scenarios.files import read_scene_file
 from scenarios.oracle import with_oracle
@@ -63,7 +63,7 @@ def test_an_untested_reason_is_called_likely_and_an_unknown_one_not_known():
     failing = limit.failing
     assert failing is not None
     nothing = replace(limit, case="x.toml:speed", trials=(replace(failing, broken="hits"),))
-    reason, tested = why_played(nothing, "speed")
+    reason, _, tested = why_played(nothing, "speed")
     assert reason.startswith(NOT_KNOWN)
     assert "in steps of an eighth" in reason
     assert tested == ""

@@ -12,9 +12,9 @@ import pytest
 from adapters.features import changed_pymunk
 from adapters.habits import FLIGHT, FRICTION, HABITS, PUSH_OUT, RESTITUTION, habits_of
 from reports.stability.cases import CASES
+from reports.stability.explain import explained
 from reports.stability.limits import QUICK, Limit, Search, Trial
 from reports.stability.players import PLAYERS, Player, play_as
-from reports.stability.reasons import explained
 from reports.stability.twins import HITS_WAIT, LATE, Twins, told, twin_of
 from scenarios.catalogue import scenario
 
@@ -107,7 +107,7 @@ def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_twin():
     assert "pushed out by a share a step" in kept.reason
     assert kept.tested == "the reference with the player's flight and push-out alone has this limit"
     assert other.reason == "friction takes speed along the contact"
-    assert other.source == ""
+    assert other.source == "the engine's default"
     assert untested.why.startswith("likely: overlaps are pushed out")
 
 

@@ -135,7 +135,7 @@ def taken_socket(port: int) -> socket.socket:
     """A socket on the loopback address at the first free port from `port` on.
 
     Raises:
-        OSError: if none of the next few is free.
+        OSError: if none of the next few is free, or one may not be had.
     """
     for each in range(port, min(port + PORTS, 65536)):
         try:
@@ -144,8 +144,10 @@ def taken_socket(port: int) -> socket.socket:
             taken.bind((HOST, each))
             taken.listen(64)
             return taken
-        except OSError:
+        except OSError as fault:
             taken.close()
+            if isinstance(fault, PermissionError):
+                raise OSError("the system keeps it for administrators, as it does ports below 1024") from None
     raise OSError(f"none of the ports {port} to {min(port + PORTS, 65536) - 1} is free")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters.play import turned
 from reports.game.flight import EARTH, EARTH_SIZE, Flight, Flyer, field_scenario
 from reports.game.messages import Fly, Frames, Key, Message, read_message
 from reports.game.pilot import SHIP
@@ -76,12 +77,14 @@ class Session:
         }  # fmt: skip
 
     def push(self) -> list[float]:
-        """What drives the ship: force N, torque N m."""
+        """What drives the ship: force N in the world frame, torque N m."""
         flight = self.flight
         time = flight.frame * flight.scenario.sample_interval
         thrusts = flight.scenario.thrusts if flight.replayed else flight.pilot.now
         on = [thrust for thrust in thrusts if thrust.disk == SHIP and thrust.start <= time < thrust.stop]
-        force = sum((thrust.force for thrust in on), np.zeros(2))
+        angle = float(flight.solid.state.angle[SHIP])
+        forces = [turned(thrust.force, angle) if thrust.frame == "body" else thrust.force for thrust in on]
+        force = sum(forces, np.zeros(2))
         return [*force.tolist(), float(sum(thrust.torque for thrust in on))]
 
     def told(self, flyer: Flyer) -> dict[str, Any]:

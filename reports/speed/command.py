@@ -8,7 +8,6 @@ import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
@@ -17,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from reports import style
-from reports.commands import checked_engines, checked_scenes, open_out
+from reports.commands import checked_engines, checked_scenes, opening
 from reports.exits import DONE, FAILED, broken_off, say
 from reports.folders import open_part, replace_folder
 from reports.journal import JOURNAL, Journal
@@ -45,10 +44,12 @@ def run_speed(
     effort = replace(effort, scenes=tuple(named)) if named else effort
     plan = Plan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
     out = out.resolve()
-    journal = open_out(out, partial(open_part, ours=is_ours, strangers="crosscheck speed did not make"))
-    part = journal.path.parent
-    with broken_off(part, lambda: f"What has ended is kept in {part}: ask again with --resume"), journal:
-        results, header = carry_out(plan, command, journal, resume)
+    header = about(command, seed)
+    with opening(out):
+        kept = kept_of(plan, header, open_part(out, is_ours, "crosscheck speed did not make"), resume)
+    part = kept.journal.path.parent
+    with broken_off(part, lambda: f"What has ended is kept in {part}: ask again with --resume"), kept.journal:
+        results, header = carry_out(plan, header, kept, resume)
         if not results.measured.errors.size:
             nothing_measured(part, results)
         write_all(part, results, header)
@@ -66,13 +67,15 @@ def nothing_measured(part: Path, results: Results) -> NoReturn:
     sys.exit(FAILED)
 
 
-def carry_out(plan: Plan, command: str, journal: Journal, resume: bool) -> tuple[Results, dict[str, Any]]:
-    """All that was measured, and the header that tables and page carry."""
-    header = about(command, plan.seed)
+def kept_of(plan: Plan, header: Mapping[str, Any], journal: Journal, resume: bool) -> Kept:
+    """What is kept of an interrupted measurement of this plan, by the same versions on the same machine."""
     asked = {"scenes": plan.scenes, "engines": plan.engines, "effort": asdict(plan.effort), "whole": plan.whole}
-    decides = {key: header[key] for key in ("seed", "versions", "machine")}
+    return Kept(journal, asked | {key: header[key] for key in ("seed", "versions", "machine")}, resume)
+
+
+def carry_out(plan: Plan, header: dict[str, Any], kept: Kept, resume: bool) -> tuple[Results, dict[str, Any]]:
+    """All that was measured, and the header that tables and page carry."""
     with Progress() as progress:
-        kept = Kept(journal, asked | decides, resume)
         if resume:
             progress.note(f"tasks of the same plan and versions that had ended: {len(kept)}")
         results = Results(plan, measure(plan, progress, kept))

@@ -6,6 +6,7 @@ import json
 import os
 from typing import Any
 
+from reports.folders import may_go_on
 from reports.journal import Journal, lines_of, numbers, plain
 
 
@@ -16,10 +17,11 @@ class Kept:
     """
 
     def __init__(self, journal: Journal, header: dict[str, Any], resume: bool) -> None:
-        """Begin anew, unless `resume` and the journal is of a measurement with the very same `header`."""
+        """Go on, if `resume` and the journal is of a measurement with the very same `header`; raises as `may_go_on`."""
         self.journal = journal
-        lines = list(lines_of(journal.path.parent)) if resume else []
+        lines = list(lines_of(journal.path.parent))
         same = bool(lines) and lines[0].get("header") == json.loads(json.dumps(plain(header)))
+        may_go_on(journal, len(lines[1:]), same, resume)
         self.results = {json.dumps(line["task"]): line["result"] for line in lines[1:]} if same else {}
         if not same:
             os.truncate(journal.path, 0)

@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.journal import JOURNAL, Journal, lines_of, numbers, plain
+from reports.journal import Journal, lines_of, numbers, plain
 from reports.machine import about
 from reports.runner import run_all
 from reports.stability.cases import CASES
+from reports.stability.explain import explained, tried_out
 from reports.stability.failures import keep_failure
 from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Search, Trial, players_of
 from reports.stability.maps import MAPS, MapOf, map_of
-from reports.stability.reasons import explained, tried_out
 from reports.stability.touching import TOUCHING, LawOf, law_of
 from reports.stability.vary import case_of_file
 from reports.terminal import Progress
@@ -170,16 +170,17 @@ def limit_from(record: dict[str, Any]) -> Limit:
 
 
 def done_before(folder: Path, plan: Plan) -> set[Task]:
-    """The tasks that ended well in an interrupted run of the same versions; none if there is no such run."""
-    if not (folder / JOURNAL).is_file():
+    """The tasks of the plan that ended well in an interrupted run, if all of that was by the same versions."""
+    headers = [line["header"] for line in lines_of(folder) if "header" in line]
+    if any(header["versions"] != about("", 0)["versions"] for header in headers):
         return set()
-    lines = list(lines_of(folder))
-    headers = [line["header"] for line in lines if "header" in line]
-    if not headers or any(header["versions"] != about("", 0)["versions"] for header in headers):
-        return set()
-    ended = [line for line in lines if "task" in line]
-    well = {Task(**line["task"]) for line in ended if line[line["task"]["kind"]]["status"] == "ok"}
-    return well & set(tasks_of(plan))
+    return ended_well(folder) & set(tasks_of(plan))
+
+
+def ended_well(folder: Path) -> set[Task]:
+    """The tasks of a journal that ended well."""
+    ended = [line for line in lines_of(folder) if "task" in line]
+    return {Task(**line["task"]) for line in ended if line[line["task"]["kind"]]["status"] == "ok"}
 
 
 def table(limits: Sequence[Limit]) -> pd.DataFrame:

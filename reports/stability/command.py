@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -14,11 +13,11 @@ from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import ENGINES
-from reports.commands import checked_engines, open_out, unknown
+from reports.commands import checked_engines, opening, unknown
 from reports.exits import DONE, FAILED, broken_off, refuse, say
-from reports.folders import open_part, replace_folder
-from reports.journal import JOURNAL
-from reports.stability.atlas import Atlas, Plan, carry_out, case_named, done_before, read, table
+from reports.folders import may_go_on, open_part, replace_folder
+from reports.journal import JOURNAL, Journal
+from reports.stability.atlas import Atlas, Plan, Task, carry_out, case_named, done_before, ended_well, read, table
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
 from reports.stability.maps import MAPS
@@ -41,18 +40,27 @@ def find_limits(
     form = "full" if full else "quick"
     plan = Plan(cases, maps, touching, checked_engines(engines), form, workers or os.cpu_count() or 1, command)
     out = out.resolve()
-    journal = open_out(out, partial(open_part, ours=FILES.__contains__, strangers="crosscheck stability did not make"))
+    with opening(out):
+        journal = open_part(out, FILES.__contains__, "crosscheck stability did not make")
+        done = gone_on_with(journal, plan, resume)
     part = journal.path.parent
     kept = f"What has ended is kept in {part}: ask again with --resume"
     with broken_off(part, lambda: kept), journal, Progress() as progress:
-        done = done_before(part, plan) if resume else set()
-        if not done:
-            os.truncate(journal.path, 0)
         carry_out(plan, journal, done, progress)
         progress.say("writing the tables and the page")
         found = write_files(part)
         replace_folder(part, out)
     finish(found, out)
+
+
+def gone_on_with(journal: Journal, plan: Plan, resume: bool) -> set[Task]:
+    """The tasks of the plan that ended well in an interrupted run; raises as `may_go_on`, lest others are lost."""
+    folder = journal.path.parent
+    done = done_before(folder, plan)
+    may_go_on(journal, len(ended_well(folder)), bool(done), resume)
+    if not done:
+        os.truncate(journal.path, 0)
+    return done
 
 
 def write_files(folder: Path) -> Atlas:

@@ -133,18 +133,18 @@ def cure_of(search: Search, limit: Limit) -> str:
     return ""
 
 
-def why_played(limit: Limit, varied: str) -> tuple[str, str]:
-    """Why a scene fails for which no reason was written down beforehand, and how that was tested: "" if it was not."""
+def why_played(limit: Limit, varied: str) -> tuple[str, str, str]:
+    """Why a scene fails of which nothing was written down before, where that stands, and how it was tested, or ""."""
     failing = limit.failing
     if failing is None:
-        return "", ""
+        return "", "", ""
     if cure := CURES.get(limit.cured):
-        return cure.tells, f"works {cure.how}"
+        return cure.tells, "", f"works {cure.how}"
     if limit.twin:
         return told(limit)
     if failing.broken == "refused":
-        return "the player refuses it", SAYS_SO
+        return "the player refuses it", "", SAYS_SO
     if varied == "dt" and failing.broken in ("penetration", "escape"):
-        return HITS_WAIT, ""
+        return HITS_WAIT, "", ""
     tried = [cure.how for cure in CURES.values() if cure.fits(limit.player, varied)]
-    return f"{NOT_KNOWN}; it also fails {', '.join(tried)}" if tried else NOT_KNOWN, ""
+    return f"{NOT_KNOWN}; it also fails {', '.join(tried)}" if tried else NOT_KNOWN, "", ""

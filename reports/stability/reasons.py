@@ -1,20 +1,14 @@
-"""Why a player fails where it does: a sentence, its source, and how it was tested; untested ones are called likely."""
+"""The table of reasons: why a player fails where it does, a sentence and its source, and what must bear it out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from fnmatch import fnmatch
 from math import atan, pi, sqrt
 from typing import NamedTuple
 
 from adapters.habits import DIGITS, IMPULSE, PUSH_OUT, RESTITUTION
-from reports.stability.cases import CASES
-from reports.stability.cures import SAYS_SO, cure_of, why_played
-from reports.stability.limits import NEVER_FAILS, Limit, Search
-from reports.stability.twins import LATE, told, twin_of
-
-NEAR = 1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a hit lost by degrees
+from reports.stability.limits import NEVER_FAILS, Limit
+from reports.stability.twins import B2_SETTINGS, B2_TYPES, LATE, OF_PYMUNK, PRODUCT, THRESHOLD, THRESHOLDS
 
 
 class Reason(NamedTuple):
@@ -40,10 +34,6 @@ class Reason(NamedTuple):
 
 DISCRETE = "contacts are looked for at the ends of steps only, and lost once the centres have passed each other"
 GEOMETRY = "geometry: (v dt)2 = (2R)2 - b2 between disks, v dt = R at a thin wall"
-B2_SETTINGS = "Box2D 2.3 Common/b2Settings.h: "
-B2_TYPES = "Box2D 3.1 src/types.c: "
-THRESHOLDS = {"box2d": B2_SETTINGS + "b2_velocityThreshold", "box2d_v3": B2_TYPES + "restitutionThreshold"}
-THRESHOLD = "hits that close at less than 1 m/s are played as inelastic"
 EULER_OUT = (
     "the push belongs to a place where the disk is not: with x' = x + v dt the oscillator's map grows by 1 + (w dt)2"
 )
@@ -85,8 +75,8 @@ REASONS = (
         for box, source in THRESHOLDS.items()
     ),
     Reason(
-        "restitution", "pymunk:shipped", "the elasticities of the two shapes are multiplied: e on every shape gives e2",
-        "Munk2D src/cpArbiter.c, cpArbiterUpdate", 1 - (1 + sqrt(1 - 0.04)) / 2, "pymunk:matched", RESTITUTION,
+        "restitution", "pymunk:shipped", PRODUCT, OF_PYMUNK, 1 - (1 + sqrt(1 - 0.04)) / 2, "pymunk:matched",
+        RESTITUTION,
     ),
     # One disk, or two.
     Reason("bounce_drift", "pymunk:shipped", "v dt exceeds the radius, and the floor is missed", GEOMETRY, habit=LATE),
@@ -231,60 +221,3 @@ def reason_of(limit: Limit) -> Reason | None:
     if limit.verdict == NEVER_FAILS:
         return None
     return next((r for r in REASONS if fnmatch(limit.case, r.cases) and fnmatch(limit.player, r.players)), None)
-
-
-def tried_out(search: Search, limit: Limit) -> Limit:
-    """The limit with what was found by playing its failing run again: a twin that has it, too, or what cures it.
-
-    Where a reason is written down, only a twin can bear it out; on a scene of one's own a cure is the better news.
-    """
-    if limit.case in CASES:
-        limit = replace(limit, twin=twin_of(search, limit))
-        return limit if limit.twin or reason_of(limit) else replace(limit, cured=cure_of(search, limit))
-    limit = replace(limit, cured=cure_of(search, limit))
-    return limit if limit.cured else replace(limit, twin=twin_of(search, limit))
-
-
-def explained(limits: Sequence[Limit]) -> list[Limit]:
-    """The limits with their reasons, each tested by what it predicts, or by the limit of its switch."""
-    by_name = {(limit.case, limit.player): limit for limit in limits}
-    return [with_reason(limit, by_name) for limit in limits]
-
-
-def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit:
-    """The limit with its reason and with how that was tested: "" if it was not, or did not hold.
-
-    What a twin of the player shows stands above a reason that speaks of something else, and holds by nothing else.
-    """
-    reason = reason_of(limit)
-    if reason is None:
-        varied = CASES[limit.case].parameter if limit.case in CASES else limit.case.rsplit(":", 1)[-1]
-        text, tested = why_played(limit, varied)
-        return replace(limit, reason=text, tested=tested)
-    tests = []
-    if reason.predicts is not None and brackets(limit, reason.predicts):
-        tests.append(f"predicts {reason.predicts:.4g}")
-    if reason.switch != limit.player and (other := by_name.get((limit.case, reason.switch))) and farther(other, limit):
-        tests.append(f"{reason.switch} gets farther")
-    if limit.failing is not None and limit.failing.broken == "refused":
-        tests.append(SAYS_SO)
-    if limit.twin and (reason.habit in limit.twin.split(", ") or not tests):
-        text, shown = told(limit)
-        reason = reason if reason.habit in limit.twin.split(", ") else Reason(reason.cases, reason.players, text, "")
-        tests.append(shown)
-    return replace(limit, reason=reason.text, source=reason.source, tested="; ".join(tests))
-
-
-def brackets(limit: Limit, value: float) -> bool:
-    """Whether a value lies in the bracket, or outside by no more than `NEAR`."""
-    low, high = min(limit.works_at, limit.fails_at), max(limit.works_at, limit.fails_at)
-    return low / NEAR <= value <= high * NEAR
-
-
-def farther(one: Limit, other: Limit) -> bool:
-    """Whether `one` fails later on the way from gentle to harsh, or not at all."""
-    if one.verdict == NEVER_FAILS:
-        return other.verdict != NEVER_FAILS
-    values = CASES[one.case].values
-    harsher = 1 if values[-1] > values[0] else -1
-    return harsher * one.fails_at > harsher * other.fails_at

@@ -34,18 +34,29 @@ LATE = "late hits"  # a twin without any habit
 HITS_WAIT = "a hit waits for the end of its step"
 NEAR = 2.0  # where a player works nowhere, its twin must read as much as it does, to this factor
 
+B2_SETTINGS, B2_TYPES = "Box2D 2.3 Common/b2Settings.h: ", "Box2D 3.1 src/types.c: "
+THRESHOLD = "hits that close at less than 1 m/s are played as inelastic"
+THRESHOLDS = {"box2d": B2_SETTINGS + "b2_velocityThreshold", "box2d_v3": B2_TYPES + "restitutionThreshold"}
+PRODUCT = "the elasticities of the two shapes are multiplied: e on every shape gives e2"
+OF_PYMUNK = "Munk2D src/cpArbiter.c, cpArbiterUpdate"
+TOGETHER = "the contacts of a step get their impulses together, in the engine's own order of stages"
+OWN_ORDER = "adapters/switched.py, from the engine's own step"
+AT_ONCE = "an overlap is undone at once, so that disks move that have hit nothing yet"
 SENTENCES = (
-    (LATE, "*", HITS_WAIT),
-    (FLIGHT, "*", "under a push a step of flight goes another way than v dt + a dt2 / 2"),
-    (RESTITUTION, "pymunk:*", "the elasticities of the two shapes are multiplied: e on every shape gives e2"),
-    (RESTITUTION, "box2d*", "hits that close at less than 1 m/s are played as inelastic"),
-    (IMPULSE, "*", "the contacts of a step get their impulses together, in the engine's own order of stages"),
-    (PUSH_OUT, "reference:*", "an overlap is undone at once, so that disks move that have hit nothing yet"),
-    (PUSH_OUT, "*", "overlaps are pushed out bit by bit, beside the motion"),
-    (FRICTION, "*", "friction takes speed along the contact"),
-    (SKIN, "*", "walls are thicker than they are drawn"),
-    (DIGITS, "*", "numbers are float32"),
-)  # fmt: skip
+    (LATE, "*", HITS_WAIT, "contacts are looked for once a step"),
+    (FLIGHT, "*", "under a push a step of flight goes another way than v dt + a dt2 / 2", "alpha of ENGINES"),
+    (RESTITUTION, "pymunk:*", PRODUCT, OF_PYMUNK),
+    (RESTITUTION, "box2d:*", THRESHOLD, THRESHOLDS["box2d"]),
+    (RESTITUTION, "box2d_v3:*", THRESHOLD, THRESHOLDS["box2d_v3"]),
+    (IMPULSE, "reference:*", "walls come first, then pairs", "reference_impl/lesson.py"),
+    (IMPULSE, "*", TOGETHER, OWN_ORDER),
+    (PUSH_OUT, "reference:*", AT_ONCE, "exercise 11, task 2"),
+    (PUSH_OUT, "*", "overlaps are pushed out bit by bit, beside the motion", OWN_ORDER),
+    (FRICTION, "*", "friction takes speed along the contact", "the engine's default"),
+    (SKIN, "*", "walls are thicker than they are drawn", B2_SETTINGS + "b2_polygonRadius"),
+    (DIGITS, "*", "numbers are float32", "IEEE 754"),
+)
+"""Habit, players, what it does, and where that stands."""
 
 
 def twin_of(search: Search, limit: Limit) -> str:
@@ -124,13 +135,13 @@ class Twins:
         return judge(self.case.predicate, *self.case.play(twin, scenario))
 
 
-def told(limit: Limit) -> tuple[str, str]:
-    """The reason that the twin gives, and how it was tested."""
+def told(limit: Limit) -> tuple[str, str, str]:
+    """The reason that the twin gives, where it stands, and how it was tested."""
     names = limit.twin.split(", ")
-    sentences = [next(text for habit, who, text in SENTENCES if habit == name and fnmatch(limit.player, who))
-                 for name in names]  # fmt: skip
+    rows = [next(row for row in SENTENCES if row[0] == name and fnmatch(limit.player, row[1])) for name in names]
+    texts, sources = ("; ".join(dict.fromkeys(row[k] for row in rows)) for k in (2, 3))
     only = "late hits and nothing else" if limit.twin == LATE else f"the player's {listed(names)} alone"
-    return "; ".join(sentences), f"the reference with {only} has this limit"
+    return texts, sources, f"the reference with {only} has this limit"
 
 
 def listed(names: Sequence[str]) -> str:

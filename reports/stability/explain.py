@@ -1,0 +1,82 @@
+"""Gives every limit its reason: the row of the table that fits it, or what was found by playing its failing run again.
+
+A reason is tested by what it predicts, by the limit of a switch, by a cure or by a twin; else it is called likely.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from reports.stability.cases import CASES
+from reports.stability.cures import SAYS_SO, cure_of, why_played
+from reports.stability.limits import NEVER_FAILS, Limit, Search
+from reports.stability.reasons import Reason, reason_of
+from reports.stability.twins import told, twin_of
+
+NEAR = 1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a hit lost by degrees
+
+
+def tried_out(search: Search, limit: Limit) -> Limit:
+    """The limit with what was found by playing its failing run again: a twin that has it, too, or what cures it.
+
+    Where a reason is written down, only a twin can bear it out; on a scene of one's own a cure is the better news.
+    """
+    if limit.case in CASES:
+        limit = replace(limit, twin=twin_of(search, limit))
+        return limit if limit.twin or reason_of(limit) else replace(limit, cured=cure_of(search, limit))
+    limit = replace(limit, cured=cure_of(search, limit))
+    return limit if limit.cured else replace(limit, twin=twin_of(search, limit))
+
+
+def explained(limits: Sequence[Limit]) -> list[Limit]:
+    """The limits with their reasons, each tested by what it predicts, or by the limit of its switch."""
+    by_name = {(limit.case, limit.player): limit for limit in limits}
+    return [with_reason(limit, by_name) for limit in limits]
+
+
+def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit:
+    """The limit with its reason and with how that was tested: "" if it was not, or did not hold.
+
+    A written reason that holds by nothing else gives way to a twin that shows another.
+    """
+    reason = reason_of(limit)
+    if reason is None:
+        varied = CASES[limit.case].parameter if limit.case in CASES else limit.case.rsplit(":", 1)[-1]
+        text, source, tested = why_played(limit, varied)
+        return replace(limit, reason=text, source=source, tested=tested)
+    tests = tests_of(limit, reason, by_name)
+    if limit.twin:
+        text, source, shown = told(limit)
+        if reason.habit in limit.twin.split(", "):
+            tests.append(shown)
+        elif not tests:
+            return replace(limit, reason=text, source=source, tested=shown)
+    return replace(limit, reason=reason.text, source=reason.source, tested="; ".join(tests))
+
+
+def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Limit]) -> list[str]:
+    """What bears the reason out, but for a twin."""
+    tests = []
+    if reason.predicts is not None and brackets(limit, reason.predicts):
+        tests.append(f"predicts {reason.predicts:.4g}")
+    if reason.switch != limit.player and (other := by_name.get((limit.case, reason.switch))) and farther(other, limit):
+        tests.append(f"{reason.switch} gets farther")
+    if limit.failing is not None and limit.failing.broken == "refused":
+        tests.append(SAYS_SO)
+    return tests
+
+
+def brackets(limit: Limit, value: float) -> bool:
+    """Whether a value lies in the bracket, or outside by no more than `NEAR`."""
+    low, high = min(limit.works_at, limit.fails_at), max(limit.works_at, limit.fails_at)
+    return low / NEAR <= value <= high * NEAR
+
+
+def farther(one: Limit, other: Limit) -> bool:
+    """Whether `one` fails later on the way from gentle to harsh, or not at all."""
+    if one.verdict == NEVER_FAILS:
+        return other.verdict != NEVER_FAILS
+    values = CASES[one.case].values
+    harsher = 1 if values[-1] > values[0] else -1
+    return harsher * one.fails_at > harsher * other.fails_at
