@@ -141,18 +141,15 @@ def name_of(*spheres: int) -> str:
 
 def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool) -> list[Row]:
     """An asteroid beyond an edge comes in at the opposite one; a ufo that leaves is set back to its start."""
-    wrong = []
-    for k, (edge, onto) in enumerate(list(ONTO.items())[: len(question.balls) - 1]):
-        after = came.last[k + 1]
-        if not (near(after.x, onto) and near(after.v, question.balls[k + 1].v)):
-            start_at = shown(question.balls[k + 1].x)
-            wrong.append(f"{edge}: from {start_at} to {shown(after.x)} m instead of {shown(onto)} m")
-    stayed = all(near(a.x, b.x) for b, a in list(zip(question.balls, came.last))[len(ONTO) + 1 :])
-    cause = "projectObjects sets it onto the wrong place" if wrong else "projectObjects moves spheres that are inside"
-    rows = [
-        judged("edges", "loop", "Is an asteroid beyond an edge set onto the opposite one?", wrong[0] if wrong else
-               "yes" if stayed else "others are moved", "yes", not wrong and stayed, cause),
-    ]  # fmt: skip
+    pairs = list(zip(question.balls, came.last))[1:]
+    got, expected, cause = next(filter(None, map(wrong_at_edge, ONTO.items(), pairs)), ("yes", "yes", ""))
+    moved = [(before, after) for before, after in pairs[len(ONTO) :] if not near(before.x, after.x)]
+    if moved and not cause:
+        before, after = moved[0]
+        got, expected = f"one inside, at {shown(before.x)} m, is set to {shown(after.x)} m", "it stays"
+        cause = "projectObjects moves spheres that are inside"
+    asked = "Is an asteroid beyond an edge set onto the opposite one?"
+    rows = [judged("edges", "loop", asked, got, expected, not cause, cause)]
     if ufo:
         home, place = start[0][:2], came.last[0].x
         asked = "Is a ufo that leaves set back to its start?"
@@ -160,3 +157,15 @@ def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool)
         got, expected = f"it is at {shown(place)} m", f"at {shown(home)} m"
         rows.append(judged("ufo", "loop", asked, got, expected, near(place, home), cause))
     return rows
+
+
+def wrong_at_edge(edge: tuple[str, tuple[float, float]], pair: tuple[Ball, Ball]) -> tuple[str, str, str] | None:
+    """What came of one beyond this edge, what should have, and the likely cause; None if it is right."""
+    (name, onto), (before, after) = edge, pair
+    if not near(after.x, onto):
+        got = f"one beyond the {name} edge, at {shown(before.x)} m, is set to {shown(after.x)} m"
+        return got, f"it is set to {shown(onto)} m", "projectObjects sets it onto the wrong place"
+    if not near(after.v, before.v):
+        got = f"one beyond the {name} edge flies on at {shown(after.v)} m/s"
+        return got, f"at {shown(before.v)} m/s, as it came", "projectObjects changes its velocity"
+    return None

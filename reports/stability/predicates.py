@@ -89,7 +89,7 @@ def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
     closing, parting = (float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1]))
     e = -parting / closing
     off = abs(e - scenario.scene.restitution)
-    return Reading(off, float(truth_of(scenario).collisions.t[0]), f"the hit is played with e = {e:.3g}")
+    return Reading(off, float(truth_of(scenario).collisions.t[0]), f"the hit is played with e = {e + 0.0:.3g}")
 
 
 def _strays(scenario: Scenario, played: Trajectory) -> Reading:

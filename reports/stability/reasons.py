@@ -33,18 +33,18 @@ class Reason(NamedTuple):
 
 
 DISCRETE = "contacts are looked for at the ends of steps only, and lost once the centres have passed each other"
-GEOMETRY = "geometry: (v dt)2 = (2R)2 - b2 between disks, v dt = R at a thin wall"
+GEOMETRY = "geometry: (v dt)² = (2R)² - b² between disks, v dt = R at a thin wall"
 EULER_OUT = (
-    "the push belongs to a place where the disk is not: with x' = x + v dt the oscillator's map grows by 1 + (w dt)2"
+    "the push belongs to a place where the disk is not: with x' = x + v dt the oscillator's map grows by 1 + (w dt)²"
 )
 QUARTER = "nothing turns by more than pi/2 a step"
-MAP = "determinant of the step's map, 1 + (w dt)2 (1 - alpha); alpha of ENGINES"
+MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES"
 SWEEP = "restitution is one sweep after the substeps, so a disk that touches two others in a step loses energy"
 FINDS_LATE = "a hit is found up to a step late, and each one lasts about a step longer than it should"
 
 
 def growth_limit(share: float) -> float:
-    """w dt at which the mean energy doubles in 300 steps, growing by 1 + share (w dt)2 a step."""
+    """w dt at which the mean energy doubles in 300 steps, growing by 1 + share (w dt)² a step."""
     return sqrt((2 ** (1 / 300) - 1) / share)
 
 
@@ -135,12 +135,12 @@ REASONS = (
     ),
     *(Reason("stiff_push", player, EULER_OUT, MAP, growth_limit(1.0)) for player in ("reference:lesson", "pymunk:*")),
     Reason(
-        "stiff_push", "box2d_v3:*", "the push is constant over four substeps: the map grows by 1 + 3/8 (w dt)2", MAP,
+        "stiff_push", "box2d_v3:*", "the push is constant over four substeps: the map grows by 1 + 3/8 (w dt)²", MAP,
         growth_limit(0.375),
     ),
     *(
         Reason(
-            "stiff_push", player, "the push is constant during a step: the map grows by 1 + (w dt)2 / 2", MAP,
+            "stiff_push", player, "the push is constant during a step: the map grows by 1 + (w dt)² / 2", MAP,
             growth_limit(0.5),
         )
         for player in ("event_driven:*", "reference:ordered")

@@ -37,14 +37,14 @@ NEAR = 2.0  # where a player works nowhere, its twin must read as much as it doe
 B2_SETTINGS, B2_TYPES = "Box2D 2.3 Common/b2Settings.h: ", "Box2D 3.1 src/types.c: "
 THRESHOLD = "hits that close at less than 1 m/s are played as inelastic"
 THRESHOLDS = {"box2d": B2_SETTINGS + "b2_velocityThreshold", "box2d_v3": B2_TYPES + "restitutionThreshold"}
-PRODUCT = "the elasticities of the two shapes are multiplied: e on every shape gives e2"
+PRODUCT = "the elasticities of the two shapes are multiplied: e on every shape gives e²"
 OF_PYMUNK = "Munk2D src/cpArbiter.c, cpArbiterUpdate"
 TOGETHER = "the contacts of a step get their impulses together, in the engine's own order of stages"
 OWN_ORDER = "adapters/switched.py, from the engine's own step"
 AT_ONCE = "an overlap is undone at once, so that disks move that have hit nothing yet"
 SENTENCES = (
     (LATE, "*", HITS_WAIT, "contacts are looked for once a step"),
-    (FLIGHT, "*", "under a push a step of flight goes another way than v dt + a dt2 / 2", "alpha of ENGINES"),
+    (FLIGHT, "*", "under a push a step of flight goes another way than v dt + a dt² / 2", "alpha of ENGINES"),
     (RESTITUTION, "pymunk:*", PRODUCT, OF_PYMUNK),
     (RESTITUTION, "box2d:*", THRESHOLD, THRESHOLDS["box2d"]),
     (RESTITUTION, "box2d_v3:*", THRESHOLD, THRESHOLDS["box2d_v3"]),
