@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reports.stability.cures import CURES, cure_of, faster, larger, slower, smaller, why_played
-from reports.stability.explain import explained
+from reports.stability.cures import CURES, faster, larger, slower, smaller, why_played
+from reports.stability.explain import explained, tried_out
 from reports.stability.limits import NOT_KNOWN, QUICK, Limit, Search
 from reports.stability.players import play_as
 from reports.stability.vary import case_of_file, varied
@@ -26,7 +26,7 @@ def found(what: str, player: str, scene: str = "two.toml") -> Limit:
     path = str(SCENES / scene)
     search = Search(case_of_file(path, what), player, QUICK)
     limit = search.limit()
-    [known] = explained([replace(limit, case=f"{path}:{what}", cured=cure_of(search, limit))])
+    [known] = explained([tried_out(search, replace(limit, case=f"{path}:{what}"))])
     return known
 
 
@@ -55,14 +55,15 @@ def test_a_threshold_shows_where_the_scene_closes_at_it():
     assert found("scale", "box2d:matched").verdict == "does not fail"
 
 
-def test_an_untested_reason_is_called_likely_and_an_unknown_one_not_known():
-    """Where the step is what is varied, a finer one is no proof; where nothing helps, that is what is said."""
+def test_where_nothing_cures_it_a_twin_may_tell_and_else_it_is_called_not_known():
+    """Where the step is what is varied, a finer one is no proof: late hits alone have the limit. Or nothing helps."""
     limit = found("dt", "pymunk:matched")
-    assert limit.why == "likely: a hit waits for the end of its step"
+    assert limit.why == "a hit waits for the end of its step"
+    assert limit.tested == "the reference with late hits and nothing else has this limit"
 
     failing = limit.failing
     assert failing is not None
-    nothing = replace(limit, case="x.toml:speed", trials=(replace(failing, broken="hits"),))
+    nothing = replace(limit, case="x.toml:speed", twin="", trials=(replace(failing, broken="hits"),))
     reason, _, tested = why_played(nothing, "speed")
     assert reason.startswith(NOT_KNOWN)
     assert "in steps of an eighth" in reason

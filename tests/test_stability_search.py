@@ -150,6 +150,17 @@ def test_a_number_that_is_none_fails_and_a_run_that_broke_off_fails_with_its_rea
     assert judge(nothing, scenario, played).failed
 
 
+def test_a_statistic_may_fail_by_chance_in_one_run_of_sixteen_and_not_in_two():
+    """Of what is drawn and read with an error; a run of four that fails is too many."""
+    one = case(lambda x, run: 2.0 if run < x else 0.5, (1.0, 2.0, 4.0), drawn=True, by_chance=1 / 16)
+    found = limit_of(one)
+
+    assert (found.verdict, found.works_at) == ("limit", 1.0)
+    assert (found.trials[0].failed, found.trials[0].runs) == (1, 16)
+    assert limit_of(one, QUICK).verdict == "never works"
+    assert limit_of(replace(one, by_chance=0.0)).verdict == "never works"
+
+
 def test_one_phase_alone_would_overlook_the_limit():
     """The negative control of the phases: with hits in the middle of a step alone, tunnelling begins at 4, not 2."""
     one = CASES["tunnelling_head_on"]

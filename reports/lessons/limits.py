@@ -158,7 +158,7 @@ def counted(trial: Trial) -> str:
     """How many runs fail."""
     if trial.runs == 1:
         return "it works" if trial.works else "it fails"
-    return f"none of {trial.runs} runs fails" if trial.works else f"{trial.failed} of {trial.runs} runs fail"
+    return f"none of {trial.runs} runs fails" if not trial.failed else f"{trial.failed} of {trial.runs} runs fail"
 
 
 def measured(case: Case, value: float) -> str:

@@ -144,7 +144,5 @@ def why_played(limit: Limit, varied: str) -> tuple[str, str, str]:
         return told(limit)
     if failing.broken == "refused":
         return "the player refuses it", "", SAYS_SO
-    if varied == "dt" and failing.broken in ("penetration", "escape"):
-        return HITS_WAIT, "", ""
     tried = [cure.how for cure in CURES.values() if cure.fits(limit.player, varied)]
     return f"{NOT_KNOWN}; it also fails {', '.join(tried)}" if tried else NOT_KNOWN, "", ""

@@ -55,6 +55,7 @@ class Case:
         quick_values: to scan in the quick form, where it is not every other one of `values`.
         refines: whether the first edge is bisected.
         ratio: how close the bracket is made at best, where a run is long or what is drawn differs much.
+        by_chance: share of the runs at a value that may fail by chance, where what is read is a statistic.
         most_runs, quick_runs: at a value, in all forms and in the quick one, where a run is long.
         beside: what a failing run is shown beside.
     """
@@ -74,6 +75,7 @@ class Case:
     quick_values: tuple[float, ...] = ()
     refines: bool = True
     ratio: float = 1.0
+    by_chance: float = 0.0
     most_runs: int = 10**6
     quick_runs: int = 10**6
     beside: str = EXACT
@@ -97,7 +99,10 @@ def sorted_like(order: Sequence[float], chosen: set[float]) -> list[float]:
 
 @dataclass(frozen=True)
 class Trial:
-    """All runs at one value: how many, how many of them failed, the worst reading, and the first that failed."""
+    """All runs at one value: how many, how many of them failed, the worst reading, and the first that failed.
+
+    So many as are `allowed` may fail by chance.
+    """
 
     value: float
     runs: int
@@ -108,11 +113,12 @@ class Trial:
     event: str = ""
     broken: str = ""
     disk: int = 0
+    allowed: int = 0
 
     @property
     def works(self) -> bool:
-        """Whether no run failed."""
-        return self.failed == 0
+        """Whether no more runs failed than may by chance."""
+        return self.failed <= self.allowed
 
 
 @dataclass(frozen=True)
@@ -123,8 +129,8 @@ class Limit:
         case, player: names; the player is a key of `PLAYERS`.
         form: of `FORMS`.
         verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on), or "works only beyond".
-        works_at: the harshest value before the first failure at which no run failed; nan: none.
-        fails_at: the value next to it at which some run failed; nan: none.
+        works_at: the harshest value before the first failure at which no run failed, but by chance; nan: none.
+        fails_at: the value next to it at which some run failed, or more than by chance; nan: none.
         trials: every value tried, from gentle to harsh.
         monotone: False if it works again beyond a value at which it fails.
         seconds: of processor time that the search took.
@@ -232,8 +238,8 @@ class Search:
         worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
         if first < 0:
             return Trial(value, count, failed, worst)
-        broke = readings[first]
-        return Trial(value, count, failed, worst, first, broke.at, broke.event, broke.broken, broke.disk)
+        broke, allowed = readings[first], int(case.by_chance * count)
+        return Trial(value, count, failed, worst, first, broke.at, broke.event, broke.broken, broke.disk, allowed)
 
     def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
         """The limit, with all that was tried in the order of the scan."""
