@@ -29,6 +29,7 @@ FIELDS: dict[str, type | tuple[type, ...]] = {  # of the line of a cell
     "profile": str, "dt_s": (int, float), "status": str, "reason": str, "step": int,
     "timeout_s": (int, float), "settings": dict, "versions": dict,
 }  # fmt: skip
+HEADER = ("versions", "seed", "scenes", "engines")
 STATE = ("position", "velocity", "angle", "angular_velocity")
 HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
 
@@ -96,7 +97,10 @@ def fault_of(line: Any) -> str:
     if "cell" in line:
         wrong = [name for name, kind in FIELDS.items() if not isinstance(line.get(name), kind)]
         return f"has no {wrong[0]} that can be used, of a cell" if wrong else ""
-    known = "header" in line or "footer" in line or "timing" in line or "of" in line
+    if "header" in line:
+        wrong = [name for name in HEADER if name not in line["header"]]
+        return f"has no {wrong[0]} in its header" if wrong else ""
+    known = "footer" in line or "timing" in line or "of" in line
     return "" if known else "is none of a header, a footer, a cell, a timing, an answer"
 
 

@@ -203,14 +203,22 @@ def speed(
     run_speed(scenes or [], engine or [], full, resume, seed, out, "crosscheck " + shlex.join(sys.argv[1:]))
 
 
+VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
+
+
 @app.command()
 def stability(
     cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE|FILE.toml]...", help="Default: all.")] = None,
-    vary: Annotated[list[str] | None, typer.Option(help="What of FILE.toml to vary; repeatable. Default: all.")] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(help="Of FILE.toml, repeatable: dt, speed, mass_ratio, restitution, scale, offset. Default: all."),
+    ] = None,
     engine: Engines = None,
     full: Annotated[bool, typer.Option("--full", help="16 runs a value, every value, closer brackets.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Keep what an interrupted run in --out has ended.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder for the atlas.")] = Path("reports/out/stability"),
+    out: Annotated[Path, typer.Option(help="Folder for the atlas; one that is there is replaced.")] = Path(
+        "reports/out/stability"
+    ),
     workers: Workers = 0,
 ) -> None:
     """Find where every player fails: limits, with the first failing run of each to look at."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
 
 from reports.archive import FILES, Archive
 from reports.journal import JOURNAL, Busy, Journal
@@ -32,36 +33,55 @@ def open_part(out: Path, ours: Callable[[str], bool], strangers: str) -> Journal
     return held(part, out)
 
 
+@contextmanager
+def given_back(journal: Journal) -> Iterator[None]:
+    """Give the journal back as it is if what is first done with it fails."""
+    try:
+        yield
+    except BaseException:
+        journal.__exit__()
+        raise
+
+
 def open_new(out: Path) -> Journal:
     """The journal of a new run into `out`; raises `FolderTaken`, or `OSError` where nothing can be written."""
     journal = open_part(out, *OF_A_RUN)
     part = journal.path.parent
-    if had := ended_in(part):
-        leave(
-            journal,
-            f"{part} holds an interrupted run, in which {had} cells have ended: to go on with it, crosscheck run "
-            f"--resume {out}; to begin anew, name another --out, or delete it",
-        )
-    os.truncate(journal.path, 0)
+    with given_back(journal):
+        if had := ended_in(journal):
+            raise FolderTaken(
+                f"{part} holds an interrupted run, in which {had} cells have ended: to go on with it, crosscheck run "
+                f"--resume {out}; to begin anew, name another --out, or delete it"
+            )
+        os.truncate(journal.path, 0)
     return journal
 
 
-def may_go_on(journal: Journal, had: int, fits: bool, resume: bool) -> None:
+def ended_in(journal: Journal) -> int:
+    """How many cells have ended in an interrupted run; raises `FolderTaken` if it is none, or cannot be read."""
+    part = journal.path.parent
+    try:
+        return len(Archive.read(part).records)
+    except ValueError as fault:
+        if len(journal.path.read_bytes().splitlines()) <= 1:  # nothing, or a header
+            return 0
+        raise FolderTaken(
+            f"{part} holds what is no run that can be gone on with ({fault}); name another --out"
+        ) from None
+
+
+def may_go_on(part: Path, had: int, fits: bool, resume: bool) -> None:
     """Raise `FolderTaken` where `had` results of an interrupted command would be lost: not asked for, or none fits."""
-    holds = f"{journal.path.parent} holds {had} results of an interrupted run"
+    holds = f"{part} holds {had} results of an interrupted run"
     if had and not resume:
-        leave(
-            journal,
-            f"{holds}: to go on with it, ask again with --resume; to begin anew, name another --out, or delete it",
+        raise FolderTaken(
+            f"{holds}: to go on with it, ask again with --resume; to begin anew, name another --out, or delete it"
         )
     if had and not fits:
-        leave(journal, f"{holds} of something else, or by other versions: name another --out, or delete it")
-
-
-def leave(journal: Journal, why: str) -> NoReturn:
-    """Give the journal back as it is, and raise `FolderTaken`."""
-    with journal:
-        raise FolderTaken(why)
+        raise FolderTaken(
+            f"{holds} of something else: other scenes or cases, a scene file that has changed, with or without --full, "
+            "or other versions; name another --out, or delete it"
+        )
 
 
 def open_again(out: Path) -> Journal:
@@ -85,12 +105,12 @@ def held(folder: Path, out: Path) -> Journal:
         raise FolderTaken(f"{out} is being written by another crosscheck; wait for it, or name another --out") from None
 
 
-def ended_in(part: Path) -> int:
-    """How many cells have ended in an interrupted run."""
+def digest_of(path: str) -> str:
+    """What tells whether a scene file is still the same; "" if it cannot be read."""
     try:
-        return len(Archive.read(part).records)
-    except ValueError:
-        return 0
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError:
+        return ""
 
 
 def found(out: Path) -> Path:

@@ -33,11 +33,12 @@ def test_what_has_ended_is_not_measured_again(tmp_path: Path):
         assert len(again) == 1
         assert found["error", "scene", 1][0]["error_radii"] == np.inf
         assert np.isnan(found["error", "scene", 1][0]["change_radii"])
-    with pytest.raises(FolderTaken, match="holds 1 results of an interrupted run of something else"):
-        Kept(Journal(tmp_path), {"seed": 1}, resume=True)
-    with pytest.raises(FolderTaken, match="ask again with --resume"):
-        Kept(Journal(tmp_path), {"seed": 0}, resume=False)
-    with Journal(tmp_path) as journal:  # nothing was lost by asking, and the lock is free
+    with Journal(tmp_path) as journal:
+        with pytest.raises(FolderTaken, match="holds 1 results of an interrupted run of something else"):
+            Kept(journal, {"seed": 1}, resume=True)
+        with pytest.raises(FolderTaken, match="ask again with --resume"):
+            Kept(journal, {"seed": 0}, resume=False)
+    with Journal(tmp_path) as journal:  # nothing was lost by asking
         assert len(Kept(journal, {"seed": 0}, resume=True)) == 1
 
 

@@ -105,7 +105,7 @@ def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_twin():
     )
 
     assert "pushed out by a share a step" in kept.reason
-    assert kept.tested == "the reference with the player's flight and push-out alone has this limit"
+    assert kept.tested == "the reference with late hits and the player's flight and push-out has this limit"
     assert other.reason == "friction takes speed along the contact"
     assert other.source == "the engine's default"
     assert untested.why.startswith("likely: overlaps are pushed out")

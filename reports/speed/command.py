@@ -18,7 +18,7 @@ from rich.table import Table
 from reports import style
 from reports.commands import checked_engines, checked_scenes, opening
 from reports.exits import DONE, FAILED, broken_off, say
-from reports.folders import open_part, replace_folder
+from reports.folders import digest_of, given_back, open_part, replace_folder
 from reports.journal import JOURNAL, Journal
 from reports.machine import about
 from reports.speed import figures
@@ -46,7 +46,9 @@ def run_speed(
     out = out.resolve()
     header = about(command, seed)
     with opening(out):
-        kept = kept_of(plan, header, open_part(out, is_ours, "crosscheck speed did not make"), resume)
+        journal = open_part(out, is_ours, "crosscheck speed did not make")
+        with given_back(journal):
+            kept = kept_of(plan, header, journal, resume)
     part = kept.journal.path.parent
     with broken_off(part, lambda: f"What has ended is kept in {part}: ask again with --resume"), kept.journal:
         results, header = carry_out(plan, header, kept, resume)
@@ -69,7 +71,11 @@ def nothing_measured(part: Path, results: Results) -> NoReturn:
 
 def kept_of(plan: Plan, header: Mapping[str, Any], journal: Journal, resume: bool) -> Kept:
     """What is kept of an interrupted measurement of this plan, by the same versions on the same machine."""
-    asked = {"scenes": plan.scenes, "engines": plan.engines, "effort": asdict(plan.effort), "whole": plan.whole}
+    files = {scene: digest_of(scene) for scene in plan.scenes if scene.endswith(".toml")}
+    asked = {
+        "scenes": plan.scenes, "files": files, "engines": plan.engines, "effort": asdict(plan.effort),
+        "whole": plan.whole,
+    }  # fmt: skip
     return Kept(journal, asked | {key: header[key] for key in ("seed", "versions", "machine")}, resume)
 
 

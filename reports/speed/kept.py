@@ -17,11 +17,19 @@ class Kept:
     """
 
     def __init__(self, journal: Journal, header: dict[str, Any], resume: bool) -> None:
-        """Go on, if `resume` and the journal is of a measurement with the very same `header`; raises as `may_go_on`."""
+        """Go on, if `resume` and the journal is of a measurement with the very same `header`.
+
+        Raises:
+            FolderTaken: as `may_go_on`.
+            ValueError: the journal is none of a measurement.
+        """
         self.journal = journal
         lines = list(lines_of(journal.path.parent))
+        for number, line in enumerate(lines, start=1):
+            if not isinstance(line, dict) or not line.keys() >= ({"task", "result"} if number > 1 else {"header"}):
+                raise ValueError(f"{journal.path}: line {number} is no line of a measurement")
         same = bool(lines) and lines[0].get("header") == json.loads(json.dumps(plain(header)))
-        may_go_on(journal, len(lines[1:]), same, resume)
+        may_go_on(journal.path.parent, len(lines[1:]), same, resume)
         self.results = {json.dumps(line["task"]): line["result"] for line in lines[1:]} if same else {}
         if not same:
             os.truncate(journal.path, 0)

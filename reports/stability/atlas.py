@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.journal import Journal, lines_of, numbers, plain
+from reports.folders import digest_of
+from reports.journal import JOURNAL, Journal, lines_of, numbers, plain
 from reports.machine import about
 from reports.runner import run_all
 from reports.stability.cases import CASES
@@ -94,7 +95,8 @@ def carry_out(plan: Plan, journal: Journal, done: Collection[Task], progress: Pr
     """Do every task that is not `done`; all goes into the journal's folder."""
     folder = journal.path.parent
     (folder / "trajectories").mkdir(exist_ok=True)
-    header = about(plan.command, 0) | {"form": plan.form}
+    files = {path: digest_of(path) for path, _, _ in (name.rpartition(":") for name in plan.cases) if path}
+    header = about(plan.command, 0) | {"form": plan.form, "files": files}
     journal.append({"header": header})
     (folder / "machine.json").write_text(json.dumps(plain(header), indent=2) + "\n")
     wanted = tasks_of(plan)
@@ -144,23 +146,40 @@ class Atlas(NamedTuple):
 
 
 def read(folder: Path) -> Atlas:
-    """The atlas in a folder, in reading order."""
-    header: dict[str, Any] = {}
-    last: dict[Task, dict[str, Any]] = {}  # of two lines on one task the later holds
-    for line in lines_of(folder):
-        header = line.get("header", header)
-        if "task" in line:
-            last[Task(**line["task"])] = line
-    lines = list(last.values())
-    limits = [limit_from(line["limit"]) for line in lines if "limit" in line]
-    maps = [MapOf.from_record(line["map"]) for line in lines if "map" in line]
-    laws = [LawOf.from_record(line["law"]) for line in lines if "law" in line]
+    """The atlas in a folder, in reading order; raises `ValueError` if its journal cannot be used."""
+    headers, results = journalled(folder)
+    limits = [one for one in results.values() if isinstance(one, Limit)]
+    maps = [one for one in results.values() if isinstance(one, MapOf)]
+    laws = [one for one in results.values() if isinstance(one, LawOf)]
     order = {name: k for k, name in enumerate(CASES)}
     players = list(dict.fromkeys(player for case in CASES.values() for player in players_of(case)))
     limits.sort(key=lambda limit: (order.get(limit.case, len(order)), limit.case, players.index(limit.player)))
     maps.sort(key=lambda one: (list(MAPS).index(one.name), players.index(one.player)))
     laws.sort(key=lambda one: (list(TOUCHING).index(one.name), players.index(one.player)))
-    return Atlas(explained(limits), maps, laws, header)
+    return Atlas(explained(limits), maps, laws, headers[-1])
+
+
+def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | MapOf | LawOf]]:
+    """The headers in a folder's journal, and what came of every task; of two lines on one the later holds.
+
+    Raises:
+        ValueError: naming a line that is none of an atlas.
+    """
+    made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
+        "limit": limit_from, "map": MapOf.from_record, "law": LawOf.from_record,
+    }  # fmt: skip
+    headers: list[dict[str, Any]] = []
+    results: dict[Task, Limit | MapOf | LawOf] = {}
+    for number, line in enumerate(lines_of(folder), start=1):
+        try:
+            if "header" in line:
+                headers.append({"versions": line["header"]["versions"]} | line["header"])
+            elif "footer" not in line:
+                task = Task(**line["task"])
+                results[task] = made[task.kind](line[task.kind])
+        except (KeyError, TypeError, ValueError, AttributeError):
+            raise ValueError(f"{folder / JOURNAL}: line {number} is no line of an atlas") from None
+    return headers, results
 
 
 def limit_from(record: dict[str, Any]) -> Limit:
@@ -169,18 +188,20 @@ def limit_from(record: dict[str, Any]) -> Limit:
     return Limit(**known | {"trials": tuple(Trial(**trial) for trial in known["trials"])})
 
 
-def done_before(folder: Path, plan: Plan) -> set[Task]:
-    """The tasks of the plan that ended well in an interrupted run, if all of that was by the same versions."""
-    headers = [line["header"] for line in lines_of(folder) if "header" in line]
-    if any(header["versions"] != about("", 0)["versions"] for header in headers):
-        return set()
-    return ended_well(folder) & set(tasks_of(plan))
+def done_before(folder: Path, plan: Plan) -> tuple[int, set[Task]]:
+    """How many tasks ended well in an interrupted run, and those of the plan, if versions and scene files are the same.
 
-
-def ended_well(folder: Path) -> set[Task]:
-    """The tasks of a journal that ended well."""
-    ended = [line for line in lines_of(folder) if "task" in line]
-    return {Task(**line["task"]) for line in ended if line[line["task"]["kind"]]["status"] == "ok"}
+    Raises:
+        ValueError: the journal is none of an atlas.
+    """
+    headers, results = journalled(folder)
+    well = {task for task, result in results.items() if result.status == "ok"}
+    same = all(
+        header["versions"] == about("", 0)["versions"]
+        and all(digest_of(path) == digest for path, digest in header.get("files", {}).items())
+        for header in headers
+    )
+    return len(well), well & set(tasks_of(plan)) if same else set()
 
 
 def table(limits: Sequence[Limit]) -> pd.DataFrame:

@@ -12,22 +12,23 @@ import pandas as pd
 from rich.console import Console
 from rich.table import Table
 
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, OWN
 from reports.commands import checked_engines, opening, unknown
 from reports.exits import DONE, FAILED, broken_off, refuse, say
-from reports.folders import may_go_on, open_part, replace_folder
+from reports.folders import given_back, may_go_on, open_part, replace_folder
 from reports.journal import JOURNAL, Journal
-from reports.stability.atlas import Atlas, Plan, Task, carry_out, case_named, done_before, ended_well, read, table
+from reports.stability.atlas import Atlas, Plan, Task, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
 from reports.stability.maps import MAPS
 from reports.stability.page import write_page
 from reports.stability.touching import TOUCHING, AtGap
-from reports.stability.vary import VARIES
+from reports.stability.vary import VARIES, cannot_vary
 from reports.style import number
 from reports.terminal import Progress
 from scenarios.files import SceneFileError, read_scene_file
 
+SEE = "limits.csv and stability.html have the names of all, or tests/stability_limits.csv; for --vary see --help"
 FILES = (JOURNAL, "trajectories", "machine.json", "limits.csv", "maps.csv", "laws.csv", "stability.html")
 
 
@@ -38,11 +39,16 @@ def find_limits(
     """Find the limits of `names`, all cases and maps if there are none, into `out`; exits 0, 1, 2 or 130."""
     cases, maps, touching = checked(names, vary)
     form = "full" if full else "quick"
-    plan = Plan(cases, maps, touching, checked_engines(engines), form, workers or os.cpu_count() or 1, command)
+    players = checked_engines(engines)
+    if files := [name.removesuffix(OWN) for name in players if name not in ENGINES]:
+        how = "a file is not driven to its limits: crosscheck check judges it, crosscheck run plays it"
+        refuse([f"--engine {file}: {how}" for file in files])
+    plan = Plan(cases, maps, touching, players, form, workers or os.cpu_count() or 1, command)
     out = out.resolve()
     with opening(out):
         journal = open_part(out, FILES.__contains__, "crosscheck stability did not make")
-        done = gone_on_with(journal, plan, resume)
+        with given_back(journal):
+            done = gone_on_with(journal, plan, resume)
     part = journal.path.parent
     kept = f"What has ended is kept in {part}: ask again with --resume"
     with broken_off(part, lambda: kept), journal, Progress() as progress:
@@ -55,9 +61,8 @@ def find_limits(
 
 def gone_on_with(journal: Journal, plan: Plan, resume: bool) -> set[Task]:
     """The tasks of the plan that ended well in an interrupted run; raises as `may_go_on`, lest others are lost."""
-    folder = journal.path.parent
-    done = done_before(folder, plan)
-    may_go_on(journal, len(ended_well(folder)), bool(done), resume)
+    had, done = done_before(journal.path.parent, plan)
+    may_go_on(journal.path.parent, had, bool(done), resume)
     if not done:
         os.truncate(journal.path, 0)
     return done
@@ -85,10 +90,10 @@ def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[
     for name in names:
         if name.endswith(".toml"):
             try:
-                read_scene_file(name)
+                kept, whys = varied_of(name, vary)
+                cases, faults = cases + kept, faults + whys
             except SceneFileError as error:
                 faults += error.faults
-            cases += [f"{name}:{what}" for what in vary or VARIES]
         elif name in CASES:
             cases.append(name)
         elif name not in MAPS and name not in TOUCHING:
@@ -96,8 +101,16 @@ def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[
     if vary and not any(name.endswith(".toml") for name in names):
         faults.append(f"--vary {vary[0]}: varies a scene file, and none is named; name FILE.toml")
     if faults:
-        refuse([fault.replace("crosscheck list", "crosscheck stability --help") for fault in faults])
+        refuse([fault.replace("see: crosscheck list", SEE) for fault in faults])
     return (list(dict.fromkeys(cases)), maps, touching) if names else (list(CASES), list(MAPS), list(TOUCHING))
+
+
+def varied_of(path: str, vary: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The cases of a scene file, and why what was asked for cannot be varied; what nobody named is left out quietly."""
+    one = read_scene_file(path)
+    whys = {what: cannot_vary(one, what) for what in vary or VARIES if what in VARIES}
+    faults = [f"{path}: --vary {what}: {why}" for what, why in whys.items() if why and vary]
+    return [f"{path}:{what}" for what, why in whys.items() if not why], faults
 
 
 def finish(atlas: Atlas, out: Path) -> NoReturn:
@@ -115,7 +128,8 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
         cells = [in_words(found[name, player]) if (name, player) in found else "" for player in players]
         rows.add_row(f"{Path(name).name}, {case_named(name).parameter}", *cells)
     console.print(rows)
-    console.print("A number: fails there. –: does not fail so far. never: fails everywhere. *: works again beyond.")
+    console.print("A number: fails there. ≤, ≥: fails up to there, works beyond. –: does not fail so far. never: fails")
+    console.print("everywhere. *: more than one edge, works again beyond or fails before as well; see the page.")
     console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
     lost = [f"{one.case} on {one.player}" for one in limits if one.status != "ok"]
     lost += [f"{one.name} on {one.player}" for one in atlas.maps if one.status != "ok"]
@@ -127,4 +141,4 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
 
 def in_words(limit: Limit) -> str:
     """The limit in a few letters."""
-    return limit.word or number(limit.fails_at) + ("" if limit.monotone else "*")
+    return limit.word or limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")

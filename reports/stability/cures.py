@@ -138,10 +138,10 @@ def why_played(limit: Limit, varied: str) -> tuple[str, str, str]:
     failing = limit.failing
     if failing is None:
         return "", "", ""
-    if cure := CURES.get(limit.cured):
-        return cure.tells, "", f"works {cure.how}"
     if limit.twin:
         return told(limit)
+    if cure := CURES.get(limit.cured):
+        return cure.tells, "", f"works {cure.how}"
     if failing.broken == "refused":
         return "the player refuses it", "", SAYS_SO
     tried = [cure.how for cure in CURES.values() if cure.fits(limit.player, varied)]

@@ -12,7 +12,7 @@ from reports.stability.cases import CASES
 from reports.stability.cures import SAYS_SO, cure_of, why_played
 from reports.stability.limits import NEVER_FAILS, Limit, Search
 from reports.stability.reasons import Reason, reason_of
-from reports.stability.twins import told, twin_of
+from reports.stability.twins import LATE, told, twin_of
 
 NEAR = 1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a hit lost by degrees
 
@@ -20,13 +20,13 @@ NEAR = 1.05  # a prediction may be off by this factor: the quick form's bracket 
 def tried_out(search: Search, limit: Limit) -> Limit:
     """The limit with what was found by playing its failing run again: a twin that has it, too, or what cures it.
 
-    Where a reason is written down, only a twin can bear it out; on a scene of one's own a cure is the better news.
+    Where a reason is written down, only a twin can bear it out; what it predicts is enough.
     """
-    if limit.case in CASES:
-        limit = replace(limit, twin=twin_of(search, limit))
-        return limit if limit.twin or reason_of(limit) else replace(limit, cured=cure_of(search, limit))
-    limit = replace(limit, cured=cure_of(search, limit))
-    return limit if limit.cured else replace(limit, twin=twin_of(search, limit))
+    reason = reason_of(limit)
+    if reason is not None and reason.predicts is not None and brackets(limit, reason.predicts):
+        return limit
+    limit = replace(limit, twin=twin_of(search, limit))
+    return limit if limit.twin or reason else replace(limit, cured=cure_of(search, limit))
 
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
@@ -40,6 +40,8 @@ def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit
 
     A written reason that holds by nothing else gives way to a twin that shows another.
     """
+    if limit.status != "ok":
+        return limit
     reason = reason_of(limit)
     if reason is None:
         varied = CASES[limit.case].parameter if limit.case in CASES else limit.case.rsplit(":", 1)[-1]
@@ -50,6 +52,9 @@ def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit
         text, source, shown = told(limit)
         if reason.habit in limit.twin.split(", "):
             tests.append(shown)
+        elif reason.habit == LATE:  # which every twin has
+            text, source = f"{reason.text}; {text}", f"{reason.source}; {source}"
+            return replace(limit, reason=text, source=source, tested="; ".join([*tests, shown]))
         elif not tests:
             return replace(limit, reason=text, source=source, tested=shown)
     return replace(limit, reason=reason.text, source=reason.source, tested="; ".join(tests))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,18 +33,23 @@ def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
 
 
 def kept_failure(limit: Limit, folder: Path) -> tuple[Trajectory, Trajectory | None] | None:
-    """What was saved: the failing run and the one beside it; None if nothing was."""
+    """What was saved: the failing run and the one beside it; None if nothing was, or it cannot be read."""
     path = file_of(limit, folder)
     if not path.exists():
         return None
     beside = beside_file(path)
-    return load_trajectory(path), load_trajectory(beside) if beside.exists() else None
+    try:
+        return load_trajectory(path), load_trajectory(beside) if beside.exists() else None
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # torn by a crash: what it was found from is not
+        return None
 
 
 def file_of(limit: Limit, folder: Path) -> Path:
     """The file of the failing run."""
-    name = f"{limit.case}.{limit.player}".replace("/", "_").replace(":", "-")
-    name = name if len(name) < 200 else hashlib.sha256(name.encode()).hexdigest()[:16]
+    name = f"{limit.case}.{limit.player}"
+    if "/" in name or len(name) > 200:  # two folders may have a file of one name
+        name = f"{Path(limit.case).name}.{limit.player}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"[-200:]
+    name = name.replace(":", "-")
     return folder / "trajectories" / f"{name}.npz"
 
 

@@ -128,11 +128,12 @@ class Limit:
     Attributes:
         case, player: names; the player is a key of `PLAYERS`.
         form: of `FORMS`.
-        verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on), or "works only beyond".
-        works_at: the harshest value before the first failure at which no run failed, but by chance; nan: none.
-        fails_at: the value next to it at which some run failed, or more than by chance; nan: none.
+        verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on), or "works only beyond"
+            (at works_at, and not at the gentler fails_at).
+        works_at: of the first two neighbours of which the gentler works and the harsher fails, the gentler; nan: none.
+        fails_at: the harsher: more runs failed than may by chance; nan: none.
         trials: every value tried, from gentle to harsh.
-        monotone: False if it works again beyond a value at which it fails.
+        monotone: False if there is more than one edge: it works again beyond, or fails before as well.
         seconds: of processor time that the search took.
         cured: the change of `CURES` with which the failing run works; "" if none was found, or looked for.
         twin: the habits with which the reference has this limit, as `twin_of`; "" likewise.
@@ -168,6 +169,13 @@ class Limit:
         if self.verdict == NEVER_WORKS:
             return "refused" if self.failing is not None and self.failing.broken == "refused" else "never"
         return "–" if self.verdict == NEVER_FAILS else ""
+
+    @property
+    def sign(self) -> str:
+        """Before `fails_at` in a table: "≤" or "≥" where it fails up to there, and works beyond."""
+        if self.verdict != ONLY_BEYOND:
+            return ""
+        return "≤" if self.works_at > self.fails_at else "≥"
 
     @property
     def why(self) -> str:

@@ -7,7 +7,7 @@ from math import isnan
 from typing import TYPE_CHECKING, NamedTuple
 
 from adapters.engines import ENGINES
-from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit
+from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Limit
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import AT_ONCE, PAIRS, AtGap
 from reports.style import number
@@ -62,7 +62,7 @@ def cell_of(section: Section, player: str) -> Cell:
     values = list(section.case.values)
     harsher = 1 if values[-1] > values[0] else -1
     passed = sum(harsher * value < harsher * limit.fails_at for value in values) / len(values)
-    text = number(limit.fails_at) + ("" if limit.monotone else "*")
+    text = limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")
     return Cell(text, remark, max(1, min(9, round(9 * (1 - passed)))))
 
 
@@ -85,7 +85,7 @@ def reasons(limits: Sequence[Limit]) -> list[Why]:
 def bracket(limit: Limit) -> tuple[str, str]:
     """Works at, fails at, as text."""
     works = "nowhere" if isnan(limit.works_at) else number(limit.works_at, 4)
-    fails = "nowhere tried" if isnan(limit.fails_at) else number(limit.fails_at, 4)
+    fails = "nowhere tried" if isnan(limit.fails_at) else limit.sign + number(limit.fails_at, 4)
     return works, fails
 
 
@@ -100,7 +100,7 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     cases = list(dict.fromkeys(limit.case for limit in mine))
     failing = [limit for limit in mine if limit.verdict != NEVER_FAILS]
     found = [f"{len(mine)} searches in {len(cases)} cases: {len(mine) - len(failing)} found no failure as far as they "
-             f"went, {sum(limit.verdict == LIMIT for limit in mine)} a limit, and "
+             f"went, {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} a limit, and "
              f"{sum(limit.verdict == NEVER_WORKS for limit in mine)} failed everywhere."]  # fmt: skip
     fails: dict[str, list[str]] = {}
     for limit in failing:
@@ -120,8 +120,8 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     if odd:
         names = ", ".join(dict.fromkeys(f"{limit.player} in {limit.case}" for limit in odd[:3]))
         found.append(
-            f"{len(odd)} of the searches found a player that works again beyond a value at which it fails (marked *), "
-            f"as {names}."
+            f"{len(odd)} of the searches found more than one edge (marked *): a player that works again beyond a value "
+            f"at which it fails, or fails before as well, as {names}."
         )
     return found
 

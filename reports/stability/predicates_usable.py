@@ -5,17 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from reports import laws, scales
-from reports.collisions import match
+from reports.collisions import match, pair_keys, who
 from reports.comparison import answered, cut
 from reports.stability.predicates import Predicate, Reading, first_above
-from scenarios.model import Scenario, Trajectory
+from scenarios.model import Collisions, Scenario, Trajectory
 
-MOST_RISE, MOST_OVERLAP = 0.05, 0.1  # of the energy at hand; radii
+MOST_RISE, MOST_OVERLAP, MOST_LOST = 0.05, 0.1, 0.5  # of the energy at hand; radii; of a way
+LEAST_WAY = 0.01  # radii between two samples, less of which is rounding
 
 
 def _usable(scenario: Scenario, played: Trajectory) -> Reading:
     parts = [part for part in (_rise(scenario, played), _overlap(scenario, played), _escape(scenario, played),
-             _wrong_hits(scenario, played)) if part is not None]  # fmt: skip
+             _stuck(scenario, played), _wrong_hits(scenario, played)) if part is not None]  # fmt: skip
     return max(parts, key=lambda part: part.value, default=Reading(0.0))  # a disk alone can do nothing wrong
 
 
@@ -50,22 +51,46 @@ def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
     )
 
 
+def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
+    """A disk that keeps a velocity and does not go its way, as where the last place of its position is too coarse."""
+    scene, v = scenario.scene, played.velocity
+    if len(played) < 2 or scene.wrap is not None:
+        return None
+    steady = (v[1:] == v[:-1]).all(axis=2) & ~scene.static
+    ought = np.linalg.norm(v[1:], axis=2) * scenario.sample_interval / scene.radius
+    went = np.linalg.norm(np.diff(played.position, axis=0), axis=2) / scene.radius
+    lost = np.where(steady & (ought > LEAST_WAY), 1 - went / np.where(ought > 0, ought, 1.0), 0.0)
+    k, disk = np.unravel_index(int(lost.argmax()), lost.shape)
+    event = f"disk {disk} goes {max(1 - float(lost[k, disk]), 0.0):.3g} of its way"
+    return Reading(float(lost.max()) / MOST_LOST, float(played.t[k + 1]), event, "strays", disk=int(disk))
+
+
 def _wrong_hits(scenario: Scenario, played: Trajectory) -> Reading | None:
     scenario, true = answered(scenario)
     if true is None:
         return None
     k = min(len(played), len(true))
     played, true = cut(played, k), cut(true, k)
-    found = match(played.collisions, true.collisions, float(true.t[-1]), scenario.dt(scenario.substeps[0]))
-    if found.first_wrong is None:
+    dt = scenario.dt(scenario.substeps[0])
+    found = match(played.collisions, true.collisions, float(true.t[-1]), dt)
+    wrong = found.first_wrong or never_hit(played.collisions, true.collisions, float(true.t[-1]) - 3 * dt)
+    if wrong is None:
         return None
-    at, what = found.first_wrong
+    at, what = wrong
     kind, pair = what.split(maxsplit=1)
-    wrong = len(found.missed) + len(found.invented)
-    return Reading(2.0 * wrong, at, f"{kind} hit: {pair}", "hits", disk=int(pair.split("-")[0]))
+    count = len(found.missed) + len(found.invented)
+    return Reading(2.0 * max(count, 1), at, f"{kind} hit: {pair}", "hits", disk=int(pair.split("-")[0]))
+
+
+def never_hit(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
+    """The first true hit up to `end` s of a pair that never hits in the run; `match` lets those pass that are close."""
+    hard = (true.impulse > 0) & (true.t < end)
+    missed = np.flatnonzero(hard & ~np.isin(pair_keys(true), pair_keys(played)))
+    return (float(true.t[missed[0]]), f"missed {who(true.i[missed[0]], true.j[missed[0]])}") if len(missed) else None
 
 
 USABLE = Predicate(
     "unusable", "of the bound", 1.0,
-    "not finite, through a wall, 5 % more energy, an overlap of a tenth of a radius, or a wrong hit", _usable,
+    "not finite, through a wall, 5 % more energy, an overlap of a tenth of a radius, half a way lost, a wrong hit",
+    _usable,
 )  # fmt: skip

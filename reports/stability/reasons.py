@@ -7,6 +7,7 @@ from math import atan, pi, sqrt
 from typing import NamedTuple
 
 from adapters.habits import DIGITS, IMPULSE, PUSH_OUT, RESTITUTION
+from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, Limit
 from reports.stability.twins import B2_SETTINGS, B2_TYPES, LATE, OF_PYMUNK, PRODUCT, THRESHOLD, THRESHOLDS
 
@@ -217,7 +218,8 @@ REASONS = (
 
 
 def reason_of(limit: Limit) -> Reason | None:
-    """The first row that fits; None where nothing failed."""
+    """The first row that fits; None where nothing failed. Of a scene of one's own only what holds in all of them."""
     if limit.verdict == NEVER_FAILS:
         return None
-    return next((r for r in REASONS if fnmatch(limit.case, r.cases) and fnmatch(limit.player, r.players)), None)
+    rows = [row for row in REASONS if limit.case in CASES or row.cases == "*"]
+    return next((r for r in rows if fnmatch(limit.case, r.cases) and fnmatch(limit.player, r.players)), None)

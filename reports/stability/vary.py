@@ -127,6 +127,15 @@ def varied(path: str, what: str, x: float, _run: int, _of: int) -> Scenario:
     return replace(VARIES[what][2](one, x), substeps=one.substeps[-1:])
 
 
+def cannot_vary(one: Scenario, what: str) -> str:
+    """Why this cannot be varied in a scene, as the end of a sentence; "" if it can."""
+    if what == "mass_ratio" and one.scene.static.all():
+        return "no disk moves, so that none can be made heavier"
+    if what == "dt" and not ladder(one):
+        return "it lasts less than ten steps of an eighth of its sample_interval, the finest that would be tried"
+    return ""
+
+
 @cache
 def case_of_file(path: str, what: str) -> Case:
     """The case: up to which value is the scene of this file usable?"""
