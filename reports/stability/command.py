@@ -120,13 +120,14 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
     rows = Table(title="Where they fail", title_justify="left", box=None, padding=(0, 1, 0, 0))
     shown = list(dict.fromkeys(limit.case for limit in limits))
     players = [name for name in ENGINES if any(limit.player == name for limit in limits)]
-    rows.add_column("case, parameter", no_wrap=True)
+    rows.add_column("case, parameter", overflow="fold")  # this one, so that no number is cut
     for player in players:
         rows.add_column(player.replace(":", "\n"), justify="right", no_wrap=True)
     found = {(limit.case, limit.player): limit for limit in limits}
     for name in shown:
         cells = [in_words(found[name, player]) if (name, player) in found else "" for player in players]
-        rows.add_row(f"{Path(name).name}, {case_named(name).parameter}", *cells)
+        case, parameter = Path(name).name, case_named(name).parameter
+        rows.add_row(case + (", " if len(case + parameter) < 24 else ",\n") + parameter, *cells)
     console.print(rows)
     console.print("A number: fails there. ≤, ≥: fails up to there, works beyond. –: does not fail so far. never: fails")
     console.print("everywhere. *: more than one edge, works again beyond or fails before as well; see the page.")
