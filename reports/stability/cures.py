@@ -1,4 +1,4 @@
-"""Why a scene of one's own fails where it does: the failing run with one thing changed, until it works."""
+"""Why a scene fails of which nothing was written down: the failing run with one thing changed, until it works."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def tried_out(search: Search, limit: Limit) -> Limit:
 
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
-    """The limits with their reasons, each tested by what it predicts, or by the limit of its switch."""
+    """The limits with their reasons, each tested if it can be: by itself, or by the limit of its switch among them."""
     by_name = {(limit.case, limit.player): limit for limit in limits}
     return [with_reason(limit, by_name) for limit in limits]
 
