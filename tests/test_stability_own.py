@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reports.cli import VARIED
+from reports.stability.cases import CASES
 from reports.stability.cures import CURES, cure_of, faster, larger, slower, smaller, why_played
 from reports.stability.explain import explained, tried_out
-from reports.stability.limits import NOT_KNOWN, QUICK, Limit, Search, Trial
+from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Search, Trial
 from reports.stability.players import PLAYERS, play_as
 from reports.stability.reasons import reason_of
-from reports.stability.vary import case_of_file, varied
+from reports.stability.vary import VARIES, case_of_file, varied
 from scenarios.files import read_scene_file
 from scenarios.oracle import with_oracle
 
@@ -145,6 +147,13 @@ def test_a_disk_that_float32_keeps_where_it_is_fails():
     assert far["event_driven:float64"].works
 
 
+@pytest.mark.parametrize("x", [0.00294, 0.0167])
+def test_a_disk_that_is_hit_twice_between_two_samples_is_not_called_stuck(x: float):
+    """In the cradle it leaves as it came, at rest or not, and has gone less than that."""
+    trial = Search(CASES["dt_cradle_with_gaps"], "box2d_v3:matched", FULL).trial(x)
+    assert trial.works, trial.event
+
+
 @pytest.mark.parametrize("name", ["tunnelling_mine.toml", "dt_mine.toml", "overlap_mine.toml"])
 def test_the_name_of_a_scene_file_does_not_pick_its_reason(name: str):
     """The table's patterns are for the atlas' own cases; what every exact method refuses holds everywhere."""
@@ -153,6 +162,11 @@ def test_the_name_of_a_scene_file_does_not_pick_its_reason(name: str):
 
     assert reason_of(limit) is None
     assert reason_of(replace(limit, player="event_driven:float64")) is not None
+
+
+def test_the_help_names_what_can_be_varied():
+    """It is written out there, so that --help need not load the scenes."""
+    assert VARIED.split(", ") == list(VARIES)
 
 
 def test_what_ended_without_a_result_has_no_reason_of_physics():

@@ -196,8 +196,9 @@ def done_before(folder: Path, plan: Plan) -> tuple[int, set[Task]]:
     """
     headers, results = journalled(folder)
     well = {task for task, result in results.items() if result.status == "ok"}
+    versions = about("", 0)["versions"]
     same = all(
-        header["versions"] == about("", 0)["versions"]
+        header["versions"] == versions
         and all(digest_of(path) == digest for path, digest in header.get("files", {}).items())
         for header in headers
     )

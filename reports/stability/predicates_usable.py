@@ -52,11 +52,17 @@ def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
 
 
 def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
-    """A disk that keeps a velocity and does not go its way, as where the last place of its position is too coarse."""
-    scene, v = scenario.scene, played.velocity
+    """A disk that keeps its velocity and does not go its way, as the last place of its position is too coarse.
+
+    Before its first hit only: two hits between two samples may leave it the velocity it had.
+    """
+    scene, v, hits = scenario.scene, played.velocity, played.collisions
     if len(played) < 2 or scene.wrap is not None:
         return None
-    steady = (v[1:] == v[:-1]).all(axis=2) & ~scene.static
+    first_hit = np.full(scene.n, np.inf)
+    for disks in (hits.i, hits.j):
+        np.minimum.at(first_hit, disks[disks >= 0], hits.t[disks >= 0])
+    steady = (v[1:] == v[:-1]).all(axis=2) & ~scene.static & (played.t[1:, None] < first_hit)
     ought = np.linalg.norm(v[1:], axis=2) * scenario.sample_interval / scene.radius
     went = np.linalg.norm(np.diff(played.position, axis=0), axis=2) / scene.radius
     lost = np.where(steady & (ought > LEAST_WAY), 1 - went / np.where(ought > 0, ought, 1.0), 0.0)
