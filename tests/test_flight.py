@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import cos, pi, sin, sqrt
+from math import pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +12,10 @@ import pytest
 from adapters.engines import ENGINES, Row
 from adapters.play import play
 from reports.game.flight import EARTH, FRAME, Flight, field_scenario
-from reports.game.messages import read_message
 from reports.game.pilot import SHIP
-from reports.game.session import Session
-from scenarios.catalogue import SCENARIOS
 from scenarios.closed_forms import world_pushes
 from scenarios.exercise import SHIP as START
 from scenarios.files import read_scene_file, scene_text
-from scenarios.model import Scenario
-from scenarios.placing import lay_out
 
 EVENTS = [  # frame, key, down: a turn, a push across it, a renewed push, both keys of a pair
     (8, "a", True), (24, "w", True), (40, "w", True), (56, "a", False), (72, "w", False), (80, "s", True),
@@ -250,29 +245,6 @@ def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.M
     assert flight.frame == 10
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["", "{", "null", "[]", "1e999", '{"do": "fly"}', '{"do": "jump"}', '{"do": "frames", "count": 5}',
-     '{"do": "frames", "count": 1.5}', '{"do": "frames", "count": "1"}', '{"do": "frames", "count": 1, "more": 2}',
-     '{"do": "key", "key": "q", "down": true}', '{"do": "key", "key": "w", "down": 1}',
-     '{"do": "fly", "engines": []}', '{"do": "fly", "engines": ["nobody"]}',
-     '{"do": "fly", "engines": ["reference:exercise"], "restitution": 1.5}',
-     '{"do": "fly", "engines": ["reference:exercise"], "asteroids": 1000000}',
-     '{"do": "fly", "engines": ["reference:exercise"], "seed": -1}', '{"do": "save"' + " " * 5000 + "}",
-     b"\xff\xfe\x00", "[" * 3000],
-)  # fmt: skip
-def test_a_malformed_message_is_told_in_a_sentence(text: str | bytes):
-    """ValueError and nothing else, whatever the text is."""
-    with pytest.raises(ValueError, match=r"\w{3,}"):
-        read_message(text)
-
-
-def test_saving_before_flying_is_told():
-    """There is nothing to save."""
-    with pytest.raises(ValueError, match="nothing has been flown"):
-        Session(["reference:exercise"]).answer('{"do": "save"}')
-
-
 def test_spin_is_part_of_the_energy():
     """m v2 / 2 + I w2 / 2, and momentum m v, of all disks."""
     flight = Flight(field_scenario(), ["reference:exercise"])
@@ -283,33 +255,3 @@ def test_spin_is_part_of_the_energy():
     assert told["energy"] == pytest.approx(sum(each), rel=1e-14)
     assert told["momentum"] == pytest.approx((scene.mass @ scene.velocity).tolist(), rel=1e-13)
     assert 0 < pi / 4 * 0.3**4 * scene.angular_velocity[1] ** 2 < told["energy"]
-
-
-def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
-    """The earth, the way back to the start and "You won" belong to the exercise's field, not to every wrap."""
-    scene = lay_out(
-        position=[[3.0, 1.5]], velocity=[[1.0, 0.0]], radius=[0.25], mass=[1.0], restitution=1.0, wrap=[[0, 0], [4, 3]]
-    )
-    scenario = Scenario("through-the-edge", "Does it come back?", "", scene, 6.0, 0.125)
-    session = Session(["reference:exercise"], scenario)
-    session.flight.advance(scenario.samples)
-    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", scenario, session.flight.dt)
-    told = session.now()
-
-    assert run.trajectory is not None
-    assert session.flight.solid.state.position.tolist() == run.trajectory.position[-1].tolist()
-    assert (told["left_at"], told["won"], session.field()["earth"]) == (-1, False, None)
-
-
-def test_the_flame_is_against_a_push_that_turns_with_the_ship():
-    """In a replayed scene whose push is in the ship's own frame; the page draws what it is told."""
-    whole = SCENARIOS["body_frame_thrust"]()
-    session = Session(["reference:exercise"], whole)
-    [push] = whole.thrusts
-    x, y = push.force
-    session.flight.advance(20)
-    angle = float(session.flight.solid.state.angle[SHIP])
-
-    assert push.frame == "body"
-    assert abs(angle) > 0.1
-    assert session.push()[:2] == pytest.approx([cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y])
