@@ -8,8 +8,7 @@ from math import ceil
 
 import numpy as np
 
-from scenarios.event_truth import float64_truth, perturbed
-from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
+from scenarios.model import Array, Scenario, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
 from scenarios.numbers import Numbers, Undecided, balls, digits, has_balls
 from scenarios.oracle_bodies import Leg
@@ -19,10 +18,11 @@ from scenarios.oracle_record import TruthRecord, record_of
 from scenarios.truth_cache import keep, key_of, look_up
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be told apart
-ASTRAY, NEIGHBOURS = 1e-10, 2  # m, for so many starts near by: a tenth of what players are held to
 LEAST_GAIN = 1.05  # times as far must half as many bits again reach, or more will not help
 SPARE, LEFT = 1.3, 64  # times as many bits as the rate so far asks for, and so many to be left for the accuracy
 MOST_DISKS = 200
+WORK = 80_000  # steps of the event loop for one answer, all attempts together; half a minute to a minute
+HEAVY = 4096  # bits that make a step twice as dear as one of few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, HIT_BY_HIT, NOTHING = "closed form", "hit by hit, in many digits", "nothing"
 ACCURACY = 1e-12  # m; two precisions that differ by more have parted
@@ -54,47 +54,9 @@ class OracleTruth:
         key = key_of(self.scenario, has_balls())
         found = look_up(key)
         if found is None:
-            record = computed(self.scenario)
-            found = vars(replace(record, followed_until=followed_until(self.scenario, record)))
+            found = vars(computed(self.scenario))
             keep(key, found)
         return TruthRecord(**found)
-
-
-def followed_until(scenario: Scenario, record: TruthRecord) -> float:
-    """s, up to when motions from starts a unit in the last place apart stay together; inf: to the end.
-
-    Beyond it a distance between trajectories says nothing about a solver, only about chaos. float64 events tell, or,
-    where these end by themselves (what rests is not for them), the oracle.
-    """
-    try:
-        horizon, reason = float64_truth(scenario).horizon
-    except NoTruth:  # no judge in float64: the truth stands by itself
-        return np.inf
-    if not reason:
-        return np.inf
-    return (
-        horizon
-        if reason.startswith("float64")
-        else min(
-            (parting(scenario, record, perturbed(scenario.scene, seed)) for seed in range(NEIGHBOURS)), default=np.inf
-        )
-    )
-
-
-def parting(scenario: Scenario, record: TruthRecord, scene: Scene) -> float:
-    """s, the last sample before the motion of a scene near by is astray from the record; inf: it is not."""
-    near, k = replace(scenario, scene=scene), digits(FEWEST_BITS)
-    try:
-        path = trace(scene, [push for push in scenario.thrusts if push.force.any()], scenario.duration, k)
-    except NoTruth:  # what touches may overlap when it is moved
-        return np.inf
-    ours = record.sampled(scenario.scene, scenario.thrusts, scenario.times)
-    theirs = record_of(near, path, 0.0, k.bits, "").sampled(scene, scenario.thrusts, scenario.times)
-    both = min(len(ours), len(theirs))
-    astray = np.abs(ours.position[:both] - theirs.position[:both]).max(axis=(1, 2)) > ASTRAY
-    if not astray.any():
-        return np.inf if both == len(ours) else float(theirs.t[-1])
-    return float(ours.t[max(int(astray.argmax()) - 1, 0)])
 
 
 def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:
@@ -139,10 +101,11 @@ def certified(scenario: Scenario, pushes: Sequence[Thrust]) -> TruthRecord | Non
 
     How far the first bits reach tells how many are needed for all: a motion loses them at a steady rate.
     """
-    bits, before, until = FEWEST_BITS, 0.0, scenario.duration
+    bits, before, until, work = FEWEST_BITS, 0.0, scenario.duration, WORK
     while bits <= MOST_BITS:
+        work //= 2
         try:
-            path = trace(scenario.scene, pushes, until, balls(bits))
+            path = trace(scenario.scene, pushes, until, balls(bits), steps(work, bits))
             error, reached = spread(path, until), until
             if error < ACCURACY:
                 return record_of(scenario, path, error, bits, "certified")
@@ -154,6 +117,11 @@ def certified(scenario: Scenario, pushes: Sequence[Thrust]) -> TruthRecord | Non
         needed = LEFT + ceil(SPARE * bits * until / max(reached, until * bits / MOST_BITS))
         before, bits = reached, max(bits + bits // 2, needed)
     return None
+
+
+def steps(work: int, bits: int) -> int:
+    """How many steps of the event loop in numbers of so many bits are the given work."""
+    return int(work / (1 + bits / HEAVY))
 
 
 def spread(path: Path, until: float) -> float:
@@ -172,9 +140,10 @@ def spread(path: Path, until: float) -> float:
 
 def two_precisions(scenario: Scenario, pushes: Sequence[Thrust], kind: Callable[[int], Numbers]) -> TruthRecord:
     """The record in numbers of one kind, up to where twice as many bits say the same."""
-    scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
+    scene, until, bits, work = scenario.scene, scenario.duration, FEWEST_BITS, WORK // 2
     while True:
-        coarse, fine = (trace(scene, pushes, until, kind(each)) for each in (bits, 2 * bits))
+        work //= 2
+        coarse, fine = (trace(scene, pushes, until, kind(each), steps(work, each)) for each in (bits, 2 * bits))
         parted, error = difference(coarse, fine, until, kind(2 * bits))
         end = min(coarse.end, fine.end, until)
         if parted >= end or 2 * bits >= MOST_BITS:
@@ -195,10 +164,11 @@ def _out_of_scale(scenario: Scenario) -> str:
     sizes = {
         "radius": scene.radius, "position": scene.position, "wall": scene.walls, "velocity": scene.velocity,
         "gravity": scene.gravity, "duration": np.array([scenario.duration]),
+        "acceleration by a thrust": np.array([p.force / scene.mass[p.disk] for p in scenario.thrusts]),
     }  # fmt: skip
     for name, values in sizes.items():
         if values.size and (most := float(np.abs(values).max())) > LARGEST:
-            return f"a {name} of {most:g} (SI) is above {LARGEST:g}: too large to follow to {ACCURACY:g} m"
+            return f"the largest {name} is {most:g} (SI), above {LARGEST:g}: too large to follow to {ACCURACY:g} m"
     return ""
 
 

@@ -30,7 +30,8 @@ class Hop(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2; with a hop, the part of it along the wall."""
+    """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2; with a hop, the part of it along the wall; and on what the
+    disk rests meanwhile."""
 
     t: Number
     x: Number
@@ -40,6 +41,7 @@ class Leg(NamedTuple):
     ax: Number
     ay: Number
     hop: Hop | None = None
+    held: tuple[Contact, ...] = ()
 
     @property
     def numbers(self) -> list[Number]:
@@ -172,7 +174,7 @@ class Bodies:
 
     def begin(self, i: int, leg: Leg) -> None:
         """Put body i on a new leg."""
-        self.legs[i] = leg
+        self.legs[i] = leg = leg._replace(held=self.held[i])
         row = [float(x) for x in (*leg[1:7], leg.t)]
         self.table[i], self.shape[i] = row, shape_of(row)
         self.count[i] += 1

@@ -13,23 +13,22 @@ import numpy as np
 
 from scenarios.model import Scene, Thrust
 from scenarios.numbers import Number, Numbers, Undecided
-from scenarios.oracle_ahead import Ahead
+from scenarios.oracle_ahead import Ahead, key
 from scenarios.oracle_bodies import Bodies
 from scenarios.oracle_contacts import Pressed
 from scenarios.oracle_path import Ends, Event, Path, Recent, Record, ambiguous
 from scenarios.oracle_resting import lie_down, next_in_line, press, settle
 from scenarios.oracle_ties import Blow, Contact, Outcome, Touch
 
-MOST_HITS = 20_000
 MOST_IDLE = 100  # contacts on end without a hit: their signs contradict each other
-MOST_STEPS = 60_000  # hits, edges crossed, records made anew
+MOST_STEPS = 60_000  # hits, edges crossed, records made anew, orders of simultaneous hits tried
 
 
 class Motion:
-    """A scene on its way to `until` s, in the numbers `k`; all arithmetic must be done within `k.precise()`."""
+    """A scene on its way to `until` s, in the numbers `k` and `left` steps; arithmetic only within `k.precise()`."""
 
-    def __init__(self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers) -> None:
-        self.k, self.until, self.scene = k, until, scene
+    def __init__(self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, left: int) -> None:
+        self.k, self.until, self.scene, self.left = k, until, scene, left
         self.bodies = Bodies(scene, k)
         self.ahead = Ahead(self.bodies)
         self.records: list[Record | None] = [None] * scene.n
@@ -46,12 +45,10 @@ class Motion:
         """Everything up to `until`, or up to where the motion has no answer."""
         try:
             self.begin()
-            for _ in range(MOST_STEPS):
-                if not self.advance():
-                    return self.path
-                if len(self.path.events) >= MOST_HITS:
-                    raise Ends(float(self.now), f"more than {MOST_HITS} hits")
-            raise Ends(float(self.now), f"more than {MOST_STEPS} events")
+            while self.advance():
+                self.left -= 1
+                if self.left < 0:
+                    raise Ends(float(self.now), f"the work allowed for an answer in {self.k.bits} bits is used up")
         except Ends as end:
             self.path.end, self.path.reason = end.t, str(end)
             self.path.disks, self.path.outcomes = end.disks, end.outcomes
@@ -192,13 +189,16 @@ class Motion:
             outcome = Outcome(after, [blow], frozenset(contacts if bodies.matter.sticks else ()))
         else:
             resting = frozenset(c for held in bodies.held for c in held)
-            ends = bodies.matter.outcomes(touches, v, resting, bodies.upright)
+            ends, tried = bodies.matter.outcomes(touches, v, resting, bodies.upright)
+            self.left -= tried
             if len(ends) != 1 or not ends[0].velocities:
                 names = ", ".join(str(i) for i in disks if i < self.scene.n)
                 raise Ends(now, ambiguous(names, ends), disks, [end for end in ends if end.velocities])
             outcome = ends[0]
+        arriving = {key(contact) for contact in contacts}
         for blow in outcome.blows:
-            self.log(blow)
+            self.log(blow, key(blow.contact) in arriving)
+            arriving.discard(key(blow.contact))
         self.idle = 0 if outcome.blows else self.idle + 1
         if self.idle > MOST_IDLE:
             raise Ends(now, f"the digits of {self.k.bits} bits are used up")
@@ -228,10 +228,10 @@ class Motion:
         if stop is not None and bounce is not None:
             self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
 
-    def log(self, blow: Blow) -> None:
+    def log(self, blow: Blow, new: bool) -> None:
         """Write a hit down; refuse where those of a disk pile up."""
         contact, j = blow.contact, self.bodies.partner(blow.contact)
-        self.path.events.append(Event(self.now, contact.i, j, blow.impulse, float(blow.cosine)))
+        self.path.events.append(Event(self.now, contact.i, j, blow.impulse, float(blow.cosine), new))
         self.recent.add(contact.i, float(self.now), self.bodies.name(contact))
         if j >= 0:
             self.recent.add(j, float(self.now), f"disk {contact.i}")
@@ -293,7 +293,7 @@ class Motion:
                 self.predict(i)
 
 
-def trace(scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers) -> Path:
-    """The motion of `scene` under `thrusts` up to `until` s, in the numbers `k`. Raises what `Bodies` raises."""
+def trace(scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, most: int = MOST_STEPS) -> Path:
+    """The motion of `scene` under `thrusts` up to `until` s, in `most` steps at most. Raises what `Bodies` raises."""
     with k.precise():
-        return Motion(scene, thrusts, until, k).run()
+        return Motion(scene, thrusts, until, k, most).run()

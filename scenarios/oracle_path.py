@@ -27,13 +27,15 @@ class Ends(Exception):
 
 
 class Event(NamedTuple):
-    """A hit: t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle."""
+    """A hit: t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle; new: they come together now,
+    and did not touch before."""
 
     t: Number
     i: int
     j: int
     impulse: Number
     cosine: float
+    new: bool = False
 
 
 class Record(NamedTuple):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenarios.closed_forms import Hit, answer, world_pushes
+from scenarios.horizon import horizon
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.oracle_path import Event, Path
 
@@ -31,7 +32,7 @@ class TruthRecord:
         bits: of the numbers it was computed with.
         method: "closed form", "two-precision" (the same with half as many bits) or "certified" (interval arithmetic).
         reason: why it ends where it does.
-        followed_until: s; until then a player with nothing but the rounding of float64 stays within 1e-9 m of it.
+        followed_until: s; until then a float64 engine can be held to it, see `horizon.py`.
         outcomes: (o, 4) outcome, disk, vx, vy m/s: where the order of simultaneous hits matters, all ends it may have.
         orders: (p, 3) outcome, disk, other: the hits, in one order, that lead to each.
         remains: what can still be said after the end, a sentence each.
@@ -102,7 +103,7 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
     rows += [hit for leg, stop in bouncing(legs, end) for hit in bounces(scenario.scene, leg, stop)]
     # Legs and samples are float64: a few roundings of the largest coordinate and of the longest way since a hit.
     speeds = np.abs(legs[:, 4:6]).max() + legs[:, 10].max()
-    reach = np.abs(legs[:, 2:4]).max() + scenario.duration * speeds
+    reach = np.abs(legs[:, 2:4]).max() + min(end, scenario.duration) * speeds
     outcomes = [
         [k, i, *map(float, v)] for k, one in enumerate(path.outcomes) for i, v in one.velocities.items()
         if i < scenario.scene.n
@@ -117,6 +118,7 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         bits=bits,
         method=method,
         reason=path.reason,
+        followed_until=horizon(scenario, path),
         outcomes=frozen(np.array(outcomes).reshape(-1, 4)),
         orders=frozen(np.array(orders).reshape(-1, 3)),
         remains=tuple(remains(scenario.scene, legs, path.disks, end)) if path.disks else (),

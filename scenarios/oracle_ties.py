@@ -105,17 +105,19 @@ class Matter:
         v: Velocities,
         still: frozenset[Contact] = frozenset(),
         upright: Callable[[Contact, Contact], bool] = lambda _one, _other: False,
-    ) -> list[Outcome]:
+    ) -> tuple[list[Outcome], int]:
         """Every different end that resolving the approaching contacts in some order can have, with one such order.
+
+        And how many hits were tried for that.
 
         still: contacts with no speed across, exactly. upright: whether a hit on one contact leaves the other so.
         The last element has no velocities where some order does not end.
         """
         sign, ends = self.numbers.sign, list[Outcome]()
         waiting = [Outcome(v, [], still)]
-        for _ in range(MOST_ORDERS):
+        for tried in range(MOST_ORDERS):
             if not waiting:
-                return ends
+                return ends, tried
             now, blows, still = waiting.pop()
             if len(blows) > LONGEST:
                 break
@@ -130,7 +132,7 @@ class Matter:
                 waiting.append(Outcome(after, [*blows, blow], frozenset(kept)))
             if not closing and not any(self._same(now, end.velocities) for end in ends):
                 ends.append(Outcome(now, blows, still))
-        return [*ends, Outcome({}, [], frozenset())]
+        return [*ends, Outcome({}, [], frozenset())], MOST_ORDERS
 
     def _same(self, one: Mapping[int, Velocity], other: Mapping[int, Velocity]) -> bool:
         return all(self.numbers.sign(a - b) == 0 for i in one for a, b in zip(one[i], other[i]))

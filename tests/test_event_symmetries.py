@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from event_truth import float64_truth
 from gases import gas, hits_of, state_after
 
 from scenarios.catalogue import scenario
-from scenarios.event_truth import float64_truth
 from scenarios.events import EventEngine
 
 

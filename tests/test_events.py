@@ -6,11 +6,11 @@ import re
 
 import numpy as np
 import pytest
+from event_truth import float64_truth
 from gases import gas, hits_of, state_after
 
 from scenarios import events
 from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.event_truth import float64_truth
 from scenarios.events import EventEngine
 from scenarios.model import Scenario, Scene, Thrust
 from scenarios.no_truth import NoTruth

@@ -29,8 +29,8 @@ def asked(scene: Scene, duration: float = 2.0, **fields) -> Scenario:
 
 
 def states(scene: Scenario, record: TruthRecord):
-    """The trajectory of a record at the scenario's samples."""
-    return record.sampled(scene.scene, scene.thrusts, scene.times)
+    """The trajectory of a record at the scenario's samples, beyond the horizon of float64, too."""
+    return replace(record, followed_until=np.inf).sampled(scene.scene, scene.thrusts, scene.times)
 
 
 def drawn(seed: int, n: int = 5, restitution: float = 1.0, gravity: float = 0.0, **fields) -> Scene:

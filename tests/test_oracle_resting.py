@@ -14,10 +14,9 @@ from test_scenarios import smallest_gap
 
 from scenarios import oracle_resting
 from scenarios.catalogue import scenario
-from scenarios.event_truth import float64_truth, perturbed
 from scenarios.model import Scene, Thrust
 from scenarios.numbers import has_balls, mpfr
-from scenarios.oracle import ACCURACY, computed, followed_until, parting
+from scenarios.oracle import ACCURACY, computed
 from scenarios.oracle_record import TruthRecord
 from scenarios.placing import lay_out
 
@@ -225,21 +224,6 @@ def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
     aside = replace(balanced, position=[[0, 0], [0.03125, 0.75], [0, 3]])
     # Beside the top it bounces down the round: rule Z1 is for lines.
     assert "the hits of disk 1 on disk 0 accumulate" in computed(asked(aside, 0.1)).reason
-
-
-def test_players_are_held_to_a_settling_scene_only_while_float64_can_follow():
-    """The oracle's own estimate, where float64 events have one, too: within a few samples of theirs."""
-    one = lasting(boxed(1, 0.9, 10.0), 2.0)
-    record = computed(one, mpfr)
-    theirs, reason = float64_truth(one).horizon
-    ours = parting(one, record, perturbed(one.scene, 0))
-
-    assert reason.startswith("float64")
-    assert 1.0 < ours < 1.4
-    assert ours == pytest.approx(theirs, abs=0.2)
-    # What rests from the start is no business of float64 events; a ball that bounces to rest is followed to the end.
-    ball = scenario("bouncing_ball_e09")
-    assert followed_until(ball, computed(ball)) == np.inf
 
 
 def test_a_push_lifts_a_resting_disk_and_lets_it_fall():

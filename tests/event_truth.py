@@ -1,4 +1,4 @@
-"""The float64 event engine as a truth: its answer up to where its own rounding would begin to show."""
+"""The float64 event engine beside the oracle: its answer up to where its own rounding would begin to show."""
 
 from __future__ import annotations
 
