@@ -25,6 +25,7 @@ from reports.known_answers import MEANING
 from reports.lessons.catalogue import LESSONS
 from reports.metrics import METRICS
 from reports.replay import frames, name_of, pack, played, ratio_of
+from reports.trust import how_far_to_trust
 from scenarios.catalogue import SCENARIOS
 
 HERE = Path(__file__).parent
@@ -94,7 +95,7 @@ def write_page(
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
         heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, lessons=LESSONS, truth_of=truth_of,
-        common=by_name(common),
+        common=by_name(common), trust=how_far_to_trust(comparisons),
     )  # fmt: skip
     path.write_text(html, encoding="utf-8")
 
