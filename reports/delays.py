@@ -166,8 +166,8 @@ def windows(played: Trajectory, jumps: Jumps, dt: float) -> tuple[np.ndarray, ..
     """(k,) indices of collisions: the first within `WINDOW` dt of a sample, the first not before it, the first after
     it, the first beyond."""
     t, window = played.t, WINDOW * dt
-    shifts = (-window, "left"), (-SAME * window, "left"), (SAME * window, "right"), (window, "right")
-    return tuple(np.searchsorted(jumps.t, t + shift, side=side) for shift, side in shifts)
+    not_before, after = (np.searchsorted(jumps.t, t + shift * SAME * window) for shift in (-1, 1))
+    return np.searchsorted(jumps.t, t - window), not_before, after, np.searchsorted(jumps.t, t + window)
 
 
 @laws.once

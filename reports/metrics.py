@@ -46,7 +46,7 @@ def angular_momentum_error(view: View) -> Value | None:
 
 @over_judged
 def energy_error(view: View) -> Value | None:
-    """Largest |E(t) - E_expected(t)| over the energy at hand; E(0) at e = 1, else the truth's within the delay."""
+    """Largest |E(t) - E(0)| at e = 1, else distance from the truth's range within three steps; over that at hand."""
     return _largest(violations.energy(view), view)
 
 
@@ -57,19 +57,25 @@ def energy_created(view: View) -> Value | None:
 
 @over_judged
 def energy_apart(view: View) -> Value | None:
-    """Root mean square difference of the energy, a collision within three steps late or early, over that at hand."""
+    """Root mean square distance of the energy from the truth's range within three steps, over the energy at hand.
+
+    Beside an engine: difference of the energies of all disks that are away from their collisions in both (view.py).
+    """
     return Value(_rms(view.energy_apart[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0))
 
 
 @over_judged
 def momentum_apart(view: View) -> Value | None:
-    """Root mean square distance of the momenta, a collision within three steps late or early, over the sum of m|v|."""
+    """Root mean square distance of the momentum from the truth's range within three steps, over the sum of m|v|.
+
+    Beside an engine: distance of the momenta of all disks that are away from their collisions in both (view.py).
+    """
     return Value(_rms(view.momentum_apart[view.judged.any(axis=1)]) / (scales.momentum(view.scenario) or 1.0))
 
 
 @over_judged
 def energy_loss_error(view: View) -> Value | None:
-    """Energy lost up to the last judged sample, less what the truth loses within the delay, over the energy at hand."""
+    """Energy lost by the last judged sample, less what the truth loses by three steps around it; over that at hand."""
     scenario = view.scenario
     if violations.keeps_energy(scenario) or scenario.thrusts or violations.lifts(scenario):
         return None
@@ -137,13 +143,16 @@ def position_max_radii(view: View) -> Value | None:
 
 @over_judged
 def velocity_rms(view: View) -> Value | None:
-    """Root mean square difference of velocity, a collision within three steps late or early, over disks and samples."""
+    """Root mean square over disks and samples of what `velocity_max` is the largest of."""
     return Value(_rms(view.velocity_apart[view.judged]))
 
 
 @over_judged
 def velocity_max(view: View) -> Value | None:
-    """Largest difference of velocity of any disk from that on the nearest of its true flights within three steps."""
+    """Largest difference of a disk's velocity from the nearest that it has in the truth within three steps.
+
+    Beside an engine: from the other's, where the disk has no collision within three steps in either (view.py).
+    """
     return _largest_of_disks(np.where(view.judged, view.velocity_apart, 0.0), view)
 
 
