@@ -12,7 +12,8 @@ import plotly.graph_objects as go
 from adapters.play import Run
 from reports import laws, scales, style, violations
 from reports.comparison import Comparison, cut
-from reports.view import TOUCHY, View
+from reports.delays import jumps_of
+from reports.view import View
 from scenarios.model import Array, Trajectory
 
 ZERO = 1e-17
@@ -48,12 +49,13 @@ class Chart:
 
 def views(comparison: Comparison, other: Trajectory | None) -> list[tuple[Run, View]]:
     """What the middle dt's runs played, each beside `other` and cut to the samples both have."""
-    played = []
+    played, scenario = [], comparison.scenario
+    jumps = jumps_of(other, scenario) if other is not None and other is comparison.truth else None
     for run in comparison.middle_runs:
         if run.trajectory is not None and len(run.trajectory) > 1:
             k = min(len(run.trajectory), len(other) if other is not None else len(run.trajectory))
             mine = cut(run.trajectory, k)
-            played.append((run, View(comparison.scenario, run.dt, mine, cut(other, k) if other else None)))
+            played.append((run, View(scenario, run.dt, mine, cut(other, k) if other else None, jumps)))
     return played
 
 
@@ -76,15 +78,15 @@ def momentum(comparison: Comparison) -> Drawing:
         return Drawing("Momentum", why, None)
     scale, lines = scales.momentum(comparison.scenario) or 1.0, []
     for run, view in views(comparison, comparison.truth):
-        lines.append(Line(run, view.played.t, np.where(view.calm, view.momentum_apart / scale, np.nan)))
+        lines.append(Line(run, view.played.t, view.momentum_apart / scale))
     caption = (
         "Walls and static disks take up momentum, so no law is broken here: how far the momentum is from the truth's, "
-        f"over the Σ m|v| at hand{HITS}. A late hit is a spike."
+        f"over the Σ m|v| at hand{DELAY}."
     )
     return Drawing("Momentum apart from the truth's", caption, over_time(comparison, lines, "apart / Σ m|v| at hand"))
 
 
-HITS = f" (within {TOUCHY} dt of a true hit left out: a late hit is measured as such)"
+DELAY = ", where a collision up to three steps late or early costs nothing: that is measured by itself"
 
 
 def energy(comparison: Comparison) -> Drawing:
@@ -93,8 +95,10 @@ def energy(comparison: Comparison) -> Drawing:
     if not conserved and comparison.truth is None:
         return energy_course(comparison)
     lines = over(views(comparison, None if conserved else comparison.truth), violations.energy)
-    against = "what it was at the start, as no hit takes any (e = 1)," if conserved else "the truth's" + HITS
-    caption = f"Distance of the energy from {against} over the energy at hand. Lower is better."
+    against = "what it was at the start, as no hit takes any (e = 1)," if conserved else "the truth's,"
+    caption = (
+        f"Distance of the energy from {against} over the energy at hand{'' if conserved else DELAY}. Lower is better."
+    )
     return Drawing("Energy error", caption, over_time(comparison, lines, "error / energy at hand"))
 
 

@@ -161,45 +161,77 @@ def closest_in_order(few, many):  # type: ignore[no-untyped-def]
     return chosen
 
 
-def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float) -> tuple[Array, Array]:
-    """Restitution of each hit that can be read off the samples, and its time: ((m,), (m,) s).
+class Restitutions(NamedTuple):
+    """What was read off samples: e and time of each collision, (m,) and (m,) s, and how many were below the floor."""
 
-    A hit can be read if neither disk has another one in the same sample interval or the next, and none of them
+    values: Array
+    times: Array
+    below: int
+
+
+CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold hit far more
+FLOOR = 100  # times the rounding of the velocities that a change must have: e is then read to a hundredth or so
+
+
+def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, rounding: float) -> Restitutions:
+    """Restitution of each collision that can be read off the samples.
+
+    One can be read if neither disk has another in the same sample interval or the next, and none of them
     changes its spin (friction): then the change of velocity points along the normal n, and e = -(dv'.n) / (dv.n).
     Two disks must also change their momenta by as much, and a disk at a wall along the wall's normal: else
-    something was hit of which the player did not tell. Hits closing slower than `slowest` m/s are left out.
+    something was hit of which the player did not tell. Those closing slower than `slowest` m/s are left out.
+
+    Those that change the velocities by no more than `FLOOR` times their rounding, which is relative, are below the
+    floor: their normal, and with it e, would be noise. What gravity adds before and after is taken out with the
+    velocities, and rounded as they are. Engines tell such collisions of a contact that lasts: Box2D 3.1 of a disk
+    that slides along a wall whenever it comes nearer at any speed at all.
     """
-    t, collisions = trajectory.t, trajectory.collisions
+    t, spin, collisions = trajectory.t, trajectory.angular_velocity, trajectory.collisions
     interval = np.searchsorted(t, collisions.t, side="left") - 1
     busy: dict[tuple[int, int], int] = {}
     for k, i, j in zip(interval, collisions.i, collisions.j):
         for disk in (i, j):
             busy[k, disk] = busy.get((k, disk), 0) + 1
-    values, times = [], []
+    values, times, below = [], [], 0
     for k, i, j, when in zip(interval, collisions.i, collisions.j, collisions.t):
         disks = (i, j) if j >= 0 else (i,)
         alone = all(busy[k, disk] == 1 and (k + 1, disk) not in busy for disk in disks)
-        if alone and 0 <= k < len(t) - 1:
-            closing, parting = speeds_along_normal(trajectory, scene, k, int(i), int(j), when)
+        if alone and 0 <= k < len(t) - 1 and not scene.static[i]:
+            earlier, later = around(trajectory, scene, k, when)
+            if is_rounding(earlier, later, disks, rounding):
+                below += 1
+                continue
+            turned = np.abs(spin[k + 1] - spin[k])[list(disks)].max() * scene.radius[i]
+            closing, parting = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
             if closing > max(slowest, 0.0):
                 values.append(parting / closing)
                 times.append(when)
-    return np.array(values), np.array(times)
+    return Restitutions(np.array(values), np.array(times), below)
 
 
-CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold hit far more
+def around(trajectory: Trajectory, scene: Scene, k: int, when: float) -> tuple[Array, Array]:
+    """(n, 2) m/s just before and just after `when` s, from the samples k and k + 1 around it and gravity."""
+    t, velocity = trajectory.t, trajectory.velocity
+    falling = np.where(scene.static[:, None], 0.0, scene.gravity)
+    return velocity[k] + falling * (when - t[k]), velocity[k + 1] - falling * (t[k + 1] - when)
+
+
+def is_rounding(earlier: Array, later: Array, disks: tuple[int, ...], rounding: float) -> bool:
+    """Whether the change of the first disk, which tells the normal, or that of both is below the floor."""
+    change = later[list(disks)] - earlier[list(disks)]
+    speed = np.linalg.norm(earlier[list(disks)], axis=1) + np.linalg.norm(later[list(disks)], axis=1)
+    between = change[0] - change[1] if len(disks) > 1 else change[0]
+    floor = FLOOR * rounding
+    return bool(np.linalg.norm(change[0]) <= floor * speed[0] or np.linalg.norm(between) <= floor * speed.sum())
 
 
 def speeds_along_normal(
-    trajectory: Trajectory, scene: Scene, k: int, i: int, j: int, when: float
+    earlier: Array, later: Array, scene: Scene, i: int, j: int, turned: float
 ) -> tuple[float, float]:
-    """m/s at which disk i and disk or wall j close before and part after a hit between samples k and k + 1.
+    """m/s at which disk i and disk or wall j close before and part after a collision; `turned` m/s by its friction.
 
-    (nan, nan) if the change is not that of one frictionless hit.
+    (nan, nan) if the change is not that of one frictionless collision.
     """
-    t, velocity, spin = trajectory.t, trajectory.velocity, trajectory.angular_velocity
-    falling = np.where(scene.static[:, None], 0.0, scene.gravity)
-    earlier, later = velocity[k] + falling * (when - t[k]), velocity[k + 1] - falling * (t[k + 1] - when)
     change = later - earlier
     normal = change[i] / (np.linalg.norm(change[i]) or 1.0)
     if j >= 0 and not scene.static[j]:
@@ -209,7 +241,6 @@ def speeds_along_normal(
         untold = abs(change[i] @ (end - start)) / np.linalg.norm(end - start)
     else:
         untold = 0.0
-    turned = np.abs(spin[k + 1] - spin[k])[[i, j] if j >= 0 else [i]].max() * scene.radius[i]
     if max(untold, turned) > CLEAN * np.linalg.norm(change[i]):
         return np.nan, np.nan
     before, after = (earlier[i] - earlier[j], later[i] - later[j]) if j >= 0 else (earlier[i], later[i])

@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
+from adapters.engines import ENGINES, FLOAT64
 from adapters.play import Run
+from reports.delays import Jumps, jumps_of
 from reports.metrics import METRICS
-from reports.view import Value, View
+from reports.view import Value, View, not_judged
 from scenarios.model import Collisions, Scenario, Trajectory
 from scenarios.no_truth import NoTruth
 
@@ -49,13 +51,14 @@ class Comparison:
 def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     """Every metric of every run against the laws, the truth and every other engine at the same dt."""
     scenario, truth = answered(scenario)
+    jumps = None if truth is None else jumps_of(truth, scenario)
     rows: list[tuple] = []
     for run in runs:
         if run.status != "ok":  # what it played before it failed is kept in its file, but earns no score
             rows.append(_row(run, "status", Value(np.nan, note=f"{run.status}: {run.reason}"), "", "itself"))
             continue
         for versus, other in _opponents(run, runs, truth):
-            rows += _measure(scenario, run, versus, other)
+            rows += _measure(scenario, run, versus, other, jumps if versus == "truth" else None)
     return Comparison(scenario, truth, tuple(runs), pd.DataFrame(rows, columns=list(COLUMNS)))
 
 
@@ -79,16 +82,17 @@ def _opponents(run: Run, runs: Sequence[Run], truth: Trajectory | None) -> Itera
             yield other.name, other.trajectory
 
 
-def _measure(scenario: Scenario, run: Run, versus: str, other: Trajectory | None) -> list[tuple]:
+def _measure(scenario: Scenario, run: Run, versus: str, other: Trajectory | None, jumps: Jumps | None) -> list[tuple]:
     assert run.trajectory is not None
     kind = versus if versus in ("itself", "truth") else "engine"
     k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
-    view = View(scenario, run.dt, cut(run.trajectory, k), None if other is None else cut(other, k))
+    rounding = ENGINES[run.name].rounding if run.name in ENGINES else FLOAT64  # a solver's file keeps float64
+    view = View(scenario, run.dt, cut(run.trajectory, k), None if other is None else cut(other, k), jumps, rounding)
     rows = []
     with np.errstate(over="ignore", invalid="ignore"):  # what was thrown far enough overflows; the value says so
         for name, metric in METRICS.items():
             if kind in metric.against and (value := metric.of(view)) is not None:
-                rows.append(_row(run, name, value, metric.unit, versus))
+                rows.append(_row(run, name, value if k > 1 else not_judged("the start alone"), metric.unit, versus))
     return rows
 
 

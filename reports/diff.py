@@ -15,6 +15,7 @@ import pandas as pd
 from reports.archive import Archive
 from reports.comparison import COLUMNS
 from reports.metrics import METRICS
+from reports.view import NOT_JUDGED
 
 # Measured on two cores under a load of 15 to 20 (no idler machine could be had), 3 scenes and --timings 5. 8 runs of
 # one build set against each other, 280 verdicts from 4200 ratios of rounds: "worse" 4 times, as often with a factor of
@@ -152,7 +153,7 @@ def changed_numbers(before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]
     """Every number that both tables have and that is not the same, and how many are, by engine.
 
     The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric says what is better;
-    how far two engines are apart is neither.
+    how far two engines are apart is neither, and so is a number that is judged in one of the two only.
     """
     both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
     both["name"] = both.engine + ":" + both.profile
@@ -164,8 +165,16 @@ def changed_numbers(before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]
         verdict = "worse" if must else verdict_of(row["metric"], row["versus"], was, now)
         what = f"{row['scenario']}  dt {float(row['dt_s']):.4g} s  {row['metric']} against {row['versus']}"
         note = " (same cell, other bits)" if must else ""
-        changes.append(Change(row["name"], what + note, row["value"], row["value_after"], verdict, ratio(was, now)))
+        was_said, now_said = said_of(row["value"], row["note"]), said_of(row["value_after"], row["note_after"])
+        if NOT_JUDGED in (was_said, now_said):
+            verdict, note = "other", ""
+        changes.append(Change(row["name"], what + note, was_said, now_said, verdict, ratio(was, now)))
     return changes, Counter(both[~differs].name)
+
+
+def said_of(value: str, note: str) -> str:
+    """A number as the table has it, or that too little carries it."""
+    return NOT_JUDGED if note.startswith(NOT_JUDGED) else value
 
 
 def players_of(row: Mapping[Hashable, Any]) -> list[str]:

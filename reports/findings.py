@@ -28,10 +28,11 @@ def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
 
     `inf` for who was asked and has no result, so that to refuse a hard scene does not help.
     """
-    scored = [comparison for comparison in comparisons if comparison.truth is not None]
+    # A truth that is lost before its second sample has only the start, which is given to all.
+    scored = [comparison for comparison in comparisons if comparison.truth is not None and len(comparison.truth) > 1]
     rows = []
     for comparison in scored:
-        found = {name: value for (name, metric), (value, _) in values(comparison).items() if metric == MAPPED}
+        found = {name: one.value for (name, metric), one in values(comparison).items() if metric == MAPPED}
         rows.append({run.name: found.get(run.name, np.inf) for run in comparison.middle_runs})
     return pd.DataFrame(rows, index=[comparison.scenario.name for comparison in scored])
 

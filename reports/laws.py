@@ -18,16 +18,16 @@ Law = TypeVar("Law", bound=Callable[..., Any])
 
 
 def once(law: Law) -> Law:
-    """The law, worked out once for the same objects and forgotten with the first of them.
+    """The law, worked out once for the same objects (or equal floats) and forgotten with the first of them.
 
     A run is set against each other player at its dt: without this its energy would be added up some forty times.
     """
-    known: WeakKeyDictionary[Any, dict[tuple[int, ...], tuple[Any, Any]]] = WeakKeyDictionary()
+    known: WeakKeyDictionary[Any, dict[tuple[float, ...], tuple[Any, Any]]] = WeakKeyDictionary()
 
     @wraps(law)
     def remembered(what: Any, *others: Any) -> Any:
         found = known.setdefault(what, {})
-        key = tuple(map(id, others))
+        key = tuple(other if isinstance(other, float) else id(other) for other in others)
         if key not in found:
             value = law(what, *others)
             if isinstance(value, np.ndarray):
@@ -54,6 +54,19 @@ def moving_inertia(scene: Scene) -> Array:
 def momentum(trajectory: Trajectory, scene: Scene) -> Array:
     """(k, 2) kg m/s: sum of m v."""
     return np.einsum("i,kia->ka", moving_mass(scene), trajectory.velocity)
+
+
+@once
+def momenta(trajectory: Trajectory, scene: Scene) -> Array:
+    """(k, n, 2) kg m/s: m v of each disk."""
+    return moving_mass(scene)[:, None] * trajectory.velocity
+
+
+@once
+def energies(trajectory: Trajectory, scene: Scene) -> Array:
+    """(k, n) J: what each disk adds to `energy`."""
+    linear = (trajectory.velocity**2).sum(axis=2) / 2 - trajectory.position @ scene.gravity
+    return linear * moving_mass(scene) + trajectory.angular_velocity**2 * moving_inertia(scene) / 2
 
 
 def angular_momentum(trajectory: Trajectory, scene: Scene) -> Array:
@@ -94,8 +107,13 @@ def penetration(trajectory: Trajectory, scene: Scene) -> Array:
 
 def distance_to_segment(x: Array, start: Array, end: Array) -> Array:
     """(k,) m from points x (k, 2) to the segment."""
+    return np.linalg.norm(x - nearest_on_segment(x, start, end), axis=1)
+
+
+def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
+    """(k, 2) m, the points of the segment nearest to x (k, 2)."""
     along = np.clip((x - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
-    return np.linalg.norm(x - (start + along[:, None] * (end - start)), axis=1)
+    return start + along[:, None] * (end - start)
 
 
 def through_walls(trajectory: Trajectory, scene: Scene) -> np.ndarray:

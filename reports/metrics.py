@@ -7,13 +7,31 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 
 import numpy as np
 
 from reports import laws, scales, violations
 from reports.collisions import pair_keys
-from reports.view import Value, View
+from reports.view import LEAST_SHARE, Value, View, not_judged
 from scenarios.model import Array
+
+Measure = Callable[[View], Value | None]
+
+
+def over_judged(measure: Measure) -> Measure:
+    """The metric, that says how many samples carry it, and nothing where they are too few (view.py: LEAST_SHARE)."""
+
+    @wraps(measure)
+    def carried(view: View) -> Value | None:
+        found = measure(view)
+        if found is None or view.other is None:
+            return found
+        if view.share < LEAST_SHARE:
+            return not_judged(f"only {view.carried}")
+        return found._replace(note=", ".join(filter(None, (view.carried, found.note))))
+
+    return carried
 
 
 def momentum_error(view: View) -> Value | None:
@@ -26,8 +44,9 @@ def angular_momentum_error(view: View) -> Value | None:
     return _largest(violations.angular_momentum(view), view)
 
 
+@over_judged
 def energy_error(view: View) -> Value | None:
-    """Largest |E(t) - E_expected(t)| over the energy at hand; E(0) at e = 1, else the truth's in calm samples."""
+    """Largest |E(t) - E(0)| at e = 1, else distance from the truth's range within three steps; over that at hand."""
     return _largest(violations.energy(view), view)
 
 
@@ -36,44 +55,55 @@ def energy_created(view: View) -> Value | None:
     return _largest(violations.energy_rise(view), view)
 
 
+@over_judged
 def energy_apart(view: View) -> Value | None:
-    """Root mean square difference of the energy in calm samples, over the energy at hand."""
-    assert view.other is not None
-    scene = view.scenario.scene
-    apart = laws.energy(view.played, scene) - laws.energy(view.other, scene)
-    return Value(_rms(apart[view.calm]) / (scales.energy(view.scenario) or 1.0))
+    """Root mean square distance of the energy from the truth's range within three steps, over the energy at hand.
+
+    Beside an engine: difference of the energies of all disks that are away from their collisions in both (view.py).
+    """
+    return Value(_rms(view.energy_apart[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0))
 
 
+@over_judged
 def momentum_apart(view: View) -> Value | None:
-    """Root mean square distance of the momenta in calm samples, over the sum of m|v| at hand."""
-    return Value(_rms(view.momentum_apart[view.calm]) / (scales.momentum(view.scenario) or 1.0))
+    """Root mean square distance of the momentum from the truth's range within three steps, over the sum of m|v|.
+
+    Beside an engine: distance of the momenta of all disks that are away from their collisions in both (view.py).
+    """
+    return Value(_rms(view.momentum_apart[view.judged.any(axis=1)]) / (scales.momentum(view.scenario) or 1.0))
 
 
+@over_judged
 def energy_loss_error(view: View) -> Value | None:
-    """Energy lost from the first to the last calm sample, less what the truth loses, over the energy at hand."""
+    """Energy lost by the last judged sample, less what the truth loses by three steps around it; over that at hand."""
     scenario = view.scenario
-    if violations.keeps_energy(scenario) or scenario.thrusts or violations.lifts(scenario) or view.other is None:
+    if violations.keeps_energy(scenario) or scenario.thrusts or violations.lifts(scenario):
         return None
-    last = int(np.flatnonzero(view.calm)[-1])
-    played, true = laws.energy(view.played, scenario.scene), laws.energy(view.other, scenario.scene)
-    excess = (played[0] - played[last]) - (true[0] - true[last])
-    return Value(float(excess) / (scales.energy(scenario, view.other) or 1.0), at=float(view.played.t[last]))
+    if view.other is None or view.jumps is None:
+        return None
+    if not view.judged.any():
+        return Value(np.nan)
+    last, scale = int(np.flatnonzero(view.judged.any(axis=1))[-1]), scales.energy(scenario, view.other) or 1.0
+    low, high = view.energy_range
+    start = laws.energy(view.played, scenario.scene)[0] - laws.energy(view.other, scenario.scene)[0]
+    excess, width = float(start - view.energy_apart[last]) / scale, (high[last] - low[last]) / scale
+    return Value(excess, at=float(view.played.t[last]), note=f"the delay explains {width:.2g}" if width else "")
 
 
 def restitution(view: View) -> Value | None:
-    """Median e = -(dv after).n / (dv before).n over the hits that can be read off the samples."""
-    values, _ = view.restitutions
-    return Value(float(np.median(values)), note=f"{len(values)} hits read") if len(values) else None
+    """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the samples."""
+    values, _, below = view.restitutions
+    return _read(float(np.median(values)), len(values), below) if len(values) else _unread(below)
 
 
 def restitution_error(view: View) -> Value | None:
-    """Largest |e - what the scene states| over the hits that can be read off the samples."""
-    values, times = view.restitutions
+    """Largest |e - what the scene states| over the collisions that can be read off the samples."""
+    values, times, below = view.restitutions
     if not len(values):
-        return None
+        return _unread(below)
     off = np.abs(values - view.scenario.scene.restitution)
     worst = int(np.argmax(off))
-    return Value(float(off[worst]), at=float(times[worst]), note=f"{len(values)} hits read")
+    return _read(float(off[worst]), len(values), below)._replace(at=float(times[worst]))
 
 
 def penetration_radii(view: View) -> Value | None:
@@ -111,14 +141,19 @@ def position_max_radii(view: View) -> Value | None:
     return _largest_of_disks(view.apart / view.scenario.scene.radius, view)
 
 
+@over_judged
 def velocity_rms(view: View) -> Value | None:
-    """Root mean square difference of velocity over disks and calm samples."""
-    return Value(_rms(view.velocity_apart[view.calm]))
+    """Root mean square over disks and samples of what `velocity_max` is the largest of."""
+    return Value(_rms(view.velocity_apart[view.judged]))
 
 
+@over_judged
 def velocity_max(view: View) -> Value | None:
-    """Largest difference of velocity of any disk in calm samples."""
-    return _largest_of_disks(np.where(view.calm[:, None], view.velocity_apart, 0.0), view)
+    """Largest difference of a disk's velocity from the nearest that it has in the truth within three steps.
+
+    Beside an engine: from the other's, where the disk has no collision within three steps in either (view.py).
+    """
+    return _largest_of_disks(np.where(view.judged, view.velocity_apart, 0.0), view)
 
 
 def angle_rms(view: View) -> Value | None:
@@ -181,7 +216,16 @@ def hit_delay_max_dt(view: View) -> Value | None:
 
 
 def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
+
+
+def _read(value: float, read: int, below: int) -> Value:
+    return Value(value, note=f"{read} collisions read" + (f", {below} below the floor" if below else ""))
+
+
+def _unread(below: int) -> Value | None:
+    """None where no collision could be read for other reasons than rounding."""
+    return not_judged(f"no collision read, {below} below the floor") if below else None
 
 
 def _largest(series: Array | None, view: View) -> Value | None:

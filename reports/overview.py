@@ -10,6 +10,7 @@ import numpy as np
 from reports.comparison import Comparison
 from reports.metrics import METRICS
 from reports.style import TRUTH, heat, number
+from reports.view import NOT_JUDGED
 
 OUTCOMES = {
     "unsupported": "refused", "diverged": "diverged", "error": "error", "crashed": "crashed", "timeout": "time-out",
@@ -25,6 +26,22 @@ class Cell(NamedTuple):
     heat: int = -1
     failed: bool = False
     best: bool = False
+
+
+class Measured(NamedTuple):
+    """A number of the tables: value, a remark on it, and whether enough carries it; else the remark says why not."""
+
+    value: float
+    remark: str
+    judged: bool
+
+    @property
+    def text(self) -> str:
+        """As a table shows it."""
+        return number(self.value) if self.judged else NOT_JUDGED
+
+
+Found = dict[tuple[str, str], Measured]  # (`engine:profile`, metric) -> its number
 
 
 class Column(NamedTuple):
@@ -59,18 +76,19 @@ def names_of(comparisons: Iterable[Comparison]) -> list[str]:
     return list(dict.fromkeys(run.name for comparison in comparisons for run in comparison.runs))
 
 
-def values(comparison: Comparison) -> dict[tuple[str, str], tuple[float, str]]:
-    """(`engine:profile`, metric) -> (value, note) at the middle dt, against the truth or else the laws of physics."""
+def values(comparison: Comparison) -> Found:
+    """The numbers of a scenario at the middle dt, against the truth or else the laws of physics."""
     table = comparison.table
     near = table.dt_s == comparison.middle_dt
-    found: dict[tuple[str, str], tuple[float, str]] = {}
+    found: Found = {}
     for versus in ("itself", TRUTH):  # the truth comes last and wins
         rows = table[near & (table.versus == versus) & table.metric.isin(list(METRICS))]
         for row in rows.to_dict("records"):
-            note = f"disk {row['disk']}, " if row["disk"] >= 0 and comparison.scenario.scene.n > 1 else ""
-            note += f"at {row['at_s']:.4g} s" if np.isfinite(row["at_s"]) else ""
-            key = f"{row['engine']}:{row['profile']}", str(row["metric"])
-            found[key] = (float(row["value"]), note.strip(", ") or str(row["note"]))
+            where = f"disk {row['disk']}" if row["disk"] >= 0 and comparison.scenario.scene.n > 1 else ""
+            when = f"at {row['at_s']:.4g} s" if np.isfinite(row["at_s"]) else ""
+            remark = ", ".join(filter(None, (where, when, str(row["note"]))))
+            judged = not str(row["note"]).startswith(NOT_JUDGED)
+            found[f"{row['engine']}:{row['profile']}", str(row["metric"])] = Measured(row["value"], remark, judged)
     return found
 
 
@@ -112,19 +130,21 @@ def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: 
         pooled = {name: pool(metric, name, found) for name in names if name not in untrusted}
         whole = {name: value for name, (value, _) in pooled.items() if not any(name in each for each in failed)}
         best = min((value for value in whole.values() if not np.isnan(value)), default=np.nan)
-        for name, (value, count) in pooled.items():
-            rows[name].append(Cell(number(value), f"in {count} scenarios", best=whole.get(name) == best))
+        for name, (value, remark) in pooled.items():
+            rows[name].append(Cell(number(value), remark, best=whole.get(name) == best))
     return rows
 
 
-def pool(metric: str, name: str, found: Sequence[dict[tuple[str, str], tuple[float, str]]]) -> tuple[float, int]:
-    """The median, for hits the sum, of a metric over the scenarios that have it, and how many these are."""
+def pool(metric: str, name: str, found: Sequence[Found]) -> tuple[float, str]:
+    """The median, for hits the sum, of a metric over the scenarios in which it is judged; in how many it is, or not."""
     kinds = ("collisions_missed", "collisions_invented") if metric == "wrong_hits" else (metric,)
-    known = [[each[name, kind][0] for kind in kinds if (name, kind) in each] for each in found]
-    totals = [sum(each) for each in known if each]
+    known = [[each[name, kind] for kind in kinds if (name, kind) in each] for each in found]
+    totals = [sum(one.value for one in each) for each in known if each and all(one.judged for one in each)]
+    left_out = sum(not one.judged for each in known for one in each[:1])
+    remark = f"in {len(totals)} scenarios" + (f", {NOT_JUDGED} in {left_out}" if left_out else "")
     if not totals:
-        return np.nan, 0
-    return float(np.sum(totals) if metric == "wrong_hits" else np.median(totals)), len(totals)
+        return np.nan, remark
+    return float(np.sum(totals) if metric == "wrong_hits" else np.median(totals)), remark
 
 
 def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[str, list[Cell]]:
@@ -138,8 +158,8 @@ def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[st
             if name in failed:
                 cells.append(Cell(*failed[name], failed=True))
             elif (name, MAPPED) in found:
-                value, note = found[name, MAPPED]
-                cells.append(Cell(number(value, 2), note, heat(value)))
+                value, remark, judged = found[name, MAPPED]
+                cells.append(Cell(number(value, 2), remark, heat(value)) if judged else Cell(NOT_JUDGED, remark))
             elif name in played:
                 cells.append(Cell("no truth", comparison.scenario.without_truth))
             else:
@@ -158,8 +178,7 @@ def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[s
         cells = []
         for name in names:
             if (name, key) in found:
-                value, note = found[name, key]
-                cells.append(Cell(number(value), note))
+                cells.append(Cell(found[name, key].text, found[name, key].remark))
             else:
                 cells.append(Cell(failed[name][0], failed[name][1], failed=True) if name in failed else Cell("–"))
         unit = "" if metric.unit == "1" else metric.unit

@@ -20,7 +20,8 @@ from reports.scenes import played_scenario
 from reports.worker_process import LONGEST, Failure, allow
 from scenarios.model import Scenario
 
-JUDGES = ("comparison", "metrics", "view", "laws", "collisions", "violations", "scales")  # by which runs are compared
+# By which runs are compared.
+JUDGES = ("comparison", "metrics", "view", "delays", "laws", "collisions", "violations", "scales")
 NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which nothing means NaN
 Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order of the tables
 

@@ -1,7 +1,7 @@
 """How far a trajectory breaks the laws it should keep, sample by sample, relative to what is at hand.
 
-Each function returns (k,) numbers, or None where the law says nothing. Samples at which the truth has just
-hit, or is about to, are nan where the truth is what is compared with.
+Each function returns (k,) numbers, or None where the law says nothing. Where the truth is what is compared with, it is
+the truth within the detection delay (delays.py), and samples that are not judged are nan.
 """
 
 from __future__ import annotations
@@ -55,11 +55,10 @@ def energy(view: View) -> Array | None:
     scenario, conserved = view.scenario, keeps_energy(view.scenario)
     if conserved == (view.other is not None) or lifts(scenario):
         return None
-    actual = laws.energy(view.played, scenario.scene)
     if view.other is None:
+        actual = laws.energy(view.played, scenario.scene)
         return np.abs(actual - actual[0]) / (scales.energy(scenario) or 1.0)
-    off = np.abs(actual - laws.energy(view.other, scenario.scene)) / (scales.energy(scenario, view.other) or 1.0)
-    return np.where(view.calm, off, np.nan)
+    return np.abs(view.energy_apart) / (scales.energy(scenario, view.other) or 1.0)
 
 
 def energy_rise(view: View) -> Array | None:

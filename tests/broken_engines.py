@@ -11,7 +11,7 @@ import numpy as np
 from adapters.engine import Engine, Hit, Unsupported
 from adapters.engines import ENGINES, Row
 from adapters.reference import Reference
-from reference_impl import exercise
+from reference_impl import exercise, ordered
 from scenarios.model import State
 
 
@@ -248,6 +248,47 @@ class RaisesInStep(Sound):
     def step(self, count=1):
         super().step(count)
         raise RuntimeError("island solver ran out of memory")
+
+
+class Exact(Reference):
+    """The solver that takes collisions in their order: beside it a wrong energy is not lost among late collisions."""
+
+    def __init__(self) -> None:
+        super().__init__(ordered)
+
+
+class Freezes(Exact):
+    """Stands still after the start."""
+
+    def step(self, count=1):
+        self.disks.velocity[...] = 0.0
+        self.disks.angular_velocity[...] = 0.0
+        self.steps += count
+
+
+class Scales(Exact):
+    """At the tenth and 60th step (a ship rests before) all velocities become `factor` times as large."""
+
+    factor = 1.0
+
+    def step(self, count=1):
+        for _ in range(count):
+            if self.steps in (10, 60):
+                self.disks.velocity[...] *= self.factor
+                self.disks.angular_velocity[...] *= self.factor
+            super().step()
+
+
+class DoublesSpeed(Scales):
+    """Everything is twice as fast."""
+
+    factor = 2.0
+
+
+class GainsEnergy(Scales):
+    """Everything has 10 % more energy."""
+
+    factor = 1.1**0.5
 
 
 class RefusesAll(Sound):

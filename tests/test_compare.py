@@ -4,26 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from answers import beside_truth, truth_of
 from broken_engines import NanAtStep7
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
 from reports.comparison import COLUMNS, compare, cut
+from reports.delays import jumps_of
 from reports.findings import findings
 from reports.metrics import METRICS
 from reports.view import View
 from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Scenario, Scene, Thrust, Trajectory
+from scenarios.model import Scenario, Scene, Thrust
 from scenarios.oracle import with_oracle
 
 WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
-
-
-def truth_of(name: str) -> tuple[Scenario, Trajectory]:
-    """A scenario and its exact answer."""
-    one = scenario(name)
-    assert one.truth is not None
-    return one, one.truth(one.times)
 
 
 def value(metric: str, view: View) -> float:
@@ -37,7 +32,7 @@ def value(metric: str, view: View) -> float:
 def test_the_truth_against_itself_is_zero(name: str):
     """Every error of the truth measured against the truth is 0, it never leaves the 1 % band, it misses no hit."""
     one, truth = truth_of(name)
-    view = View(one, one.dt(1), truth, truth)
+    view = beside_truth(one, one.dt(1), truth, truth)
 
     for metric, row in METRICS.items():
         if "truth" in row.against and (found := row.of(view)) is not None:
@@ -152,8 +147,9 @@ def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
         for other in (None, cut(truth, len(played))):
             kind = "itself" if other is None else "truth"
             if kind in METRICS[metric].against:
+                beside = View(one, one.dt(1), played, other, None if other is None else jumps_of(truth, one))
                 with np.errstate(over="ignore", invalid="ignore"):  # as `compare` does
-                    found = METRICS[metric].of(View(one, one.dt(1), played, other))
+                    found = METRICS[metric].of(beside)
                 assert found is None or isinstance(found.value, float | int)
 
 

@@ -1,0 +1,21 @@
+"""A scenario, its exact answer, and a view of something played beside it, as `compare` makes it."""
+
+from __future__ import annotations
+
+from reports.comparison import answered, cut
+from reports.delays import jumps_of
+from reports.view import View
+from scenarios.catalogue import scenario
+from scenarios.model import Scenario, Trajectory
+
+
+def truth_of(name: str) -> tuple[Scenario, Trajectory]:
+    """A scenario and its exact answer."""
+    one, truth = answered(scenario(name))
+    assert truth is not None
+    return one, truth
+
+
+def beside_truth(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> View:
+    """What was played, cut to the samples of the truth, beside it."""
+    return View(one, dt, cut(played, len(truth)), truth, jumps_of(truth, one))
