@@ -7,9 +7,12 @@ from __future__ import annotations
 
 import os
 import resource
+import select
+import signal
 import sys
 from json import dumps, loads  # as they are before a solver may replace them
 from pathlib import Path
+from threading import Thread
 from typing import IO, Any
 
 from adapters.solver_file import SolverFailed, read_solver
@@ -20,6 +23,7 @@ MEMORY = 2 * 2**30  # bytes of data; V8 sets aside far more addresses than it us
 def main() -> None:
     """Load the file that the first line names, say what it has, then answer request by request until the input ends."""
     requests, answers = private_pipes()
+    Thread(target=end_with_parent, args=(requests,), daemon=True).start()
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
@@ -39,6 +43,14 @@ def private_pipes() -> tuple[IO[str], IO[str]]:
     for stream in range(3):
         os.dup2(nowhere, stream)
     return requests, answers
+
+
+def end_with_parent(requests: IO[str]) -> None:
+    """When nobody is left who could ask, end this process and all that the file has started, whatever it is doing."""
+    hung_up = select.poll()
+    hung_up.register(requests, 0)
+    hung_up.poll()
+    os.killpg(os.getpid(), signal.SIGKILL)
 
 
 def load(path: Path) -> Any:

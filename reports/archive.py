@@ -4,7 +4,7 @@ journal.jsonl   a header, a line a cell as it ends, a footer; after a run was re
 trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to its last good state
 scenes/         copies of the scene files
 machine.json    machine, versions, command, seed
-compared/       the scenarios' shares of deviations.csv, so that a report made again does not measure again
+compared/       the scenarios' exact answers and shares of deviations.csv, so that a report does not measure again
 deviations.csv, runs.csv, report.html
 """
 

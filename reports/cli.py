@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from reports.exits import refuse
+from reports.exits import ends_when_told, refuse
 
 app = typer.Typer(
     name="crosscheck",
@@ -35,7 +35,10 @@ Out = Annotated[
 ]
 Workers = Annotated[int, typer.Option(min=0, help="Processes that play at once; 0: one a core.")]
 Timeout = Annotated[
-    float, typer.Option(min=0.1, max=1e6, metavar="S", help="After which a cell is stopped, in C code too.")
+    float,
+    typer.Option(
+        min=0.1, max=1e6, metavar="S", help="That a cell, or an exact answer, may take; then it is stopped, in C too."
+    ),
 ]
 Memory = Annotated[
     int, typer.Option(min=0, max=10**9, metavar="MB", help="That a process may take; 0: its share of this machine's.")
@@ -128,11 +131,12 @@ def truth(
     events: Annotated[bool, typer.Option("--events", help="All hits, not only the first and last ten.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="For programs: all of it as JSON.")] = False,
     seed: Seed = 0,
+    timeout: Timeout = 60.0,
 ) -> None:
     """Print the exact answer to a scene: its hits, how far it reaches, how precise it is and what ends it."""
     from reports.truth_command import show_truth
 
-    show_truth(scene, seed, events, as_json)
+    show_truth(scene, seed, events, as_json, timeout)
 
 
 @app.command()
@@ -238,4 +242,5 @@ def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metric
 
 def main() -> None:
     """The command `crosscheck`."""
-    app()
+    with ends_when_told():
+        app()

@@ -20,7 +20,6 @@ from reports.folders import FolderTaken, found
 from reports.metrics import METRICS
 from reports.report import Report, make_report
 from reports.scenes import open_scene, with_steps
-from reports.tables import NotCompared
 from reports.terminal import Progress, print_summary
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 from scenarios.files import SceneFileError
@@ -28,24 +27,22 @@ from scenarios.oracle import answered_by
 
 
 def finish(report: Report, out: Path) -> NoReturn:
-    """Print the summary; exit 1 if there is an engine of which nothing can be compared."""
+    """Print the summary; exit 1 if there is an engine, or a scene, of which not all that was asked for is compared."""
     print_summary(report, str((out / "report.html").resolve()))
     runs = [run for comparison in report.comparisons for run in comparison.runs]
     played = {run.name for run in runs if run.status == "ok"}
     if lost := sorted({run.name for run in runs} - played):
         say(f"no cell of {', '.join(lost)} was played to its end: see the status column of {out / 'runs.csv'}")
-    sys.exit(FAILED if lost else DONE)
+    for name, why in report.unjudged.items():
+        say(f"{name} is not judged: {why}")
+    sys.exit(FAILED if lost or report.unjudged else DONE)
 
 
 def report_again(out: Path) -> NoReturn:
     """Tables and page from the journal in `out`."""
-    try:
-        with refusing(str(out)), Progress() as progress:
-            folder = found(out)
-            report = make_report(folder, progress.say)
-    except NotCompared as fault:
-        say(str(fault))
-        sys.exit(FAILED)
+    with refusing(str(out)), Progress() as progress:
+        folder = found(out)
+        report = make_report(folder, progress.say)
     finish(report, folder)
 
 

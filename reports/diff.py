@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Hashable, Mapping
+from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -95,8 +95,10 @@ def difference(before: Path, after: Path) -> Difference:
     one, other = Archive.read(before), Archive.read(after)
     warnings, like = warnings_of(one, other)
     cells = by_name(one), by_name(other)
-    numbers, same = changed_numbers(table_of(before), table_of(after), equal_keys(*cells) if like else set())
-    return Difference(warnings, changed_statuses(*cells), numbers, same, timings_of(one, other, *cells) if like else [])
+    tables = table_of(before), table_of(after)
+    numbers, same = changed_numbers(*tables, equal_keys(*cells) if like else set())
+    statuses = changed_statuses(*cells) + changed_judgement(*tables, cells[0].keys() & cells[1].keys())
+    return Difference(warnings, statuses, numbers, same, timings_of(one, other, *cells) if like else [])
 
 
 def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
@@ -135,6 +137,28 @@ def changed_statuses(before: dict[tuple, dict[str, Any]], after: dict[tuple, dic
             verdict = "worse" if was == "ok" or now == "not played" else "better" if now == "ok" else "other"
             changes.append(Change(engine, f"{scenario}  dt {dt:.4g} s  status", was, now, verdict))
     return changes
+
+
+def changed_judgement(before: pd.DataFrame, after: pd.DataFrame, both: Collection[tuple]) -> list[Change]:
+    """Which cells, of those that `both` have, are not judged any more, or are now: of that only one has numbers."""
+    was, now = reasons(before), reasons(after)
+    changes = []
+    for cell, versus in sorted(was.keys() ^ now.keys()):
+        if cell in both:
+            scenario, engine, dt = cell
+            what, key = f"{scenario}  dt {dt:.4g} s  against {versus}: status", (cell, versus)
+            verdict = "worse" if key in now else "better"
+            changes.append(Change(engine, what, was.get(key, "judged"), now.get(key, "judged"), verdict))
+    return changes
+
+
+def reasons(table: pd.DataFrame) -> dict[tuple[tuple, str], str]:
+    """((scenario, `engine:profile`, dt in s), against what) -> why it is not judged."""
+    rows = table[(table.metric == "status") & table.note.str.startswith(NOT_JUDGED)].to_dict("records")
+    return {
+        ((r["scenario"], f"{r['engine']}:{r['profile']}", float(r["dt_s"])), str(r["versus"])): str(r["note"])
+        for r in rows
+    }
 
 
 def table_of(folder: Path) -> pd.DataFrame:

@@ -99,8 +99,10 @@ def again(record: dict[str, Any], row: Row, scenario: Scenario, timeout: float) 
     """Status, reason and trajectory, from a process of its own that prints where the user sees it."""
     cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", 1)
     worker = Worker(memory=0, show=True)
-    outcome = worker.do(partial(play_here, cell, row, scenario), timeout)
-    worker.close()
+    try:
+        outcome = worker.do(partial(play_here, cell, row, scenario), timeout)
+    finally:
+        worker.close()
     if outcome is None:
         return "crashed", "its process ended as if from outside", from_trail(worker.left(), scenario)
     if isinstance(outcome, bytes):

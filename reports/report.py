@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +25,7 @@ class Report:
         runs: runs.csv.
         findings: the sentences on top.
         untrusted: the players that broke the protocol: their rows are kept, but nothing is concluded from them.
+        unjudged: name of a scene -> why it is not held to its answer, or not compared at all, though it should be.
     """
 
     archive: Archive
@@ -32,6 +33,7 @@ class Report:
     runs: pd.DataFrame
     findings: list[str]
     untrusted: set[str]
+    unjudged: Mapping[str, str]
 
 
 def make_report(folder: Path, say: Callable[[str], None]) -> Report:
@@ -60,4 +62,4 @@ def make_report(folder: Path, say: Callable[[str], None]) -> Report:
         known_answers=pd.DataFrame(known),
         about=header | {"seconds": archive.seconds},
     )
-    return Report(archive, comparisons, tables.runs, sentences, untrusted)
+    return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged)

@@ -18,7 +18,6 @@ from reports.journal import JOURNAL, Journal
 from reports.report import make_report
 from reports.runner import NoScheduler, cluster
 from reports.suite import Means, OtherVersions, Plan, carry_out
-from reports.tables import NotCompared
 from reports.terminal import Progress
 from scenarios.catalogue import SCENARIOS
 
@@ -36,7 +35,7 @@ def run_plan(
     means: Means,
     command: str,
 ) -> NoReturn:
-    """Play, compare, report into `out`; exits 0, 1 (an engine could not be compared at all), 2 or 130."""
+    """Play, compare, report into `out`; exits 0, 1 (an engine or a scene could not be compared), 2, 130 or 143."""
     plan = Plan(
         scenes=checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
         engines={name: row_of(name) for name in checked_engines(engines)},
@@ -101,7 +100,7 @@ def carry_on(plan: Plan, means: Means, journal: Journal, out: Path) -> NoReturn:
             carry_out(plan, means, journal, progress)
             report = make_report(part, progress.say)
             replace_folder(part, out)
-    except (NoScheduler, OtherVersions, NotCompared) as fault:
+    except (NoScheduler, OtherVersions) as fault:
         say(f"{fault}. {what_is_kept(out)}")
         sys.exit(FAILED)
     finish(report, out)

@@ -1,38 +1,59 @@
-"""A scene's share of deviations.csv: made in a worker as soon as the last cell of the scene has ended, and kept."""
+"""A scene's share of deviations.csv: made in a worker as soon as the last cell of the scene has ended, and kept.
+
+First the scene's exact answer is had, within the time that a cell may take, then all runs are set against it: two tasks
+of a worker. What could not be had in time, or at all, is said in the share, and the other scenes go on.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 
+from adapters.play import Run
+from reports.answers import Answer, answer_of, no_answer, put_answer, read_answer
 from reports.archive import Archive, run_of, trajectory_file
 from reports.cells import Cell, versions
-from reports.comparison import Comparison, compare
+from reports.comparison import COLUMNS, Comparison, compare
 from reports.scenes import played_scenario
-from reports.worker_process import LONGEST, Failure, allow
+from reports.view import NOT_JUDGED
+from reports.worker_process import Failure, allow
 from scenarios.model import Scenario
 
 # By which runs are compared.
 JUDGES = ("comparison", "metrics", "view", "delays", "laws", "collisions", "violations", "scales")
+ANSWER = ".npz"  # how the file of an answer ends
 NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which nothing means NaN
+COMPARING = 300.0  # s that a scene may take beyond its answer: the slowest of ours needs some 5
 Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order of the tables
+Task = tuple[Path, Callable[[], Any]]  # where its result is kept, and what makes it in a worker
 
 
 class Gathering:
-    """The cells of a run as they come in; of each scene that is whole, the task that compares it."""
+    """The cells of a run as they come in; of each scene that is whole, the tasks that answer and compare it.
 
-    def __init__(self, archive: Archive, missing: Iterable[Cell]) -> None:
-        self.folder, self.players = archive.folder, archive.header["engines"]
+    Attributes:
+        unkept: scene -> its share, where that may not be kept, as a file of a trajectory is gone or torn.
+        failed: scene -> why it could not be compared.
+    """
+
+    def __init__(self, archive: Archive, missing: Iterable[Cell], timeout: float) -> None:
+        """`timeout`: s that an exact answer may take; what has had less is tried again."""
+        self.folder, self.players, self.timeout = archive.folder, archive.header["engines"], timeout
         self.missing = Counter(cell.scene for cell in missing)
         self.records: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
+        self.scenes: dict[Path, str] = {}  # of the tasks that were given out
+        self.unkept: dict[str, bytes] = {}
+        self.failed: dict[str, Failure] = {}
         for record in archive.records:
             self.put(record)
 
@@ -40,23 +61,43 @@ class Gathering:
         """Note the line of a cell, in the place of an earlier one."""
         self.records.setdefault(record["scene"], {})[name_of(record), record["substeps"]] = record
 
-    def whole(self) -> Iterator[tuple[Path, Callable[[], Any]]]:
-        """Of every scene of which nothing is missing: where its share goes, and how it is made."""
+    def whole(self) -> Iterator[Task]:
+        """Of every scene of which nothing is missing, what is to be done first."""
         for scene in self.records:
             yield from self.task_of(scene)
 
-    def ended(self, record: dict[str, Any]) -> Iterator[tuple[Path, Callable[[], Any]]]:
+    def ended(self, record: dict[str, Any]) -> Iterator[Task]:
         """The same, of the scene of a cell that has ended now."""
         self.put(record)
         self.missing[record["scene"]] -= 1
         yield from self.task_of(record["scene"])
 
-    def task_of(self, scene: str) -> Iterator[tuple[Path, Callable[[], Any]]]:
-        """The task of a scene, if it is whole and its share is not there."""
-        if not self.missing[scene]:
-            records = in_order(self.records[scene].values(), self.players)
-            if not (path := path_of(self.folder, records)).exists():
-                yield path, partial(share_of, self.folder, records)
+    def task_of(self, scene: str) -> Iterator[Task]:
+        """The next task of a scene, if it is whole: its answer, then its share; each is given out once."""
+        if self.missing[scene]:
+            return
+        records = in_order(self.records[scene].values(), self.players)
+        asked = answer_file(self.folder, records)
+        answer = read_answer(asked)
+        if asked not in self.scenes and (answer is None or answer.may_be_had(self.timeout)):
+            self.scenes[asked] = scene
+            yield asked, partial(answer_here, self.folder, records)
+        elif answer is not None and not (path := share_file(self.folder, records, answer)).exists():
+            self.scenes[path] = scene
+            yield path, partial(share_of, self.folder, records, asked)
+
+    def came(self, path: Path, result: Any) -> Iterator[Task]:
+        """Keep what came of a task, and give out the next of its scene."""
+        scene = self.scenes[path]
+        if path.suffix == ANSWER:
+            put_answer(path, no_answer(result, self.timeout) if isinstance(result, Failure) else result)
+            yield from self.task_of(scene)
+        elif isinstance(result, Failure):
+            self.failed[scene] = result
+        elif result.damaged:
+            self.unkept[scene] = result.csv
+        else:
+            keep_share(path, result.csv)
 
 
 def in_order(records: Iterable[dict[str, Any]], players: Sequence[str]) -> list[dict[str, Any]]:
@@ -69,17 +110,42 @@ def name_of(record: dict[str, Any]) -> str:
     return f"{record['engine']}:{record['profile']}"
 
 
-def share_of(folder: Path, records: Records) -> bytes:
-    """In the worker: the share of a scene; nothing if a file of a trajectory is gone or torn."""
-    allow(LONGEST)
-    comparison = compared(folder, records)
+class Share(NamedTuple):
+    """A scene's part of deviations.csv; `damaged`: a file of a trajectory is gone or torn, so that it is not kept."""
+
+    csv: bytes
+    damaged: bool
+
+
+def answer_here(folder: Path, records: Records) -> Answer:
+    """In the worker: the exact answer to a scene."""
+    return answer_of(scenario_of(folder, records))
+
+
+def share_of(folder: Path, records: Records, answered: Path) -> Share:
+    """In the worker: the share of a scene whose answer is kept in the file `answered`."""
+    allow(COMPARING)
+    answer = read_answer(answered)
+    assert answer is not None
+    comparison = compared(folder, records, answer)
+    table = comparison.table
+    if answer.lost and not (lost := not_judged(comparison.runs, answer.lost, "truth")).empty:
+        table = pd.concat([table, lost])
     damaged = any(run.status != record["status"] for run, record in zip(comparison.runs, records))
-    return b"" if damaged else comparison.table.to_csv(index=False).encode()
+    return Share(table.to_csv(index=False).encode(), damaged)
 
 
-def compared(folder: Path, records: Records) -> Comparison:
-    """The runs behind the lines of a scene's cells, set against its truth and each other."""
-    return compare(scenario_of(folder, records), [run_of(folder, record) for record in records])
+def compared(folder: Path, records: Records, answer: Answer) -> Comparison:
+    """The runs behind the lines of a scene's cells, set against its answer and each other."""
+    scenario = answer.given_to(scenario_of(folder, records))
+    return compare(scenario, [run_of(folder, record) for record in records])
+
+
+def not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
+    """A row for each run that was played to its end and is, all the same, not set against `versus`."""
+    rest = ("status", -1, np.nan, "", versus, np.nan, f"{NOT_JUDGED}: {why}")  # as `COLUMNS`
+    rows = [(run.scenario, run.engine, run.profile, run.dt, *rest) for run in runs if run.status == "ok"]
+    return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
 def scenario_of(folder: Path, records: Records) -> Scenario:
@@ -88,32 +154,37 @@ def scenario_of(folder: Path, records: Records) -> Scenario:
     return replace(scenario, substeps=tuple(sorted({record["substeps"] for record in records})))
 
 
-def keep_share(path: Path, share: bytes | Failure) -> None:
-    """Write it whole or not at all, as a part would be taken for the whole; nothing if there is none to keep.
-
-    What could not be made while cells were played is tried again with the tables.
-    """
-    if isinstance(share, Failure) or not share:
-        return
+def keep_share(path: Path, csv: bytes) -> None:
+    """Write it whole or not at all, as a part would be taken for the whole."""
     new = path.with_name(f"{path.name}.new")
-    new.write_bytes(share)
+    new.write_bytes(csv)
     os.replace(new, path)
 
 
-def read_share(path: Path) -> pd.DataFrame:
+def read_share(share: Path | bytes) -> pd.DataFrame:
     """The table, bit for bit as it was written."""
     empty = {column: [""] for column in NUMBERS}
-    return pd.read_csv(path, keep_default_na=False, na_values=empty)
+    return pd.read_csv(io.BytesIO(share) if isinstance(share, bytes) else share, keep_default_na=False, na_values=empty)
 
 
-def path_of(folder: Path, records: Records) -> Path:
-    """Where the share of a scene is kept: named by all that decides it, the judge's source and the files too."""
+def answer_file(folder: Path, records: Records) -> Path:
+    """Where the answer to a scene is kept: named by the scene and the judge's source."""
+    return named_by(folder, records, (records[0]["scene_hash"], judge()), ANSWER)
+
+
+def share_file(folder: Path, records: Records, answer: Answer) -> Path:
+    """Where the share of a scene is kept: named by all that decides it, its answer, the judge and the files too."""
     sizes = []
     for record in records:
         path = trajectory_file(folder, record["cell"])
         sizes.append((record["cell"], record["status"], record["reason"], path.stat().st_size if path.exists() else -1))
-    digest = hashlib.sha256(repr((sizes, judge())).encode()).hexdigest()[:16]
-    return folder / "compared" / f"{records[0]['scenario']}-{digest}.csv"
+    return named_by(folder, records, (sizes, judge(), answer.lost), ".csv")
+
+
+def named_by(folder: Path, records: Records, what: tuple, suffix: str) -> Path:
+    """A file of a scene that is another one when anything of `what` is."""
+    digest = hashlib.sha256(repr(what).encode()).hexdigest()[:16]
+    return folder / "compared" / f"{records[0]['scenario']}-{digest}{suffix}"
 
 
 @cache

@@ -22,7 +22,7 @@ from reports.machine import about
 from reports.playing import Played, conform_here, play_here, player, time_here
 from reports.runner import TIMEOUT, run_all
 from reports.scenes import open_scene, with_steps
-from reports.shares import Gathering, keep_share
+from reports.shares import Gathering
 from reports.terminal import Progress
 from reports.worker_process import Failure
 from scenarios.files import write_scene_file
@@ -67,7 +67,7 @@ class Means:
 
     Attributes:
         workers: processes that play at once.
-        timeout: s a cell may take.
+        timeout: s a cell may take, and the exact answer to a scene.
         memory: bytes a worker may take; 0: no limit.
         scheduler: address of the dask scheduler whose workers play; "": this machine.
     """
@@ -93,7 +93,7 @@ def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) ->
     missing = {task: work for task, work in tasks.items() if task not in done}
     cells = [task for task in missing if isinstance(task, Cell)]
     alone = {cell for cell in cells if plan.engines[cell.engine].leaves_state}
-    gathering = Gathering(archive, cells)
+    gathering = Gathering(archive, cells, means.timeout)
     comparing: deque[Any] = deque(gathering.whole())
     progress.start(len(missing), len(tasks))
     limits = means.timeout, means.memory
@@ -105,7 +105,7 @@ def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) ->
                 progress.done(said, line["status"], line["reason"])
                 comparing.extend(gathering.ended(line))
             elif isinstance(task, Path):
-                keep_share(task, result)
+                comparing.extend(gathering.came(task, result))
             else:
                 progress.done(*keep_answer(journal, task, result))
     archive = Archive.read(folder)

@@ -4,34 +4,33 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence, Set
 from contextlib import closing
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
 
+from reports.answers import Answer, read_answer
 from reports.archive import Archive, run_of
 from reports.comparison import Comparison, answered
 from reports.journal import JOURNAL
 from reports.runner import run_all
 from reports.shares import (
+    ANSWER,
+    Gathering,
     Records,
-    compared,
+    answer_file,
     in_order,
-    keep_share,
     name_of,
-    path_of,
+    not_judged,
     read_share,
     scenario_of,
-    share_of,
+    share_file,
 )
 from reports.worker_process import Failure
-
-
-class NotCompared(Exception):
-    """The runs of a scene could not be set against its truth and each other, and why."""
 
 
 class Tables(NamedTuple):
@@ -39,13 +38,17 @@ class Tables(NamedTuple):
 
     Attributes:
         runs: runs.csv.
+        answers: scene -> its exact answer, as it was had or not.
         shares: scene -> where its share of deviations.csv is.
-        damaged: scene -> its comparison, where a file of a trajectory is gone or torn: no share of it is kept.
+        unkept: scene -> its comparison, of which no share is kept: it could not be made, or a file is gone or torn.
+        unjudged: name of a scene -> why it is not held to its answer, or not compared at all, though it should be.
     """
 
     runs: pd.DataFrame
+    answers: dict[str, Answer]
     shares: dict[str, Path]
-    damaged: dict[str, Comparison]
+    unkept: dict[str, Comparison]
+    unjudged: dict[str, str]
 
 
 def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
@@ -53,51 +56,70 @@ def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
 
     Raises:
         ValueError: no cell has ended, or a scene is not the one that was played.
-        NotCompared: naming the scene and what was raised.
     """
-    by_scene = ordered(archive)
+    by_scene, folder = ordered(archive), archive.folder
     if not by_scene:
-        raise ValueError(f"{archive.folder / JOURNAL}: no cell has ended yet, so there is nothing to report")
-    shares = {scene: path_of(archive.folder, records) for scene, records in by_scene.items()}
-    damaged = compare_missing(archive.folder, by_scene, shares, say)
+        raise ValueError(f"{folder / JOURNAL}: no cell has ended yet, so there is nothing to report")
+    gathering = compare_missing(archive, by_scene, say)
+    answers = {scene: read_answer(answer_file(folder, records)) for scene, records in by_scene.items()}
+    had = {scene: answer for scene, answer in answers.items() if answer is not None}
+    assert len(had) == len(by_scene)
+    shares = {scene: share_file(folder, records, had[scene]) for scene, records in by_scene.items()}
+    unkept = {scene: unkept_comparison(folder, by_scene[scene], had[scene], share)
+              for scene, share in (gathering.unkept | gathering.failed).items()}  # fmt: skip
+    unjudged = {by_scene[scene][0]["scenario"]: answer.lost for scene, answer in had.items() if answer.lost}
+    unjudged |= {unkept[scene].scenario.name: not_compared(failure) for scene, failure in gathering.failed.items()}
     say("writing the tables")
-    write_deviations(archive.folder / "deviations.csv", shares, damaged)
-    runs = table_of_runs([record for records in by_scene.values() for record in records], archive, damaged)
-    runs.to_csv(archive.folder / "runs.csv", index=False)
-    return Tables(runs, shares, damaged)
+    write_deviations(folder / "deviations.csv", shares, unkept)
+    sweep(folder / "compared", {*shares.values(), *(answer_file(folder, records) for records in by_scene.values())})
+    runs = table_of_runs([record for records in by_scene.values() for record in records], archive, unkept)
+    runs.to_csv(folder / "runs.csv", index=False)
+    return Tables(runs, had, shares, unkept, unjudged)
 
 
-def compare_missing(
-    folder: Path, by_scene: Mapping[str, Records], shares: Mapping[str, Path], say: Callable[[str], None]
-) -> dict[str, Comparison]:
-    """Make the shares that are not kept, in worker processes; returns the comparisons of which none may be kept."""
-    (folder / "compared").mkdir(exist_ok=True)
-    missing = {scene: path for scene, path in shares.items() if not path.exists()}
-    for scene in missing:
-        scenario_of(folder, by_scene[scene])  # a scene that is another one now is found here
-    tasks: dict[Hashable, Any] = {scene: partial(share_of, folder, by_scene[scene]) for scene in missing}
-    damaged = {}
-    with closing(run_all(tasks, os.cpu_count() or 1)) as results:
-        for number, (scene, share) in enumerate(results, 1):
-            name = by_scene[scene][0]["scenario"]
-            say(f"comparing: {name}, {number} of {len(tasks)}")
-            if isinstance(share, Failure):
-                raise NotCompared(f"{name} could not be compared: {share.reason}")
-            if share:
-                keep_share(missing[scene], share)
-            else:
-                damaged[scene] = compared(folder, by_scene[scene])
-    return damaged
+def compare_missing(archive: Archive, by_scene: Mapping[str, Records], say: Callable[[str], None]) -> Gathering:
+    """Have the answers and make the shares that are not kept, in worker processes, each within its time."""
+    (archive.folder / "compared").mkdir(exist_ok=True)
+    # As much time as the cells had: it is the same option.
+    gathering = Gathering(archive, [], max(record["timeout_s"] for record in archive.records))
+    tasks = deque(gathering.whole())
+    for scene in set(gathering.scenes.values()):
+        scenario_of(archive.folder, by_scene[scene])  # a scene that is another one now is found here
+    with closing(run_all({}, os.cpu_count() or 1, gathering.timeout, urgent=tasks)) as results:
+        for path, result in results:
+            name = by_scene[gathering.scenes[path]][0]["scenario"]
+            say(f"{'answered' if path.suffix == ANSWER else 'compared'}: {name}")
+            tasks.extend(gathering.came(path, result))
+    return gathering
+
+
+def not_compared(failure: Failure) -> str:
+    """Why a scene is not compared."""
+    if failure.status == "timeout":
+        return f"the comparison took too long: {failure.reason}"
+    return f"the comparison could not be made: {failure.status}: {failure.reason}"
+
+
+def unkept_comparison(folder: Path, records: Records, answer: Answer, share: bytes | Failure) -> Comparison:
+    """What can be shown of a scene of which no share is kept; what could not be compared is held to no answer."""
+    runs = [run_of(folder, record) for record in records]
+    scenario = scenario_of(folder, records)
+    if isinstance(share, bytes):
+        scenario, truth = answered(answer.given_to(scenario))
+        return Comparison(scenario, truth, runs, read_share(share))
+    why = not_compared(share)
+    scenario = replace(scenario, truth=None, without_truth=why)
+    return Comparison(scenario, None, runs, not_judged(runs, why, "itself"))
 
 
 def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
     """The comparisons in reading order; only the runs at the middle dt hold their trajectories: no other is drawn."""
     comparisons = []
     for scene, records in ordered(archive).items():
-        if scene in tables.damaged:
-            comparisons.append(tables.damaged[scene])
+        if scene in tables.unkept:
+            comparisons.append(tables.unkept[scene])
             continue
-        scenario, truth = answered(scenario_of(archive.folder, records))
+        scenario, truth = answered(tables.answers[scene].given_to(scenario_of(archive.folder, records)))
         middle = scenario.substeps[len(scenario.substeps) // 2]
         runs = [run_of(archive.folder, record, with_trajectory=record["substeps"] == middle) for record in records]
         comparisons.append(Comparison(scenario, truth, runs, read_share(tables.shares[scene])))
@@ -113,28 +135,32 @@ def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
     return {scene: in_order(records, players) for scene, records in by_scene.items() if records}
 
 
-def write_deviations(path: Path, shares: Mapping[str, Path], damaged: Mapping[str, Comparison]) -> None:
-    """Put the scenes' shares one after the other, and delete those that are of something else."""
+def write_deviations(path: Path, shares: Mapping[str, Path], unkept: Mapping[str, Comparison]) -> None:
+    """Put the scenes' shares one after the other."""
     with path.open("wb") as whole:
         for number, (scene, share) in enumerate(shares.items()):
-            if scene in damaged:
-                whole.write(damaged[scene].table.to_csv(index=False, header=not number).encode())
+            if scene in unkept:
+                whole.write(unkept[scene].table.to_csv(index=False, header=not number).encode())
                 continue
             with share.open("rb") as part:
                 if number:
                     part.readline()  # the names of the columns
                 shutil.copyfileobj(part, whole)
-    for other in set((path.parent / "compared").iterdir()) - set(shares.values()):
+
+
+def sweep(folder: Path, kept: Set[Path]) -> None:
+    """Delete the answers and shares that are of something else."""
+    for other in set(folder.iterdir()) - kept:
         other.unlink()
 
 
 def table_of_runs(
-    records: Sequence[dict[str, Any]], archive: Archive, damaged: Mapping[str, Comparison]
+    records: Sequence[dict[str, Any]], archive: Archive, unkept: Mapping[str, Comparison]
 ) -> pd.DataFrame:
     """A row a cell: what was played, how it ended, how long the engine took, with which settings and versions."""
     found = {
         (run.scenario, run.name, run.dt): {"status": run.status, "reason": run.reason}
-        for comparison in damaged.values()
+        for comparison in unkept.values()
         for run in comparison.runs
     }
     columns = [

@@ -4,61 +4,45 @@ from __future__ import annotations
 
 import json
 import sys
+from contextlib import closing
+from functools import partial
+from typing import NoReturn
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from reports.answers import no_answer, record_here
 from reports.commands import checked_scenes
 from reports.exits import DONE, FAILED, say
 from reports.journal import plain
+from reports.runner import run_all
 from reports.scenes import open_scene
 from reports.style import number
+from reports.worker_process import Failure
 from scenarios.model import Scenario
-from scenarios.no_truth import NoTruth
-from scenarios.oracle import CLOSED_FORM, OracleTruth, TruthRecord
+from scenarios.oracle_record import TruthRecord
 
 SHOWN = 10  # hits at the start and at the end
 HEADINGS = ("t, s", "disk", "other", "impulse, N s", "cos of impact angle")
 
 
-def show_truth(scene: str, seed: int, every: bool, as_json: bool) -> None:
-    """Print the exact answer to a scene; exits 1 where there is none, 2 on a name or file that is no scene."""
+def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float) -> NoReturn:
+    """Print the exact answer to a scene; exits 1 where there is none within `timeout` s, 2 on what is no scene."""
     (checked,) = checked_scenes([scene], [], False, seed)
     scenario = open_scene(checked, seed)
-    try:
-        record = record_of(scenario)
-    except NoTruth as refusal:
-        say(f"{scenario.name}: no exact answer: {refusal}")
+    # In a worker, which can be stopped whatever it is doing.
+    with closing(run_all({checked: partial(record_here, checked, seed)}, 1, timeout)) as results:
+        [(_, record)] = results
+    if isinstance(record, Failure | str):
+        why = f"no exact answer: {record}" if isinstance(record, str) else no_answer(record, timeout).reason
+        say(f"{scenario.name}: {why}")
         sys.exit(FAILED)
     if as_json:
         print(json.dumps(as_plain(scenario, record), indent=2, allow_nan=False))
     else:
         print_truth(scenario, record, every)
     sys.exit(DONE)
-
-
-def record_of(scenario: Scenario) -> TruthRecord:
-    """The oracle's record, or a record of what a closed form says. Raises `NoTruth`."""
-    if isinstance(scenario.truth, OracleTruth):
-        record = scenario.truth.record()
-        if record.valid_until < scenario.sample_interval:
-            raise NoTruth(record.reason)
-        return record
-    if scenario.truth is None:
-        raise NoTruth(scenario.without_truth)
-    truth = scenario.truth(scenario.times)
-    hits = truth.collisions
-    angles = np.full(len(hits), np.nan)  # a closed form does not need them
-    return TruthRecord(
-        legs=np.zeros((0, 12)),
-        events=np.stack([hits.t, hits.i, hits.j, hits.impulse, angles], axis=-1),
-        valid_until=truth.valid_until,
-        error_bound=truth.error_bound,
-        bits=53,
-        method=CLOSED_FORM,
-        reason=truth.reason,
-    )
 
 
 def as_plain(scenario: Scenario, record: TruthRecord) -> dict:

@@ -30,9 +30,10 @@ ACCURACY = 1e-12  # m; two precisions that differ by more have parted
 
 @dataclass(frozen=True, eq=False)
 class OracleTruth:
-    """The truth of a scenario by the oracle; nothing is computed before it is called."""
+    """The truth of a scenario by the oracle; nothing is computed before it is called, nor what is `known` already."""
 
     scenario: Scenario
+    known: TruthRecord | None = None
 
     def __call__(self, t: Array) -> Trajectory:
         """The exact `Trajectory` at the times t (k,) s, cut at its horizon.
@@ -51,6 +52,8 @@ class OracleTruth:
 
     def record(self) -> TruthRecord:
         """The record: from the cache, or computed and put there. Raises `NoTruth`."""
+        if self.known is not None:
+            return self.known
         key = key_of(self.scenario, has_balls())
         found = look_up(key)
         if found is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import tempfile
@@ -60,10 +61,21 @@ def source_hash() -> str:
 def look_up(key: str) -> dict[str, Any] | None:
     """The fields of the record kept under `key`; None where there is none that can be read in full."""
     where = folder()
-    if where is None:
-        return None
+    return None if where is None else unpacked(where / f"{key}.npz")
+
+
+def packed(fields: dict[str, Any]) -> bytes:
+    """The fields of a record as the bytes of an .npz."""
+    file = io.BytesIO()
+    numbers = json.dumps({name: fields[name] for name in NUMBERS})
+    np.savez_compressed(file, **{name: fields[name] for name in ARRAYS}, numbers=np.array(numbers))
+    return file.getvalue()
+
+
+def unpacked(path: Path) -> dict[str, Any] | None:
+    """The fields of the record in a file that holds what `packed` gave; None if it cannot be read in full."""
     try:
-        with np.load(where / f"{key}.npz", allow_pickle=False) as saved:
+        with np.load(path, allow_pickle=False) as saved:
             arrays = {name: frozen(saved[name]) for name in ARRAYS}
             numbers = json.loads(str(saved["numbers"]))
         if any(arrays[name].shape[1:] != (width,) for name, width in ARRAYS.items()) or set(numbers) != set(NUMBERS):
@@ -84,8 +96,7 @@ def keep(key: str, fields: dict[str, Any]) -> bool:
         where.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=where, suffix=".part")
         with os.fdopen(handle, "wb") as file:
-            numbers = json.dumps({name: fields[name] for name in NUMBERS})
-            np.savez_compressed(file, **{name: fields[name] for name in ARRAYS}, numbers=np.array(numbers))
+            file.write(packed(fields))
         # Another process may write the same record at the same time: the last rename wins, both are whole.
         os.replace(temporary, where / f"{key}.npz")
     except OSError:

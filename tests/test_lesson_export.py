@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import base64
 import json
-import signal
 import zlib
-from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser
 
-from reports.lessons import command, conventions, pages
+from reports.lessons import command, pages
 from reports.lessons.catalogue import LESSONS
-from reports.lessons.pages import offline
+from reports.lessons.pages import offline, told
 from tests.browsing import opened
 from tests.command_line import crosscheck
 
@@ -24,7 +21,7 @@ def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
     """It asks nothing of anywhere, its sliders work, and what it holds is what the lesson shows live."""
     lesson = LESSONS["order"]
     path = tmp_path / "order.html"
-    path.write_text(offline(lesson, lambda: None))
+    path.write_text(offline(lesson, {places: told("order", places) for places in lesson.grid}))
     page, heard = opened(browser, path.as_uri())
     page.on("request", lambda request: heard.append(request.url))
     page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
@@ -49,11 +46,9 @@ def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: 
     few = {name: LESSONS[name] for name in ("order", "mixing")}
     monkeypatch.setattr(command, "LESSONS", few)
     monkeypatch.setattr(pages, "LESSONS", few)
-    monkeypatch.setattr(conventions, "ENGINES", {name: conventions.ENGINES[name] for name in ("pymunk:shipped",)})
-    pages.measured.cache_clear()
+    monkeypatch.setattr(command, "ENGINES", {name: command.ENGINES[name] for name in ("pymunk:shipped",)})
     done = crosscheck("lesson", "--export", tmp_path / "all", cwd=tmp_path)
     again = crosscheck("lesson", "--export", tmp_path / "all", cwd=tmp_path)
-    pages.measured.cache_clear()
     page, heard = opened(browser, (tmp_path / "all" / "index.html").as_uri())
     text = page.locator("#measured").inner_text()
     links = page.locator("a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
@@ -94,7 +89,7 @@ def test_what_cannot_be_written_is_told_before_any_run(
     for path in (tmp_path / "folder" / "other.txt", tmp_path / "other.html"):
         path.write_text("somebody's own")
     before = sorted(tmp_path.rglob("*"))
-    monkeypatch.setattr(command, "offline", lambda *_: pytest.fail("a run was made"))
+    monkeypatch.setattr(command, "write_pages", lambda *_: pytest.fail("a run was made"))
     done = crosscheck("lesson", *words, cwd=tmp_path)
 
     assert done.returncode == 2
@@ -120,19 +115,17 @@ def test_a_page_that_cannot_be_made_leaves_the_old_one(tmp_path: Path, monkeypat
     assert path.read_text() == whole
 
 
-def test_ctrl_c_is_heard_even_where_an_engine_swallows_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Python drops what is raised in a callback from C, as pymunk's: the export ends after that run, with 130."""
-
-    def deaf(_: object, done: Callable[[], None], __: object) -> str:
-        with suppress(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        done()
-        return ""
-
-    monkeypatch.setattr(command, "offline", deaf)
-    before = signal.getsignal(signal.SIGINT)  # ignored, where a shell has put the tests into the background
+def test_a_run_that_fails_ends_the_export_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Exit 1 with the lesson, where its sliders were, and what was raised; nothing is left behind."""
+    monkeypatch.setattr(command, "told", fails)
     done = crosscheck("lesson", "order", "--export", tmp_path / "order.html", cwd=tmp_path)
 
-    assert done.returncode == 130
+    assert done.returncode == 1
+    assert f"{LESSONS['order'].title}, sliders at (0, " in done.stderr
+    assert "): error: ZeroDivisionError: of a lesson\n" in done.stderr
     assert list(tmp_path.iterdir()) == []
-    assert signal.getsignal(signal.SIGINT) is before
+
+
+def fails(*_: object) -> None:
+    """What a lesson with a fault does."""
+    raise ZeroDivisionError("of a lesson")

@@ -14,8 +14,9 @@ from adapters.engines import ENGINES
 from adapters.play import play
 from adapters.switched import Switched
 from reports.game.server import Game, application
-from reports.lessons import conventions
+from reports.lessons import pages
 from reports.lessons.catalogue import LESSONS
+from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson, play_once
 from reports.lessons.mechanisms import SWITCHED
 from reports.lessons.meeting import hit_of_the_reference, two
@@ -113,13 +114,11 @@ def test_the_numbers_of_a_hit_are_those_of_the_solver():
     assert "parting over closing speed: 0.9" in steps["Update"]
 
 
-def test_conventions_are_measured(monkeypatch: pytest.MonkeyPatch):
+def test_conventions_are_measured():
     """An engine that is made otherwise is found otherwise: nothing in the table is typed in."""
-    monkeypatch.setattr(conventions, "ENGINES", {name: ENGINES[name] for name in ("pymunk:shipped", "box2d:shipped")})
-    rows = {row.asked: row.got for row in conventions.table()}
+    rows = {row.asked: row.got for row in table({name: ENGINES[name] for name in ("pymunk:shipped", "box2d:shipped")})}
     slow = rows["What is e of a pair that closes at 0.1 m/s, where 0.5 is stated?"]
-    monkeypatch.setattr(conventions, "ENGINES", {"pymunk:shipped": ENGINES["pymunk:matched"]})
-    swapped = {row.asked: row.got for row in conventions.table()}
+    swapped = {row.asked: row.got for row in table({"pymunk:shipped": ENGINES["pymunk:matched"]})}
 
     assert slow["pymunk:shipped"] == ("0.25", "departs")
     assert slow["box2d:shipped"][1] == "departs"
@@ -162,7 +161,7 @@ def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
 
 def test_the_list_of_lessons_fits_and_leads_to_each(browser: Browser, url: str, monkeypatch: pytest.MonkeyPatch):
     """With the table of conventions below it, which says when and with what it was measured."""
-    monkeypatch.setattr(conventions, "ENGINES", {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")})
+    monkeypatch.setattr(pages, "ENGINES", {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")})
     page, heard = opened(browser, url, viewport={"width": 400, "height": 800})
     links = page.locator(".shelf a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
     waits = page.locator("#measured").inner_text()
@@ -219,10 +218,9 @@ def test_a_slider_that_is_dragged_asks_for_where_it_stops(browser: Browser, url:
     assert heard == []
 
 
-def test_what_departs_is_seen_to_depart(monkeypatch: pytest.MonkeyPatch):
+def test_what_departs_is_seen_to_depart():
     """As many digits as it takes: 20 beside a stated 20 would be no departure."""
-    monkeypatch.setattr(conventions, "ENGINES", {"box2d_v3:shipped": ENGINES["box2d_v3:shipped"]})
-    rows = conventions.table()
+    rows = table({"box2d_v3:shipped": ENGINES["box2d_v3:shipped"]})
 
     departing = [(row.expected, *row.got["box2d_v3:shipped"]) for row in rows]
     assert [verdict for _, _, verdict in departing].count("departs") > 3

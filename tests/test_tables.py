@@ -4,23 +4,38 @@ import ast
 import os
 import shutil
 import signal
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import reports
 from adapters.engines import ENGINES
 from reports import shares, tables
+from reports.answers import answer_of, no_answer, put_answer, read_answer
 from reports.archive import Archive
 from reports.cells import Cell
 from reports.journal import JOURNAL, Journal
-from reports.shares import JUDGES, Gathering, compared, name_of, share_of
+from reports.shares import (
+    ANSWER,
+    JUDGES,
+    Gathering,
+    Share,
+    answer_file,
+    answer_here,
+    compared,
+    name_of,
+    share_of,
+)  # fmt: skip
 from reports.suite import Means, Plan, carry_out
-from reports.tables import NotCompared, comparisons_of, make_tables
+from reports.tables import comparisons_of, make_tables
 from reports.terminal import Progress
+from reports.worker_process import Failure
+from scenarios.catalogue import scenario
 
 
 @pytest.fixture(scope="module")
@@ -40,12 +55,14 @@ def silent(_: str) -> None:
 
 def test_all_is_compared_while_it_is_played(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """When the last cell has ended every share is there: the tables are put together, and no worker is asked."""
-    monkeypatch.setattr(tables, "share_of", None)
+    monkeypatch.setattr(shares, "share_of", None)
+    monkeypatch.setattr(shares, "answer_here", None)
     archive = Archive.read(folder)
     made = make_tables(archive, silent)
 
     assert {path.parent.name for path in made.shares.values()} == {"compared"}
-    assert len(list((folder / "compared").iterdir())) == len(made.shares) == 2
+    assert len(list((folder / "compared").glob("*.csv"))) == len(made.shares) == 2
+    assert len(list((folder / "compared").glob("*.npz"))) == len(made.answers) == 2
 
 
 def test_what_is_kept_is_what_was_compared(folder: Path):
@@ -53,7 +70,7 @@ def test_what_is_kept_is_what_was_compared(folder: Path):
     archive = Archive.read(folder)
     made = make_tables(archive, silent)
     by_scene = tables.ordered(archive)
-    computed = [compared(folder, records) for records in by_scene.values()]
+    computed = [compared(folder, records, answer_here(folder, records)) for records in by_scene.values()]
 
     for one, again in zip(computed, comparisons_of(archive, made)):
         for column in one.table.columns:
@@ -74,7 +91,7 @@ def test_a_share_that_is_not_there_or_not_whole_is_made_again(folder: Path, tmp_
     make_tables(Archive.read(copy), silent)
 
     assert (copy / "deviations.csv").read_bytes() == whole
-    assert {path.suffix for path in (copy / "compared").iterdir()} == {".csv"}
+    assert {path.suffix for path in (copy / "compared").iterdir()} == {".csv", ANSWER}
 
 
 def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
@@ -86,7 +103,7 @@ def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
     whole = (copy / "deviations.csv").read_bytes()
     journal = (copy / JOURNAL).read_bytes()
     monkeypatch.setattr(shares, "judge", lambda: "another metric")
-    monkeypatch.setattr(tables, "share_of", partial(killed_once, tmp_path / "mark"))
+    monkeypatch.setattr(shares, "share_of", partial(killed_once, tmp_path / "mark"))
     after = make_tables(Archive.read(copy), silent).shares
 
     assert (tmp_path / "mark").exists()
@@ -95,47 +112,110 @@ def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
     assert (copy / JOURNAL).read_bytes() == journal
 
 
-def killed_once(mark: Path, folder: Path, records: list) -> bytes:
+def killed_once(mark: Path, *given: Any) -> Share:
     """In the worker: what the system does that has no memory left, the first time only."""
     if not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return share_of(folder, records)
+    return share_of(*given)
 
 
-def test_a_scene_is_compared_when_its_last_cell_has_ended_and_not_before(folder: Path):
-    """Of two scenes with the cells coming in turn, each gives its task with its own last cell, once."""
-    archive = Archive.read(folder)
+def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_before(folder: Path, tmp_path: Path):
+    """Of two scenes with the cells coming in turn, each gives its task with its own last cell, once, then the next."""
+    copy = Path(shutil.copytree(folder, tmp_path / "copy"))
+    whole = {path: path.read_bytes() for path in (copy / "compared").iterdir()}
+    for path in whole:
+        path.unlink()
+    archive = Archive.read(copy)
     cells = [Cell(one["scene"], one["seed"], name_of(one), one["substeps"]) for one in archive.records]
-    gathering = Gathering(replace(archive, records=[]), cells)
-    for path in (folder / "compared").iterdir():
-        path.rename(path.with_suffix(".away"))
-    made = [(record["scene"], [path.name for path, _ in gathering.ended(record)]) for record in archive.records]
-    again = Gathering(archive, cells[:1])
-    resumed = [path.name for path, _ in again.whole()]
-    for path in (folder / "compared").iterdir():
-        path.rename(path.with_suffix(".csv"))
+    gathering = Gathering(replace(archive, records=[]), cells, 60.0)
+    made = [(record["scene"], [*gathering.ended(record)]) for record in archive.records]
+    resumed = [path.name for path, _ in Gathering(archive, cells[:1], 60.0).whole()]
+    first = [task for _, tasks in made for task in tasks]
+    then = [task for path, work in first for task in gathering.came(path, work())]
+    after = [task for path, work in then for task in gathering.came(path, work())]
     last = {scene: max(k for k, (which, _) in enumerate(made) if which == scene) for scene, _ in made}
 
-    assert [k for k, (_, paths) in enumerate(made) if paths] == sorted(last.values())
-    assert all(len(paths) <= 1 for _, paths in made)
+    assert [k for k, (_, tasks) in enumerate(made) if tasks] == sorted(last.values())
+    assert all(len(tasks) <= 1 for _, tasks in made)
     assert [name.split("-")[0] for name in resumed] == [scene for scene in last if scene != cells[0].scene]
-    assert not list(Gathering(archive, []).whole())
+    assert [path.suffix for path, _ in (*first, *then)] == [ANSWER] * 2 + [".csv"] * 2
+    assert after == list(Gathering(archive, [], 60.0).whole()) == []
+    assert {path: path.read_bytes() for path in (copy / "compared").glob("*.csv")} == {
+        path: text for path, text in whole.items() if path.suffix == ".csv"
+    }
 
 
-def test_a_comparison_that_fails_is_one_clear_sentence(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """It names the scene and what was raised, in the worker; nothing of it is kept."""
+def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """It says what was raised, in the worker; the scene is held to no answer; nothing of it is kept."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
-    for path in (copy / "compared").iterdir():
+    for path in (copy / "compared").glob("slow_hit*.csv"):
         path.unlink()
-    monkeypatch.setattr(tables, "share_of", fails)
+    monkeypatch.setattr(shares, "share_of", fails)
+    archive = Archive.read(copy)
+    made = make_tables(archive, silent)
+    table = pd.read_csv(copy / "deviations.csv")
+    said = table[table.scenario == "slow_hit"]
+    one, other = comparisons_of(archive, made)
 
-    with pytest.raises(NotCompared, match=r"\w+ could not be compared: ZeroDivisionError: of a metric"):
-        make_tables(Archive.read(copy), silent)
-    assert not list((copy / "compared").iterdir())
+    assert made.unjudged == {"slow_hit": WHY}
+    assert set(said.metric) == {"status"}
+    assert set(said.note) == {f"not judged: {WHY}"}
+    assert len(said) == len(one.runs)
+    assert (one.truth, one.scenario.without_truth) == (None, WHY)
+    assert len(other.table) == (table.scenario == "cradle_touching").sum() > len(other.runs)
+    assert not list((copy / "compared").glob("slow_hit*.csv"))
 
 
-def fails(*_: object) -> bytes:
+WHY = "the comparison could not be made: error: ZeroDivisionError: of a metric"
+
+
+def test_what_took_too_long_is_had_again_only_with_more_time(folder: Path, tmp_path: Path):
+    """An answer that was not had in 5 s is not tried again within 5 s; within 6 s it is, and all is as it was."""
+    copy = Path(shutil.copytree(folder, tmp_path / "copy"))
+    whole = (copy / "deviations.csv").read_bytes() if (copy / "deviations.csv").exists() else b""
+    archive = replace(Archive.read(copy), records=[r | {"timeout_s": 5.0} for r in Archive.read(copy).records])
+    (records,) = [records for scene, records in tables.ordered(archive).items() if scene == "slow_hit"]
+    put_answer(answer_file(copy, records), no_answer(Failure("timeout", "stopped after 5 s"), 5.0))
+    without = make_tables(archive, silent)
+    table = pd.read_csv(copy / "deviations.csv")
+    said = table[(table.scenario == "slow_hit") & (table.metric == "status")]
+    again = make_tables(replace(archive, records=[r | {"timeout_s": 6.0} for r in archive.records]), silent)
+
+    assert without.unjudged == {"slow_hit": "the exact answer took longer than 5 s (--timeout)"}
+    assert set(said.versus) == {"truth"}
+    assert len(said) == len(records)
+    assert "truth" not in set(table[(table.scenario == "slow_hit") & (table.metric != "status")].versus)
+    assert len(table[(table.scenario == "slow_hit") & (table.metric != "status")])  # laws and engines are judged
+    assert again.unjudged == {}
+    assert whole in (b"", (copy / "deviations.csv").read_bytes())
+
+
+@pytest.mark.parametrize("name", ["line_gas", "falling_box", "cradle_touching"])
+def test_an_answer_comes_back_from_its_file_bit_for_bit(tmp_path: Path, name: str):
+    """All its arrays, where and why it ends; of none why there is none; a torn file is none."""
+    one = answer_of(scenario(name))
+    put_answer(tmp_path / "answer.npz", one)
+    back = read_answer(tmp_path / "answer.npz")
+    text = (tmp_path / "answer.npz").read_bytes()
+    (tmp_path / "answer.npz").write_bytes(text[:-20])
+
+    assert back is not None
+    assert back[1:] == one[1:]
+    assert bits(back.truth) == bits(one.truth)
+    assert read_answer(tmp_path / "answer.npz") is None
+
+
+def bits(one: Any) -> Any:
+    """All that a truth holds, arrays as bytes, whatever fields it has."""
+    if is_dataclass(one):
+        return [bits(getattr(one, each.name)) for each in fields(one)]
+    return one.tobytes() if isinstance(one, np.ndarray) else one
+
+
+def fails(*_: object) -> Share:
     """What a metric with a fault does."""
     raise ZeroDivisionError("of a metric")
 

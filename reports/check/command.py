@@ -6,9 +6,11 @@ import errno
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Hashable, Sequence
+from contextlib import closing
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from adapters.solver_file import KINDS, SolverFailed, dangling
 from adapters.solver_process import SolverProcess
@@ -16,9 +18,15 @@ from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
 from reports.check.verdict import NONE, FileCheck, check_file
 from reports.exits import BAD_INPUT, DONE, FAILED, refuse, say
+from reports.runner import run_all
+from reports.worker_process import Failure
+
+if TYPE_CHECKING:
+    from reports.check.smallest import Smallest
 
 # What an earlier file of ours has among its first HEAD bytes, and nothing else has: it may be written over.
 PAGE, JUNIT, HEAD = b'<meta name="generator" content="crosscheck check">', b'<testsuites name="crosscheck check"', 4096
+CHECKING = 600.0  # s that a file may take: what each of its calls may take adds up to less
 NOBODYS = (".", "__", "node_modules")  # how the names of files and folders begin that no student wrote
 HANDED_OUT = ("gl-matrix.js", "gl-matrix-min.js", "mainScript.js")  # lie beside a student's file
 
@@ -31,7 +39,7 @@ def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) 
     if page is None and not path.is_dir() and not json_wanted:
         page = Path("check.html")
     places_for(page, junit)
-    checks = list(checked(files, path.is_dir() and not json_wanted))
+    checks = checked(files, path.is_dir() and not json_wanted)
     if not path.is_dir() and checks[0].refused:
         refuse([checks[0].refused])
     if json_wanted:
@@ -83,33 +91,51 @@ def places_for(page: Path | None, junit: Path | None) -> None:
             refuse([f"{option} {path}: {fault.strerror or fault}; name another file"])
 
 
-def checked(files: Sequence[Path], progress: bool) -> Iterator[FileCheck]:
-    """The checks in order, as many at once as there are cores: each file runs in a process of its own."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for k, one in enumerate(pool.map(check_file, files)):
+def checked(files: Sequence[Path], progress: bool) -> list[FileCheck]:
+    """The checks in order, as many at once as there are cores, in workers: those can be stopped whatever they do."""
+    tasks: dict[Hashable, Any] = {file: partial(check_file, file) for file in files}
+    done: dict[Path, FileCheck] = {}
+    with closing(run_all(tasks, min(os.cpu_count() or 1, len(files)), CHECKING)) as results:
+        for file, one in results:
+            done[file] = not_checked(file, one) if isinstance(one, Failure) else one
             if progress and sys.stderr.isatty():
-                print(f"\r{k + 1} of {len(files)}", end="\n" if k + 1 == len(files) else "", file=sys.stderr)
-            yield one
+                end = "\n" if len(done) == len(files) else ""
+                print(f"\r{len(done)} of {len(files)}", end=end, file=sys.stderr)
+    return [done[file] for file in files]
+
+
+def not_checked(file: Path, failure: Failure) -> FileCheck:
+    """What is said of a file whose check did not come to its end."""
+    return FileCheck(file, [], f"{file}: could not be checked: {failure.status}: {failure.reason}")
 
 
 def make_page(path: Path, one: FileCheck) -> None:
     """Look for the smallest scene that shows a fault, and write the page."""
     from reports.check.page import write_page
-    from reports.check.smallest import Smallest, smallest_scene
 
     smallest: Smallest | None = None
     if one.faults and one.restitution is not None:
-        try:
-            with SolverProcess(one.path) as process:
-                smallest = smallest_scene(process, one.restitution)
-        except SolverFailed:
-            smallest = None  # the rows say how it failed
+        task: dict[Hashable, Any] = {path: partial(smallest_here, one.path, one.restitution)}
+        with closing(run_all(task, 1, CHECKING)) as results:
+            [(_, found)] = results
+        smallest = None if isinstance(found, Failure) else found  # the rows say how it failed
     try:
         write_page(path, one, smallest)
     except OSError as fault:
         say(f"--page {path}: {fault.strerror or fault}; name another file")
         sys.exit(BAD_INPUT)
     say(f"{path.resolve()}")
+
+
+def smallest_here(file: Path, restitution: float) -> Smallest | None:
+    """In a worker: the smallest scene that shows a fault of a file; None if none is found, or the file fails."""
+    from reports.check.smallest import smallest_scene
+
+    try:
+        with SolverProcess(file) as process:
+            return smallest_scene(process, restitution)
+    except SolverFailed:
+        return None
 
 
 def write(path: Path, text: str) -> None:

@@ -6,18 +6,19 @@ import logging
 import socket
 import sys
 import webbrowser
-from asyncio import CancelledError
-from collections.abc import Sequence
+from asyncio import CancelledError, get_running_loop
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from secrets import token_hex
 from time import monotonic
+from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
@@ -25,16 +26,18 @@ from starlette.responses import HTMLResponse
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from reports.exits import refuse
+from reports.exits import TERMINATED, Stopped, refuse
 from reports.game.messages import MOST_BYTES
 from reports.game.page import game_page
 from reports.game.session import Session, as_json
 from scenarios.model import Scenario
 
+T = TypeVar("T")
 HOST, NAMES = "127.0.0.1", ("127.0.0.1", "localhost")
 PORTS = 20  # tried in a row
 MOST_TABS = 16
 MOST_A_SECOND, MOST_FAULTS = 240, 50  # messages: a page sends 60 a second and the keys; and faulty ones in all
+THREADS = ThreadPoolExecutor(MOST_TABS + 8)  # one a tab, and some for the pages; not the loop's, for which it waits
 POLICY, LATER = 1008, 1013  # WebSocket close codes: it breaks the rules; try again later
 
 
@@ -82,12 +85,12 @@ class Game:
         self.tabs += 1
         session = None
         try:
-            session = await run_in_threadpool(Session, self.engines, self.file)
+            session = await in_thread(Session, self.engines, self.file)
             with suppress(WebSocketDisconnect):
                 await socket.send_text(as_json(session.field() | {"server": self.mark}))
                 await converse(socket, session)
         finally:
-            if session is not None:
+            if session is not None and not session.given_up:
                 session.close()
             self.tabs -= 1
 
@@ -113,15 +116,23 @@ async def converse(socket: WebSocket, session: Session) -> None:
             await socket.close(POLICY, f"more than {MOST_A_SECOND} messages a second")
             return
         try:
-            answer = await run_in_threadpool(session.answer, event.get("text") or event.get("bytes") or "")
+            answer = await in_thread(session.answer, event.get("text") or event.get("bytes") or "")
         except ValueError as fault:
             faults += 1
             answer = {"kind": "fault", "text": str(fault)}
+        except CancelledError:
+            session.given_up = True  # its thread is not done with its engines
+            raise
         if faults > MOST_FAULTS:
             await socket.close(POLICY, f"more than {MOST_FAULTS} faulty messages")
             return
         if answer is not None:
             await socket.send_text(as_json(answer))
+
+
+async def in_thread(do: Callable[..., T], *arguments: Any) -> T:
+    """What `do` gives, in a thread; a server that stops does not wait for it."""
+    return await get_running_loop().run_in_executor(THREADS, partial(do, *arguments))
 
 
 def application(game: Game, lessons: Sequence[BaseRoute] = ()) -> Starlette:
@@ -152,7 +163,7 @@ def taken_socket(port: int) -> socket.socket:
 
 
 def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
-    """Serve until Ctrl-C; say where, and open a browser there if asked; exits 2 if there is no port."""
+    """Serve until Ctrl-C; say where, and open a browser there if asked; exits 2 if there is no port, 143 on SIGTERM."""
     try:
         listening = taken_socket(port)
     except OSError as fault:
@@ -166,9 +177,13 @@ def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
         print(f"--open: no browser was found here; open {url} yourself.", file=sys.stderr)
     server = uvicorn.Server(config_of(app))
     logging.getLogger("uvicorn.error").addFilter(is_news)
-    with suppress(KeyboardInterrupt):
+    try:
         server.run(sockets=[listening])
-    print("Stopped.")
+    except KeyboardInterrupt as stopped:  # which the server hands on when it has ended; Ctrl-C is how it ought to end
+        if isinstance(stopped, Stopped) and stopped.status == TERMINATED:
+            raise
+    finally:
+        print("Stopped.")
 
 
 def is_news(record: logging.LogRecord) -> bool:

@@ -18,10 +18,14 @@ from scenarios.model import Array, Scenario
 
 
 class Session:
-    """A page and its flight. `file`: the flight that is flown again, instead of one that is steered."""
+    """A page and its flight. `file`: the flight that is flown again, instead of one that is steered.
+
+    Attributes:
+        given_up: nobody waits for its answer any more, and it may still be at it.
+    """
 
     def __init__(self, engines: Sequence[str], file: Scenario | None = None) -> None:
-        self.file = file
+        self.file, self.given_up = file, False
         self.flight = self.begun(Fly(do="fly", engines=list(engines)))
 
     def begun(self, wish: Fly) -> Flight:

@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+import os
+import sys
+from collections.abc import Callable, Hashable, Mapping
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryFile
+from typing import Any
 
+from adapters.engines import ENGINES
 from reports.commands import unknown
-from reports.exits import refuse
+from reports.exits import FAILED, refuse, say
 from reports.folders import FolderTaken, may_write
 from reports.game.command import FIRST
 from reports.game.server import Game, application, serve
 from reports.lessons.catalogue import LESSONS
+from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson
-from reports.lessons.pages import ALONE, FILES, ROUTES, Links, index_page, offline
+from reports.lessons.pages import ALONE, FILES, ROUTES, Links, index_page, offline, told
+from reports.runner import run_all
 from reports.terminal import Progress
+from reports.worker_process import Failure
 
 # What a page of ours has among its first HEAD bytes, and nothing else has: it may be written over.
 MARK, HEAD = b'<meta name="generator" content="crosscheck lesson">', 4096
+
+SHOWING = 300.0  # s that one setting of the sliders may take: the slowest needs some 5, once its engines are compiled
+CONVENTIONS = "the conventions of the engines"
 
 
 def open_lesson(name: str, port: int, opens: bool, export: Path | None) -> None:
@@ -40,7 +49,7 @@ def write_one(name: str, path: Path) -> None:
     if path.exists() and not ours(path):
         refuse([f"--export {path}: is there and no page of a lesson; name another file"])
     must_be_writable(path.parent, path)
-    write_pages({path: LESSONS[name]}, ALONE)
+    write_pages({path: LESSONS[name]}, ALONE, {})
     print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, opens without a server")
 
 
@@ -55,8 +64,8 @@ def write_all(folder: Path) -> None:
         refuse([f"--export {folder}: {fault.strerror or fault}; name another folder"])
     must_be_writable(folder, folder)
     pages = {folder / f"{name}.html": lesson for name, lesson in LESSONS.items()}
-    write_pages(pages, FILES)
-    put(folder / "index.html", index_page(FILES))
+    rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[CONVENTIONS]
+    put(folder / "index.html", index_page(FILES, rows))
     size = sum(path.stat().st_size for path in pages)
     print(f"{folder / 'index.html'}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server")
 
@@ -75,31 +84,35 @@ def must_be_writable(folder: Path, asked: Path) -> None:
         refuse([f"--export {asked}: {fault.strerror or fault}; name another place"])
 
 
-def write_pages(pages: Mapping[Path, Lesson], links: Links) -> None:
-    """Each page as soon as all its runs have ended, of which there is one for every setting of the sliders."""
-    runs = sum(len(lesson.grid) for lesson in pages.values())
+def write_pages(pages: Mapping[Path, Lesson], links: Links, besides: dict[str, Callable[[], Any]]) -> dict[str, Any]:
+    """Each page as soon as all its runs have ended, one for every setting of the sliders; returns what `besides` gave.
+
+    All run in workers, which can be stopped whatever they do; exits 1 if one of them fails.
+    """
+    tasks: dict[Hashable, Callable[[], Any]] = {
+        (path, places): partial(told, lesson.name, places) for path, lesson in pages.items() for places in lesson.grid
+    }
+    tasks.update(besides)
+    answers: dict[Path, dict[tuple[int, ...], Any]] = {path: {} for path in pages}
+    found: dict[str, Any] = {}
     with Progress() as progress:
-        progress.start(runs, runs, "starting")
-        with stoppable(progress.done) as done:
-            for path, lesson in pages.items():
-                put(path, offline(lesson, partial(done, f"{lesson.number} {lesson.title}"), links))
-
-
-@contextmanager
-def stoppable(done: Callable[[str], None]) -> Iterator[Callable[[str], None]]:
-    """`done`, which ends all on Ctrl-C: raised within an engine's callback it would be lost, so it waits for a run."""
-    asked: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
-
-    def checked(what: str) -> None:
-        if asked:
-            raise KeyboardInterrupt
-        done(what)
-
-    try:
-        yield checked
-    finally:
-        signal.signal(signal.SIGINT, before)
+        progress.start(len(tasks), len(tasks))
+        with closing(run_all(tasks, os.cpu_count() or 1, SHOWING)) as results:
+            for task, result in results:
+                if isinstance(result, Failure):
+                    what = task if isinstance(task, str) else f"{pages[task[0]].title}, sliders at {task[1]}"
+                    say(f"{what}: {result.status}: {result.reason}")
+                    sys.exit(FAILED)
+                if isinstance(task, str):
+                    found[task] = result
+                    progress.done(task)
+                    continue
+                path, lesson = task[0], pages[task[0]]
+                answers[path][task[1]] = result
+                progress.done(f"{lesson.number} {lesson.title}")
+                if len(answers[path]) == len(lesson.grid):
+                    put(path, offline(lesson, answers.pop(path), links))
+    return found
 
 
 def put(path: Path, text: str) -> None:
@@ -110,3 +123,5 @@ def put(path: Path, text: str) -> None:
         part.replace(path)
     except OSError as fault:
         refuse([f"--export {path}: {fault.strerror or fault}"])
+    finally:
+        part.unlink(missing_ok=True)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from adapters.conformance import PROBES, Finding, conform
-from adapters.engines import ENGINES
+from adapters.engines import Row
 from reports.style import number
 
 ASKED = (
@@ -23,9 +24,9 @@ class Convention:
     got: dict[str, tuple[str, str]]  # engine:profile -> reading, verdict
 
 
-def table() -> list[Convention]:
+def table(engines: Mapping[str, Row]) -> list[Convention]:
     """The physics probes put to every engine now, in the order of `ASKED`; a few seconds."""
-    findings = {name: {each.probe: each for each in conform(name, row)} for name, row in ENGINES.items()}
+    findings = {name: {each.probe: each for each in conform(name, row)} for name, row in engines.items()}
     rows = []
     for probe in ASKED:
         answers = {name: found[probe] for name, found in findings.items() if probe in found}

@@ -5,20 +5,21 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cache
 from threading import Lock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from markupsafe import Markup
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 
+from adapters.engines import ENGINES
 from reports.cells import versions
 from reports.documents import looks_as_json, render
+from reports.game.server import in_thread
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
 from reports.lessons.crowd import EVERY_PAIR
@@ -56,8 +57,13 @@ def about() -> dict[str, str]:
     return {"made": datetime.now(UTC).isoformat(timespec="seconds")[:16].replace("T", " ") + " UTC"} | versions()
 
 
-def lesson_page(lesson: Lesson, links: Links = LIVE, grid: str = "") -> str:
-    """The page; `grid`: every setting's answer, packed, for a page without a server."""
+def told(name: str, places: Sequence[int]) -> dict[str, Any]:
+    """What the lesson of that name shows with its sliders at these indices, for JSON; as what a worker does."""
+    return LESSONS[name].at(places).told()
+
+
+def lesson_page(lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, grid: str = "") -> str:
+    """The page, which shows `first`; `grid`: every setting's answer, packed, for a page without a server."""
     names = list(LESSONS)
     k = names.index(lesson.name)
     around = [LESSONS[names[each]] if 0 <= each < len(names) else None for each in (k - 1, k + 1)]
@@ -66,52 +72,53 @@ def lesson_page(lesson: Lesson, links: Links = LIVE, grid: str = "") -> str:
         ["player.js", "player_canvas.js", "lessons/chart.js", "lessons/lesson.js"], STYLES, connects=not grid,
         lesson=lesson, text=[Markup(paragraph) for paragraph in lesson.text], looks=looks_of(lesson),
         looks_json=looks_as_json(looks_of(lesson)), grid=grid, around=around, links=links, about=about(),
-        first=lesson.at(lesson.start).told(),
+        first=first,
     )  # fmt: skip
 
 
-def offline(lesson: Lesson, done: Callable[[], None], links: Links = ALONE) -> str:
-    """One page with the answer to every setting of the sliders, from runs made now; `done` is called after each."""
-    answers = {}
-    for places in lesson.grid:
-        answers[",".join(map(str, places))] = lesson.at(places).told()
-        done()
-    packed = zlib.compress(json.dumps(answers, separators=(",", ":")).encode(), 9)
-    return lesson_page(lesson, links, base64.b64encode(packed).decode())
+def offline(lesson: Lesson, answers: Mapping[tuple[int, ...], Any], links: Links = ALONE) -> str:
+    """One page with the answer, as of `told`, to every setting of the sliders."""
+    grid = {",".join(map(str, places)): answers[places] for places in lesson.grid}
+    packed = zlib.compress(json.dumps(grid, separators=(",", ":")).encode(), 9)
+    return lesson_page(lesson, answers[lesson.start], links, base64.b64encode(packed).decode())
 
 
-def index_page(links: Links = LIVE) -> str:
-    """The list of lessons; below it the conventions of the engines, which a live page asks for: it takes a while."""
+def index_page(links: Links = LIVE, rows: Sequence[Convention] = ()) -> str:
+    """The list of lessons; below it the conventions of the engines: `rows`; a live page asks for them later."""
     live = links is LIVE
     groups = {heading: [LESSONS[name] for name in LESSONS if LESSONS[name].number[0] in numbers]
               for heading, numbers in GROUPS.items()}  # fmt: skip
     return render(
         "lessons/index.html.j2", ["lessons/index.js"] if live else [], STYLES, connects=live, groups=groups,
-        links=links, table=None if live else Markup(conventions_table()),
+        links=links, table=None if live else Markup(conventions_page(rows, about())),
     )  # fmt: skip
 
 
 def conventions_table() -> str:
     """What the probes find in every engine, when and with which versions: measured once, when it is first asked for."""
     with MEASURING:
-        rows, when = measured()
+        return conventions_page(*measured())
+
+
+def conventions_page(rows: Sequence[Convention], when: Mapping[str, str]) -> str:
+    """The table for a page; `when` and with what it was measured."""
     return render("lessons/conventions.html.j2", [], [], rows=rows, about=when)
 
 
 @cache
 def measured() -> tuple[list[Convention], dict[str, str]]:
     """The table, and when and with what it was made."""
-    return table(), about()
+    return table(ENGINES), about()
 
 
 async def index(_: Request) -> Response:
     """/lesson."""
-    return HTMLResponse(await run_in_threadpool(index_page))
+    return HTMLResponse(await in_thread(index_page))
 
 
 async def conventions(_: Request) -> Response:
     """/lesson/conventions: the table alone."""
-    return HTMLResponse(await run_in_threadpool(conventions_table))
+    return HTMLResponse(await in_thread(conventions_table))
 
 
 async def page(request: Request) -> Response:
@@ -119,7 +126,7 @@ async def page(request: Request) -> Response:
     lesson = LESSONS.get(request.path_params["name"])
     if lesson is None:
         return PlainTextResponse(f"There is no such lesson; there are {', '.join(LESSONS)}.", 404)
-    return HTMLResponse(await run_in_threadpool(lesson_page, lesson))
+    return HTMLResponse(await in_thread(lambda: lesson_page(lesson, told(lesson.name, lesson.start))))
 
 
 async def shown(request: Request) -> Response:
@@ -129,7 +136,7 @@ async def shown(request: Request) -> Response:
         if lesson is None:
             raise ValueError("there is no such lesson")
         places = [int(place) for place in request.query_params.get("at", "")[:99].split(",")]
-        found = await run_in_threadpool(lesson.at, places)
+        found = await in_thread(lesson.at, places)
     except ValueError as fault:
         return JSONResponse({"fault": str(fault)}, 400)
     return JSONResponse(found.told())

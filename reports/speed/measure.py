@@ -21,7 +21,6 @@ from reports.speed.plan import PLAIN, SCENE, Plan, Player, Reach, middle
 from reports.speed.timing import Sample
 from reports.terminal import Progress
 from reports.worker_process import Failure
-from scenarios.catalogue import DRAWN
 
 HANGS, ALL_ROUNDS = 600.0, 3600.0  # s a ladder and a timing may take: against what hangs, no limit of what is measured
 SIZE, IDLE, TRUTH = "size", "idle", "truth"
@@ -66,9 +65,9 @@ def measure(plan: Plan, progress: Progress, kept: Kept | None = None) -> Measure
 
 def find_reach(plan: Plan, measured: Measured, progress: Progress) -> Reach:
     """(scene, seed) -> how many sample intervals have an exact answer; those that have none are told of."""
-    drawn = {draw: partial(ladder.reach_of, *draw) for draw in plan.draws if draw[0] in DRAWN}  # these may take long
-    results = {draw: ladder.reach_of(*draw) for draw in plan.draws if draw not in drawn}
-    results |= done(drawn, plan.workers, progress, "exact answer")
+    # In workers, which can be stopped whatever they are doing.
+    asked = {draw: partial(ladder.reach_of, *draw) for draw in plan.draws}
+    results = dict(done(asked, plan.workers, progress, "exact answer"))
     reach = {}
     for (scene, seed), result in results.items():
         reach[scene, seed], why = (0, result.reason) if isinstance(result, Failure) else result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from contextlib import suppress
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -11,14 +12,15 @@ from numpy.typing import NDArray
 
 from reports.archive import STATE, load_trajectory, packed
 from reports.replay import HITS
-from reports.stability.limits import EXACT, Limit, Search, Trial
+from reports.stability.limits import Limit, Search, Trial
 from scenarios.model import Collisions, Scenario, Trajectory, frozen
+from scenarios.no_truth import NoTruth
 
 BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 
 
 def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
-    """Save the first failing run of a search, and the other run that it is judged by if there is one."""
+    """Save the first failing run of a search, and what it is shown beside, if there is any: here, not for the page."""
     failing, seen = limit.failing, search.failure(limit)
     if failing is None or seen is None or seen[1].trajectory is None:
         return
@@ -27,9 +29,9 @@ def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
     path = file_of(limit, folder)
     shown = near(failing, scenario)
     path.write_bytes(packed(part_of(run.trajectory, shown, scenario), small=True))
-    if search.case.beside != EXACT:
-        assert scenario.truth is not None
-        beside_file(path).write_bytes(packed(part_of(scenario.truth(scenario.times), shown, scenario), small=True))
+    with suppress(NoTruth):
+        if scenario.truth is not None:
+            beside_file(path).write_bytes(packed(part_of(scenario.truth(scenario.times), shown, scenario), small=True))
 
 
 def kept_failure(limit: Limit, folder: Path) -> tuple[Trajectory, Trajectory | None] | None:

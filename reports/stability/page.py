@@ -19,7 +19,7 @@ from reports.page import HERE, SCRIPTS, content_policy, css, deflated, looks_as_
 from reports.replay import pack_layers, ratio_of
 from reports.stability import overview
 from reports.stability.atlas import Atlas, case_named
-from reports.stability.failures import kept_failure, near, part_of
+from reports.stability.failures import kept_failure, near
 from reports.stability.limits import EXACT, Case, Limit, Trial
 from reports.stability.maps import MAPS
 from reports.stability.touching import GAPS, TOUCHING
@@ -100,11 +100,10 @@ def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
     failing, kept = limit.failing, kept_failure(limit, folder)
     if failing is None or kept is None:
         return None
-    played, other = kept
+    played, beside = kept
     scenario = case.scene(failing.value, failing.first, failing.runs)
     shown = near(failing, scenario)
     layers: list[tuple[Run | None, Trajectory]] = [(named(limit), played)]
-    beside = truth_of(scenario, shown) if case.beside == EXACT else other
     if beside is not None and len(beside):
         layers.append((None, beside))
     pack = pack_layers(scenario, layers, shown, opening(failing, scenario, shown))
@@ -116,14 +115,6 @@ def named(limit: Limit) -> Run:
     """A run that carries a player's name, which decides how it is drawn."""
     engine, profile = limit.player.split(":")
     return Run(engine, profile, limit.case, 0.0)
-
-
-def truth_of(scenario: Scenario, shown: np.ndarray) -> Trajectory | None:
-    """The exact answer at the samples `shown`, if there is one."""
-    try:
-        return part_of(scenario.truth(scenario.times), shown, scenario) if scenario.truth is not None else None
-    except ValueError:  # NoTruth: there is none
-        return None
 
 
 def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, Any]:
