@@ -15,12 +15,13 @@ from adapters.features import FEATURES
 from adapters.play import play
 from reports.cli import app
 from reports.machine import about
-from reports.speed import charts, figures, tables
+from reports.speed import charts, figures
 from reports.speed.effort import QUICK
 from reports.speed.measure import Measured, measure
 from reports.speed.page import write_page
 from reports.speed.pareto import FAILED, UNREACHABLE
 from reports.speed.plan import Plan
+from reports.speed.pooling import POOLED
 from reports.speed.results import Results
 from reports.terminal import Progress
 from scenarios.catalogue import scenario
@@ -280,4 +281,4 @@ def test_one_scene_and_one_engine_are_measured_by_themselves(tmp_path: Path):
     assert {"speed.html", "speed.csv", "speed_samples.csv", "speed_errors.csv", "machine.json"} <= names
     assert "speed_figures.csv" not in names
     assert "Noise floor" in done.output
-    assert tables.POOLED not in set(pd.read_csv(tmp_path / "out" / "speed.csv").scenario)
+    assert POOLED not in set(pd.read_csv(tmp_path / "out" / "speed.csv").scenario)

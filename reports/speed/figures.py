@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from reports.speed.results import Results
@@ -14,16 +15,21 @@ from reports.speed.results import Results
 KEPT = Path(__file__).parent / "figures.csv"
 COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
 YARDSTICK = ("reference", "exercise")
+AGAINST, AGAINST_BARE = "cost over reference:exercise", "the same less idle steps"
 GATED = (10, 100, 1000)  # disks
 LOOSE = 3.0  # times as dear or as cheap as kept: compilers and processors differ by less, a lost optimisation by more
 
 
 def figures(results: Results) -> pd.DataFrame:
     """Columns `COLUMNS`: pooled points, cost at matched accuracy, cost by number of disks and its exponent, driving."""
+    failed = results.pooled.failed
     parts = [
         results.pooled.assign(figure="pooled error", at=results.pooled.rung, value=results.pooled.error,
-                              low=results.pooled.error_low, high=results.pooled.error_high, unit="radii"),
+                              low=results.pooled.error_low, high=results.pooled.error_high, unit="radii",
+                              note=failed.map("failed in {}".format) + results.pooled.of.map(" of {}".format)),
         results.pooled.assign(figure="pooled cost", at=results.pooled.rung, value=results.pooled.cost, unit="us/s"),
+        results.pooled.assign(figure="pooled cost less idle steps", at=results.pooled.rung, value=results.pooled.bare,
+                              low=np.nan, high=np.nan, unit="us/s"),
         results.pooled_reached.assign(figure="cost at accuracy", at=results.pooled_reached.accuracy,
                                       value=results.pooled_reached.cost, note=results.pooled_reached.why, unit="us/s"),
         results.sizes.assign(figure="cost of a step", at=results.sizes.n, value=results.sizes.cost, unit="us"),
@@ -31,8 +37,18 @@ def figures(results: Results) -> pd.DataFrame:
                               note=results.growth.stopped, unit="1"),
         results.driving.assign(figure="idle step", value=results.driving.step_us, unit="us"),
         results.driving.assign(figure="idle call", value=results.driving.call_us, unit="us"),
+        cheaper(results.versus, AGAINST, "cheaper", "ratio"), cheaper(results.versus, AGAINST_BARE, "bare_cheaper", ""),
     ]  # fmt: skip
     return pd.concat([part.reindex(columns=COLUMNS) for part in parts], ignore_index=True)
+
+
+def cheaper(versus: pd.DataFrame, figure: str, count: str, value: str) -> pd.DataFrame:
+    """A row an engine and change of `versus`: in which scenes it costs less than `YARDSTICK`; value: the ratio."""
+    rows = versus[versus[count].notna()]
+    numbers = {name: rows[column] if value else np.nan for name, column in
+               (("value", "ratio"), ("low", "low"), ("high", "high"))}  # fmt: skip
+    said = rows[count].map("{:.0f}".format) + rows.scenes.map(" of {}: ".format) + rows[f"{count}_in"]
+    return rows.assign(figure=figure, at=rows.change, note=said, unit="1", **numbers)
 
 
 def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
