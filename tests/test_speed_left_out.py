@@ -132,7 +132,7 @@ def test_an_order_tells_how_many_steps_failed():
     row = tables.orders(Measured(errors=pd.DataFrame(rows)), 0).iloc[0]
 
     assert (row.verdict, row.failed, row.steps) == (ORDER, 1, 4)
-    assert row.error == np.inf
+    assert (row.coarsest_error, row.finest_error) == (0.8, np.inf)
 
 
 def own(scenario: str, cost: float) -> dict:

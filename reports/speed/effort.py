@@ -60,7 +60,7 @@ QUICK = Effort(
         "disk_between_static_disks", "slide_on_incline", "column_of_ten", "line_gas", "cradle_with_gaps",
         "body_frame_thrust", "asteroids", "gas_of_100",
     ),
-    seeds=8, most_steps=4_000, rounds=5, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000, 3000), patience=0.1,
+    seeds=6, most_steps=4_000, rounds=4, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000, 3000), patience=0.1,
     dial_scenes=("column_of_ten", "falling_box", "slide_on_incline"),
     budget_scenes=(
         "free_fall", "head_on_equal_e09", "oblique_e1", "slow_hit", "mass_ratios", "wall_to_wall", "bouncing_ball_e1",

@@ -13,6 +13,7 @@ import pandas as pd
 from reports.speed.results import Results
 
 KEPT = Path(__file__).parent / "figures.csv"
+ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")  # of the same run: errors alone
 COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
 YARDSTICK = ("reference", "exercise")
 AGAINST, AGAINST_BARE = "cost over reference:exercise", "the same less idle steps"
@@ -65,10 +66,21 @@ def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
     path.write_text(lines + table, encoding="utf-8")
 
 
+def keep(folder: Path) -> None:
+    """Keep figures, orders of convergence, and how much of the errors is explained, of a measurement in `folder`.
+
+    The latter two hold no times: the same versions give the same rows on any machine of a kind.
+    """
+    KEPT.write_bytes((folder / "speed_figures.csv").read_bytes())
+    for path in (ORDERS, EXPLAINED):
+        read(folder / f"speed_{path.name}").to_csv(path, index=False, float_format="%.4g")
+
+
 def read(path: Path = KEPT) -> pd.DataFrame:
-    """The figures without their header."""
+    """A table without its header; what is empty in a column of words is "", in one of numbers nan."""
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    return pd.read_csv(io.StringIO("\n".join(lines)), dtype={"at": str, "note": str})
+    table = pd.read_csv(io.StringIO("\n".join(lines)), dtype={"at": str, "note": str})
+    return table.fillna({word: "" for word in ("at", "note") if word in table})
 
 
 def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:

@@ -11,7 +11,7 @@ from adapters.engines import ENGINES
 from adapters.features import DIALS
 from reports.speed.ladder import open_scene
 from reports.speed.measure import IDLE, SIZE, Measured
-from reports.speed.order import Order, median_interval, order_of
+from reports.speed.order import FINEST, NEARER, Order, median_interval, order_of
 from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
 from reports.speed.plan import DIAL, FEATURE, PLAIN, SCENE
 from reports.speed.pooling import WHO, pooled
@@ -113,9 +113,9 @@ def in_us(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario and player: slope, low, high, verdict, see `order.Order`; finest_dt_s and its error in radii
-    (median over the seeds); steps, how many were played, and failed, at how many of them a draw failed: what failed
-    has no part in slope and verdict.
+    """A row a scenario and player: slope, low, high, verdict, see `order.Order`; coarsest_error and finest_error in
+    radii (medians over the seeds), the latter at finest_dt_s; steps, how many were played, and failed, at how many of
+    them a draw failed: what failed has no part in slope and verdict.
     """
     rows = []
     for keys, dt, errors, changes in ladders(measured):
@@ -123,10 +123,20 @@ def orders(measured: Measured, seed: int) -> pd.DataFrame:
         if not np.isfinite(errors).any():
             found = Order(np.nan, np.nan, np.nan, FAILED)
         rows.append(dict(zip(["scenario", *WHO], keys)) | found._asdict() | {
-            "finest_dt_s": dt[-1], "error": float(np.median(errors[:, -1])), "steps": len(dt),
+            "finest_dt_s": dt[-1], "steps": len(dt),
+            **dict(zip(("coarsest_error", "finest_error"), np.median(errors[:, [0, -1]], axis=0).tolist())),
             "failed": int((~np.isfinite(errors)).any(axis=0).sum()),
         })  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def no_nearer(fitted: pd.DataFrame) -> pd.Series:
+    """Of the rows of `orders`: whether from the coarsest to the finest step the error falls by less than a tenth.
+
+    Not so where all steps failed, or where the finest is right to `FINEST`; a failed finest step is no nearer.
+    """
+    falls = fitted.finest_error < NEARER * fitted.coarsest_error
+    return ~falls & (fitted.finest_error > FINEST) & (fitted.failed < fitted.steps)
 
 
 def ladders(measured: Measured) -> Iterator[tuple[tuple, np.ndarray, np.ndarray, np.ndarray]]:
