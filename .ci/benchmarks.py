@@ -1,4 +1,4 @@
-"""The figures in the repository and the README's picture: uv run python .ci/benchmarks.py, alone on the machine.
+"""The kept tables of speed and the README's picture: uv run python .ci/benchmarks.py, alone on the machine.
 
 It takes about a quarter of an hour on two cores, says so, and goes on where it was interrupted. With --check it
 measures a few ratios anew, in a few seconds, and says, by its exit status too, whether they are still what is kept.
@@ -22,9 +22,10 @@ def make() -> None:
     """Measure all, keep the figures, take the picture."""
     crosscheck = Path(sys.executable).parent / "crosscheck"
     subprocess.run([crosscheck, "speed", "--full", "--resume", "--out", OUT], check=True)
-    figures.KEPT.write_bytes((OUT / "speed_figures.csv").read_bytes())
+    figures.keep(OUT)
     subprocess.run([sys.executable, Path(__file__).parent / "picture.py", OUT / "speed.html"], check=True)
-    print(f"kept: {figures.KEPT}, reports/speed.png")
+    kept = ", ".join(str(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED))
+    print(f"kept: {kept}, reports/speed.png; README's sentences on them: python -m tests.speed_figures")
 
 
 def check() -> list[str]:

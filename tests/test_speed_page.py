@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from playwright.sync_api import Browser
-from typer.testing import CliRunner
 
 from adapters.features import FEATURES
+from adapters.habits import HABITS
 from adapters.play import play
-from reports.cli import app
 from reports.machine import about
-from reports.speed import charts, figures, tables
+from reports.speed import charts, figures
+from reports.speed.budget import budget_of
 from reports.speed.effort import QUICK
+from reports.speed.explained import extent
 from reports.speed.measure import Measured, measure
 from reports.speed.page import write_page
 from reports.speed.pareto import FAILED, UNREACHABLE
 from reports.speed.plan import Plan
+from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal import Progress
 from scenarios.catalogue import scenario
@@ -221,6 +224,35 @@ def test_the_kept_figures_have_every_ratio_that_is_gated():
     }
 
 
+def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
+    """How much one scene moves the curve, what failed, who costs less than our own solver; and of a budget that is cut,
+    which scene, when, of how long, and over how many seconds the share is. Without the cut scene none of the latter.
+    """
+    rows = [row for name in HABITS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYERS]
+    both = pd.concat([results.measured.budget, pd.DataFrame(rows, columns=results.measured.budget.columns)])
+    cut = Results(results.plan, replace(results.measured, budget=both))
+    whole, shorter = (page_of(each, tmp_path) for each in (results, cut))
+    (gas,) = extent(cut.explained).cuts
+
+    for page in (whole, shorter):
+        assert said_of_pool(results.pooled) in page
+        assert "pymunk:shipped 1" in said_of_pool(results.pooled)
+        assert 'id="versus"' in page
+        assert "Scored to" in page  # the asteroids, whose exact answer ends before they do
+    assert f"gas_of_100 at {gas.until:.2g} of {gas.horizon:.2g} s" in shorter
+    assert 'id="cuts"' in shorter
+    assert "1 scenes are cut" in shorter
+    assert "every scene as far as its exact answer goes" in whole
+    assert 'id="cuts"' not in whole
+
+
+def page_of(results: Results, folder: Path) -> str:
+    """The page as text, its entities undone."""
+    path = folder / "speed.html"
+    write_page(path, results, about("crosscheck speed", 0) | SAID)
+    return unescape(path.read_text())
+
+
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (400, "dark")])
 def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
     browser: Browser, results: Results, tmp_path: Path, width: int, scheme: str
@@ -237,47 +269,3 @@ def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
     assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with habits: three players; two switched off
     assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
     assert heard == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["no_such_scene"], "scenario 'no_such_scene' is not known"),
-        (["free_fall", "--engine", "pymonk"], "did you mean pymunk"),
-        (["free_fall", "--out", "README.md"], "is a file"),
-        (["free_fall", "--out", "tests"], "which crosscheck speed did not make"),
-    ],
-)
-def test_bad_input_is_one_clear_sentence(arguments: list[str], says: str, monkeypatch: pytest.MonkeyPatch):
-    """Exit 2, no traceback."""
-    monkeypatch.chdir(Path(__file__).parent.parent)
-    done = CliRunner().invoke(app, ["speed", *arguments])
-
-    assert done.exit_code == 2
-    assert says in done.stderr
-    assert "Traceback" not in done.output
-
-
-def test_a_scene_without_an_exact_answer_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Exit 1 and the reason; nothing is left behind."""
-    monkeypatch.setattr("reports.speed.ladder.reach_of", lambda *_: (0, "two outcomes"))
-    done = CliRunner().invoke(app, ["speed", "cradle_touching", "--out", str(tmp_path / "out")])
-
-    assert done.exit_code == 1
-    assert "cradle_touching" in done.stderr
-    assert "no exact answer: two outcomes" in done.stderr
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow  # starts worker processes six times
-def test_one_scene_and_one_engine_are_measured_by_themselves(tmp_path: Path):
-    """Exit 0; tables and a page, without sizes and features; a second run may replace it."""
-    arguments = ["speed", "free_fall", "--engine", "reference", "--out", str(tmp_path / "out")]
-    for _ in range(2):
-        done = CliRunner().invoke(app, arguments)
-        assert done.exit_code == 0, done.output
-    names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {"speed.html", "speed.csv", "speed_samples.csv", "speed_errors.csv", "machine.json"} <= names
-    assert "speed_figures.csv" not in names
-    assert "Noise floor" in done.output
-    assert tables.POOLED not in set(pd.read_csv(tmp_path / "out" / "speed.csv").scenario)

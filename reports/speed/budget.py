@@ -17,6 +17,7 @@ from adapters.habits import FLIGHT, Habit, habits_of, with_habits
 from adapters.play import Run, play
 from reports import laws, scales
 from reports.comparison import cut
+from reports.scenes import open_scene
 from reports.speed.ladder import held
 from reports.view import View
 from scenarios.model import Array, Scenario, Trajectory
@@ -26,8 +27,8 @@ TIME, INTERPLAY, SUM, ALL, TOTAL, UNEXPLAINED = (
 )  # fmt: skip
 TOTALS = (SUM, ALL, TOTAL)
 COLUMNS = [
-    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "part", "position_radii", "energy", "share",
-    "off_engine_radii", "off_reference_radii", "off_apart_radii", "closed_apart_radii", "note",
+    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "part", "position_radii",
+    "energy", "share", "off_engine_radii", "off_reference_radii", "off_apart_radii", "closed_apart_radii", "note",
 ]  # fmt: skip
 LIMIT = 0.5  # radii by which late hits alone may put a disk off: where all is far off, no part adds up to anything
 
@@ -67,7 +68,8 @@ class Offset(NamedTuple):
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
     """A row a part of what puts player `name` of `HABITS` off in a scene, at this many steps a sample interval.
 
-    Of `COLUMNS`: until_s, how far the scene was followed; position_radii and energy, the root mean square of what the
+    Of `COLUMNS`: until_s, how far the scene was followed, horizon_s, how far its exact answer goes, and duration_s, the
+    scene itself; position_radii and energy, the root mean square of what the
     part changes, the energy in parts of that at hand; share, by which it makes up the position's total (1 in all;
     negative: it makes up for others); off_engine_radii, off_reference_radii and off_apart_radii: what switching it off
     changes in the engine, in the reference with all the rest, and how far these two are apart; closed_apart_radii: how
@@ -77,7 +79,8 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
     scenario, dt = at.scenario, at.dt
     engine, profile = name.split(":")
     known = {"scenario": scenario.name, "seed": seed, "engine": engine, "profile": profile, "dt_s": dt,
-             "until_s": scenario.duration}  # fmt: skip
+             "until_s": scenario.duration, "horizon_s": held(scene, seed).scenario.duration,
+             "duration_s": open_scene(scene, seed).duration}  # fmt: skip
     try:
         run = at.played(row_of(name).make())
         budget = Budget(at, habits_of(name, run.settings, scenario.scene, dt), at.offset(run))

@@ -9,9 +9,9 @@ import pandas as pd
 
 from adapters.habits import NAMES
 from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED
+from reports.speed.explained import LEAST, TO
 
-EXPLAINED = 0.01  # of the engine's error: what is left over below it is said to be none
-LEAST = 1e-9  # radii: a part that is smaller for everybody has no column
+EXPLAINED = TO[0]  # of the engine's error: what is left over below it is said to be none
 FULL, DECADES = 1.0, 6  # radii of a full bar; how many decades below it a bar is empty
 WHO = ["engine", "profile"]
 
@@ -24,10 +24,15 @@ class Cell(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Rows of cells by `engine:profile`, and the notes of those that could not be explained."""
+    """Rows of cells by `engine:profile`, and the notes of those that could not be explained.
+
+    until, horizon, duration: s, up to where the scene was followed, its exact answer goes, and it lasts.
+    """
 
     scenario: str
     until: float
+    horizon: float
+    duration: float
     columns: list[str]
     rows: dict[str, list[Cell]]
     notes: dict[str, str]
@@ -36,7 +41,7 @@ class Table(NamedTuple):
 def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
     """Root mean squares in radii, a row a player: engine, what is left unexplained, the parts, sum and all."""
     here = budget[budget.scenario == scenario]
-    parts = [part for part in causes(budget) if here[here.part == part].position_radii.max() > LEAST]
+    parts = [part for part in causes(budget) if here[here.part == part].position_radii.max() > LEAST]  # of anybody
     columns = [TOTAL, UNEXPLAINED, *parts, INTERPLAY, SUM, ALL]
     rows: dict[str, list[Cell]] = {}
     notes: dict[str, str] = {}
@@ -44,7 +49,8 @@ def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
         found = group.set_index("part").position_radii
         rows[f"{engine}:{profile}"] = [cell(float(found.get(column, np.nan))) for column in columns]
         notes |= {f"{engine}:{profile}": note for note in group.note if note}
-    return Table(scenario, float(here.until_s.iloc[0]), columns, rows, notes)
+    until, horizon, duration = (float(here[name].iloc[0]) for name in ("until_s", "horizon_s", "duration_s"))
+    return Table(scenario, until, horizon, duration, columns, rows, notes)
 
 
 def causes(budget: pd.DataFrame) -> list[str]:
@@ -60,17 +66,23 @@ def cell(value: float) -> Cell:
 
 
 def overview(budget: pd.DataFrame) -> Table:
-    """In how many scenes each part is the largest, and in how many all but `EXPLAINED` is explained; bars of all."""
-    columns = ["explained", *causes(budget)]
+    """In how many scenes an engine was played, has an error, has it explained but for `EXPLAINED`, and in how many
+    each part is the largest; bars of all scenes, and every engine has its row, also one that failed them all.
+    """
+    columns = ["played", "errors", "explained", *causes(budget)]
+    count = budget.scenario.nunique()
     rows = {}
-    for (engine, profile), group in budget[budget.note == ""].groupby(WHO, sort=False):
-        scenes = group.pivot(index="scenario", columns="part", values="position_radii")
-        known = scenes.reindex(columns=causes(budget)).fillna(0.0)
+    for (engine, profile), group in budget.groupby(WHO, sort=False):
+        played = group[group.note == ""]
+        scenes = played.pivot(index="scenario", columns="part", values="position_radii")
+        scenes = scenes.reindex(columns=[TOTAL, UNEXPLAINED, *causes(budget)]).fillna(0.0)
+        off = scenes[scenes[TOTAL] > LEAST]
+        known = scenes[causes(budget)]
         largest = known[known.max(axis=1) > LEAST].idxmax(axis=1)
-        explained = int((scenes[UNEXPLAINED] <= EXPLAINED * scenes[TOTAL]).sum())
-        counts = [explained, *(int((largest == part).sum()) for part in known.columns)]
-        rows[f"{engine}:{profile}"] = [Cell(count, count / len(scenes)) for count in counts]
-    return Table("", np.nan, columns, rows, {})
+        explained = int((off[UNEXPLAINED] <= EXPLAINED * off[TOTAL]).sum())
+        counts = [len(scenes), len(off), explained, *(int((largest == part).sum()) for part in known.columns)]
+        rows[f"{engine}:{profile}"] = [Cell(number, number / count) for number in counts]
+    return Table("", np.nan, np.nan, np.nan, columns, rows, {})
 
 
 def switched_off(budget: pd.DataFrame) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ import plotly.graph_objects as go
 from reports import style
 from reports.charts import ZERO, decades, shortened
 from reports.speed.models import KINDS
-from reports.speed.pareto import ACCURACIES, FAILED, UNREACHABLE, front
+from reports.speed.pareto import ACCURACIES, FAILED, front
 from scenarios.model import Array
 
 FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"
@@ -44,10 +44,12 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
 def at_the_edge(
     lost: pd.DataFrame, drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any]
 ) -> list[dict[str, Any]]:
-    """What failed, on the upper edge at the cost it has or would have by its other dts, else in the corner."""
+    """What failed, on the upper edge, and what was not timed, at its error; at the cost it has or would have by its
+    other dts, else at the right edge.
+    """
     if lost.empty:
         return []
-    top = edge(y_axis, FAILED)
+    top = edge(y_axis, FAILED) if np.isinf(lost.error).any() else np.nan
     traces = []
     for engine, profile, group in by_player(lost):
         others = drawn[(drawn.engine == engine) & (drawn.profile == profile)]
@@ -55,7 +57,8 @@ def at_the_edge(
         cost = group.cost.where(group.cost.notna(), per_rung * 2.0**group.rung)
         corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside: what is outside is not drawn
         x = cost.fillna(corner).clip(upper=corner)
-        trace = line(engine, profile, x, np.full(len(group), top), [told(row) for row in records(group)])
+        y = group.error.clip(lower=LOWEST).where(np.isfinite(group.error), top)
+        trace = line(engine, profile, x, y, [told(row) for row in records(group)])
         traces.append(trace | {"mode": "markers", "cliponaxis": False})
     return traces
 
@@ -107,7 +110,7 @@ def dials(points: pd.DataFrame, relative: bool = False) -> go.Figure:
             trace["textfont"] = {"color": trace["line"]["color"], "size": 11}
         traces.append(trace)
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
-    traces += [] if relative else at_the_edge(lost, drawn, x_axis, y_axis)
+    traces += at_the_edge(lost, drawn, x_axis, y_axis)
     return figure(traces, x_axis, y_axis, TALLEST if relative else TALL)
 
 
@@ -129,7 +132,7 @@ def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
     for k, (engine, profile) in enumerate(names):
         group = reached[(reached.engine == engine) & (reached.profile == profile)]
         x = np.arange(len(group)) + (k - (len(names) - 1) / 2) * 0.8 / max(len(names), 1)
-        y = group.cost.where(group.cost.notna(), np.where(group.why.isin([UNREACHABLE, FAILED]), never, not_down))
+        y = group.cost.where(group.cost.notna(), np.where(group.lost, never, not_down))
         text = [
             f"{row['accuracy']} of a radius: "
             + (row["why"] if np.isnan(row["cost"]) else f"{style.number(row['cost'])} µs/s {at(row)}{row['why']}")
@@ -159,16 +162,17 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
         traces.append(line(engine, profile, group.n, group.cost, text, {
             "error_y": bars(group.cost, group.low, group.high),
         }))  # fmt: skip
-        ends = growth[(growth.engine == engine) & (growth.profile == profile) & (growth.stopped != "")]
-        for row in records(ends):
-            n, why = row["stopped"].split(": ", 1)
-            cross = line(engine, profile, [float(n)], [stopped], [f"{n} disks: {why}"])
-            traces.append(cross | {"mode": "markers", "cliponaxis": False})
+    for row in records(growth[growth.stopped != ""]):
+        n, why = row["stopped"].split(": ", 1)
+        cross = line(row["engine"], row["profile"], [float(n)], [stopped], [f"{n} disks: {why}"])
+        traces.append(cross | {"mode": "markers", "cliponaxis": False})
     return figure(traces, x_axis, y_axis, TALL)
 
 
 def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
-    """A row a change, a mark a scene: `ratio` ("cost_ratio", "error_ratio") to the unchanged engine, 1: the same."""
+    """A row a change, a mark a scene: `ratio` ("cost_ratio", "error_ratio") to the unchanged engine, 1: the same; a
+    change that failed the scene stands at the right edge.
+    """
     rows = list(dict.fromkeys(zip(table.engine, table.profile, table.change)))[::-1]
     values = table[ratio].to_numpy(float)
     known = np.append(values[np.isfinite(values) & (values > 0)], [0.9, 1.1])
@@ -178,6 +182,7 @@ def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
         "title": title, "type": "log", "range": [low, high],
         "tickvals": ticks, "ticktext": [style.number(tick) for tick in ticks],
     }  # fmt: skip
+    failed = edge(x_axis, FAILED) if np.isinf(table.error_radii).any() else np.nan
     y_axis = {
         "title": "", "tickvals": list(range(len(rows))), "range": [-0.7, len(rows) - 0.3],
         "ticktext": [f"{engine}: {change}" for engine, _, change in rows],
@@ -189,6 +194,7 @@ def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
     for engine, profile, group in by_player(table):
         y = [rows.index((engine, profile, change)) for change in group.change]
         x = group[ratio].where(np.isfinite(group[ratio]) & (group[ratio] > 0))
+        x = x.where(np.isfinite(group.error_radii), failed)
         text = [
             f"{row['change']}, {row['scenario']}: ×{style.number(row[ratio])}<br>"
             f"error {style.number(row['error_radii'])} radii, unchanged {style.number(row['error_radii_plain'])}<br>"
@@ -240,8 +246,7 @@ def told(row: dict[str, Any]) -> str:
     if row["error_high"] != row["error_low"]:
         error += f" ({style.number(row['error_low'])} to {style.number(row['error_high'])}, {row['seeds']} draws)"
     lines = [f"{at(row)}error {error} radii".strip()]
-    if np.isfinite(row["cost"]):
-        lines.append(f"{spread(row)} µs/s")
+    lines.append(f"{spread(row)} µs/s" if np.isfinite(row["cost"]) else "not timed")
     if np.isfinite(row["idle"]):
         lines.append(f"as many steps without anything to do {style.number(row['idle'])} µs/s")
     if row["wrapping"] > 0:

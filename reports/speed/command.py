@@ -23,16 +23,17 @@ from reports.journal import JOURNAL, Journal
 from reports.machine import about
 from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
+from reports.speed.explained import sentence
 from reports.speed.kept import Kept
 from reports.speed.measure import measure
 from reports.speed.page import write_page
-from reports.speed.pareto import ACCURACIES, UNREACHABLE
+from reports.speed.pareto import ACCURACIES
 from reports.speed.plan import Plan
+from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal import Progress
 
 PAGE = "speed.html"
-SHORT = {UNREACHABLE: "never"}
 
 
 def run_speed(
@@ -107,16 +108,25 @@ def print_summary(results: Results, page: str) -> None:
     """What each accuracy costs, pooled, the noise floor, and where the page is."""
     console = Console()
     title = f"µs per simulated second for so small an error, of a radius; median of {len(results.scenes)} scenes"
-    title += "\n(k of n: so accurate in k scenes only; never: at no dt in half of them or more)"
+    title += "\n(k of n: so accurate in k scenes only; never: at no dt, or failed, in half of them or more)"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine", no_wrap=True)
     for accuracy in ACCURACIES:
         table.add_column(accuracy, justify="right", no_wrap=True)
     for (engine, profile), group in results.pooled_reached.groupby(["engine", "profile"], sort=False):
-        costs = zip(group.cost.tolist(), group.why.tolist())
-        cells = (style.number(cost) if isfinite(cost) else SHORT.get(why, why) for cost, why in costs)
+        cells = (
+            style.number(row["cost"])
+            if isfinite(row["cost"])
+            else "never"
+            if row["lost"]
+            else f"{row['got']} of {row['of']}"
+            for row in group.to_dict("records")
+        )
         table.add_row(f"{engine}:{profile}", *cells)
     console.print(table)
+    console.print(said_of_pool(results.pooled), highlight=False)
+    if len(results.explained):
+        console.print(f"Error budget: {sentence(results.explained)}.", highlight=False)
     console.print(said_of_noise(results), highlight=False)
     for what, why in results.left_out:
         console.print(f"left out: {what}: {why}", highlight=False)

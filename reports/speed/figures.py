@@ -7,23 +7,30 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from reports.speed.results import Results
 
 KEPT = Path(__file__).parent / "figures.csv"
+ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")  # of the same run: errors alone
 COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
 YARDSTICK = ("reference", "exercise")
+AGAINST, AGAINST_BARE = "cost over reference:exercise", "the same less idle steps"
 GATED = (10, 100, 1000)  # disks
 LOOSE = 3.0  # times as dear or as cheap as kept: compilers and processors differ by less, a lost optimisation by more
 
 
 def figures(results: Results) -> pd.DataFrame:
     """Columns `COLUMNS`: pooled points, cost at matched accuracy, cost by number of disks and its exponent, driving."""
+    failed = results.pooled.failed
     parts = [
         results.pooled.assign(figure="pooled error", at=results.pooled.rung, value=results.pooled.error,
-                              low=results.pooled.error_low, high=results.pooled.error_high, unit="radii"),
+                              low=results.pooled.error_low, high=results.pooled.error_high, unit="radii",
+                              note=failed.map("failed in {}".format) + results.pooled.of.map(" of {}".format)),
         results.pooled.assign(figure="pooled cost", at=results.pooled.rung, value=results.pooled.cost, unit="us/s"),
+        results.pooled.assign(figure="pooled cost less idle steps", at=results.pooled.rung, value=results.pooled.bare,
+                              low=np.nan, high=np.nan, unit="us/s"),
         results.pooled_reached.assign(figure="cost at accuracy", at=results.pooled_reached.accuracy,
                                       value=results.pooled_reached.cost, note=results.pooled_reached.why, unit="us/s"),
         results.sizes.assign(figure="cost of a step", at=results.sizes.n, value=results.sizes.cost, unit="us"),
@@ -31,8 +38,18 @@ def figures(results: Results) -> pd.DataFrame:
                               note=results.growth.stopped, unit="1"),
         results.driving.assign(figure="idle step", value=results.driving.step_us, unit="us"),
         results.driving.assign(figure="idle call", value=results.driving.call_us, unit="us"),
+        cheaper(results.versus, AGAINST, "cheaper", "ratio"), cheaper(results.versus, AGAINST_BARE, "bare_cheaper", ""),
     ]  # fmt: skip
     return pd.concat([part.reindex(columns=COLUMNS) for part in parts], ignore_index=True)
+
+
+def cheaper(versus: pd.DataFrame, figure: str, count: str, value: str) -> pd.DataFrame:
+    """A row an engine and change of `versus`: in which scenes it costs less than `YARDSTICK`; value: the ratio."""
+    rows = versus[versus[count].notna()]
+    numbers = {name: rows[column] if value else np.nan for name, column in
+               (("value", "ratio"), ("low", "low"), ("high", "high"))}  # fmt: skip
+    said = rows[count].map("{:.0f}".format) + rows.scenes.map(" of {}: ".format) + rows[f"{count}_in"]
+    return rows.assign(figure=figure, at=rows.change, note=said, unit="1", **numbers)
 
 
 def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
@@ -49,10 +66,21 @@ def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
     path.write_text(lines + table, encoding="utf-8")
 
 
+def keep(folder: Path) -> None:
+    """Keep figures, orders of convergence, and how much of the errors is explained, of a measurement in `folder`.
+
+    The latter two hold no times: the same versions give the same rows on any machine of a kind.
+    """
+    KEPT.write_bytes((folder / "speed_figures.csv").read_bytes())
+    for path in (ORDERS, EXPLAINED):
+        read(folder / f"speed_{path.name}").to_csv(path, index=False, float_format="%.4g")
+
+
 def read(path: Path = KEPT) -> pd.DataFrame:
-    """The figures without their header."""
+    """A table without its header; what is empty in a column of words is "", in one of numbers nan."""
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    return pd.read_csv(io.StringIO("\n".join(lines)), dtype={"at": str, "note": str})
+    table = pd.read_csv(io.StringIO("\n".join(lines)), dtype={"at": str, "note": str})
+    return table.fillna({word: "" for word in ("at", "note") if word in table})
 
 
 def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:

@@ -54,11 +54,12 @@ def reach_of(scene: str, seed: int) -> tuple[int, str]:
 def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int]) -> list[dict[str, Any]]:
     """A row a rung of `ladder` (coarse to fine) of what engine `name` makes of the scene, up to the horizon.
 
-    error_radii is the largest distance of any disk from where it truly is, change_radii the largest from where the
-    rung before had it; inf and nan where it failed. A player that closes in on another motion changes less and less
-    while its error stays.
+    until_s is how far the exact answer, and so the run, goes of the duration_s of the scene; error_radii the largest
+    distance of any disk from where it truly is, change_radii the largest from where the rung before had it; inf and
+    nan where it failed. A player that closes in on another motion changes less and less while its error stays.
     """
     scenario, truth = held(scene, seed)
+    whole = open_scene(scene, seed).duration
     radius, before, rows = scenario.scene.radius, None, []
     engine_name, profile = name.split(":")
     for k in ladder:
@@ -70,7 +71,7 @@ def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int
         row = {
             "scenario": scenario.name, "seed": seed, "engine": engine_name, "profile": profile,
             "dt_s": scenario.dt(k), "substeps": k, "status": run.status, "reason": run.reason,
-            "error_radii": np.inf, "change_radii": np.nan,
+            "until_s": scenario.duration, "duration_s": whole, "error_radii": np.inf, "change_radii": np.nan,
         }  # fmt: skip
         played = run.trajectory if run.status == "ok" else None
         if played is not None:

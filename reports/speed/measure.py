@@ -105,6 +105,7 @@ def rung_by_rung(player: Player, workers: int) -> list[dict]:
             result = [{
                 "scenario": scenario.name, "seed": player.seed, "engine": engine, "profile": profile,
                 "dt_s": scenario.dt(k), "substeps": k, "status": result.status, "reason": result.reason,
+                "until_s": ladder.held(player.scene, player.seed).scenario.duration, "duration_s": scenario.duration,
                 "error_radii": float("inf"), "change_radii": float("nan"),
             }]  # fmt: skip
         rows += result

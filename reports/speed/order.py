@@ -10,6 +10,7 @@ import numpy as np
 from scenarios.model import Array
 
 FINEST = 1e-6  # radii: the finest accuracy asked for; a rise or a rest below it is rounding, and nobody minds
+NEARER = 0.9  # of the error at the coarsest step: who has more than that left at the finest has come no nearer
 RISE = 1.1  # an error that grows by more than this from a step to a finer one is not monotone
 STANDSTILL = 0.25  # of the error that is left: of order p the last halving of dt moves 2^p - 1 times that
 RESAMPLES = 1000

@@ -15,11 +15,13 @@ from plotly.offline import get_plotlyjs
 from reports import style
 from reports.charts import Drawing
 from reports.page import SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
-from reports.speed import budget_tables, charts, tables
+from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import TOTALS, UNEXPLAINED
 from reports.speed.order import ELSEWHERE, UNSTEADY
 from reports.speed.pareto import ACCURACIES
+from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
+from reports.speed.versus import OWN
 
 HERE = Path(__file__).parent
 FLAGGED = (ELSEWHERE, UNSTEADY)
@@ -51,7 +53,8 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         features=features_section(results), dials=dial_sections(results), dial_rows=charts.records(results.dials),
         sections=[section_of(results, name) for name in results.scenes],
         noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
-        driving=charts.records(results.driving), feature_rows=charts.records(results.features),
+        driving=charts.records(results.driving), feature_rows=charts.records(results.features), 
+        versus=charts.records(results.versus), own=OWN,
         left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
         feature_scenes=results.plan.feature_scenes, budget=budget_section(results),
         totals=(*TOTALS, UNEXPLAINED),
@@ -73,21 +76,22 @@ def section(
 
 def pooled_section(results: Results) -> Section:
     """All scenarios at once."""
-    count = len(results.scenes)
+    count, steps = len(results.scenes), results.pooled.rung.nunique()
     drawings = {
         "speed": Drawing(
             "Error against cost",
-            f"A point is one rung of the dt ladder, each of its coordinates the median over {count} scenes. "
-            "Down and left is better; nobody is both faster and better than the broad grey line, and of those who take "
-            "steps nobody than the narrow one. "
-            "A scene that a player failed counts as infinitely wrong.",
+            f"A point is one step size, {steps} that all scenes have, each of its coordinates the geometric mean of "
+            f"the middle half of {count} scenes: {', '.join(results.scenes)}. {said_of_pool(results.pooled)} A scene "
+            "that an engine failed counts as infinitely wrong and infinitely dear. Down and left is better; no engine "
+            "is both faster and better than the broad grey line, and of those who take steps none than the narrow one.",
             charts.speed(results.pooled, tall=True),
         ),
         "matched": Drawing(
             "Cost at matched accuracy",
             "The median over the scenes of what the cheapest measured dt costs whose error, and that of every finer "
-            "one, is no larger. never: half of the scenes or more are unreachable at any dt, or failed. not yet: half "
-            "or more are not reached down to the finest dt measured.",
+            "one, is no larger; a scene in which it is not reached counts as infinitely dear. never: half of the "
+            "scenes or more are unreachable at any dt, or failed. not yet: half or more are not reached down to the "
+            "finest dt measured. Hover for how many of each.",
             charts.matched(results.pooled_reached, tall=True),
         ),
     }
@@ -103,6 +107,8 @@ def section_of(results: Results, scene: str) -> Section:
     noise = results.noise_summary(scene)
     low, high = (style.number(noise.get(end, np.nan)) for end in ("low", "high"))
     floor = f" Noise floor: half of the players read {low} to {high} against themselves." if noise["pairs"] else ""
+    until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
+    scored = f" Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends." if until < whole else ""
     wrapping = (points.wrapping > 0).any()
     apart = (
         " Setting disks onto the opposite edge, which an engine without such an edge leaves to Python, is not in it: "
@@ -113,7 +119,7 @@ def section_of(results: Results, scene: str) -> Section:
     drawings = {
         "speed": Drawing(
             "Error against cost",
-            f"A point is one dt; halving it goes right.{spread} Time: median of the rounds, bars the quartiles."
+            f"A point is one dt; halving it goes right.{scored}{spread} Time: median of the rounds, bars the quartiles."
             f"{floor}{apart}",
             charts.speed(points),
         ),
@@ -144,7 +150,11 @@ def budget_section(results: Results) -> dict[str, Any] | None:
     budget = results.measured.budget
     if budget.empty:
         return None
+    table = results.explained
+    parts = set(table.engine + ":" + table.profile)
     return {
+        "sentence": explained.sentence(table), "cuts": explained.extent(table).cuts,
+        "absent": [name for name in results.names if name not in parts],
         "overview": budget_tables.overview(budget),
         "scenes": [budget_tables.of_scene(budget, scene) for scene in dict.fromkeys(budget.scenario)],
         "off": budget_tables.switched_off(budget), "closed": float(budget.closed_apart_radii.max()),
@@ -175,11 +185,13 @@ def dial_sections(results: Results) -> list[Section]:
     if results.dials.empty:
         return []
     count = results.dials.scenario.nunique()
+    without = ", ".join(f"{engine} in {scene}" for engine, scene in tables.without_ratio(results.dials))
     pooled = Drawing(
         "Pooled",
         "Dotted: one dt, and more iterations or substeps to the right, the first and the last named. Solid: the same "
         "engine as matched, from 4 times that dt to an eighth of it. Both over what it costs and how far it is off as "
-        f"matched, at that dt, where all lines meet; medians over {count} scenes.",
+        f"matched, at that dt, where all lines meet; geometric means of the middle half of {count} scenes."
+        + (f" Without a ratio, as there is nothing to divide by: {without}." if without else ""),
         charts.dials(results.pooled_dials, relative=True),
     )
     each = {

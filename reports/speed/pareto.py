@@ -12,6 +12,7 @@ from scenarios.model import Array
 ACCURACIES = {"10 %": 0.1, "1 %": 0.01, "0.1 %": 0.001, "1e-6": 1e-6}  # of a radius
 UNREACHABLE = "unreachable at any dt"
 NOT_REACHED = "not reached"
+NOT_TIMED = "not timed"
 FAILED = "failed"
 
 
@@ -41,8 +42,11 @@ def cost_to_reach(accuracy: float, dt: Array, cost: Array, error: Array, verdict
     """
     if not np.isfinite(error).any():
         return Reached(np.nan, np.nan, FAILED)
-    held = np.logical_and.accumulate((error <= accuracy)[::-1])[::-1] & np.isfinite(cost)
-    if held.any():
-        k = int(np.flatnonzero(held)[np.argmin(cost[held])])
+    held = np.logical_and.accumulate((error <= accuracy)[::-1])[::-1]
+    priced = held & np.isfinite(cost)
+    if priced.any():
+        k = int(np.flatnonzero(priced)[np.argmin(cost[priced])])
         return Reached(float(cost[k]), float(dt[k]))
+    if held.any():
+        return Reached(np.nan, np.nan, NOT_TIMED)
     return Reached(np.nan, np.nan, UNREACHABLE if verdict == ELSEWHERE else NOT_REACHED)

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from reports.speed import models, tables
+from reports.speed import explained, models, tables, versus
 from reports.speed.measure import Measured
-from reports.speed.pareto import ACCURACIES, FAILED, UNREACHABLE
+from reports.speed.pareto import ACCURACIES, FAILED, NOT_TIMED, UNREACHABLE
 from reports.speed.plan import Plan
+from reports.speed.pooling import POOLED, pooled
 
 QUIET = 0.05  # how far from 1 an engine against itself may read
 
@@ -65,8 +66,8 @@ class Results:
 
     @cached_property
     def pooled(self) -> pd.DataFrame:
-        """See `tables.pooled`."""
-        return tables.pooled(self.points)
+        """See `pooling.pooled`."""
+        return pooled(self.points)
 
     @cached_property
     def dials(self) -> pd.DataFrame:
@@ -80,17 +81,26 @@ class Results:
 
     @cached_property
     def pooled_reached(self) -> pd.DataFrame:
-        """As `reached`: the median over the scenarios where more than half get there, else why they do not."""
+        """As `reached`: the median over the scenarios where more than half get there, and how many do and do not.
+
+        A scenario in which a player does not get there is infinitely dear. Columns besides: of, how many scenarios;
+        got, in how many it gets there; never, at no dt; failed; untimed; in the others it does not down to the finest
+        dt. lost: half or more are never or failed.
+        """
         rows = []
         for (engine, profile, accuracy), group in self.reached.groupby(["engine", "profile", "accuracy"], sort=False):
-            count, got = len(group), int(group.cost.notna().sum())
-            never = int(group.why.isin([UNREACHABLE, FAILED]).sum())
+            counts = {
+                "of": len(group), "got": int(group.cost.notna().sum()),
+                "never": int((group.why == UNREACHABLE).sum()), "failed": int((group.why == FAILED).sum()),
+                "untimed": int((group.why == NOT_TIMED).sum()),
+            }  # fmt: skip
             median = float(np.median(group.cost.fillna(np.inf)))
-            said = f"{got} of {count}"
-            why = said if np.isfinite(median) else (UNREACHABLE if 2 * never >= count else said)
+            told = [f"{what} in {counts[what]}" for what in ("never", "failed", "untimed") if counts[what]]
             rows.append({
-                "scenario": tables.POOLED, "engine": engine, "profile": profile, "accuracy": accuracy,
-                "cost": median if np.isfinite(median) else np.nan, "dt_s": np.nan, "why": why,
+                "scenario": POOLED, "engine": engine, "profile": profile, "accuracy": accuracy,
+                "cost": median if np.isfinite(median) else np.nan, "dt_s": np.nan,
+                "why": ", ".join([f"{counts['got']} of {len(group)}", *told]),
+                "lost": 2 * int(group.lost.sum()) >= len(group), **counts,
             })  # fmt: skip
         return pd.DataFrame(rows)
 
@@ -136,6 +146,17 @@ class Results:
         return tables.features(self.measured)
 
     @cached_property
+    def explained(self) -> pd.DataFrame:
+        """See `explained.explained`."""
+        budget = self.measured.budget
+        return explained.explained(budget) if len(budget) else pd.DataFrame(columns=explained.COLUMNS)
+
+    @cached_property
+    def versus(self) -> pd.DataFrame:
+        """See `versus.against_own`."""
+        return versus.against_own(self.points, self.features)
+
+    @cached_property
     def models(self) -> pd.DataFrame:
         """See `models.cheapest`."""
         return models.cheapest(self.measured.truths, self.points)
@@ -161,7 +182,7 @@ class Results:
             "speed_pooled": self.pooled, "speed_orders": self.orders, "speed_reached": self.reached,
             "speed_sizes": self.sizes, "speed_features": self.features, "speed_driving": self.driving,
             "speed_noise": self.noise, "speed_models": self.models, "speed_dials": self.dials,
-            "speed_budget": self.measured.budget,
+            "speed_budget": self.measured.budget, "speed_explained": self.explained, "speed_versus": self.versus,
         }  # fmt: skip
         for name, table in files.items():
             table.to_csv(folder / f"{name}.csv", index=False)

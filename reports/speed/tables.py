@@ -11,14 +11,12 @@ from adapters.engines import ENGINES
 from adapters.features import DIALS
 from reports.speed.ladder import open_scene
 from reports.speed.measure import IDLE, SIZE, Measured
-from reports.speed.order import Order, median_interval, order_of
-from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, cost_to_reach
+from reports.speed.order import FINEST, NEARER, Order, median_interval, order_of
+from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
 from reports.speed.plan import DIAL, FEATURE, PLAIN, SCENE
+from reports.speed.pooling import WHO, pooled
 from reports.speed.sizes import exponent
 from reports.speed.timing import summed_up
-
-WHO = ["engine", "profile"]
-POOLED = "pooled"
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
@@ -41,23 +39,41 @@ def dials(measured: Measured, seed: int) -> pd.DataFrame:
 def pooled_dials(found: pd.DataFrame) -> pd.DataFrame:
     """As `pooled`, of cost and error over those of the matched engine at the dt at which its dial is turned.
 
-    change is the value of the dial; a ladder of dt has none.
+    change is the value of the dial; a ladder of dt has none. Scenes of `without_ratio` have no part in it.
     """
-    turned = found[found.change != PLAIN]
-    here = turned.groupby("scenario").dt_s.first().rename("here")
-    beside = found[(found.change == PLAIN) & (found.dt_s == found.scenario.map(here))]
-    keys = ["scenario", "engine"]
-    both = found.merge(beside[[*keys, "cost", "error"]], on=keys, suffixes=("", "_here"))
+    both = found.merge(beside(found), on=["scenario", "engine"], suffixes=("", "_here"))
+    both = both[measurable(both)]
     for of in ("cost", "error"):
         both[of] /= both[f"{of}_here"]
     parts = [pooled(group).assign(change=str(change)) for (_, change), group in both.groupby(["profile", "change"])]
-    return pd.concat(parts).sort_values("rung", kind="stable")
+    return pd.concat(parts).sort_values("rung", kind="stable") if parts else found.head(0)
+
+
+def without_ratio(found: pd.DataFrame) -> list[tuple[str, str]]:
+    """(engine, scenario) of the dials where the matched engine failed, was not timed, or is right to the last bit."""
+    here = beside(found)
+    lost = here[~measurable(here)]
+    return list(zip(lost.engine, lost.scenario))
+
+
+def beside(found: pd.DataFrame) -> pd.DataFrame:
+    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its dial is turned."""
+    dt = found[found.change != PLAIN].groupby("scenario").dt_s.first()
+    here = found[(found.change == PLAIN) & (found.dt_s == found.scenario.map(dt))]
+    both = here[["scenario", "engine", "cost", "error"]]
+    return both.rename(columns={"cost": "cost_here", "error": "error_here"})
+
+
+def measurable(here: pd.DataFrame) -> pd.Series:
+    """Whether there is something to divide by."""
+    return np.isfinite(here.cost_here) & np.isfinite(here.error_here) & (here.error_here > 0)
 
 
 def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
     """A row a scenario, player, change and dt of one kind.
 
-    Columns: scenario, engine, profile, change, dt_s, substeps, seeds, failed (how many), status and reason (of the
+    Columns: scenario, engine, profile, change, dt_s, substeps, until_s and duration_s (of the first
+    seed, see `ladder.errors_of`), seeds, failed (how many), status and reason (of the
     first that failed), error (median over the seeds, radii; inf where it failed) and its 95 % interval error_low,
     error_high; cost (median, µs per simulated second; nan where not timed), its quartiles low and high, best,
     wrapping, rounds.
@@ -68,6 +84,7 @@ def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
         values, failed = group.error_radii.to_numpy(float), group[group.status != "ok"]
         low, high = median_interval(values, seed)
         rows.append(dict(zip(keys, key)) | {
+            "until_s": group.until_s.iloc[0], "duration_s": group.duration_s.iloc[0],
             "seeds": len(group), "failed": len(failed), "status": "ok" if failed.empty else failed.status.iloc[0],
             "reason": "" if failed.empty else failed.reason.iloc[0],
             "error": float(np.percentile(values, 50, method="higher" if np.isinf(values).any() else "linear")),
@@ -96,14 +113,30 @@ def in_us(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario and player: slope, low, high, verdict, see `order.Order`."""
+    """A row a scenario and player: slope, low, high, verdict, see `order.Order`; coarsest_error and finest_error in
+    radii (medians over the seeds), the latter at finest_dt_s; steps, how many were played, and failed, at how many of
+    them a draw failed: what failed has no part in slope and verdict.
+    """
     rows = []
     for keys, dt, errors, changes in ladders(measured):
         found = order_of(dt, errors, changes, seed) if errors.shape[1] >= 2 else Order(np.nan, np.nan, np.nan, "")
         if not np.isfinite(errors).any():
             found = Order(np.nan, np.nan, np.nan, FAILED)
-        rows.append(dict(zip(["scenario", *WHO], keys)) | found._asdict())
+        rows.append(dict(zip(["scenario", *WHO], keys)) | found._asdict() | {
+            "finest_dt_s": dt[-1], "steps": len(dt),
+            **dict(zip(("coarsest_error", "finest_error"), np.median(errors[:, [0, -1]], axis=0).tolist())),
+            "failed": int((~np.isfinite(errors)).any(axis=0).sum()),
+        })  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def no_nearer(fitted: pd.DataFrame) -> pd.Series:
+    """Of the rows of `orders`: whether from the coarsest to the finest step the error falls by less than a tenth.
+
+    Not so where all steps failed, or where the finest is right to `FINEST`; a failed finest step is no nearer.
+    """
+    falls = fitted.finest_error < NEARER * fitted.coarsest_error
+    return ~falls & (fitted.finest_error > FINEST) & (fitted.failed < fitted.steps)
 
 
 def ladders(measured: Measured) -> Iterator[tuple[tuple, np.ndarray, np.ndarray, np.ndarray]]:
@@ -117,7 +150,8 @@ def ladders(measured: Measured) -> Iterator[tuple[tuple, np.ndarray, np.ndarray,
 
 
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
-    """A row a scenario, player and accuracy: accuracy (radii), cost (µs per simulated second), dt_s, why it is not."""
+    """A row a scenario, player and accuracy: accuracy (radii), cost (µs per simulated second), dt_s, why it is not, and
+    lost: it is not at any dt, or failed."""
     verdicts: dict[tuple, str] = dict(zip(zip(fitted.scenario, fitted.engine, fitted.profile), fitted.verdict))
     rows = []
     for keys, group in found.groupby(["scenario", *WHO], sort=False):
@@ -127,29 +161,8 @@ def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
             if why == NOT_REACHED:
                 why = f"not down to dt {group.dt_s.min():.2g} s"
             rows.append(dict(zip(["scenario", *WHO], keys)) | {
-                "accuracy": name, "cost": cost, "dt_s": dt, "why": why,
+                "accuracy": name, "cost": cost, "dt_s": dt, "why": why, "lost": why in (UNREACHABLE, FAILED),
             })  # fmt: skip
-    return pd.DataFrame(rows)
-
-
-def pooled(found: pd.DataFrame) -> pd.DataFrame:
-    """A row a player and rung: error and cost, each the median over the scenarios, with quartiles; of, failed.
-
-    A scenario that a player failed counts as infinitely wrong; its cost is then that of the others.
-    """
-    rungs = found.groupby("scenario").rung.max().min()
-    rows = []
-    for (engine, profile, rung), group in found[found.rung <= rungs].groupby([*WHO, "rung"], sort=False):
-        error, cost = group.error.to_numpy(float), group.cost.dropna().to_numpy(float)
-        quartiles = np.percentile(error, [25, 50, 75], method="nearest") if len(error) else [np.nan] * 3
-        prices = np.percentile(cost, [25, 50, 75]) if len(cost) else [np.nan] * 3
-        rows.append({
-            "scenario": POOLED, "engine": engine, "profile": profile, "rung": rung, "dt_s": np.nan,
-            "error": quartiles[1], "error_low": quartiles[0], "error_high": quartiles[2],
-            "cost": prices[1], "low": prices[0], "high": prices[2], "seeds": len(group),
-            "failed": int((group.failed > 0).sum()), "status": "ok", "reason": "", "best": np.nan, "wrapping": np.nan,
-            "idle": np.nan,
-        })  # fmt: skip
     return pd.DataFrame(rows)
 
 
@@ -185,11 +198,14 @@ def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
     costs = in_us(summed_up(samples, [*WHO, "n"])).sort_values("n", kind="stable")
     costs = in_order(costs.reset_index(drop=True))
     rows = []
-    for (engine, profile), group in costs.groupby(WHO, sort=False):
+    timed = (costs.engine + ":" + costs.profile).tolist()
+    for name in dict.fromkeys([*timed, *(name for name, _ in measured.stopped)]):  # some have not even the fewest disks
+        engine, profile = name.split(":")
+        group = costs[(costs.engine == engine) & (costs.profile == profile)]
         fitted = exponent(group.n.to_numpy(float), group.cost.to_numpy(float))
-        ends = [f"{n}: {why}" for (name, n), why in measured.stopped.items() if name == f"{engine}:{profile}"]
+        ends = [f"{n}: {why}" for (who, n), why in measured.stopped.items() if who == name]
         rows.append({"engine": engine, "profile": profile} | dict(zip(("exponent", "low", "high"), fitted)) | {
-            "most": int(group.n.max()), "stopped": ends[0] if ends else "",
+            "most": int(group.n.max()) if len(group) else 0, "stopped": ends[0] if ends else "",
         })  # fmt: skip
     return costs, pd.DataFrame(rows)
 

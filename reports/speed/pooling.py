@@ -1,0 +1,101 @@
+"""All scenarios in one number: the geometric mean of the middle half of them, and how much any one of them moves it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from reports.speed.order import FINEST
+from scenarios.model import Array
+
+WHO = ["engine", "profile"]
+POOLED = "pooled"
+QUARTERS = (0.25, 0.75)
+LEAST = 2.0**-53  # an error of 0 counts as one of rounding: it has no logarithm
+
+
+def middle_half(values: Array) -> float:
+    """The geometric mean of the middle half of values (m,), each an equal share of the whole; nan of none.
+
+    The interquartile mean, here of logarithms: as robust as a median against a quarter of the values at either end,
+    infinite ones among them, but carried by half of the values where a median is carried by one or two. A value that
+    a quartile cuts counts in part. See Agarwal et al., "Deep reinforcement learning at the edge of the statistical
+    precipice", 2021, section 4.3.
+    """
+    if not len(values):
+        return float("nan")
+    edges = np.arange(len(values) + 1) / len(values)
+    weights = np.minimum(edges[1:], QUARTERS[1]) - np.maximum(edges[:-1], QUARTERS[0])
+    inside = weights > 0
+    logs = np.log(np.maximum(np.sort(values), LEAST))
+    return float(np.exp(np.average(logs[inside], weights=weights[inside])))
+
+
+def moved(values: Array, floor: float = 0.0) -> Array:
+    """By which factor (m,), 1 or more, `middle_half` changes if each of values (m,) is left out; what is below `floor`
+    counts as equal to it. inf where only one of the two is infinite, 1 where both are.
+    """
+    whole = max(middle_half(values), floor)
+    others = np.maximum([middle_half(np.delete(values, k)) for k in range(len(values))], floor)
+    if np.isinf(whole):
+        return np.where(np.isinf(others), 1.0, np.inf)
+    return np.maximum(others / whole, whole / others)
+
+
+def pooled(found: pd.DataFrame) -> pd.DataFrame:
+    """A row a player and rung that all scenarios have: error and cost, each `middle_half` over the scenarios.
+
+    Columns besides: error_low, error_high, low, high (quartiles); bare, of the cost less that of as many idle steps;
+    of (how many scenarios), failed (in how many it did), timed (how many carry the cost); moved and cost_moved (by
+    which factor leaving out one scenario changes error and cost at most), moved_by and cost_moved_by (which one).
+    A scenario that a player failed counts as infinitely wrong and infinitely dear; one that it played but was not timed
+    in is left out of the cost, and `timed` says so.
+    """
+    rungs = found.groupby("scenario").rung.max().min()
+    rows = []
+    for (engine, profile, rung), group in found[found.rung <= rungs].groupby([*WHO, "rung"], sort=False):
+        scenes, error = group.scenario.to_numpy(str), group.error.to_numpy(float)
+        priced = group[group.cost.notna() | (group.failed > 0)]
+        cost = priced.cost.fillna(np.inf).to_numpy(float)
+        bare = cost - priced.idle.to_numpy(float)
+        quartiles = np.percentile(error, [25, 75], method="nearest")
+        prices = np.percentile(cost, [25, 75], method="nearest") if len(cost) else [np.nan] * 2
+        rows.append({
+            "scenario": POOLED, "engine": engine, "profile": profile, "rung": rung, "dt_s": np.nan,
+            "error": middle_half(error), "error_low": quartiles[0], "error_high": quartiles[1],
+            "cost": finite(middle_half(cost)), "low": finite(prices[0]), "high": finite(prices[1]),
+            "bare": finite(middle_half(bare)) if not np.isnan(bare).any() else np.nan,
+            "of": len(group), "seeds": len(group), "failed": int((group.failed > 0).sum()), "timed": len(priced),
+            **most("moved", scenes, moved(error, FINEST)),
+            **most("cost_moved", priced.scenario.to_numpy(str), moved(cost)),
+            "status": "ok", "reason": "", "best": np.nan, "wrapping": np.nan, "idle": np.nan,
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def finite(value: float) -> float:
+    """The value, nan where it is infinite: what nobody can pay has no cost."""
+    return float(value) if np.isfinite(value) else float("nan")
+
+
+def most(name: str, scenes: Array, factors: Array) -> dict[str, float | str]:
+    """The largest factor under `name`, and under `name`_by its scenario; nan and "" of none."""
+    if not len(factors):
+        return {name: float("nan"), f"{name}_by": ""}
+    k = int(np.argmax(factors))
+    return {name: float(factors[k]), f"{name}_by": str(scenes[k])}
+
+
+def said_of_pool(found: pd.DataFrame) -> str:
+    """How much one scene can move a pooled point of `pooled`, and what failed; in words."""
+    failed = found[found.failed > 0].groupby(WHO, sort=False).failed.max().reset_index()
+    lost = ", ".join(f"{row.engine}:{row.profile} {row.failed}" for row in failed.itertuples())
+    told = f"Scenes failed: {lost}." if lost else "No engine failed a scene."
+    if found.of.max() < 2:
+        return f"One scene, so nothing is pooled. {told}"
+    worst, cost = found.iloc[int(found.moved.to_numpy(float).argmax())], found.cost_moved.max()
+    said = (
+        f"Leaving out any one of the {found.of.max()} scenes moves no pooled error by more than a factor of "
+        f"{worst.moved:.2g} ({worst.engine}:{worst.profile} without {worst.moved_by})"
+    )
+    return f"{said}{f' and no pooled cost by more than {cost:.2g}' if np.isfinite(cost) else ''}. {told}"

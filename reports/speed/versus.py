@@ -1,0 +1,64 @@
+"""What every engine with end-of-step detection costs over this project's own solver, scene by scene, at its cheapest.
+
+Our own solver must not be called the cheapest by a pooled number alone: here is every scene in which it is not, with
+and without what an idle step costs (the binding and the engine's fixed cost), and for every changed setting measured.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from adapters.habits import HABITS
+from reports.speed.plan import PLAIN
+
+OWN = "reference:exercise"
+LATE = tuple(name for name in HABITS if name != OWN)
+COLUMNS = [
+    "engine", "profile", "change", "scenes", "ratio", "low", "high", "cheaper", "cheaper_in", "bare_cheaper",
+    "bare_cheaper_in", "not_timed_in",
+]  # fmt: skip
+KEYS = ["engine", "profile", "change"]
+
+
+def against_own(points: pd.DataFrame, features: pd.DataFrame) -> pd.DataFrame:
+    """A row an engine with end-of-step detection, and one each of its changed settings, of `COLUMNS`.
+
+    ratio, low, high: its cost over that of `OWN` at the same steps, geometric mean, least and most over the scenes;
+    cheaper: in how many scenes it costs less, and bare_cheaper: less where an idle step is taken off both (nan where
+    that is not known); scenes: in how many both were timed, and not_timed_in those in which one was not.
+    """
+    plain = points.assign(change=PLAIN, name=points.engine + ":" + points.profile)
+    at = ["scenario", "dt_s"]
+    own = plain[plain.name == OWN][[*at, "cost", "idle"]].rename(columns={"cost": "own", "idle": "own_idle"})
+    both = plain[plain.name.isin(LATE)].merge(own, on=at, how="left")
+    if own.empty or both.empty:
+        return pd.DataFrame(columns=COLUMNS)
+    rows = pd.concat([both, features_over_own(features)]) if len(features) else both
+    found = [row_of(group) for _, group in rows.groupby(KEYS, sort=False)]
+    return pd.DataFrame(found, columns=COLUMNS)
+
+
+def features_over_own(features: pd.DataFrame) -> pd.DataFrame:
+    """scenario, engine, profile, change, cost and own of every changed setting of `LATE`, timed in the same rounds."""
+    names = features.engine + ":" + features.profile
+    own = features[names == OWN].groupby("scenario").cost_plain.first()
+    changed = features[names.isin(LATE)]
+    return changed.assign(own=changed.scenario.map(own), idle=np.nan, own_idle=np.nan)
+
+
+def row_of(group: pd.DataFrame) -> dict[str, object]:
+    """One row of `against_own` from those of one engine in all scenes and steps."""
+    known = {key: group[key].iloc[0] for key in KEYS}
+    logs = group.assign(log=np.log(group.cost) - np.log(group.own))
+    ratios = logs.groupby("scenario", sort=False)["log"].mean()
+    timed = np.exp(ratios.dropna())
+    bare = ((group.cost - group.idle) - (group.own - group.own_idle)) * group.get("dt_s", np.nan)
+    bare = bare.groupby(group.scenario, sort=False).mean().dropna()
+    cheaper, bare_cheaper = timed[timed < 1].index, bare[bare < 0].index
+    return known | {
+        "scenes": len(timed), "ratio": np.exp(np.log(timed).mean()), "low": timed.min(), "high": timed.max(),
+        "cheaper": len(cheaper), "cheaper_in": " ".join(cheaper),
+        "bare_cheaper": len(bare_cheaper) if len(bare) else np.nan, "bare_cheaper_in": " ".join(bare_cheaper),
+        "not_timed_in": " ".join(ratios[ratios.isna()].index),
+    }  # fmt: skip

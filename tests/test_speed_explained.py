@@ -1,0 +1,77 @@
+"""What the error budget leaves out is said beside the share that it explains."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from reports.speed import budget, explained
+from reports.speed.budget import TOTAL, UNEXPLAINED, budget_of
+from reports.speed.explained import COLUMNS, Cut, extent, sentence, share
+from reports.speed.ladder import held
+
+
+def made_up(*rows: tuple[str, str, float, float, float, float, str]) -> pd.DataFrame:
+    """A table of scene, engine, until, horizon, error, what is left, note."""
+    return pd.DataFrame(
+        [(scene, 0, engine, "own", 0.1, until, horizon, 9.0, error, left, note)
+         for scene, engine, until, horizon, error, left, note in rows],
+        columns=COLUMNS,
+    )  # fmt: skip
+
+
+TABLE = made_up(
+    ("short", "a", 0.2, 1.0, 1.0, 0.005, ""),
+    ("short", "b", 0.2, 1.0, 1.0, 0.5, ""),
+    ("whole", "a", 4.0, 4.0, 1.0, 0.0005, ""),
+    ("whole", "b", 4.0, 4.0, np.nan, np.nan, "error: no"),
+    ("still", "a", 3.0, 3.0, 0.0, 0.0, ""),
+    ("still", "b", 3.0, 3.0, 1e-13, 1e-13, ""),
+)
+
+
+def test_the_share_counts_what_is_not_played_and_what_is_exact_apart():
+    """Three errors: two explained to 1 %, one to 0.1 %; two are rounding, one was not played."""
+    assert share(TABLE) == explained.Share(3, (2, 1), 2, 1, 1, 1)
+
+
+def test_the_extent_counts_scenes_and_seconds_once_and_names_what_is_cut():
+    """However many engines played them."""
+    assert extent(TABLE) == explained.Extent(3, pytest.approx(7.2), pytest.approx(8.0), [Cut("short", 0.2, 1.0)])
+    assert extent(TABLE).cuts[0].share == pytest.approx(0.2)
+
+
+def test_the_sentence_says_what_is_cut_at_which_time_and_how_much_is_left():
+    """Nothing is cut: said, too; the words differ, so that neither can stand for the other."""
+    said, uncut = sentence(TABLE), sentence(TABLE[TABLE.scenario != "short"])
+
+    assert said.startswith("of 3 errors (2 engines in 3 scenes; 2 more are below 1e-09 radii; 1 were not played) 2 are")
+    assert "over 7 of 8 simulated seconds: 1 scenes are cut" in said
+    assert "(short at 0.2 of 1 s)" in said
+    assert said.endswith("Of the 1 errors in scenes that are not cut, 1 are explained to 1 %")
+    assert uncut.endswith("over 7 of 7 simulated seconds: every scene as far as its exact answer goes")
+
+
+def test_the_budget_itself_tells_how_far_it_goes():
+    """The gas is cut, and its exact answer ends before the scene; a fall is followed to its end."""
+    rows = [
+        row for scene, k in (("gas_of_100", 4), ("free_fall", 4)) for row in budget_of(scene, 0, "pymunk:matched", k)
+    ]
+    table = explained.explained(pd.DataFrame(rows, columns=budget.COLUMNS)).set_index("scenario")
+    gas, fall = table.loc["gas_of_100"], table.loc["free_fall"]
+
+    assert 0 < gas.until_s < gas.horizon_s < gas.duration_s
+    assert gas.horizon_s == held("gas_of_100", 0).scenario.duration
+    assert fall.until_s == fall.horizon_s == fall.duration_s
+    assert [cut.scenario for cut in extent(table.reset_index()).cuts] == ["gas_of_100"]
+
+
+def test_a_row_has_the_error_and_what_is_left_of_the_budget():
+    """As the parts have them."""
+    rows = pd.DataFrame(budget_of("slow_hit", 0, "box2d:matched", 4), columns=budget.COLUMNS)
+    parts = rows.set_index("part").position_radii
+    row = explained.explained(rows).iloc[0]
+
+    assert (row.error_radii, row.unexplained_radii) == (parts[TOTAL], parts[UNEXPLAINED])
+    assert row.note == ""

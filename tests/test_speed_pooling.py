@@ -1,0 +1,138 @@
+"""The pooled curve is carried by half of the scenes: no one of them is the curve, and none that fails is dropped."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from adapters.engines import ENGINES
+from reports.speed import ladder
+from reports.speed.effort import QUICK
+from reports.speed.order import FINEST
+from reports.speed.pooling import middle_half, moved, pooled, said_of_pool
+from scenarios.model import Array
+
+MOST = 2.0  # the factor by which leaving out one scene of the quick form may move a pooled error
+BEFORE = (
+    "free_fall", "head_on_equal_e09", "oblique_e1", "bouncing_ball_e1", "line_gas", "cradle_with_gaps", "ship_thrust",
+    "asteroids",
+)  # fmt: skip
+RUNGS = 3  # those that every scene has
+
+
+def test_the_middle_half_of_known_values():
+    """Of four the two in the middle; of three the middle one counts 2/3 and each other 1/6; of one itself."""
+    assert middle_half(np.array([1e9, 1.0, 100.0, 10.0])) == pytest.approx(np.sqrt(1000))
+    assert middle_half(np.array([1.0, 8.0, 64.0])) == pytest.approx(8.0)
+    assert middle_half(np.array([1.0, 1.0, 64.0])) == pytest.approx(64 ** (1 / 6))
+    assert middle_half(np.array([3.0])) == pytest.approx(3.0)
+    assert np.isnan(middle_half(np.array([])))
+
+
+def test_a_quarter_may_fail_or_be_exact_but_no_more():
+    """inf among the upper quarter and 0 among the lower have no weight; one more of the former, and all is infinite."""
+    values = np.array([0.0, 0.0, 2.0, 2.0, 2.0, 2.0, np.inf, np.inf])
+
+    assert middle_half(values) == pytest.approx(2.0)
+    assert middle_half(np.append(values, np.inf)) == np.inf
+
+
+def test_what_one_value_moves_is_found():
+    """Nothing where all are equal; below the floor nothing counts; one too many that fails moves it to infinity."""
+    assert moved(np.full(8, 3.0)) == pytest.approx(np.ones(8))
+    assert moved(np.array([1e-12, 1e-9, 1e-8]), floor=1e-6) == pytest.approx(np.ones(3))
+    assert moved(np.array([1.0, 2.0, 4.0]), floor=0.0).max() > 1.2
+    assert moved(np.array([1.0, 1.0, 1.0, np.inf])) == pytest.approx([np.inf] * 3 + [1.0])
+    assert moved(np.array([1.0, np.inf, np.inf, np.inf])) == pytest.approx(np.ones(4))
+
+
+def errors_of(scenes: tuple[str, ...], names: tuple[str, ...]) -> dict[tuple[str, int], Array]:
+    """(engine, rung) -> errors in radii, a scene each, of the steps that all scenes have."""
+    found: dict[tuple[str, int], list[float]] = {}
+    for scene in scenes:
+        rungs = QUICK.ladder(ladder.open_scene(scene, 0))[:RUNGS]
+        for name in names:
+            for rung, row in enumerate(ladder.errors_of(scene, 0, name, ENGINES[name].make, rungs)):
+                found.setdefault((name, rung), []).append(row["error_radii"])
+    return {key: np.array(errors) for key, errors in found.items()}
+
+
+def most_moved(errors: dict[tuple[str, int], Array]) -> float:
+    """The largest factor by which a pooled point moves if a scene is left out."""
+    return max(moved(each, FINEST).max() for each in errors.values())
+
+
+def median_moved(errors: dict[tuple[str, int], Array]) -> float:
+    """The same of the median that was the statistic before, which is always one of the values."""
+    factors = [1.0]
+    for each in errors.values():
+        whole = max(np.percentile(each, 50, method="nearest"), FINEST)
+        others = [max(np.percentile(np.delete(each, k), 50, method="nearest"), FINEST) for k in range(len(each))]
+        factors += [max(other / whole, whole / other) for other in others]
+    return max(factors)
+
+
+STEPPING = ("reference:exercise", "pymunk:shipped", "box2d_v3:shipped")
+
+
+def test_no_one_scene_is_the_pooled_curve():
+    """Of three engines, the shipped ones being those whose errors are the farthest apart."""
+    errors = errors_of(QUICK.scenes, STEPPING)
+
+    assert most_moved(errors) < MOST
+    for each in errors.values():
+        assert not np.isclose(middle_half(each), each, rtol=1e-6).any()
+
+
+def test_the_scenes_and_the_median_of_before_fail_both():
+    """Negative control: with the scenes of before the statistic moves by more, and their median was free_fall's own
+    closed form, a g dt t / 2 over the radius, at every step.
+    """
+    errors = errors_of(BEFORE, STEPPING)
+    fall = ladder.held("free_fall", 0).scenario
+    g, t = float(np.linalg.norm(fall.scene.gravity)), fall.duration
+    for rung in range(RUNGS):
+        medians = np.percentile(errors["reference:exercise", rung], 50, method="nearest")
+        assert medians == pytest.approx(0.5 * fall.dt(2**rung) * g * t / fall.scene.radius[0], rel=1e-9)
+
+    assert most_moved(errors) > MOST
+    assert median_moved(errors) > 10 * MOST
+
+
+@pytest.mark.slow  # ten engines through fourteen scenes
+def test_no_one_scene_is_the_pooled_curve_of_any_engine():
+    """All engines and profiles."""
+    assert most_moved(errors_of(QUICK.scenes, tuple(ENGINES))) < MOST
+
+
+def points(costs: list[float], errors: list[float]) -> pd.DataFrame:
+    """A row a scene of one engine at one step: failed where the error is infinite."""
+    names = [f"scene_{k}" for k in range(len(costs))]
+    return pd.DataFrame({
+        "scenario": names, "engine": "some", "profile": "own", "rung": 0, "cost": costs, "error": errors, "idle": 1.0,
+        "failed": np.isinf(errors).astype(int),
+    })  # fmt: skip
+
+
+def test_a_failed_scene_is_infinitely_dear_and_an_untimed_one_is_counted():
+    """Dropping the failed scene would make the engine cheaper: it was the dearest, which is why it failed."""
+    failed = pooled(points([1.0, 2.0, 4.0, np.nan], [0.1, 0.2, 0.4, np.inf])).iloc[0]
+    untimed = pooled(points([1.0, 2.0, 4.0, np.nan], [0.1, 0.2, 0.4, 0.5])).iloc[0]
+
+    assert failed.cost == pytest.approx(np.sqrt(8))  # of 1, 2, 4, inf
+    assert untimed.cost == pytest.approx(2.0)  # of 1, 2, 4
+    assert [failed[name] for name in ("of", "failed", "timed")] == [4, 1, 4]
+    assert [untimed[name] for name in ("of", "failed", "timed")] == [4, 0, 3]
+    assert "Scenes failed: some:own 1." in said_of_pool(pooled(points([1.0, np.nan], [0.1, np.inf])))
+    assert "No engine failed a scene." in said_of_pool(pooled(points([1.0, 2.0], [0.1, 0.2])))
+
+
+def test_a_pool_says_which_scene_moves_it_most():
+    """Leaving out the only scene between small and large errors moves the middle most."""
+    told = pooled(points([1.0] * 5, [1e-3, 1e-3, 0.1, 10.0, 10.0]))
+
+    assert told.moved.iloc[0] == pytest.approx(moved(told_errors := np.array([1e-3, 1e-3, 0.1, 10, 10])).max())
+    assert told.moved_by.iloc[0] == f"scene_{moved(told_errors).argmax()}"
+    assert f"without {told.moved_by.iloc[0]}" in said_of_pool(told)
+    assert said_of_pool(pooled(points([1.0], [0.1]))).startswith("One scene")
