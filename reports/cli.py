@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from reports.exits import ends_when_told, refuse
+from reports.exits import refuse
 
 app = typer.Typer(
     name="crosscheck",
@@ -238,9 +238,3 @@ def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metric
     from reports.commands import explain
 
     explain(what)
-
-
-def main() -> None:
-    """The command `crosscheck`."""
-    with ends_when_told():
-        app()

@@ -1,0 +1,15 @@
+"""The command `crosscheck`, or `python -m reports`: it can be told to stop before it has imported what it needs."""
+
+from reports.exits import ends_when_told
+
+
+def main() -> None:
+    """Do what the command line asks for."""
+    with ends_when_told():
+        from reports.cli import app  # which takes a second: what is raised while it is imported may be lost
+
+        app()
+
+
+if __name__ == "__main__":
+    main()
