@@ -15,7 +15,6 @@ from reports.lessons.catalogue import LESSONS
 from scenarios.catalogue import SCENARIOS
 from tests.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS
-from tests.stability_limits import readme_table
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
@@ -130,8 +129,3 @@ def test_every_file_the_readme_names_exists():
     assert named
     for path in named:
         assert (ROOT / path).exists() or path.startswith("reports/out/"), path  # the latter is there after a run
-
-
-def test_the_table_of_limits_is_that_of_the_file():
-    """No number in it is typed in."""
-    assert readme_table() in TEXT

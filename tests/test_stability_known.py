@@ -60,10 +60,12 @@ def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
 
 
 def test_only_the_speculative_margin_invents_hits():
-    """Box2D 3.1 as shipped, within 0.02 m: 0.04 of the sum of the radii; nobody else."""
+    """Box2D 3.1, within four slops: as shipped 0.02 m, 0.04 of the sum of the radii; nobody else."""
     found = {player: limit("near_miss", player).verdict for player in (*DISCRETE, *PARTNERS)}
 
-    assert {player for player, verdict in found.items() if verdict != "does not fail"} == {"box2d_v3:shipped"}
+    invent = {player for player, verdict in found.items() if verdict != "does not fail"}
+    assert "box2d_v3:shipped" in invent
+    assert invent <= {"box2d_v3:shipped", "box2d_v3:matched"}
     assert limit("near_miss", "box2d_v3:shipped").fails_at < 0.04
 
 
@@ -94,11 +96,13 @@ def test_the_caps_on_spin_are_a_quarter_and_an_eighth_of_a_turn_a_step():
 def drift(player: str, x: float, runs: int = 1) -> float:
     """Gain of height per bounce over |v| dt, of balls dropped from 1.25 m and a little more; x = dt / fall time."""
     found = []
-    for scenario in (ball(x, run, runs) for run in range(runs)):
+    for scenario in (ball(x, run) for run in range(runs)):
         played = play_as(player, scenario).trajectory
         assert played is not None
         height = scenario.scene.position[0, 1] - scenario.scene.radius[0]
-        found.append(apex_drift(scenario, played) * height / (sqrt(2 * 10 * height) * scenario.sample_interval))
+        found.append(
+            apex_drift(scenario, played) * height / (sqrt(2 * 10 * height) * scenario.dt(scenario.substeps[0]))
+        )
     return float(np.mean(found))
 
 
@@ -108,7 +112,7 @@ def test_a_bounce_gains_what_the_order_of_operations_says():
     # Higher orders in dt: a tenth at this step.
     assert drift("box2d:matched", 0.01) == pytest.approx(1.0, rel=0.1)
     assert drift("reference:lesson", 0.01) == pytest.approx(1.0, rel=0.1)
-    # A soft contact gives back more or less with the phase of the hit in its step.
+    # A soft contact gives back more or less with the phase of the collision in its step.
     assert drift("box2d_v3:matched", 0.01, runs=6) == pytest.approx(-1 / 4, rel=0.25)
     assert drift("box2d_v3:matched+16_substeps", 0.01, runs=6) == pytest.approx(-1 / 16, rel=0.5)
     assert drift("box2d_v3:shipped", 0.01, runs=6) < -0.5  # its margin of 2 cm stops the ball before the floor
@@ -117,7 +121,7 @@ def test_a_bounce_gains_what_the_order_of_operations_says():
 @pytest.mark.parametrize("player", PARTNERS)
 def test_float32_is_off_by_6_percent_at_10_km(player: str):
     """At 1 m/s and 1/240 s, exactly as adding up in float32 is; from 4096 m on it is more than 1 %."""
-    scenario = far(1e4, 0, 1)
+    scenario = far(1e4, 0)
     played = play_as(player, scenario).trajectory
     x = np.float32(1e4)
     for _ in range(240):
@@ -133,7 +137,7 @@ def test_float32_is_off_by_6_percent_at_10_km(player: str):
 )
 def test_a_push_read_off_the_positions_makes_an_oscillator_grow_as_published(player: str, factor: float):
     """E / E0 after 400 steps at w dt = 0.05, engine_facts section 5."""
-    played: Trajectory | None = on_spring(PLAYERS[player], oscillator(0.05, 0, 1))[1].trajectory
+    played: Trajectory | None = on_spring(PLAYERS[player], oscillator(0.05, 0))[1].trajectory
     assert played is not None
     energy = (played.velocity**2 + played.position**2).sum(axis=(1, 2)) / 2
 
@@ -165,7 +169,7 @@ def test_a_pair_keeps_its_velocities_up_to_a_mass_ratio_of_1e8():
 def test_a_wrong_threshold_would_be_noticed():
     """The negative control: a scene that closes at twice the speed does not fail at 1 m/s."""
     case = CASES["slow_hit"]
-    faster = replace(case, scene=lambda x, run, of: case.scene(2 * x, run, of))
+    faster = replace(case, scene=lambda x, run: case.scene(2 * x, run))
     found = Search(faster, "box2d:shipped", QUICK).limit()
 
     assert not min(found.works_at, found.fails_at) <= 1.0 <= max(found.works_at, found.fails_at)

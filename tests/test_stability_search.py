@@ -8,7 +8,7 @@ import os
 import zlib
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from math import isnan, nan
+from math import isnan, nan, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +52,7 @@ TOO_FAST = Predicate("too fast", "m/s", 1.0, "the reading is above 1", read_spee
 def case(reading: Callable[[float, int], float], values: tuple[float, ...], **more: Any) -> Case:
     """A case whose runs read what a function of the value and the number of the run gives."""
 
-    def scene(x: float, run: int, _of: int) -> Scenario:
+    def scene(x: float, run: int) -> Scenario:
         return Scenario("made-up", "?", "", replace(SCENE, velocity=[[reading(x, run), 0]]), 1.0, 1.0, (1,))
 
     def play(_: Player, scenario: Scenario) -> tuple[Scenario, Run]:
@@ -121,7 +121,7 @@ def test_what_works_only_where_it_is_harsh_is_called_so():
 
 def test_one_run_in_sixteen_is_enough_to_fail_and_is_the_one_that_is_kept():
     """The fraction that failed stands beside the limit; one run alone would have seen nothing."""
-    rare = case(lambda x, run: 2.0 if run == 11 and x > 17 else 0.5, UP, drawn=True)
+    rare = case(lambda x, run: 2.0 if run == 11 and x > 17 else 0.5, UP, runs=16)
     search = Search(rare, "reference:exercise", FULL)
     found = search.limit()
     failing = found.failing
@@ -132,7 +132,7 @@ def test_one_run_in_sixteen_is_enough_to_fail_and_is_the_one_that_is_kept():
     kept = search.failure(found)
     assert kept is not None
     assert kept[0].scene.velocity[0, 0] == 2.0
-    assert limit_of(replace(rare, drawn=False)).verdict == "does not fail"
+    assert limit_of(replace(rare, runs=1)).verdict == "does not fail"
 
 
 def test_a_number_that_is_none_fails_and_a_run_that_broke_off_fails_with_its_reason():
@@ -152,19 +152,58 @@ def test_a_number_that_is_none_fails_and_a_run_that_broke_off_fails_with_its_rea
 
 def test_a_statistic_may_fail_by_chance_in_one_run_of_sixteen_and_not_in_two():
     """Of what is drawn and read with an error; a run of four that fails is too many."""
-    one = case(lambda x, run: 2.0 if run < x else 0.5, (1.0, 2.0, 4.0), drawn=True, by_chance=1 / 16)
+    one = case(lambda x, run: 2.0 if run < x else 0.5, (1.0, 2.0, 4.0), runs=16, by_chance=1 / 16)
     found = limit_of(one)
 
     assert (found.verdict, found.works_at) == ("limit", 1.0)
     assert (found.trials[0].failed, found.trials[0].runs) == (1, 16)
-    assert limit_of(one, QUICK).verdict == "never works"
+    assert limit_of(one, QUICK).works_at == 1.0
     assert limit_of(replace(one, by_chance=0.0)).verdict == "never works"
+
+
+def test_the_limit_is_the_first_failure_and_what_works_beyond_is_seen_in_both_forms():
+    """Two stretches that fail: the search stops at the gentler, and says that there is more than one edge."""
+    one = case(lambda x, _: 2.0 if 5 < x < 20 or x > 50 else 0.5, UP)
+    quick, full = (limit_of(one, form) for form in (QUICK, FULL))
+
+    for found in (quick, full):
+        assert found.verdict == "limit"
+        assert found.works_at <= 5 <= found.fails_at
+        assert not found.monotone
+    assert quick.spacing == pytest.approx(3.0)
+    assert full.spacing == pytest.approx(sqrt(3.0))
+
+
+def test_the_values_of_the_quick_form_are_some_of_those_of_the_full_one():
+    """So that where both have all runs, which are the same, what fails in one fails in the other."""
+    for name, one in CASES.items():
+        assert set(one.scan(QUICK)) <= set(one.scan(FULL)), name
+
+
+def test_what_few_runs_do_not_show_is_found_next_to_the_limit_by_all_of_them():
+    """Run 11 fails from 4 on, where the four runs of the way see nothing; they alone would say 17."""
+    one = case(lambda x, run: 2.0 if x > 17 or (run == 11 and x > 4) else 0.5, UP, runs=16)
+    found = limit_of(one, QUICK)
+
+    assert found.works_at <= 4 <= found.fails_at
+    assert limit_of(replace(one, runs=4), QUICK).works_at > 16
+
+
+def test_a_value_is_left_at_its_first_failure_but_at_the_limit_all_is_played():
+    """Beyond the limit one run is enough to see that it does not work; the share that failed is that of all at it."""
+    found = limit_of(case(lambda x, run: 2.0 if x > 17 and run >= 1 else 0.5, UP, runs=16), QUICK)
+    failing = found.failing
+
+    assert failing is not None
+    assert (failing.runs, failing.failed, failing.first, failing.left) == (16, 15, 1, False)
+    assert [(trial.runs, trial.left) for trial in found.trials if trial.value == 100.0] == [(2, True)]
+    assert [trial.runs for trial in found.trials if trial.value == 1.0] == [4]
 
 
 def test_one_phase_alone_would_overlook_the_limit():
     """The negative control of the phases: with hits in the middle of a step alone, tunnelling begins at 4, not 2."""
     one = CASES["tunnelling_head_on"]
-    blind = replace(one, scene=lambda x, _run, _of: at_speed(x, 0, 2), drawn=False)
+    blind = replace(one, scene=lambda x, _run: at_speed(x, 1), runs=1)
 
     assert Search(blind, "reference:exercise", QUICK).limit().works_at > 3.5
     assert Search(one, "reference:exercise", QUICK).limit().fails_at < 2.1

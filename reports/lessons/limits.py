@@ -71,10 +71,10 @@ def limits_of(name: str) -> list[Limit]:
 
 
 def run_at(case: Case, player: str, value: float) -> tuple[Trial, Scenario, Run]:
-    """All runs of a player at a value, and of them the first that fails, or the last, which has the worst phase."""
-    search, count = Search(case, player, QUICK), case.runs(QUICK)
-    trial = search.played(value)
-    return trial, *(search.seen.get(value) or case.play(PLAYERS[player], case.scene(value, count - 1, count)))
+    """All runs of a player at a value, and of them the first that fails, or the first, which has the worst phase."""
+    search = Search(case, player, QUICK)
+    trial = search.trial(value, to_the_end=True)
+    return trial, *(search.seen.get(value) or case.play(PLAYERS[player], case.scene(value, 0)))
 
 
 def show_limits(settings: Settings) -> Shown:
@@ -172,8 +172,8 @@ LIMITS = Lesson(
     text=(
         "Every method works in gentle scenes. Make one thing harsher, a speed, a distance, a size, and most have a "
         "value from which on they <b>fail</b>: a hit is missed, a spin is cut, a place is rounded away. The search "
-        "tries values from gentle to harsh, a hit at several moments of its step, and halves the gap between the last "
-        "value that works and the first that fails until the two are 5 % apart.",
+        "tries values from gentle to harsh, a collision at several moments of its step, stops at the first that fails, "
+        f"and halves the gap to the last that works until the two are {QUICK.ratio - 1:.0%} apart.",
         "A reason counts as tested if the limit follows from it, or if a player that differs in that one thing gets "
         "farther; else it is called likely. These are the cases that take a second; "
         "<code>crosscheck stability</code> searches them all.",

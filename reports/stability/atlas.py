@@ -31,13 +31,14 @@ from reports.worker_process import Failure
 
 COLUMNS = (
     "engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "seeds", "reason",
-    "verdict", "failed_fraction", "runs", "monotone", "tested", "source", "event", "form",
+    "verdict", "failed_fraction", "runs", "monotone", "spacing", "tested", "source", "event", "form",
 )  # fmt: skip
 TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one player
 SLOWEST_FIRST = (
     "long_gas",
     "long_wrapped_gas",
     "thermometer",
+    "fast_gas",
     "dense_gas",
     "pile_comes_to_rest",
     "bounce_drift",
@@ -220,7 +221,7 @@ def row_of(limit: Limit) -> dict[str, Any]:
         "predicate": failing.broken if failing else case.predicate.name,
         "seeds": max(trial.runs for trial in limit.trials), "reason": limit.why, "verdict": limit.verdict,
         "failed_fraction": failing.failed / failing.runs if failing else 0.0, "runs": limit.runs,
-        "monotone": limit.monotone, "tested": limit.tested, "source": limit.source,
+        "monotone": limit.monotone, "spacing": shortened(limit.spacing), "tested": limit.tested, "source": limit.source,
         "event": failing.event if failing else "", "form": limit.form,
     }  # fmt: skip
 

@@ -129,8 +129,13 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
         case, parameter = Path(name).name, case_named(name).parameter
         rows.add_row(case + (", " if len(case + parameter) < 24 else ",\n") + parameter, *cells)
     console.print(rows)
-    console.print("A number: fails there. ≤, ≥: fails up to there, works beyond. –: does not fail so far. never: fails")
-    console.print("everywhere. *: more than one edge, works again beyond or fails before as well; see the page.")
+    console.print(
+        "A number: the first failure from gentle to harsh. ≤, ≥: fails up to there, works beyond. –: does not"
+    )
+    console.print(
+        "fail so far. never: fails everywhere. *: works again beyond, or fails before. Brackets, and how far apart"
+    )
+    console.print("values were scanned, are in limits.csv (works_at, fails_at, spacing) and on the page.")
     console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
     lost = [f"{one.case} on {one.player}" for one in limits if one.status != "ok"]
     lost += [f"{one.name} on {one.player}" for one in atlas.maps if one.status != "ok"]

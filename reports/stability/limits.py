@@ -1,11 +1,11 @@
-"""Finds the limit up to which a player works: a coarse scan of a case's parameter, then bisection of the first edge."""
+"""Finds the limit up to which an engine works: the first failure on the way from gentle to harsh, then bisection."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import isfinite, nan, sqrt
+from math import isfinite, isnan, nan, sqrt
 
 from adapters.play import Run
 from reports.stability.players import PLAYERS, Player, played
@@ -18,16 +18,24 @@ LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND = "limit", "does not fail", "never 
 
 @dataclass(frozen=True)
 class Form:
-    """How thorough a search is: runs at a value, how close the bracket is made, every how many values are scanned."""
+    """How thorough a search is.
+
+    Attributes:
+        few: runs at a value that is only passed on the way; next to the limit a value gets all of its case.
+        ratio: how close the bracket is made.
+        whole: whether every value is played to its last run, also where one has failed, and those that only this form
+            scans are, too.
+    """
 
     name: str
-    runs: int
+    few: int
     ratio: float
-    every: int
+    whole: bool
 
 
-QUICK = Form("quick", runs=4, ratio=1.05, every=2)
-FULL = Form("full", runs=16, ratio=1.01, every=1)
+ALL = 10**6  # runs: more than any case has
+QUICK = Form("quick", few=4, ratio=1.05, whole=False)
+FULL = Form("full", few=ALL, ratio=1.01, whole=True)
 FORMS = {form.name: form for form in (QUICK, FULL)}
 
 
@@ -46,17 +54,17 @@ class Case:
         asks: the question in one sentence.
         parameter, unit: what is varied, dimensionless where it can be.
         values: to scan, from gentle to harsh.
-        scene: (value, number of the run from 0, of how many) -> the scenario; it is played at its only step size.
+        scene: (value, number of the run from 0) -> the scenario; it is played at its only step size. Fewer runs are the
+            first of more.
         predicate: what failing means.
-        drawn: whether the runs at a value differ (in the phase of the hit within a step, or in what is drawn).
+        runs: at a value: 1 where nothing differs, else phases of the collision within a step, or seeds.
         whole: whether the parameter counts something.
         also: players of `PLAYERS` besides those of `ENGINES`: an engine with one thing switched.
         play: player and scenario -> the run and what it is judged by, where that takes more than one call of `play`.
-        quick_values: to scan in the quick form, where it is not every other one of `values`.
-        refines: whether the first edge is bisected.
+        quick_values: to scan in the quick form, where a run is long: some of `values`.
+        refines: whether the first edge is bisected, and the full form scans between the values.
         ratio: how close the bracket is made at best, where a run is long or what is drawn differs much.
         by_chance: share of the runs at a value that may fail by chance, where what is read is a statistic.
-        most_runs, quick_runs: at a value, in all forms and in the quick one, where a run is long.
         beside: what a failing run is shown beside.
     """
 
@@ -66,9 +74,9 @@ class Case:
     parameter: str
     unit: str
     values: tuple[float, ...]
-    scene: Callable[[float, int, int], Scenario]
+    scene: Callable[[float, int], Scenario]
     predicate: Predicate
-    drawn: bool = False
+    runs: int = 1
     whole: bool = False
     also: tuple[str, ...] = ()
     play: Callable[[Player, Scenario], tuple[Scenario, Run]] = once
@@ -76,32 +84,38 @@ class Case:
     refines: bool = True
     ratio: float = 1.0
     by_chance: float = 0.0
-    most_runs: int = 10**6
-    quick_runs: int = 10**6
     beside: str = EXACT
 
+    @property
+    def harsher(self) -> int:
+        """1 if larger values are harsher, -1 if smaller ones are."""
+        return 1 if self.values[-1] > self.values[0] else -1
+
     def scan(self, form: Form) -> tuple[float, ...]:
-        """The values to scan; the last of them always."""
-        if form.every == 1:
+        """The values to scan; in the full form those half way between them as well, so that the quick ones are some."""
+        if not form.whole:
+            return self.quick_values or self.values
+        if not self.refines:
             return self.values
-        return self.quick_values or tuple(sorted_like(self.values, {*self.values[:: form.every], self.values[-1]}))
+        halves = (self.half_way(*pair, self.ratio) for pair in pairwise(self.values))
+        return tuple(sorted({*self.values, *filter(None, halves)}, key=lambda value: self.harsher * value))
 
-    def runs(self, form: Form) -> int:
-        """How many runs a value gets."""
-        most = self.most_runs if form.every == 1 else min(self.most_runs, self.quick_runs)
-        return min(form.runs, most) if self.drawn else 1
-
-
-def sorted_like(order: Sequence[float], chosen: set[float]) -> list[float]:
-    """The chosen ones in the order in which they stand."""
-    return [value for value in order if value in chosen]
+    def half_way(self, one: float, other: float, ratio: float) -> float | None:
+        """The value in the middle of two in their logarithm; None if they are within a ratio, or there is none."""
+        low, high = min(one, other), max(one, other)
+        if high <= low * ratio:
+            return None
+        if not self.whole:
+            return sqrt(low * high)
+        middle = round(sqrt(low * high))
+        return float(middle) if low < middle < high else None
 
 
 @dataclass(frozen=True)
 class Trial:
-    """All runs at one value: how many, how many of them failed, the worst reading, and the first that failed.
+    """The runs at one value: how many, how many of them failed, the worst reading, and the first that failed.
 
-    So many as are `allowed` may fail by chance.
+    So many as are `allowed` may fail by chance. `left`: whether it was left at a failure, with runs not played.
     """
 
     value: float
@@ -114,6 +128,7 @@ class Trial:
     broken: str = ""
     disk: int = 0
     allowed: int = 0
+    left: bool = False
 
     @property
     def works(self) -> bool:
@@ -130,10 +145,12 @@ class Limit:
         form: of `FORMS`.
         verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on), or "works only beyond"
             (at works_at, and not at the gentler fails_at).
-        works_at: of the first two neighbours of which the gentler works and the harsher fails, the gentler; nan: none.
-        fails_at: the harsher: more runs failed than may by chance; nan: none.
+        works_at: the harshest value before the first failure, where all runs of the form were played; nan: none.
+        fails_at: the first failure on the way from gentle to harsh: more runs failed than may by chance; nan: none.
         trials: every value tried, from gentle to harsh.
-        monotone: False if there is more than one edge: it works again beyond, or fails before as well.
+        monotone: False if there is more than one edge among the values tried: it works again beyond,
+            or fails at the gentlest as well.
+        spacing: the resolution: the largest ratio of two neighbours among the values tried, up to the first failure.
         seconds: of processor time that the search took.
         cured: the change of `CURES` with which the failing run works; "" if none was found, or looked for.
         twin: the habits with which the reference has this limit, as `twin_of`; "" likewise.
@@ -148,6 +165,7 @@ class Limit:
     fails_at: float
     trials: tuple[Trial, ...]
     monotone: bool = True
+    spacing: float = nan
     cured: str = ""
     twin: str = ""
     reason: str = ""
@@ -191,85 +209,87 @@ class Limit:
 
 @dataclass
 class Search:
-    """One case on one player; remembers what was tried and the first failing run next to the limit."""
+    """One case on one player; remembers what was read at each value and the first failing run there."""
 
     case: Case
     player: str
     form: Form
-    tried: dict[float, Trial] = field(default_factory=dict)
+    readings: dict[float, list[Reading]] = field(default_factory=dict)
     seen: dict[float, tuple[Scenario, Run]] = field(default_factory=dict)
 
     def limit(self) -> Limit:
-        """Scan, then bisect the first edge."""
-        scan = list(self.case.scan(self.form))
-        works = [self.trial(value).works for value in scan]
-        edge = first_edge(works)
-        if edge is None and works[0]:
+        """Scan until the first failure, bisect between it and what works before; then see what works again beyond."""
+        scan = self.case.scan(self.form)
+        first = next((k for k, value in enumerate(scan) if not self.trial(value, self.form.few).works), len(scan))
+        while first and not self.trial(scan[first - 1]).works:  # the few runs on the way did not show it
+            first -= 1
+        works = [True] * first + [self.trial(value).works for value in scan[first:]]
+        if all(works):
             return self.limit_of(NEVER_FAILS, scan[-1], nan)
-        if edge is None:
+        if not any(works):
             return self.limit_of(NEVER_WORKS, nan, scan[0])
-        near, far = scan[edge], scan[edge + 1]
-        good, bad = (near, far) if works[edge] else (far, near)
-        while self.case.refines and (middle := self.between(good, bad)) is not None:
+        edge = next((k for k in range(1, len(scan)) if works[k - 1] and not works[k]), None)
+        if edge is not None:
+            return self.limit_of(LIMIT, *self.bracket(scan[edge - 1], scan[edge]))
+        edge = works.index(True)
+        return self.limit_of(ONLY_BEYOND, *self.bracket(scan[edge], scan[edge - 1]))
+
+    def bracket(self, good: float, bad: float) -> tuple[float, float]:
+        """What works and what fails, brought together by bisection as close as form and case say."""
+        ratio = max(self.form.ratio, self.case.ratio)
+        while self.case.refines and (middle := self.case.half_way(good, bad, ratio)) is not None:
             good, bad = (middle, bad) if self.trial(middle).works else (good, middle)
-        return self.limit_of(LIMIT if works[edge] else ONLY_BEYOND, good, bad)
+        return good, bad
 
-    def between(self, good: float, bad: float) -> float | None:
-        """The value to try next, or None if the bracket is close enough."""
-        low, high, ratio = min(good, bad), max(good, bad), max(self.form.ratio, self.case.ratio)
-        if self.case.whole:
-            middle = round(sqrt(low * high))
-            return float(middle) if low < middle < high and high > low * ratio else None
-        if high <= low * ratio:
-            return None
-        return sqrt(low * high)
+    def trial(self, value: float, runs: int = ALL, to_the_end: bool = False) -> Trial:
+        """Play a value up to so many runs; it is left where more have failed than may, unless the form is the full one.
 
-    def trial(self, value: float) -> Trial:
-        """Play all runs at one value."""
-        if value not in self.tried:
-            self.tried[value] = self.played(value)
-        return self.tried[value]
-
-    def played(self, value: float) -> Trial:
-        """All runs at one value; the first that fails is remembered."""
-        case, count = self.case, self.case.runs(self.form)
-        readings: list[Reading] = []
-        first = -1
-        for run_number in range(count):
-            scenario, run = case.play(PLAYERS[self.player], case.scene(value, run_number, count))
-            reading = judge(case.predicate, scenario, run)
-            readings.append(reading)
-            if reading.failed and first < 0:
-                first = run_number
-                self.seen[value] = scenario, run
+        Where a run has failed that may have by chance, all are played.
+        """
+        most, readings = self.case.runs, self.readings.setdefault(value, [])
         failed = sum(reading.failed for reading in readings)
+        while len(readings) < (most if failed or to_the_end else min(runs, most)):
+            if failed > self.allowed and not (self.form.whole or to_the_end):
+                break
+            scenario, run = self.case.play(PLAYERS[self.player], self.case.scene(value, len(readings)))
+            readings.append(judge(self.case.predicate, scenario, run))
+            failed += readings[-1].failed
+            if readings[-1].failed:
+                self.seen.setdefault(value, (scenario, run))
+        return self.tried(value)
+
+    @property
+    def allowed(self) -> int:
+        """How many runs at a value may fail by chance."""
+        return int(self.case.by_chance * self.case.runs)
+
+    def tried(self, value: float) -> Trial:
+        """What is known of a value."""
+        readings = self.readings[value]
+        count, failed = len(readings), sum(reading.failed for reading in readings)
         worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
-        if first < 0:
+        if not failed:
             return Trial(value, count, failed, worst)
-        broke, allowed = readings[first], int(case.by_chance * count)
-        return Trial(value, count, failed, worst, first, broke.at, broke.event, broke.broken, broke.disk, allowed)
+        first = next(k for k, reading in enumerate(readings) if reading.failed)
+        one, left = readings[first], count < self.case.runs
+        return Trial(value, count, failed, worst, first, one.at, one.event, one.broken, one.disk, self.allowed, left)
 
     def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
-        """The limit, with all that was tried in the order of the scan."""
-        order = sorted(self.tried, reverse=self.case.values[0] > self.case.values[-1])
-        trials = tuple(self.tried[value] for value in order)
+        """The limit, with all that was tried from gentle to harsh; at its failure every run is played."""
+        if not isnan(fails_at):
+            self.trial(fails_at, to_the_end=True)
+        trials = tuple(self.tried(value) for value in sorted(self.readings, key=lambda x: self.case.harsher * x))
         changes = sum(one.works != other.works for one, other in pairwise(trials))
-        return Limit(
-            self.case.name, self.player, self.form.name, verdict, works_at, fails_at, trials, monotone=changes <= 1
-        )
+        until = [trial.value for trial in trials]
+        if verdict == LIMIT:
+            until = until[: until.index(fails_at) + 1]
+        spacing = max((max(one / other, other / one) for one, other in pairwise(until)), default=nan)
+        names = self.case.name, self.player, self.form.name
+        return Limit(*names, verdict, works_at, fails_at, trials, changes <= 1, spacing)
 
     def failure(self, limit: Limit) -> tuple[Scenario, Run] | None:
         """The first run that failed at the limit, for the replay; None if none failed."""
         return self.seen.get(limit.fails_at)
-
-
-def first_edge(works: Sequence[bool]) -> int | None:
-    """The first k with works[k] and not works[k + 1]; else the first with the reverse; None if all are the same."""
-    for first in (True, False):
-        for k in range(len(works) - 1):
-            if works[k] == first and works[k + 1] != first:
-                return k
-    return None
 
 
 def players_of(case: Case) -> list[str]:

@@ -104,7 +104,7 @@ def with_iterations(player: str, scenario: Scenario, _ratio: float, count: float
 
 def hit_at(x: float, y: float, run: int) -> Scenario:
     """x = dt over 1/64 s, y = closing speed in m/s: `flyby` in other units of time would be the same scene."""
-    return flyby(y, run, 2, dt=x / 64)
+    return flyby(y, run, dt=x / 64)
 
 
 HITS_X = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0)

@@ -120,8 +120,8 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     if odd:
         names = ", ".join(dict.fromkeys(f"{limit.player} in {limit.case}" for limit in odd[:3]))
         found.append(
-            f"{len(odd)} of the searches found more than one edge (marked *): a player that works again beyond a value "
-            f"at which it fails, or fails before as well, as {names}."
+            f"{len(odd)} of the searches found more than one edge (marked *): a player that works again beyond its "
+            f"first failure, as {names}. What stands in the table is the first failure."
         )
     return found
 

@@ -20,7 +20,7 @@ from reports.replay import pack_layers, ratio_of
 from reports.stability import overview
 from reports.stability.atlas import Atlas, case_named
 from reports.stability.failures import kept_failure, near
-from reports.stability.limits import EXACT, Case, Limit, Trial
+from reports.stability.limits import EXACT, FORMS, Case, Limit, Trial
 from reports.stability.maps import MAPS
 from reports.stability.touching import GAPS, TOUCHING
 from scenarios.model import Scenario, Trajectory
@@ -81,7 +81,7 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
         players=[name for name in names if "+" not in name], looks=looks, cell_of=overview.cell_of,
         maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, gaps=GAPS,
         words=overview, exact=EXACT,
-        css=Markup(css() + (HERE / "stability" / "stability.css").read_text()),
+        form=FORMS[atlas.header["form"]], css=Markup(css() + (HERE / "stability" / "stability.css").read_text()),
         looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
     )  # fmt: skip
@@ -101,7 +101,7 @@ def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
     if failing is None or kept is None:
         return None
     played, beside = kept
-    scenario = case.scene(failing.value, failing.first, failing.runs)
+    scenario = case.scene(failing.value, failing.first)
     shown = near(failing, scenario)
     layers: list[tuple[Run | None, Trajectory]] = [(named(limit), played)]
     if beside is not None and len(beside):
@@ -135,7 +135,7 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
         return shares(case, limits)
     title = f"{predicate.name.capitalize()}, {predicate.unit}"
     caption = (
-        f"The worst of all runs at each {case.parameter}, harsher to the right; above the dotted line it fails. "
+        f"The worst of the runs played at each {case.parameter}, harsher to the right; above the dotted line it fails. "
         "A line that ends has nothing to read there: refused, broken off, or not a number."
     )
     lines = []
@@ -158,9 +158,13 @@ def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
     """The share of runs that failed against the parameter, where a run has nothing else to read."""
     lines = []
     for limit in limits:
-        x, y = (np.array(pair, float) for pair in zip(*((t.value, t.failed / t.runs) for t in limit.trials)))
+        trials = [trial for trial in limit.trials if not trial.left]
+        x, y = (np.array(pair, float) for pair in zip(*((t.value, t.failed / t.runs) for t in trials)))
         lines.append(Line(named(limit), x, y))
-    caption = f"How many of the runs at each {case.parameter} failed; harsher to the right."
+    caption = (
+        f"How many of the runs at each {case.parameter} failed; harsher to the right. Values that were left at their "
+        "first failing run, as the quick form does, are not drawn."
+    )
     title = f"{case.predicate.name.capitalize()}, share of runs"
     return Drawing(title, caption, figure_of(lines, axis_of(case), "share of runs", log=False, markers=40))
 

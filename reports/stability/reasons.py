@@ -6,7 +6,7 @@ from fnmatch import fnmatch
 from math import atan, pi, sqrt
 from typing import NamedTuple
 
-from adapters.habits import DIGITS, IMPULSE, PUSH_OUT, RESTITUTION
+from adapters.habits import DIGITS, FLIGHT, IMPULSE, PUSH_OUT, RESTITUTION
 from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, Limit
 from reports.stability.twins import B2_SETTINGS, B2_TYPES, LATE, OF_PYMUNK, PRODUCT, THRESHOLD, THRESHOLDS
@@ -80,10 +80,12 @@ REASONS = (
         RESTITUTION,
     ),
     # One disk, or two.
-    Reason("bounce_drift", "pymunk:shipped", "v dt exceeds the radius, and the floor is missed", GEOMETRY, habit=LATE),
-    Reason(
-        "bounce_drift", "pymunk:matched+push_out", "the push out of the floor adds height",
-        "Munk2D src/cpSpaceStep.c, collision_bias", None, "pymunk:matched", PUSH_OUT,
+    *(
+        Reason(
+            "bounce_drift", player, "the push out of the floor adds height", "Munk2D src/cpSpaceStep.c, collision_bias",
+            None, "pymunk:matched", PUSH_OUT,
+        )
+        for player in ("pymunk:shipped", "pymunk:matched+push_out")
     ),
     Reason("bounce_drift", "pymunk:matched", "v dt exceeds the radius, and the floor is missed", GEOMETRY, habit=LATE),
     *(
@@ -94,8 +96,9 @@ REASONS = (
         for player in ("box2d:*", "reference:lesson")
     ),
     Reason(
-        "bounce_drift", "reference:exercise", "the ball is set onto the floor before its velocity is reflected",
-        "exercise 11, task 2: project, then impulse", habit=PUSH_OUT,
+        "bounce_drift", "reference:exercise",
+        "what gravity adds until a collision is found, up to a step late, is reflected with it: up to |v| dt of height",
+        "order of operations in a step: gravity, flight, then restitution", 0.005, "", FLIGHT,
     ),
     Reason(
         "bounce_drift", "box2d_v3:shipped", "the soft contact takes about |v| dt of height a bounce",

@@ -99,8 +99,8 @@ class Twins:
             return None
         judged, run = seen
         scene, runs = search.case.scene, failing.runs
-        bad = scene(limit.fails_at, failing.first, runs)
-        good = [] if isnan(limit.works_at) else [scene(limit.works_at, run, runs) for run in range(runs)]
+        bad = scene(limit.fails_at, failing.first)
+        good = [] if isnan(limit.works_at) else [scene(limit.works_at, run) for run in range(runs)]
         if bad.scene.n > MOST:
             return None
         known = [] if switched else habits_of(name, run.settings, bad.scene, bad.dt(bad.substeps[0]))

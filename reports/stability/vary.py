@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from reports.stability.cases_suite import in_steps, ladder
+from reports.stability.cases_suite import dense_ladder, in_steps, ladder
 from reports.stability.limits import Case
 from reports.stability.predicates_usable import USABLE
 from scenarios.files import read_scene_file
@@ -119,7 +119,7 @@ VARIES: dict[str, tuple[str, tuple[float, ...], Callable[[Scenario, float], Scen
 """What is varied -> its unit, the values to scan, and how."""
 
 
-def varied(path: str, what: str, x: float, _run: int, _of: int) -> Scenario:
+def varied(path: str, what: str, x: float, _run: int) -> Scenario:
     """The scene of a file at the finest step of its ladder, with one thing varied."""
     one = read_scene_file(Path(path))
     if what == "dt":
@@ -142,6 +142,6 @@ def case_of_file(path: str, what: str) -> Case:
     one = read_scene_file(Path(path))
     unit, values, _ = VARIES[what]
     return Case(
-        f"{path}:{what}", FAMILY, f"{one.name}: {one.asks}", what, unit, values or ladder(one),
+        f"{path}:{what}", FAMILY, f"{one.name}: {one.asks}", what, unit, values or dense_ladder(one),
         partial(varied, path, what), USABLE,
     )  # fmt: skip

@@ -1,0 +1,36 @@
+"""Where in its step a collision happens in the runs of a case: evenly spread and drawn, few the first of many."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+EDGE = 1e-3  # of a step: how near to a step's very beginning, or end, a phase comes
+MOST = 1024  # runs, more than any case has
+
+
+@cache
+def drawn(seed: int) -> tuple[float, ...]:
+    """`MOST` numbers from 0 to 1, the same for a seed on every machine."""
+    return tuple(float(x) for x in np.random.default_rng(seed).random(MOST))
+
+
+def phase(run: int) -> float:
+    """Where in its step the collision of a run happens, from 0 to 1, its beginning and its end.
+
+    Run 0 has it at the step's very beginning, found latest of all; of the others every second is spread evenly (van der
+    Corput, 1/2, 1/4, 3/4, 1/8 ...), and the rest are drawn: what repeats with the step could miss the even ones alone.
+    """
+    if run == 0:
+        return EDGE
+    where = radical_inverse((run + 1) // 2) if run % 2 else drawn(seed=0)[run // 2]
+    return EDGE + (1 - 2 * EDGE) * where
+
+
+def radical_inverse(k: int) -> float:
+    """The binary digits of k mirrored at the point: 1 -> 1/2, 2 -> 1/4, 3 -> 3/4 (van der Corput, 1935)."""
+    value, share = 0.0, 0.5
+    while k:
+        value, k, share = value + share * (k & 1), k >> 1, share / 2
+    return value
