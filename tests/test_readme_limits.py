@@ -52,7 +52,8 @@ def test_a_number_that_is_no_longer_true_is_noticed():
 
 def test_what_is_said_of_the_two_forms_is_what_they_do():
     """How many runs, and how close the brackets are."""
-    said = re.search(r"up to (\d+) runs.{0,60}?to\s+(\d+) %.{0,80}?`--full`.{0,120}?to\s+(\d+) %", TEXT, re.DOTALL)
+    pattern = r"up to (\d+) runs.{0,200}?to\s+(\d+) %.{0,400}?`--full`.{0,200}?to\s+(\d+) %"
+    said = re.search(pattern, TEXT, re.DOTALL)
 
     assert said is not None
     assert [int(number) for number in said.groups()] == [
