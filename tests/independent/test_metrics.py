@@ -1,0 +1,238 @@
+"""Numbers of the table from the trajectories alone, each as its line in `crosscheck list metrics` says.
+
+Left out: what is judged in collision-free samples (velocity, energy error and loss, momentum and energy apart), the
+hits that are matched to those of another (missed, invented, delay), and disks through walls. To add one, write it from
+its line and give it a row in `OWN`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from adapters.engines import ENGINES
+from adapters.play import play
+from reports.comparison import compare
+from scenarios import catalogue
+from scenarios.model import Scenario, Trajectory
+
+pytestmark = pytest.mark.independent
+
+SCENES = (
+    "free_fall", "ping_pong", "head_on_equal_e1", "head_on_unequal_e05", "oblique_e09", "mass_ratios", "slow_hit",
+    "wall_to_wall", "bouncing_ball_e09", "disk_between_static_disks", "column_of_ten", "galperin_31",
+    "cradle_touching", "spin_under_torque", "ship_thrust", "asteroids", "falling_box",
+)  # fmt: skip
+PLAYERS = ("reference:exercise", "pymunk:matched", "box2d:shipped", "box2d_v3:matched", "event_driven:float64")
+ROUNDING = 1e-12  # relative: sums of thousands of terms in another order
+FLOAT64 = 1e-13  # of energies and momenta over their whole: what is left of them is a difference, rounded at the whole
+WITH = {"time_to_1pct_s": "bouncing_ball_e09", "restitution": "head_on_unequal_e05"}
+
+
+def norm(a: np.ndarray) -> np.ndarray:
+    """Length of the vectors along the last axis."""
+    return np.sqrt((a**2).sum(axis=-1))
+
+
+def distance(one: Trajectory, other: Trajectory, scenario: Scenario) -> np.ndarray:
+    """(k, n) m; in the wrapping box the shorter way, across its edge where that is shorter."""
+    away = one.position - other.position
+    if scenario.scene.wrap is not None:
+        size = scenario.scene.wrap[1] - scenario.scene.wrap[0]
+        away = away - size * np.round(away / size)
+    return norm(away)
+
+
+def radii(one: Trajectory, other: Trajectory, scenario: Scenario) -> np.ndarray:
+    """(k, n) in radii of each disk."""
+    return distance(one, other, scenario) / scenario.scene.radius
+
+
+def turn(one: Trajectory, other: Trajectory, _: Scenario) -> np.ndarray:
+    """(k, n) rad."""
+    return np.abs(one.angle - other.angle)
+
+
+def largest(of: Callable[..., np.ndarray]) -> Callable[..., float]:
+    """The largest of all disks and samples."""
+    return lambda *given: float(of(*given).max())
+
+
+def root_mean_square(of: Callable[..., np.ndarray]) -> Callable[..., float]:
+    """Over all disks and samples."""
+    return lambda *given: float(np.sqrt((of(*given) ** 2).mean()))
+
+
+def time_to_1pct(one: Trajectory, other: Trajectory, scenario: Scenario) -> float:
+    """The time of the first sample with a disk more than 1 % of its radius off."""
+    off = (radii(one, other, scenario) > 0.01).any(axis=1)
+    return float(one.t[off.argmax()]) if off.any() else np.inf
+
+
+def moving(scenario: Scenario) -> np.ndarray:
+    """(n,) kg, 0 for what cannot move: it carries neither momentum nor energy."""
+    return np.where(scenario.scene.static, 0.0, scenario.scene.mass)
+
+
+def alone(scenario: Scenario) -> bool:
+    """Whether nothing but gravity and thrusts acts on the disks from outside."""
+    return not len(scenario.scene.walls) and not scenario.scene.static.any()
+
+
+def on_for(scenario: Scenario, t: np.ndarray) -> list[np.ndarray]:
+    """For each thrust, (k,) s, how long it has been on."""
+    return [np.clip(t, thrust.start, thrust.stop) - thrust.start for thrust in scenario.thrusts]
+
+
+def momentum_error(one: Trajectory, _: None, scenario: Scenario) -> float | None:
+    """From P(t) - P(0) - M g t - sum of F times how long it has acted.
+
+    Over the sum of m|v| that the scene can have without collisions: at the start, and all impulses from outside.
+    """
+    if not alone(scenario) or any(thrust.frame == "body" for thrust in scenario.thrusts):
+        return None
+    mass = moving(scenario)[:, None]
+    outside = mass.sum() * scenario.scene.gravity * one.t[:, None]
+    for thrust, on in zip(scenario.thrusts, on_for(scenario, one.t)):
+        outside = outside + thrust.force * on[:, None]
+    momentum = (mass * one.velocity).sum(axis=1)
+    end = np.array([scenario.duration])
+    scale = (mass[:, 0] * norm(scenario.scene.velocity)).sum() + norm(mass.sum() * scenario.scene.gravity * end)
+    scale += sum(norm(thrust.force) * on[0] for thrust, on in zip(scenario.thrusts, on_for(scenario, end)))
+    return float(norm(momentum - momentum[0] - outside).max() / scale)
+
+
+def angular_momentum_error(one: Trajectory, _: None, scenario: Scenario) -> float | None:
+    """Of x cross m v + I w about the origin, where nothing from outside turns it.
+
+    Over the sum of m|x||v| + I|w| that the scene can have: with the speeds of the start, and as far as they carry.
+    """
+    if not alone(scenario) or scenario.scene.gravity.any() or scenario.thrusts or scenario.scene.wrap is not None:
+        return None
+    mass, inertia = moving(scenario), scenario.scene.inertia
+    x, v, w = one.position, one.velocity, one.angular_velocity
+    momentum = (mass * (x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]) + inertia * w).sum(axis=1)
+    start = scenario.scene
+    speed = norm(start.velocity)
+    scale = (mass * speed * (norm(start.position) + speed * scenario.duration)).sum()
+    scale += (inertia * np.abs(start.angular_velocity)).sum()
+    return float(np.abs(momentum - momentum[0]).max() / scale)
+
+
+def energy_created(one: Trajectory, _: None, scenario: Scenario) -> float | None:
+    """From kinetic energy, without gravity and thrust: so the energy at hand is that of the start."""
+    if scenario.scene.gravity.any() or scenario.thrusts:
+        return None
+    mass = moving(scenario)
+    inertia = np.where(scenario.scene.static, 0.0, scenario.scene.inertia)
+    energy = (mass * norm(one.velocity) ** 2 + inertia * one.angular_velocity**2).sum(axis=1) / 2
+    return float((energy - np.minimum.accumulate(energy)).max() / energy[0])
+
+
+def penetration(one: Trajectory, _: None, scenario: Scenario) -> float:
+    """Of disks and disks, and of disks and walls."""
+    scene, deepest = scenario.scene, 0.0
+    for i in range(scene.n):
+        for j in range(i + 1, scene.n):
+            reach = scene.radius[i] + scene.radius[j]
+            overlap = reach - norm(one.position[:, i] - one.position[:, j]).min()
+            deepest = max(deepest, overlap / min(scene.radius[i], scene.radius[j]))
+        for start, end in scene.walls:
+            along = end - start
+            share = np.clip((one.position[:, i] - start) @ along / (along @ along), 0, 1)
+            nearest = norm(one.position[:, i] - start - share[:, None] * along).min()
+            deepest = max(deepest, (scene.radius[i] - nearest) / scene.radius[i])
+    return float(deepest)
+
+
+def restitution(one: Trajectory, _: None, scenario: Scenario) -> float | None:
+    """From the samples beside it, where two disks on a line along x meet once and nothing else happens."""
+    if one.position[..., 1].any() or scenario.scene.gravity.any() or scenario.scene.n != 2:
+        return None
+    if one.collisions.j.tolist() != [1]:
+        return None
+    after = int(np.argmin(one.t < one.collisions.t[0] - 1e-9))
+    v = one.velocity[[after - 1, after], :, 0]
+    return float(-(v[1, 0] - v[1, 1]) / (v[0, 0] - v[0, 1]))
+
+
+OWN: dict[str, Callable[..., float | None]] = {
+    "position_max_radii": largest(radii),
+    "position_rms_radii": root_mean_square(radii),
+    "position_max": largest(distance),
+    "position_rms": root_mean_square(distance),
+    "angle_max": largest(turn),
+    "angle_rms": root_mean_square(turn),
+    "time_to_1pct_s": time_to_1pct,
+    "momentum_error": momentum_error,
+    "angular_momentum_error": angular_momentum_error,
+    "energy_created": energy_created,
+    "penetration_radii": penetration,
+    "restitution": restitution,
+}
+
+
+def differences(table: pd.DataFrame, known: dict[str, Trajectory], scenario: Scenario) -> tuple[int, list[str]]:
+    """How many rows of a table were computed again, and those that came out otherwise."""
+    count, wrong = 0, []
+    for row in table[table.metric.isin(OWN)].itertuples():
+        one, other = known[f"{row.engine}:{row.profile}"], known.get(row.versus)
+        if other is not None:
+            k = min(len(one), len(other))
+            one, other = first(one, k), first(other, k)
+        own = OWN[row.metric](one, other, scenario)
+        if own is None:
+            continue
+        count += 1
+        if own != row.value and abs(own - row.value) > ROUNDING * abs(row.value) + FLOAT64:
+            wrong.append(
+                f"{scenario.name} {row.engine}:{row.profile} {row.metric} {row.versus}: {row.value}, not {own}"
+            )
+    return count, wrong
+
+
+def first(trajectory: Trajectory, k: int) -> Trajectory:
+    """The first k samples: a truth may end before a run."""
+    names = ("t", "position", "velocity", "angle", "angular_velocity")
+    return replace(trajectory, **{name: getattr(trajectory, name)[:k] for name in names})
+
+
+def compared(name: str) -> tuple[pd.DataFrame, dict[str, Trajectory], Scenario]:
+    """The table of a scene at its second step size, and what it was made from."""
+    scenario = catalogue.scenario(name)
+    runs = [play(ENGINES[player].make(), player, scenario, scenario.dt(scenario.substeps[1])) for player in PLAYERS]
+    known = {run.name: run.trajectory for run in runs if run.trajectory is not None}
+    known["truth"] = scenario.truth(scenario.times)
+    return compare(scenario, runs).table, known, scenario
+
+
+def test_the_metrics_come_out_again_from_the_trajectories(record_property: Callable[[str, object], None]):
+    """To rounding; every metric of `OWN` in some scene."""
+    count, wrong, met = 0, [], set()
+    for name in SCENES:
+        table, known, scenario = compared(name)
+        of_scene, wrong_of_scene = differences(table, known, scenario)
+        count, wrong, met = count + of_scene, wrong + wrong_of_scene, met | set(table.metric)
+    record_property(
+        "found", f"metrics: {count} of {len(SCENES)} scenes computed again, {len(wrong)} come out otherwise"
+    )
+
+    assert not wrong
+    assert set(OWN) <= met
+    assert count > 1000
+
+
+@pytest.mark.parametrize("metric", OWN)
+def test_a_metric_that_is_off_by_a_millionth_is_noticed(metric: str):
+    """Of any metric that is computed again."""
+    table, known, scenario = compared(WITH.get(metric, "oblique_e09"))
+    count, wrong = differences(table, known, scenario)
+    table.loc[table.metric == metric, "value"] = table.value * (1 + 1e-6) + 1e-6
+
+    assert count
+    assert not wrong
+    assert differences(table, known, scenario)[1]
