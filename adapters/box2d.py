@@ -49,14 +49,14 @@ class Box2DEngine:
 
     `matched`: the scene in other units. Box2D treats hits below 1 unit of length per unit of time as
     inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The length unit
-    is the smallest radius, so that the slop (0.005) is 0.5 % of it; or what the fastest disk moves in a
-    step where that is more, because nothing moves by more than 2 units a step; a scene that comes
-    there all the same is refused. No friction, sleep, continuous collision or wall skin; at e = 1 no
-    push-out, because it adds energy.
+    is a quarter of the smallest radius, which shrinks slop and the tolerance of continuous collision; or twice what
+    the fastest disk moves in a step where that is more, because nothing moves by more than 2 units a step; a scene that
+    comes there all the same is refused. Continuous collision, between disks, too, puts collisions at their own time
+    within a step; without gravity at e = 1 there is none, because it creates energy in a gas. No friction, sleep or
+    wall skin; at e = 1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
 
-    Changed one at a time by `features.py` and `habits.py`: `continuous` and `sleeping` (None: the profile's), `bullet`
-    (continuous collision between disks, too), `warm_starting`, `turning` (False: no inertia, so no spin), `friction`,
-    the iterations.
+    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `sleeping` (None: the profile's),
+    `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.
     """
 
     listening, wrapping = True, 0.0

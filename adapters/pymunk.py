@@ -19,7 +19,7 @@ FIELDS = (
 MATCHED: dict[str, Any] = {
     "iterations": 10,
     "slop": 1e-6,
-    "bias": 1e-24,
+    "bias": (1 - 0.1) ** 60,
     "elastic_bias": 1.0,
     "persistence": 1,
 }
@@ -30,11 +30,11 @@ at e = 1. `adapters/matched.csv` holds what else was tried."""
 class Pymunk:
     """`shipped`: restitution goes into every shape's elasticity, all else is pymunk's default.
 
-    `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; 50 iterations, because 10
-    lose energy in a dense gas; slop 1 % of the smallest radius, because the default 0.1 is a length in
-    the scene's units; contacts are forgotten as soon as they part, because one that touches again within three steps
-    inherits an impulse that it is not given again, but that is told, and may be taken back: energy is lost so;
-    at e = 1 no push-out, because it adds energy.
+    `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; and `MATCHED`, by `crosscheck tune`: ten
+    iterations, because more cost time and are no nearer; hardly any slop, because the default 0.1 is a length in the
+    scene's units; contacts are forgotten as soon as they part, because one that touches again within three steps
+    inherits an impulse that it is not given again, but that is told, and may be taken back; at e = 1 no position
+    correction, because it adds energy.
 
     Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `turning` False gives every disk an
     infinite inertia, `spatial_hash` (cell in m, count) replaces the tree of the broad phase; a key of `MATCHED` is the

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenarios.closed_forms import answer, at_rest, flight
+from scenarios.closed_forms import answer, at_rest, bouncing, flight
 from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.oracle import with_oracle
 from scenarios.placing import box, lay_out
@@ -158,6 +158,28 @@ def bouncing_lossy(rng: np.random.Generator, r: float, v: float) -> Scenario:
     return dropped(rng, r, v, rng.uniform(0.6, 0.9), 4.0)
 
 
+def long_bounce(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """The same for forty bounces, of which only conservation of energy is asked."""
+    ball = dropped(rng, r, v, ELASTIC, 80.0)
+    asks = "Does a ball keep its energy over many bounces?"
+    return replace(ball, asks=asks, truth=None, without_truth="after so many bounces a late collision is all there is")
+
+
+def coming_to_rest(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """A ball that bounces ever lower, comes to rest, and stays."""
+    restitution = rng.uniform(0.4, 0.8)
+    asked = dropped(rng, r, v, restitution, 2 + 2 * (1 + restitution) / (1 - restitution))
+    height, g = float(asked.scene.position[0, 1]) - r, -float(asked.scene.gravity[1])
+
+    def truth(t: Array) -> Trajectory:
+        legs = bouncing(height, g, restitution, t[-1])
+        gap, speed = legs.at(t)
+        position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + r, speed))
+        return answer(asked.scene, t, (position, velocity), legs.wall_hits(0, (0,), 1.0, restitution))
+
+    return replace(asked, truth=truth)
+
+
 def landing(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """A ball that stays where it lands."""
     return dropped(rng, r, v, 0.0, 3.0)
@@ -236,7 +258,7 @@ def sliding(_rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 FAMILIES: tuple[Sampled, ...] = (
     flight_alone, head_on, oblique, grazing, near_miss, onto_wall, onto_static, wall_to_wall, bouncing_elastic,
-    bouncing_lossy, landing, row, light_between, small_gas, long_gas, column, sliding,
+    bouncing_lossy, long_bounce, coming_to_rest, landing, row, light_between, small_gas, long_gas, column, sliding,
 )  # fmt: skip
 
 

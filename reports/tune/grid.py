@@ -80,7 +80,7 @@ GRID: tuple[Setting, ...] = (
         "box2d", "length_unit", (0.125, 0.25, 0.5, 1.0, 3.0),
         "smallest radii; slop 0.005, tolerance of continuous collision 0.015 and cap 2 units are compiled in",
     ),
-    Setting("box2d", "step_unit", (1.0, 2.0, 4.0), "displacements of the fastest disk in a step: a unit of length at least"),
+    Setting("box2d", "step_unit", (1.0, 2.0, 4.0), "ways of the fastest disk in a step: a unit of length at least"),
     Setting(
         "box2d_v3", "length_unit", (0.02, 0.1, 0.3, 0.5, 0.7, 1.0, 2.0),
         "smallest radii; sets slop (0.005 units) and the margin in which contacts are foreseen (0.02 units)",
