@@ -17,7 +17,7 @@ from reports.tune.score import Against, Make, Played, against, cost_of, measured
 from scenarios.tuning import FAMILIES
 
 SEEDS, OTHER_SEEDS = (0, 1), (2, 3)  # what is chosen on, and what has to bear it out
-LEAST = 0.95  # times the error: what gains less is kept as it is, as times are not known better
+LEAST = 0.9  # times the error: what gains less is kept as it is, as other seeds may read as much more
 SWEEPS = 4
 COLUMNS = [
     "engine", "setting", "value", "chosen", "same_dt", "cost", "equal_cost", "again", "better", "worse", "of",
