@@ -9,11 +9,39 @@ from typing import Any
 import Box2D
 import numpy as np
 
-from adapters.engine import UNREAD, Hit
+from adapters.engine import KEPT, PASSED, Hit
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from scenarios.model import Array, Scene, State
 
-VELOCITY_ITERATIONS, POSITION_ITERATIONS = 8, 3  # as the manual recommends; `Step` has no defaults
+SHIPPED: dict[str, Any] = {
+    "velocity_iterations": 8,  # as the manual recommends; `Step` has no defaults
+    "position_iterations": 3,
+    "elastic_position_iterations": 3,
+    "continuous": True,
+    "bullet": False,
+    "elastic_continuous": True,
+    "elastic_bullet": False,
+    "sub_stepping": False,
+    "warm_starting": True,
+    "skin": True,
+}
+MATCHED: dict[str, Any] = {
+    "time_unit": 1000.0,
+    "length_unit": 0.25,
+    "step_unit": 2.0,
+    "velocity_iterations": 8,
+    "position_iterations": 3,
+    "elastic_position_iterations": 0,
+    "continuous": True,
+    "bullet": True,
+    "elastic_continuous": False,
+    "elastic_bullet": False,
+    "sub_stepping": False,
+    "warm_starting": True,
+    "skin": False,
+}
+"""What the profiles choose: `time_unit` in s, `length_unit` in smallest radii, position iterations at e < 1 and at
+e = 1. `adapters/matched.csv` holds what else was tried."""
 
 
 class Box2DEngine:
@@ -21,14 +49,14 @@ class Box2DEngine:
 
     `matched`: the scene in other units. Box2D treats hits below 1 unit of length per unit of time as
     inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The length unit
-    is the smallest radius, so that the slop (0.005) is 0.5 % of it; or what the fastest disk moves in a
-    step where that is more, because nothing moves by more than 2 units a step; a scene that comes
-    there all the same is refused. No friction, sleep, continuous collision or wall skin; at e = 1 no
-    push-out, because it adds energy.
+    is a quarter of the smallest radius, which shrinks slop and the tolerance of continuous collision; or twice what
+    the fastest disk moves in a step where that is more, because nothing moves by more than 2 units a step; a scene that
+    comes there all the same is refused. Continuous collision, between disks, too, puts collisions at their own time
+    within a step; without gravity at e = 1 there is none, because it creates energy in a gas. No friction, sleep or
+    wall skin; at e = 1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
 
-    Changed one at a time by `features.py` and `habits.py`: `continuous` and `sleeping` (None: the profile's), `bullet`
-    (continuous collision between disks, too), `warm_starting`, `turning` (False: no inertia, so no spin), `friction`,
-    the iterations.
+    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `sleeping` (None: the profile's),
+    `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.
     """
 
     listening, wrapping = True, 0.0
@@ -37,27 +65,26 @@ class Box2DEngine:
         self,
         profile: str,
         *,
-        continuous: bool | None = None,
         sleeping: bool | None = None,
-        bullet: bool = False,
-        warm_starting: bool = True,
         turning: bool = True,
         friction: float | None = None,
-        velocity_iterations: int = VELOCITY_ITERATIONS,
-        position_iterations: int | None = None,
+        **settings: Any,
     ) -> None:
         self.matched = profile == "matched"
-        self.continuous = not self.matched if continuous is None else continuous
+        self.chosen = (MATCHED if self.matched else SHIPPED) | settings
+        self.turning = turning
         self.sleeping = not self.matched if sleeping is None else sleeping
-        self.bullet, self.warm_starting, self.turning = bullet, warm_starting, turning
         self.friction = 0.0 if self.matched and friction is None else friction
-        self.velocity_iterations, self.asked_position_iterations = velocity_iterations, position_iterations
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world in the profile's units."""
         self.scene, self.dt, self.steps = scene, dt, 0
-        self.time = 1000.0 if self.matched else 1.0  # s in one unit of the engine's time
-        self.length = 1.0 / max(scene.radius.min(), fastest(scene) * dt) if self.matched else 1.0  # units in one m
+        chosen = self.chosen
+        self.time, self.length = 1.0, 1.0  # s in one unit of the engine's time, units of its length in one m
+        if self.matched:
+            self.time = chosen["time_unit"]
+            least = chosen["length_unit"] * scene.radius.min()
+            self.length = float(1.0 / max(least, chosen["step_unit"] * fastest(scene) * dt))
         self.speed = self.time * self.length
         must_fit(
             position=scene.position * self.length,
@@ -76,16 +103,20 @@ class Box2DEngine:
         gravity = scene.gravity * self.speed * self.time
         heard = {"contactListener": self.listener} if self.listening else {}
         self.world = Box2D.b2World(gravity=vector(gravity), **heard)
+        keeps = (
+            "elastic_" if scene.restitution == 1 and not scene.gravity.any() else ""
+        )  # its collisions keep its energy
+        self.continuous, self.bullet = chosen[keeps + "continuous"], chosen[keeps + "bullet"]
         self.world.continuousPhysics = self.continuous
+        self.world.subStepping = chosen["sub_stepping"]
         self.world.SetAllowSleeping(self.sleeping)  # `doSleep` only sets a Python attribute that the engine never sees
-        self.world.warmStarting = self.warm_starting
-        profiles = 0 if self.matched and scene.restitution == 1 else POSITION_ITERATIONS
-        self.position_iterations = (
-            profiles if self.asked_position_iterations is None else self.asked_position_iterations
-        )
+        self.world.warmStarting = chosen["warm_starting"]
+        self.velocity_iterations = chosen["velocity_iterations"]
+        self.position_iterations = chosen[
+            "elastic_position_iterations" if scene.restitution == 1 else "position_iterations"
+        ]
         self.bodies = [self._disk(i) for i in range(scene.n)]
-        for w in range(len(scene.walls)):
-            self._wall(w)
+        self.walls = [self._wall(w) for w in range(len(scene.walls))]
 
     def _surface(self) -> dict[str, float]:
         friction = {} if self.friction is None else {"friction": self.friction}
@@ -111,13 +142,14 @@ class Box2DEngine:
         body.massData = Box2D.b2MassData(mass=float(scene.mass[i]), center=(0, 0), I=inertia)
         return body
 
-    def _wall(self, w: int) -> None:
+    def _wall(self, w: int) -> Any:
         start, end = (vector(point * self.length) for point in self.scene.walls[w])
         shape = Box2D.b2EdgeShape(vertices=[start, end])
-        if self.matched:
+        if not self.chosen["skin"]:
             shape.radius = 0.0
         body = self.world.CreateStaticBody(userData=-1 - w)
         body.CreateFixture(Box2D.b2FixtureDef(shape=shape, **self._surface()))
+        return body
 
     def push(self, disk: int, force: Array, torque: float) -> None:
         """Apply force and torque; `Step` clears both."""
@@ -163,24 +195,35 @@ class Box2DEngine:
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """Resolved values are read back from the world, a fixture and the engine's constants."""
-        matched, world = self.matched, self.world
+        matched, world, chosen = self.matched, self.world, self.chosen
         fixture = self.bodies[0].fixtures[0]
         iterations = f"{self.velocity_iterations}, {self.position_iterations}"
         return {
-            "unit of time in s": (self.time if matched else None, "kept by the adapter"),
-            "unit of length in m": (1 / self.length if matched else None, "kept by the adapter"),
+            "unit of time in s": (self.time if matched else None, KEPT),
+            "unit of length in m": (1 / self.length if matched else None, KEPT),
             "restitution threshold in m/s": (None, Box2D.b2_velocityThreshold / self.speed),
             "linear slop in m": (None, Box2D.b2_linearSlop / self.length),
             "speed cap in m/s": (None, self.speed_cap),
             "spin cap in rad/s": (None, self.spin_cap),
-            "wall skin": (0.0 if matched else None, UNREAD),
+            "wall skin in m": (None if self.chosen["skin"] else 0.0, self._skin()),
             "friction": (self.friction, fixture.friction),
             "restitution": (self.scene.restitution, fixture.restitution),
             "sleeping": (self.sleeping if matched else None, world.GetAllowSleeping()),
             "continuous collision": (self.continuous if matched else None, world.continuousPhysics),
-            "velocity, position iterations": (iterations, iterations),
+            "continuous collision between disks": (self.bullet if matched else None, self._bullets()),
+            "sub-stepping": (chosen["sub_stepping"] if matched else None, world.subStepping),
+            "warm starting": (chosen["warm_starting"] if matched else None, world.warmStarting),
+            "velocity, position iterations": (iterations, PASSED),
             "float32 rounding of the start in m": (None, rounding(self.scene)),
         }
+
+    def _skin(self) -> float | str:
+        """m, of the first wall."""
+        return self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall"
+
+    def _bullets(self) -> bool:
+        """Whether what moves is a bullet."""
+        return any(body.bullet for body in self.bodies)
 
     def versions(self) -> dict[str, str]:
         """The package; it carries its own copy of Box2D 2.3."""
@@ -188,7 +231,7 @@ class Box2DEngine:
 
     def close(self) -> None:
         """Drop the world; Box2D frees it with the last reference."""
-        self.world = self.bodies = self.listener = None  # type: ignore[assignment]
+        self.world = self.bodies = self.walls = self.listener = None  # type: ignore[assignment]
 
 
 def fastest(scene: Scene) -> float:

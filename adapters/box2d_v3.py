@@ -13,12 +13,30 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
-from adapters.engine import UNREAD, Hit
+from adapters.engine import PASSED, UNREAD, Hit
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from scenarios.model import Array, Scene, State
 
-SUBSTEPS = 4  # as the manual recommends; `step` has no default
-HERTZ, DAMPING_RATIO, PUSH_SPEED = 30.0, 10.0, 3.0  # the engine's contact tuning
+SHIPPED: dict[str, Any] = {
+    "substeps": 4,  # as the manual recommends; `step` has no default
+    "hertz": 30.0,
+    "damping_ratio": 10.0,
+    "push_speed": 3.0,
+    "continuous": True,
+    "bullet": False,
+}
+MATCHED: dict[str, Any] = {
+    "length_unit": 0.5,
+    "substeps": 4,
+    "hertz": 1e6,
+    "damping_ratio": 10.0,
+    "push_speed": 3.0,
+    "restitution_threshold": 0.0,
+    "continuous": False,
+    "bullet": False,
+}
+"""What the profiles choose: `length_unit` in smallest radii; `hertz`, `damping_ratio` and `push_speed` (m/s) are of the
+contacts. `adapters/matched.csv` holds what else was tried."""
 
 LENGTH_UNIT = Lock()  # it is global to the process: threads take turns, or worlds would be made in another's unit
 
@@ -37,13 +55,14 @@ def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
 class Box2DV3:
     """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
 
-    `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap; the length
-    unit is 2 % of the smallest radius, which shrinks slop and speculative margin with it. The cap on
-    spins cannot be lifted: a scene that reaches it is refused.
+    `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap. The length unit is half of
+    the smallest radius: slop and speculative margin are shares of it, and a larger margin foresees more collisions, but
+    this is the largest that invents none where two disks pass at 1 % of a radius. Contacts are as stiff as the engine
+    lets them be, an eighth of the substeps a second. The values are `MATCHED`, by `crosscheck tune`. The cap on spins
+    cannot be lifted: a scene that reaches it is refused.
 
-    Changed one at a time by `features.py` and `habits.py`: `substeps`, `continuous` and `sleeping` (None: the
-    profile's), `bullet` (continuous collision between disks, too), `turning` (False: no inertia, so no spin),
-    `friction`, `restitution_threshold`.
+    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `sleeping` (None: the profile's),
+    `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.
     """
 
     listening, wrapping = True, 0.0
@@ -52,19 +71,15 @@ class Box2DV3:
         self,
         profile: str,
         *,
-        substeps: int = SUBSTEPS,
-        continuous: bool | None = None,
         sleeping: bool | None = None,
-        bullet: bool = False,
         turning: bool = True,
         friction: float | None = None,
-        restitution_threshold: float | None = None,
+        **settings: Any,
     ) -> None:
         self.matched = profile == "matched"
+        self.chosen = (MATCHED if self.matched else SHIPPED) | settings
         self.friction = 0.0 if self.matched and friction is None else friction
-        self.restitution_threshold = 0.0 if self.matched and restitution_threshold is None else restitution_threshold
-        self.substeps, self.bullet, self.turning = substeps, bullet, turning
-        self.continuous = not self.matched if continuous is None else continuous
+        self.substeps, self.turning = self.chosen["substeps"], turning
         self.sleeping = not self.matched if sleeping is None else sleeping
 
     @in_its_unit
@@ -77,15 +92,17 @@ class Box2DV3:
         )  # fmt: skip
         self.scene, self.dt, self.steps = scene, dt, 0
         self.log: list[Hit] = []
-        self.unit = float(0.02 * scene.radius.min()) if self.matched else 1.0
+        self.unit = float(self.chosen["length_unit"] * scene.radius.min()) if self.matched else 1.0
         pyb2d3.set_length_units_per_meter(self.unit)
+        # The binding has no way to ask for the unit, but the default of this limit is 400 of it.
+        self.unit_found = pyb2d3.WorldDef().maximum_linear_speed / 400
         self.spin_cap = pi / 4 / dt
         self.options = self._options()
         self.world = pyb2d3.World(gravity=vector(scene.gravity), **self.options)
-        self.world.continuous_enabled = self.continuous
+        self.world.continuous_enabled = self.chosen["continuous"]
         self.world.sleeping_enabled = self.sleeping
         if self.matched:
-            self.world.set_contact_tuning(HERTZ, DAMPING_RATIO, PUSH_SPEED)
+            self.world.set_contact_tuning(*self._tuning())
         self.world.hit_event_threshold = 0.0  # listening only: report every hit
         self.bodies = [self._disk(i) for i in range(scene.n)]
         self.every = pyb2d3.Bodies()
@@ -95,9 +112,11 @@ class Box2DV3:
             self._wall(w)
         self.angle, self.spin, self.seen = np.array(scene.angle), np.array(scene.angular_velocity), 0
 
+    def _tuning(self) -> tuple[float, float, float]:
+        return self.chosen["hertz"], self.chosen["damping_ratio"], self.chosen["push_speed"]
+
     def _options(self) -> dict[str, float]:
-        threshold = self.restitution_threshold
-        options = {} if threshold is None else {"restitution_threshold": threshold}
+        options = {name: self.chosen[name] for name in ("restitution_threshold",) if name in self.chosen}
         return options | ({"maximum_linear_speed": 1e9} if self.matched else {})
 
     def _shape(self) -> Any:
@@ -118,7 +137,7 @@ class Box2DV3:
                 linear_velocity=vector(scene.velocity[i]),
                 angular_velocity=float(scene.angular_velocity[i]),
                 enable_sleep=self.sleeping,
-                is_bullet=self.bullet,
+                is_bullet=self.chosen["bullet"],
             )
         body.user_data = i
         body.create_circle_shape(self._shape(), pyb2d3.circle(radius=float(scene.radius[i])))
@@ -198,20 +217,25 @@ class Box2DV3:
         """Resolved values are read back where the binding lets one read them."""
         matched, world, options = self.matched, self.world, self.options
         return {
-            "length unit in m": (self.unit if matched else None, UNREAD),
+            "length unit in m": (self.unit if matched else None, self.unit_found),
             "restitution threshold in m/s": (options.get("restitution_threshold"), world.restitution_threshold),
             "speed cap in m/s": (options.get("maximum_linear_speed"), UNREAD),
             "spin cap in rad/s": (None, UNREAD),
-            "linear slop, speculative margin in m": (None, UNREAD),
+            "linear slop in m": (None, UNREAD),
+            "speculative margin in m": (None, UNREAD),
             "contact tuning (hertz, damping ratio, push speed in m/s)": (
-                "30, 10, 3" if matched else None,
+                "{:g}, {:g}, {:g}".format(*self._tuning()) if matched else None,
                 UNREAD,
             ),
             "friction": (self.friction, self.bodies[0].shapes[0].friction),
             "restitution": (self.scene.restitution, self.bodies[0].shapes[0].restitution),
             "sleeping": (self.sleeping if matched else None, world.sleeping_enabled),
-            "continuous collision": (self.continuous if matched else None, world.continuous_enabled),
-            "substeps": (self.substeps, self.substeps),
+            "continuous collision": (self.chosen["continuous"] if matched else None, world.continuous_enabled),
+            "continuous collision between disks": (
+                self.chosen["bullet"] if matched else None,
+                any(body.bullet for body in self.bodies),
+            ),
+            "substeps": (self.substeps, PASSED),
             "float32 rounding of the start in m": (None, rounding(self.scene)),
         }
 

@@ -6,7 +6,11 @@ from typing import Any, NamedTuple, Protocol
 
 from scenarios.model import Array, Scene, State
 
-UNREAD = "cannot be read back"  # what an engine resolved a setting to, where its binding does not tell
+# What stands in place of what an engine resolved a setting to, where its binding does not tell.
+UNREAD = "not readable"
+PASSED = "passed with every step"  # the engine keeps no such setting
+KEPT = "kept by the adapter"  # the engine knows no such setting
+NOT_TOLD = (UNREAD, PASSED, KEPT)
 
 
 class Unsupported(Exception):

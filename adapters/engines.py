@@ -92,14 +92,14 @@ ENGINES: dict[str, Row] = {
         partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64
     ),
     "pymunk:matched": Row(
-        partial(_pymunk, "matched"), "pymunk, matched: elasticity sqrt(e), 50 iterations, small slop", 0.0, FLOAT64
+        partial(_pymunk, "matched"), "pymunk, matched: elasticity sqrt(e), small slop", 0.0, FLOAT64
     ),
     "box2d:shipped": Row(
         partial(_box2d, "shipped"), "box2d-py 2.3.8 as it comes: friction, sleep, threshold 1 m/s", 1.0, FLOAT32
     ),
     "box2d:matched": Row(
         partial(_box2d, "matched"),
-        "box2d-py, matched: units that lift its thresholds; no friction, CCD, sleep", 1.0, FLOAT32
+        "box2d-py, matched: units that lift its thresholds; CCD; no friction, sleep", 1.0, FLOAT32
     ),
     "box2d_v3:shipped": Row(
         partial(_box2d_v3, "shipped"),
@@ -107,7 +107,7 @@ ENGINES: dict[str, Row] = {
     ),
     "box2d_v3:matched": Row(
         partial(_box2d_v3, "matched"),
-        "Box2D 3.1, matched: no thresholds, small length unit, no friction", 0.625, FLOAT32
+        "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction", 0.625, FLOAT32
     ),
     "event_driven:float64": Row(
         _event_driven, "from hit to hit without steps: parabolas and contact times, in float64", 0.5, FLOAT64

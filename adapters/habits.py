@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Engine
+from adapters.engine import NOT_TOLD, Engine
 from adapters.engines import FLOAT32, row_of
 from adapters.switched import BOX2D, BOX2D_V3, PYMUNK, Switched
 from scenarios.model import Scene
@@ -47,7 +47,8 @@ class Habit:
 
 def habits_of(name: str, settings: Mapping[str, tuple[Any, Any]], scene: Scene, dt: float) -> list[Habit]:
     """The habits of a player in `HABITS`, in this scene at this dt; `settings` are those it told once loaded."""
-    resolved = {setting: value for setting, (_, value) in settings.items()}
+    # What cannot be read back is as it was asked for.
+    resolved = {setting: asked if used in NOT_TOLD else used for setting, (asked, used) in settings.items()}
     flight = Habit(FLIGHT, {"alpha": row_of(name).alpha})
     single = [Habit(DIGITS, {"precision": np.float32})] if row_of(name).rounding == FLOAT32 else []
     return [flight, *HABITS[name](resolved, scene, dt), *single]
@@ -103,11 +104,22 @@ def _box2d(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> l
         "push_share": 0.2 if position else 0.0, "push_iterations": position, "slop": told["linear slop in m"],
         "push_most": 0.1 * cap,
     }  # fmt: skip
+    without = partial(Box2DEngine, profile, position_iterations=0, elastic_position_iterations=0)
     return [
         Habit(RESTITUTION, {"threshold": told["restitution threshold in m/s"]}),
         Habit(IMPULSE, impulse),
-        Habit(PUSH_OUT, push, (IMPULSE,), partial(Box2DEngine, profile, position_iterations=0)),
+        Habit(PUSH_OUT, push, (IMPULSE,), without),
     ]
+
+
+def _box2d_matched(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Habit]:
+    from adapters.box2d import Box2DEngine
+
+    unswept = partial(
+        Box2DEngine, "matched", continuous=False, bullet=False, elastic_continuous=False, elastic_bullet=False
+    )
+    swept = [Habit(SWEPT, without=unswept)] if told["continuous collision"] else []
+    return [*_box2d(told, scene, dt, "matched"), *swept]
 
 
 def _box2d_shipped(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Habit]:
@@ -119,31 +131,34 @@ def _box2d_shipped(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Hab
         Habit(FRICTION, {"friction": told["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
         # b2_polygonRadius, which an edge has, too: twice the slop.
         Habit(SKIN, {"skin": 2 * told["linear slop in m"]}, (IMPULSE, PUSH_OUT)),
-        Habit(SWEPT, without=partial(shipped, continuous=False, sleeping=False)),
+        Habit(SWEPT, without=partial(shipped, continuous=False, elastic_continuous=False, sleeping=False)),
     ]
 
 
-def _box2d_v3(unit: float) -> list[Habit]:
-    from adapters.box2d_v3 import DAMPING_RATIO, HERTZ, PUSH_SPEED
-
+def _box2d_v3(told: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Habit]:
     # b2_speculativeDistance: four slops of 0.005 units.
-    impulse = {"order": BOX2D_V3, "touching": True, "margin": 0.02 * unit, "hertz": HERTZ, "damping": DAMPING_RATIO}
-    return [Habit(IMPULSE, impulse), Habit(PUSH_OUT, {"push_speed": PUSH_SPEED}, (IMPULSE,))]
+    impulse = {
+        "order": BOX2D_V3, "touching": True, "margin": 0.02 * told["length unit in m"], "hertz": chosen["hertz"],
+        "damping": chosen["damping_ratio"],
+    }  # fmt: skip
+    return [Habit(IMPULSE, impulse), Habit(PUSH_OUT, {"push_speed": chosen["push_speed"]}, (IMPULSE,))]
 
 
-def _box2d_v3_matched(_told: Mapping[str, Any], scene: Scene, _dt: float) -> list[Habit]:
-    return _box2d_v3(0.02 * float(scene.radius.min()))
+def _box2d_v3_matched(told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Habit]:
+    from adapters.box2d_v3 import MATCHED
+
+    return _box2d_v3(told, MATCHED)
 
 
 def _box2d_v3_shipped(told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Habit]:
-    from adapters.box2d_v3 import Box2DV3
+    from adapters.box2d_v3 import SHIPPED, Box2DV3
 
     shipped = partial(Box2DV3, "shipped")
     # At the threshold itself it bounces, where Box2D 2.3 does not.
     threshold = float(np.nextafter(np.float32(told["restitution threshold in m/s"]), np.float32(0)))
     return [
         Habit(RESTITUTION, {"threshold": threshold}, without=partial(shipped, restitution_threshold=0.0)),
-        *_box2d_v3(1.0),
+        *_box2d_v3(told, SHIPPED),
         Habit(FRICTION, {"friction": told["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
         Habit(SWEPT, without=partial(shipped, continuous=False, sleeping=False)),
     ]
@@ -155,7 +170,7 @@ HABITS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Habit]]] = {
     "pymunk:shipped": _pymunk_shipped,
     "pymunk:matched": partial(_pymunk, profile="matched"),
     "box2d:shipped": _box2d_shipped,
-    "box2d:matched": partial(_box2d, profile="matched"),
+    "box2d:matched": _box2d_matched,
     "box2d_v3:shipped": _box2d_v3_shipped,
     "box2d_v3:matched": _box2d_v3_matched,
 }

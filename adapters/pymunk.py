@@ -16,18 +16,29 @@ FIELDS = (
     batch.BodyFields.POSITION | batch.BodyFields.ANGLE | batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
 )
 
+MATCHED: dict[str, Any] = {
+    "iterations": 10,
+    "slop": 1e-6,
+    "bias": (1 - 0.1) ** 60,
+    "elastic_bias": 1.0,
+    "persistence": 1,
+}
+"""What `matched` chooses: `slop` in smallest radii; the biases are what is left of an overlap after 1 s, at e < 1 and
+at e = 1. `adapters/matched.csv` holds what else was tried."""
+
 
 class Pymunk:
     """`shipped`: restitution goes into every shape's elasticity, all else is pymunk's default.
 
-    `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; 50 iterations, because 10
-    lose energy in a dense gas; slop 1 % of the smallest radius, because the default 0.1 is a length in
-    the scene's units; contacts are forgotten as soon as they part, because one that touches again within three steps
-    inherits an impulse that it is not given again, but that is told, and may be taken back: energy is lost so;
-    at e = 1 no push-out, because it adds energy.
+    `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; and `MATCHED`, by `crosscheck tune`: ten
+    iterations, because more cost time and are no nearer; hardly any slop, because the default 0.1 is a length in the
+    scene's units; contacts are forgotten as soon as they part, because one that touches again within three steps
+    inherits an impulse that it is not given again, but that is told, and may be taken back; at e = 1 no position
+    correction, because it adds energy.
 
-    Changed one at a time by `features.py`: `turning` False gives every disk an infinite inertia, `spatial_hash`
-    (cell in m, count) replaces the tree of the broad phase, `settings` are attributes of the space.
+    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `turning` False gives every disk an
+    infinite inertia, `spatial_hash` (cell in m, count) replaces the tree of the broad phase; a key of `MATCHED` is the
+    matched profile's choice, any other of `settings` an attribute of the space.
     """
 
     listening, wrapping = True, 0.0
@@ -36,7 +47,9 @@ class Pymunk:
         self, profile: str, *, turning: bool = True, spatial_hash: tuple[float, int] | None = None, **settings: Any
     ) -> None:
         self.matched = profile == "matched"
-        self.turning, self.spatial_hash, self.changed = turning, spatial_hash, settings
+        self.turning, self.spatial_hash = turning, spatial_hash
+        self.chosen = {name: settings.pop(name, value) for name, value in MATCHED.items()} if self.matched else {}
+        self.changed = settings
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new space; static disks and walls are shapes on its static body."""
@@ -66,13 +79,15 @@ class Pymunk:
         scene = self.scene
         if not self.matched:
             return {"elasticity": float(scene.restitution)} | self.changed
+        chosen = self.chosen
         asked: dict[str, Any] = {
             "elasticity": float(np.sqrt(scene.restitution)),
-            "iterations": 50,
-            "collision_slop": float(0.01 * scene.radius.min()),
-            "collision_persistence": 1,
+            "iterations": chosen["iterations"],
+            "collision_slop": float(chosen["slop"] * scene.radius.min()),
+            "collision_bias": chosen["elastic_bias" if scene.restitution == 1 else "bias"],
+            "collision_persistence": chosen["persistence"],
         }
-        return asked | ({"collision_bias": 1.0} if scene.restitution == 1 else {}) | self.changed
+        return asked | self.changed
 
     def _add_disk(self, i: int) -> None:
         scene = self.scene

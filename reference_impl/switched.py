@@ -280,7 +280,7 @@ def soften(disks: Disks, on: Switches, kept: Contacts, h: float, pushing: bool) 
             target = -gap / h
         elif pushing and on.push_speed > 0.0:
             rigid = contact.j < 0 or disks.mass[contact.i] == inf or disks.mass[contact.j] == inf
-            omega = 2.0 * pi * min(on.hertz, 0.25 / h) * (2.0 if rigid else 1.0)
+            omega = 2.0 * pi * min(on.hertz, 0.125 / h) * (2.0 if rigid else 1.0)
             stiff = 2.0 * on.damping + h * omega
             memory = 1.0 / (1.0 + h * omega * stiff)
             share = 1.0 - memory

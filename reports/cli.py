@@ -232,6 +232,19 @@ def stability(
     find_limits(cases or [], vary or [], engine or [], full, resume, out, workers, command)
 
 
+@app.command()
+def tune(
+    engine: Annotated[
+        list[str] | None, typer.Argument(metavar="[ENGINE]...", help="Default: all with settings.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for matched.csv.")] = Path("reports/out/tune"),
+) -> None:
+    """Search the public settings of engines for those nearest to the exact answers at equal cost."""
+    from reports.tune.command import tune as search_settings
+
+    search_settings(engine or [], out)
+
+
 @app.command(name="list")
 def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
     """Explain every engine, scenario and metric in a line."""

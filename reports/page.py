@@ -16,6 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from adapters.matched import searched
 from adapters.play import Run
 from reports import overview, style
 from reports.charts import CHARTS, POINTS, Drawing
@@ -95,7 +96,7 @@ def write_page(
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
         heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, lessons=LESSONS, truth_of=truth_of,
-        common=by_name(common), trust=how_far_to_trust(comparisons),
+        common=by_name(common), trust=how_far_to_trust(comparisons), searched=by_engine(searched()),
     )  # fmt: skip
     path.write_text(html, encoding="utf-8")
 
@@ -163,6 +164,13 @@ def step_range(comparisons: Sequence[Comparison]) -> tuple[float, float]:
     """s, the smallest and the largest step size of all runs."""
     steps = [run.dt for comparison in comparisons for run in comparison.runs]
     return (min(steps), max(steps)) if steps else (np.nan, np.nan)
+
+
+def by_engine(rows: Sequence[dict[str, str]]) -> dict[str, list[dict[str, str]]]:
+    """Engine -> its rows of the table of what was searched."""
+    return {
+        engine: [row for row in rows if row["engine"] == engine] for engine in dict.fromkeys(r["engine"] for r in rows)
+    }
 
 
 def by_name(settings: overview.Settings) -> dict[str, list[tuple[str, str, str]]]:

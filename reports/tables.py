@@ -154,6 +154,12 @@ def sweep(folder: Path, kept: Set[Path]) -> None:
         other.unlink()
 
 
+def settled(name: str, pair: Sequence[Any]) -> str:
+    """A setting, what was asked for, and what the engine then has, as runs.csv has it."""
+    asked, used = pair
+    return f"{name}: asked {'default' if asked is None else asked}, used {used}"
+
+
 def table_of_runs(
     records: Sequence[dict[str, Any]], archive: Archive, unkept: Mapping[str, Comparison]
 ) -> pd.DataFrame:
@@ -172,7 +178,7 @@ def table_of_runs(
         | {
             "until_s": float(record["until_s"]),
             "seconds_alone": min(archive.timings.get(record["cell"], [float("nan")])),
-            "settings": "; ".join(f"{name}={resolved}" for name, (_, resolved) in record["settings"].items()),
+            "settings": "; ".join(map(settled, record["settings"], record["settings"].values())),
             "versions": "; ".join(f"{name} {version}" for name, version in record["versions"].items()),
         }
         for record in records

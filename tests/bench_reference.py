@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from adapters.box2d import POSITION_ITERATIONS, VELOCITY_ITERATIONS, Box2DEngine
-from adapters.box2d_v3 import SUBSTEPS, Box2DV3
+from adapters.box2d import Box2DEngine
+from adapters.box2d_v3 import Box2DV3
 from adapters.pymunk import Pymunk
 from adapters.reference import Reference
 from reference_impl import crowd, ordered
@@ -80,9 +80,8 @@ def box2d(profile: str, scene: Scene, dt: float) -> Step:
     engine = Box2DEngine(profile)
     engine.load(scene, dt)
     engine.world.contactListener = None
-    unit, iterations = dt / engine.time, engine.position_iterations
-    assert iterations in (0, POSITION_ITERATIONS)
-    return lambda count: [engine.world.Step(unit, VELOCITY_ITERATIONS, iterations) for _ in range(count)]
+    unit, velocity, position = dt / engine.time, engine.velocity_iterations, engine.position_iterations
+    return lambda count: [engine.world.Step(unit, velocity, position) for _ in range(count)]
 
 
 def box2d_v3(profile: str, scene: Scene, dt: float) -> Step:
@@ -95,7 +94,7 @@ def box2d_v3(profile: str, scene: Scene, dt: float) -> Step:
     def step(count: int) -> None:
         pyb2d3.set_length_units_per_meter(engine.unit)
         for _ in range(count):
-            engine.world.step(dt, SUBSTEPS)
+            engine.world.step(dt, engine.substeps)
 
     step.engine = engine  # type: ignore[attr-defined] # the world dies with its engine
     return step

@@ -146,7 +146,7 @@ def test_the_threshold_of_both_box2ds_is_1_metre_per_second(name):
 
 @pytest.mark.parametrize("dt", [1 / 32, 1 / 64, 1 / 128])
 def test_box2d_moves_a_disk_by_at_most_two_metres_a_step(dt):
-    """The cap is on the way, so half the dt doubles the speed; matched takes the way of a step as its length unit."""
+    """The cap is on the way, so half the dt doubles the speed; matched has units as long as half of it."""
     for name, speed in (("box2d:shipped", 2 / dt), ("box2d:matched", 512.0)):
         with loaded(ENGINES[name], one_disk(velocity=(512.0, 0.0)), dt) as engine:
             engine.step()

@@ -11,7 +11,7 @@ from broken_engines import NanAtStep7, RaisesInStep
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.engine import UNREAD
+from adapters.engine import NOT_TOLD
 from adapters.engines import ENGINES
 from adapters.play import STATUSES, play, pushed_steps
 from adapters.probe import first_difference, history, loaded, one_disk, plain
@@ -234,7 +234,7 @@ def test_what_was_asked_of_an_engine_is_what_it_resolved(name, e):
     assert versions
     for setting, (wanted, resolved) in settings.items():
         assert resolved is not None, setting
-        if resolved in (UNREAD, "kept by the adapter"):
+        if resolved in NOT_TOLD or resolved == "no wall":
             continue
         if isinstance(wanted, float):
             assert resolved == pytest.approx(wanted, rel=2.0**-24), setting  # float32
@@ -243,11 +243,38 @@ def test_what_was_asked_of_an_engine_is_what_it_resolved(name, e):
 
 
 def test_matched_pymunk_resolves_slop_and_iterations_as_asked():
-    """1 % of the smallest radius, and 50."""
+    """A share of the smallest radius, and a number."""
+    from adapters.pymunk import MATCHED
+
     with loaded(ENGINES["pymunk:matched"], plain()) as engine:
-        assert engine.settings()["collision_slop"] == (0.0025, 0.0025)
-        assert engine.settings()["iterations"] == (50, 50)
-        assert engine.space.collision_slop == 0.0025
+        slop = 0.25 * MATCHED["slop"]
+        assert engine.settings()["collision_slop"] == (slop, slop)
+        assert engine.settings()["iterations"] == (MATCHED["iterations"], MATCHED["iterations"])
+        assert engine.space.collision_slop == slop
+
+
+def test_box2d_v3_reads_its_length_unit_off_the_engine():
+    """Off a default that is a multiple of it; negative control: what was asked for is not simply told again."""
+    import pyb2d3
+
+    with loaded(ENGINES["box2d_v3:matched"], plain()) as engine:
+        asked, used = engine.settings()["length unit in m"]
+        assert used == pytest.approx(asked, rel=2.0**-24)
+        engine.unit = 17.0
+        assert engine.settings()["length unit in m"] == (17.0, used)
+        pyb2d3.set_length_units_per_meter(1.0)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_a_setting_that_cannot_be_read_back_says_so(name):
+    """An argument of every step is kept by nobody, so it is not what was asked for."""
+    with loaded(ENGINES[name], plain()) as engine:
+        settings = engine.settings()
+    for setting in ("substeps", "velocity, position iterations"):
+        if setting in settings and "box2d" in name:
+            assert settings[setting][1] == "passed with every step"
+    if name == "box2d_v3:matched":
+        assert settings["contact tuning (hertz, damping ratio, push speed in m/s)"][1] == "not readable"
 
 
 @pytest.mark.parametrize("name", ["box2d:shipped", "box2d:matched"])

@@ -110,7 +110,8 @@ def run_of(name: str, scene: Scenario, dt: float) -> Run:
     [
         # Bounds of rounding, in m: of float64 where the engine keeps that, else of so many steps of up to some metres.
         ("reference:exercise", "falling_box", 25, 1e-11),  # 135 hits, or 351, hand on what rounding does
-        ("pymunk:matched", "gas_of_100", 58, 1e-11),
+        # Ten iterations end before the impulses do, so that the order of the contacts decides the last digits.
+        ("pymunk:matched", "gas_of_100", 58, 1e-5),
         ("pymunk:shipped", "oblique_e09", 240, 1e-12),
         ("pymunk:matched", "bouncing_ball_e09", 600, 1e-12),
         ("box2d:shipped", "box_billiard", 1200, 4800 * 4 * FLOAT32),

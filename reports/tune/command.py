@@ -1,0 +1,57 @@
+"""`crosscheck tune`: search the settings of engines, print what is chosen, write the table."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+import pandas as pd
+from rich.console import Console
+from rich.table import Table
+
+from reports.commands import unknown
+from reports.exits import DONE, broken_off, refuse
+from reports.terminal import Progress
+from reports.tune.grid import MAKES
+from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, Search
+
+NAME = "matched.csv"
+
+
+def tune(engines: Sequence[str], out: Path) -> NoReturn:
+    """Search the settings of `engines`, all that have any if none is named; write matched.csv into `out`; exits 0.
+
+    The table of an engine is written as soon as its search has ended. Exits 2 on a name that is no engine with
+    settings, 130 and 143 when broken off.
+    """
+    if faults := [unknown("engine", name, MAKES) for name in engines if name not in MAKES]:
+        refuse(faults)
+    out = out.resolve()
+    tables: list[pd.DataFrame] = []
+    with (
+        broken_off(out, lambda: f"What has ended is in {out / NAME}." if tables else "Nothing is kept."),
+        Progress() as bar,
+    ):
+        out.mkdir(parents=True, exist_ok=True)
+        for engine in dict.fromkeys(engines or MAKES):
+            bar.say(f"{engine}: the exact answers, and what is matched now")
+            search = Search(engine, say=bar.note)
+            bar.say(f"{engine}: setting by setting")
+            tables.append(search.run())
+            pd.concat(tables).to_csv(out / NAME, index=False)
+    show(pd.concat(tables))
+    Console().print(f"\n{out / NAME}", style="bold", highlight=False, soft_wrap=True)
+    sys.exit(DONE)
+
+
+def show(table: pd.DataFrame) -> None:
+    """Print what is chosen, and why not the others."""
+    rows = Table(title="Error over the chosen settings' error, at equal cost", title_justify="left", box=None)
+    for column in ("engine", "setting", "value", "error", "on other seeds", "cost", "verdict"):
+        rows.add_column(column, overflow="fold")
+    for _, row in table[table.verdict.isin([CHOSEN, BETTER, NO_BETTER, BREAKS])].iterrows():
+        numbers = ["" if pd.isna(row[name]) else f"{row[name]:.3g}" for name in ("equal_cost", "again", "cost")]
+        rows.add_row(row.engine, row.setting, row.value, *numbers, row.verdict)
+    Console().print(rows)

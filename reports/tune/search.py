@@ -1,0 +1,176 @@
+"""The search: setting by setting, then the pairs, again and again until nothing on the grid is better."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
+from typing import Any, NamedTuple
+
+import pandas as pd
+
+from adapters.conformance import conform
+from adapters.engines import ENGINES, Row
+from reports.tune.grid import MAKES, NOT_SEARCHED, PAIRS, matched_of, settings_of
+from reports.tune.score import Against, Make, Played, against, cost_of, measured, posed
+from scenarios.tuning import FAMILIES
+
+SEEDS, OTHER_SEEDS = (0, 1), (2, 3)  # what is chosen on, and what has to bear it out
+LEAST = 0.9  # times the error: what gains less is kept as it is, as other seeds may read as much more
+SWEEPS = 4
+COLUMNS = [
+    "engine", "setting", "value", "chosen", "same_dt", "cost", "equal_cost", "again", "better", "worse", "of",
+    "verdict", "why",
+]  # fmt: skip
+CHOSEN, BETTER, NO_BETTER, BREAKS = "chosen", "better", "no better", "breaks"
+NO_SEARCH = "not searched"
+
+
+class Trial(NamedTuple):
+    """One change of the chosen settings: what it is against them at equal cost, on both halves of the seeds."""
+
+    change: dict[str, Any]
+    cost: float
+    first: Against
+    again: Against
+    departs: list[str]
+
+    @property
+    def faults(self) -> list[str]:
+        """What it breaks on either half, and the probes that it does not keep."""
+        return [*dict.fromkeys([*self.first.faults, *self.again.faults]), *self.departs]
+
+    @property
+    def verdict(self) -> str:
+        """Whether it is to be taken: better on both halves by `LEAST`, and nothing broken."""
+        if self.first.equal_cost >= LEAST or self.again.equal_cost >= LEAST:
+            return NO_BETTER
+        return BREAKS if self.faults else BETTER
+
+
+@dataclass
+class Search:
+    """The search for one engine; `say` is told of every trial."""
+
+    engine: str
+    families: tuple[str, ...] = tuple(each.__name__ for each in FAMILIES)
+    seeds: tuple[tuple[int, ...], tuple[int, ...]] = (SEEDS, OTHER_SEEDS)
+    say: Callable[[str], None] = print
+    known: dict[tuple[Any, ...], tuple[Played, Played]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.chosen = matched_of(self.engine)
+        self.scenes = tuple(posed(self.families, seeds) for seeds in self.seeds)
+        self.kept = self.keeps(self.chosen)
+
+    def make(self, settings: dict[str, Any]) -> Make:
+        """What makes the engine with these settings."""
+        return partial(MAKES[self.engine], **settings)
+
+    def keeps(self, settings: dict[str, Any]) -> set[str]:
+        """The probes of the conformance suite that it keeps."""
+        row: Row = replace(ENGINES[f"{self.engine}:matched"], make=self.make(settings))
+        return {finding.probe for finding in conform(f"{self.engine}:matched", row) if finding.verdict == "keeps"}
+
+    def played(self, settings: dict[str, Any]) -> tuple[Played, Played]:
+        """What the settings make of both halves; measured once."""
+        key = tuple(settings.values())
+        if key not in self.known:
+            first, again = (measured(self.make(settings), scenes) for scenes in self.scenes)
+            self.known[key] = first, again
+        return self.known[key]
+
+    def trial(self, change: dict[str, Any]) -> Trial:
+        """The chosen settings with a change, against them without it."""
+        settings, before = self.chosen | change, self.played(self.chosen)
+        now = self.played(settings)
+        one_a_family = self.scenes[0][:: len(self.seeds[0])]
+        cost = cost_of(self.make(settings), self.make(self.chosen), one_a_family)
+        first, again = (against(*each) for each in zip(now, before, (cost, cost), self.scenes))
+        trial = Trial(change, cost, first, again, sorted(self.kept - self.keeps(settings)))
+        what = ", ".join(f"{name} {value:g}" for name, value in change.items())
+        self.say(f"{self.engine} {what}: {trial.first.equal_cost:.3f}, {trial.again.equal_cost:.3f}: {trial.verdict}")
+        return trial
+
+    def groups(self) -> Iterator[list[dict[str, Any]]]:
+        """The changes of each setting, and then of each pair that differ in both."""
+        for one in settings_of(self.engine):
+            yield [{one.name: value} for value in one.values if value != self.chosen[one.name]]
+        for pair in PAIRS:
+            if pair.engine == self.engine:
+                changes = [dict(zip(pair.names, values)) for values in product(*pair.values)]
+                yield [each for each in changes if all(each[name] != self.chosen[name] for name in each)]
+
+    def sweep(self) -> tuple[list[Trial], bool]:
+        """All trials, taking the best of each setting at once; and whether anything was taken."""
+        trials, taken = [], False
+        for changes in self.groups():
+            group = [self.trial(change) for change in changes]
+            trials += group
+            better = [each for each in group if each.verdict == BETTER]
+            if better:
+                best = min(better, key=lambda each: each.first.equal_cost * each.again.equal_cost)
+                self.chosen |= best.change
+                self.say(f"{self.engine}: {best.change} is taken")
+                taken = True
+        return trials, taken
+
+    def run(self) -> pd.DataFrame:
+        """Sweep until nothing is taken; the table of the last sweep, against what is chosen then."""
+        for _ in range(SWEEPS):
+            trials, taken = self.sweep()
+            if not taken:
+                break
+        return table(self.engine, self.chosen, trials)
+
+
+def table(engine: str, chosen: dict[str, Any], trials: Sequence[Trial]) -> pd.DataFrame:
+    """Columns `COLUMNS`: what is chosen of each setting, every change tried, and what was not searched and why.
+
+    same_dt, equal_cost and again (equal cost, on the other seeds) are error over the chosen settings' error, cost a
+    step's over theirs; better and worse count scenes and steps, of both halves, that differ by 20 %.
+    """
+    rows: list[dict[str, Any]] = []
+    for one in settings_of(engine):
+        of_it = [each for each in trials if list(each.change) == [one.name]]
+        rows.append(
+            {"setting": one.name, "value": shown(chosen[one.name]), "chosen": True, "verdict": CHOSEN, "why": one.what}
+        )
+        rows += [row_of(each) for each in of_it]
+    rows += [row_of(each) for each in trials if len(each.change) > 1]
+    rows += [
+        {"setting": each.name, "chosen": False, "verdict": NO_SEARCH, "why": each.why}
+        for each in NOT_SEARCHED if each.engine == engine
+    ]  # fmt: skip
+    return with_reasons(pd.DataFrame([{"engine": engine} | row for row in rows], columns=COLUMNS)).round(4)
+
+
+def with_reasons(made: pd.DataFrame) -> pd.DataFrame:
+    """The table with the reason why each chosen value is chosen: what the best other value does."""
+    made = made.copy()
+    for index, row in made[made.verdict == CHOSEN].iterrows():
+        others = made[(made.setting == row.setting) & (made.verdict != CHOSEN)].assign(
+            both=made.equal_cost * made.again
+        )
+        best = others.loc[others.both.idxmin()]
+        reason = f"{best.value}: {best.equal_cost:.2f} and {best.again:.2f} times the error"
+        reason += f", but {best.why.split('; ')[0]}" if best.verdict == BREAKS else ""
+        made.loc[index, "why"] = f"{row.why}. Next best is {reason}"
+    return made
+
+
+def row_of(trial: Trial) -> dict[str, Any]:
+    """A row of the table."""
+    first, again = trial.first, trial.again
+    return {
+        "setting": " + ".join(trial.change), "value": " + ".join(map(shown, trial.change.values())), "chosen": False,
+        "same_dt": first.same_dt, "cost": trial.cost, "equal_cost": first.equal_cost, "again": again.equal_cost,
+        "better": first.better + again.better, "worse": first.worse + again.worse, "of": first.of + again.of,
+        "verdict": trial.verdict, "why": "; ".join(trial.faults),
+    }  # fmt: skip
+
+
+def shown(value: Any) -> str:
+    """A value as the table has it."""
+    return str(value) if isinstance(value, bool) else f"{value:.6g}"
