@@ -168,7 +168,7 @@ OTHER = "in its own order of insertion"
 GAS = (
     Case(
         "dense_gas", FAMILY, "Up to which packing does a gas of 100 disks keep its energy over 200 steps?",
-        "packing", "1", PACKINGS, dense, ENERGY_DRIFTS, runs=SEEDS, also=("pymunk:matched+ten_iterations",),
+        "packing", "1", PACKINGS, dense, ENERGY_DRIFTS, runs=SEEDS, also=("pymunk:matched+fifty_iterations",),
         quick_values=PACKINGS[:-1], ratio=1.25,
     ),
     Case(
@@ -178,7 +178,7 @@ GAS = (
     Case(
         "long_gas", FAMILY, "For how many steps does a gas of 20 disks keep its energy?",
         "steps", "1", LONG, long_run, ENERGY_DRIFTS, runs=2,
-        whole=True, quick_values=(1e3, 1e4), refines=False, also=("pymunk:matched+ten_iterations",),
+        whole=True, quick_values=(1e3, 1e4), refines=False, also=("pymunk:matched+fifty_iterations",),
     ),
     Case(
         "long_wrapped_gas", FAMILY, "For how many steps does a gas without walls keep its momentum?",

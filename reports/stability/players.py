@@ -49,12 +49,12 @@ def with_bullets(make: Callable[..., Engine]) -> Callable[[], Any]:
 
 BULLETS = "continuous collision, what moves is a bullet"
 SWITCHED = (
-    Player("pymunk:matched+ten_iterations", partial(changed_pymunk, iterations=10), "10 iterations for 50"),
+    Player("pymunk:matched+fifty_iterations", partial(changed_pymunk, iterations=50), "50 iterations for 10"),
     Player(
         "pymunk:matched+push_out", partial(changed_pymunk, collision_bias=(1 - 0.1) ** 60),
         "overlaps pushed out as shipped",
     ),
-    Player("box2d:matched+bullets", with_bullets(changed_box2d), BULLETS),
+    Player("box2d:matched+bullets", with_bullets(partial(changed_box2d, elastic_continuous=True)), BULLETS),
     Player("box2d_v3:matched+bullets", with_bullets(changed_box2d_v3), BULLETS),
     Player("box2d_v3:matched+16_substeps", partial(changed_box2d_v3, substeps=16), "16 substeps for 4"),
 )  # fmt: skip
