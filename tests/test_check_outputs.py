@@ -93,7 +93,7 @@ def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], me
     """No traceback, whatever is asked for."""
     (folder / "class.txt").write_text("mine")
     (folder / "empty").mkdir(exist_ok=True)
-    with mock.patch.object(command, "check_file", side_effect=command.check_file) as asked:
+    with mock.patch.object(command, "checked", side_effect=command.checked) as asked:
         done = crosscheck("check", *words, cwd=folder)
 
     assert done.returncode == 2
