@@ -7,7 +7,7 @@ import numpy as np
 from scenarios.model import Scenario, Scene, Thrust
 
 RESTITUTIONS = (1.0, 0.9, 0.5, 0.1)
-WIDTH, HEIGHT = 9.0, 6.0  # m; no coordinate is 8 m or more but the walls', see `nudges` of test_horizon
+WIDTH, HEIGHT = 9.0, 6.0  # m; no coordinate is 8 m or more but the walls', see `nudges` of the horizon
 GAP = 0.02  # m, between any two bodies at the start: nothing touches
 
 

@@ -22,6 +22,8 @@ from scenarios.model import Scenario, Trajectory
 
 pytestmark = pytest.mark.independent
 
+Record = Callable[[str, object], None]
+
 SCENES = (
     "free_fall", "ping_pong", "head_on_equal_e1", "head_on_unequal_e05", "oblique_e09", "mass_ratios", "slow_hit",
     "wall_to_wall", "bouncing_ball_e09", "disk_between_static_disks", "column_of_ten", "galperin_31",
@@ -210,16 +212,14 @@ def compared(name: str) -> tuple[pd.DataFrame, dict[str, Trajectory], Scenario]:
     return compare(scenario, runs).table, known, scenario
 
 
-def test_the_metrics_come_out_again_from_the_trajectories(record_property: Callable[[str, object], None]):
+def test_the_metrics_come_out_again_from_the_trajectories(record_property: Record):
     """To rounding; every metric of `OWN` in some scene."""
     count, wrong, met = 0, [], set()
     for name in SCENES:
         table, known, scenario = compared(name)
         of_scene, wrong_of_scene = differences(table, known, scenario)
         count, wrong, met = count + of_scene, wrong + wrong_of_scene, met | set(table.metric)
-    record_property(
-        "found", f"metrics: {count} of {len(SCENES)} scenes computed again, {len(wrong)} come out otherwise"
-    )
+    record_property("found", f"metrics: {count} numbers of {len(SCENES)} scenes, {len(wrong)} come out otherwise")
 
     assert not wrong
     assert set(OWN) <= met

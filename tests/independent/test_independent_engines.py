@@ -16,6 +16,8 @@ from tests.independent.plain_engines import KNOWN, PLAIN, Samples
 
 pytestmark = pytest.mark.independent
 
+Record = Callable[[str, object], None]
+
 SCENES = (
     "free_fall", "head_on_equal_e09", "oblique_e05", "mass_ratios", "slow_hit", "near_miss", "bouncing_ball_e09",
     "box_billiard", "disk_between_static_disks", "slide_on_incline", "column_of_ten", "galperin_31", "cradle_touching",
@@ -41,9 +43,7 @@ def unequal(run: Run, samples: Samples) -> list[str]:
 
 
 @pytest.mark.parametrize("player", PLAYERS)
-def test_an_adapter_plays_what_its_engine_plays_when_called_directly(
-    player: str, record_property: Callable[[str, object], None]
-):
+def test_an_adapter_plays_what_its_engine_plays_when_called_directly(player: str, record_property: Record):
     """Bit for bit, with the settings that it says it asked for, and no others."""
     wrong, played = [], 0
     for name in SCENES:
@@ -55,9 +55,7 @@ def test_an_adapter_plays_what_its_engine_plays_when_called_directly(
             played += 1
             samples = PLAIN[run.engine](scenario, run.dt, asked)
             wrong += [f"{name}: {fault}" for fault in unequal(run, samples)]
-    record_property(
-        "found", f"engines: {player}, {played} of {len(SCENES)} scenes, {len(wrong)} arrays not the same to the bit"
-    )
+    record_property("found", f"engines: {player}, {played} of {len(SCENES)} scenes, {len(wrong)} arrays differ")
 
     assert not wrong
     assert played > len(SCENES) / 2

@@ -29,6 +29,8 @@ from tests.independent.random_scenes import box, placed, scenario
 
 pytestmark = pytest.mark.independent
 
+Record = Callable[[str, object], None]
+
 DRAWS = 8
 LEAST, MOST = 0.33, 1.81  # of the root mean square of eight draws over its expectation
 BILLIONTH = 1e-9
@@ -94,7 +96,7 @@ def mean_square(gases: list[tuple[np.ndarray, np.ndarray, float]], share: float)
 
 
 def test_at_the_horizon_starts_a_rounding_apart_are_a_billionth_of_a_radius_apart(
-    record_property: Callable[[str, object], None],
+    record_property: Record,
 ):
     """Of gases with and without gravity and losses, and of two scenes of the suite.
 

@@ -18,6 +18,8 @@ from tests.independent.random_scenes import RESTITUTIONS, SURROUNDINGS, random_s
 
 pytestmark = pytest.mark.independent
 
+Record = Callable[[str, object], None]
+
 SCENES, MOST_EVENTS = 320, 60
 ACCURACY = 1e-12  # m, and s: what the project says that its exact answers are certain to
 LEAST = 1e-4  # s: of bounces that die out on a wall those that last less are not in the record's list, as it says
@@ -69,8 +71,8 @@ def compared(scenario: Scenario, motion: Motion, record: TruthRecord) -> Compare
     return Compared(len(own), distance, faults)
 
 
-def test_the_oracle_gives_the_events_and_positions_of_a_motion_that_asks_every_pair(
-    record_property: Callable[[str, object], None],
+def test_the_oracle_gives_the_events_and_positions_of_a_motion_that_asks_all_pairs(
+    record_property: Record,
 ):
     """Of hundreds of random scenes; and it never ends before that motion does."""
     found, ends, refused = [], Counter(), []
