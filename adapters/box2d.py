@@ -103,10 +103,9 @@ class Box2DEngine:
         gravity = scene.gravity * self.speed * self.time
         heard = {"contactListener": self.listener} if self.listening else {}
         self.world = Box2D.b2World(gravity=vector(gravity), **heard)
-        keeps = (
-            "elastic_" if scene.restitution == 1 and not scene.gravity.any() else ""
-        )  # its collisions keep its energy
-        self.continuous, self.bullet = chosen[keeps + "continuous"], chosen[keeps + "bullet"]
+        # Continuous collision creates energy where the scene keeps it.
+        elastic = "elastic_" if scene.restitution == 1 and not scene.gravity.any() else ""
+        self.continuous, self.bullet = chosen[elastic + "continuous"], chosen[elastic + "bullet"]
         self.world.continuousPhysics = self.continuous
         self.world.subStepping = chosen["sub_stepping"]
         self.world.SetAllowSleeping(self.sleeping)  # `doSleep` only sets a Python attribute that the engine never sees

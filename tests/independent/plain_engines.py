@@ -112,6 +112,8 @@ def play_box2d(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
     sleeping = asked.get("sleeping", True)
     world.allowSleeping = sleeping
     world.continuousPhysics = asked.get("continuous collision", True)
+    world.subStepping = asked.get("sub-stepping", False)
+    world.warmStarting = asked.get("warm starting", True)
     surface: dict[str, Any] = {"restitution": float(asked["restitution"])}
     if "friction" in asked:
         surface["friction"] = asked["friction"]
@@ -128,6 +130,7 @@ def play_box2d(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
                 position=position, angle=float(scene.angle[i]), allowSleep=sleeping, fixtures=circle,
                 linearVelocity=tuple((scene.velocity[i] * speed).tolist()),
                 angularVelocity=float(scene.angular_velocity[i] * time),
+                bullet=asked.get("continuous collision between disks", False),
             )  # fmt: skip
             body.massData = Box2D.b2MassData(
                 mass=float(scene.mass[i]), center=(0, 0), I=float(scene.inertia[i] * length**2)
@@ -135,8 +138,8 @@ def play_box2d(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
         bodies.append(body)
     for start, end in (scene.walls * length).tolist():
         edge = Box2D.b2EdgeShape(vertices=[start, end])
-        if "wall skin" in asked:
-            edge.radius = asked["wall skin"]
+        if "wall skin in m" in asked:
+            edge.radius = asked["wall skin in m"] * length
         world.CreateStaticBody(fixtures=Box2D.b2FixtureDef(shape=edge, **surface))
 
     def step(number: int) -> None:
@@ -199,6 +202,7 @@ def played_box2d_v3(scene: Scene, scenario: Scenario, dt: float, asked: dict[str
             body = world.create_dynamic_body(
                 **place, linear_velocity=tuple(scene.velocity[i].tolist()),
                 angular_velocity=float(scene.angular_velocity[i]), enable_sleep=sleeping,
+                is_bullet=asked.get("continuous collision between disks", False),
             )  # fmt: skip
             body.create_circle_shape(definition, circle)
             mass = pyb2d3.MassData()
@@ -234,8 +238,9 @@ def played_box2d_v3(scene: Scene, scenario: Scenario, dt: float, asked: dict[str
 PLAIN = {"pymunk": play_pymunk, "box2d": play_box2d, "box2d_v3": play_box2d_v3}
 KNOWN = {
     "elasticity", "iterations", "collision_slop", "collision_bias", "collision_persistence", "damping",
-    "unit of length in m", "unit of time in s", "wall skin", "velocity, position iterations",
-    "friction", "restitution", "sleeping", "continuous collision",
+    "unit of length in m", "unit of time in s", "wall skin in m", "velocity, position iterations",
+    "friction", "restitution", "sleeping", "continuous collision", "continuous collision between disks",
+    "sub-stepping", "warm starting",
     "length unit in m", "restitution threshold in m/s", "speed cap in m/s", "substeps",
     "contact tuning (hertz, damping ratio, push speed in m/s)",
 }  # fmt: skip
