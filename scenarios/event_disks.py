@@ -20,8 +20,12 @@ from scenarios.model import Array
 Ints = NDArray[np.int64]
 Links = NDArray[np.uint32]
 Disks = NDArray[np.void]  # (n,) of DISK
+Runs = NDArray[np.void]  # (n,) of RUN
 NONE = np.uint32(2**32 - 1)  # ends a chain; without a sign, so that nobody must ask whether to count from the end
 NOBODY = -(2**31)
+DONE, GOES_ON, LOG_FULL, ACCUMULATION, REENTRY, ROUND_END = range(6)  # what the loop says
+BASE, STOP = 0, 1  # columns of Arena.clock
+LOGGED, WHO, WHOM, LEFT = range(4)  # and of Arena.told
 EDGE, WRAP, END, WALL = 0, 4, 8, 9  # by itself: + side (left, right, bottom, top); the wall's end; + 3 wall + part
 
 # A disk in three lines of the cache: what a search for contacts reads of others, its record, what only some need.
@@ -45,7 +49,18 @@ DISK = np.dtype(
         ("ox", "f8"), ("oy", "f8"),  # where cell (0, 0) of its lap lies: the grid of an open scene repeats for ever
         ("wall", "i4"),  # the wall it lies on; -1: none; -2 - wall: none since it slid off that one
         ("bounces", "i4"),  # hits in a row on the face of one wall
-        ("", "f8"),
+        ("corner", "i4"),  # the second wall of the corner in which it lies still; -1: none
+        ("", "i4"),
+    ]
+)  # fmt: skip
+
+# Of each disk the collisions in a row between which it has not flown, see `event_rest.rattles`.
+RUN = np.dtype(
+    [
+        ("hits", "i4"),  # those that count
+        ("walls", "i4"),  # collisions in a row with walls, whether it has flown between them or not
+        ("start", "f8"),  # s, when the first of the run was
+        ("pull", "f8"),  # m/s2, the largest that acted on those who took part
     ]
 )  # fmt: skip
 
@@ -72,6 +87,7 @@ class Rules(NamedTuple):
     falling: bool  # something is pulled
     mixed: bool  # not everything alike
     wrapped: bool
+    lasting: bool  # bounces die out too slowly for `crowd`, or never
     crowd: float  # units in the last place of the time: who hits 64 times within so many has no single continuation
 
 
@@ -96,7 +112,8 @@ class Arena(NamedTuple):
     walls: Walls
     clock: Array  # s: when the present epoch began, when the answer ends
     log: Array  # (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
-    told: Ints  # rows in the log; the two for whom the answer ends, as in the log
+    told: Ints  # rows in the log; the two for whom the answer ends, as in the log; events until the loop comes back
+    runs: Runs  # untouched where there is no scenery
 
 
 @inlined

@@ -1,8 +1,7 @@
-"""What a hit does in the event engine: Newton's restitution along the line of centres, without friction; and rest.
+"""What a hit does in the event engine: Newton's restitution along the line of centres, without friction; and its note.
 
-A disk whose bounces on a wall have come to their end lies on it: it has neither normal speed nor normal pull, and flies
-along the wall on a parabola of its own, until a hit, a change of pull or the wall's end takes it off. This is the limit
-of the bounces, not a model of friction or of sticking.
+A collision is logged and counted, so that those without an end are noticed: between which float64 tells no time, or
+between which nothing flies.
 """
 
 from __future__ import annotations
@@ -10,8 +9,11 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
+import numpy as np
+
 from scenarios.compiled import inlined, kernel
-from scenarios.event_disks import Walls
+from scenarios.event_disks import ACCUMULATION, BASE, GOES_ON, LOGGED, NOBODY, STOP, WHO, WHOM, Arena, Walls
+from scenarios.event_rest import HITS, hold, jolt, rattles, rests, second_wall, slow
 from scenarios.event_search import ROUNDING, image
 
 
@@ -63,36 +65,82 @@ def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) ->
     return q * sqrt(distance2) / a.weight, min(-closing / sqrt(distance2 * speed2), 1.0)
 
 
-@kernel
-def across(walls: Walls, a: Any, w: int, x: float, y: float) -> float:
-    """The part of a vector that points away from the face of wall `w` on which a disk touches it."""
-    ux, uy = walls.segment[w, 2], walls.segment[w, 3]
-    above = (a.y - walls.segment[w, 1]) * ux - (a.x - walls.segment[w, 0]) * uy > 0.0
-    return y * ux - x * uy if above else x * uy - y * ux
-
-
-@kernel
-def lie_down(walls: Walls, a: Any, w: int) -> None:
-    """Let a disk that touches wall `w` lie on it: of its speed and its pull only what is along the wall is left."""
-    ux, uy = walls.segment[w, 2], walls.segment[w, 3]
-    speed, pull = a.vx * ux + a.vy * uy, a.pull_x * ux + a.pull_y * uy
-    a.vx, a.vy, a.ax, a.ay = speed * ux, speed * uy, pull * ux, pull * uy
-    a.wall, a.bounces = w, 0
-
-
-@kernel
-def take_off(a: Any) -> None:
-    """Let a disk that lies on a wall fly again."""
-    a.ax, a.ay, a.wall = a.pull_x, a.pull_y, -1
+@inlined
+def tell(arena: Arena, now: float, i: int, j: int, impulse: float, cosine: float) -> None:
+    """Write a hit into the log."""
+    log, k = arena.log, arena.told[LOGGED]
+    log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = arena.clock[BASE] + now, i, j, impulse, cosine
+    arena.told[LOGGED] += 1
 
 
 @inlined
-def jolt(walls: Walls, a: Any) -> None:
-    """After a hit from elsewhere a disk stays on its wall only if nothing moves it off or into the wall."""
-    if a.wall >= 0:
-        if abs(across(walls, a, a.wall, a.vx, a.vy)) <= a.noise:
-            lie_down(walls, a, a.wall)
-        else:
-            take_off(a)
-    elif a.wall < -1:
-        a.wall = -1
+def stop(arena: Arena, now: float, i: int, j: int) -> None:
+    """Tell when and for whom the answer ends, should it."""
+    arena.clock[STOP], arena.told[WHO], arena.told[WHOM] = arena.clock[BASE] + now, i, j
+
+
+@inlined
+def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) -> bool:
+    """Count and log a hit; True if hits of disk `i` follow each other faster than float64 tells times apart."""
+    a.count += 1
+    if impulse > 0.0:
+        tell(arena, a.t, i, j, impulse, cosine)
+    a.mark_hits += 1
+    if a.mark_hits < HITS:
+        return False
+    since, a.mark_hits, a.mark_time = a.t - a.mark_time, 0, a.t
+    if since > arena.rules.crowd * np.spacing(arena.clock[BASE] + a.t):
+        return False
+    stop(arena, a.t - since, i, j)
+    return True
+
+
+@inlined
+def change(a: Any) -> None:
+    """Make void what others know of a disk, and forget what it hit last."""
+    a.count += 1
+    a.last = NOBODY
+
+
+@kernel
+def rattles_on_disk(run: Any, a: Any, b: Any, restitution: float, impulse: float, counts: bool) -> bool:
+    """Whether a disk that has just collided with disk `b` rattles between what it touches, see `rattles`."""
+    if a.weight == 0.0:
+        return False
+    run.walls = 0
+    pull2 = max(a.pull_x * a.pull_x + a.pull_y * a.pull_y, b.pull_x * b.pull_x + b.pull_y * b.pull_y)
+    return rattles(run, a, impulse * (a.weight + b.weight) / (1.0 + restitution), sqrt(pull2), counts)
+
+
+@kernel
+def hit_wall(arena: Arena, i: int, w: int, part: int) -> int:
+    """Disk `i` bounces off a wall, or comes to rest on its face or in a corner with another one.
+
+    Bounces to and fro in a corner go on, however many there are at one instant, until they have made it slow.
+    """
+    a, walls, run = arena.disks[i], arena.walls, arena.runs[i]
+    changed = a.last != -1 - w
+    impulse, cosine = collide_wall(walls, a, w, part, arena.rules.restitution)
+    jolt(walls, a)
+    crowded = note(arena, a, i, -1 - w, impulse, cosine)
+    run.walls += 1
+    walls_only = run.walls >= HITS  # no other disk has a part in it
+    trapped = False
+    if arena.rules.falling or arena.rules.restitution < 1.0:
+        closing = impulse * a.weight / (1.0 + arena.rules.restitution)
+        pull = sqrt(a.pull_x * a.pull_x + a.pull_y * a.pull_y)
+        trapped = rattles(run, a, closing, pull, changed or arena.rules.lasting)
+    mixed, corner = arena.rules.mixed, -1
+    if part == 0 and (crowded or trapped or (mixed and slow(a))):
+        corner = second_wall(walls, arena.grid, a, w)
+    may_rest = part == 0 and mixed and (walls_only or not trapped)
+    if may_rest and rests(walls, a, w, corner, crowded, trapped):
+        if impulse == 0.0:  # a contact that begins to push without a collision
+            tell(arena, a.t, i, -1 - w, 0.0, 1.0)
+        return GOES_ON
+    if trapped:
+        stop(arena, run.start, i, -1 - w)
+    to_and_fro = False
+    if corner >= 0 and walls_only and (a.pull_x != 0.0 or a.pull_y != 0.0):
+        to_and_fro = not slow(a) or hold(walls, a, w, corner) > 0.0
+    return ACCUMULATION if trapped or (crowded and not to_and_fro) else GOES_ON

@@ -9,32 +9,39 @@ import numpy as np
 
 from scenarios.compiled import inlined, kernel, pasted
 from scenarios.event_disks import (
+    ACCUMULATION,
+    BASE,
+    DONE,
     EDGE,
     END,
-    NOBODY,
+    GOES_ON,
+    LEFT,
+    LOG_FULL,
+    LOGGED,
     NONE,
+    REENTRY,
+    ROUND_END,
     WALL,
+    WHOM,
     WRAP,
     Arena,
     Disks,
     Grid,
     Ints,
     Links,
+    Runs,
     Scenery,
     cross,
     fly,
     settle,
     unlink,
 )
-from scenarios.event_impacts import across, collide, collide_wall, jolt, lie_down, take_off
+from scenarios.event_impacts import change, collide, hit_wall, note, rattles_on_disk, stop
 from scenarios.event_queue import Tree, put
+from scenarios.event_rest import across, bear, jolt, take_off
 from scenarios.event_search import ALL, ROUNDING, find_own, find_pair
 from scenarios.model import Array
 
-DONE, GOES_ON, LOG_FULL, ACCUMULATION, REENTRY, ROUND_END = range(6)
-BASE, STOP = 0, 1  # columns of Arena.clock
-LOGGED, WHO, WHOM = 0, 1, 2  # and of Arena.told
-HITS = 64  # so many of one disk within Rules.crowd: they accumulate
 EPOCH = 256.0  # s; the clock starts again after as many, so that its last place stays small
 
 
@@ -42,11 +49,12 @@ EPOCH = 256.0  # s; the clock starts again after as many, so that its last place
 def advance(arena: Arena, scenery: Scenery, until: float) -> int:
     """Let everything up to `until` s happen.
 
-    Returns DONE; LOG_FULL, to be called again with told[LOGGED] = 0; or ACCUMULATION, REENTRY or ROUND_END, with
-    clock[STOP], told[WHO] and told[WHOM] when and for whom the answer ends.
+    Returns DONE; GOES_ON after told[LEFT] events, or LOG_FULL, to be called again with told[LOGGED] = 0; or
+    ACCUMULATION, REENTRY or ROUND_END, with clock[STOP], told[WHO] and told[WHOM] when and for whom the answer ends.
     """
     disks, clock = arena.disks, arena.clock
-    while True:
+    while arena.told[LEFT] > 0:
+        arena.told[LEFT] -= 1
         now = arena.tree[1].time
         i: Any = np.int64(arena.tree[1].who)
         if clock[BASE] + now > until:
@@ -54,7 +62,7 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
         if arena.told[LOGGED] == len(arena.log):
             return LOG_FULL
         if now > EPOCH:
-            begin_epoch(disks, arena.tree, clock)
+            begin_epoch(disks, arena.tree, arena.runs, clock)
             continue
         a = disks[i]
         j: Any = np.int64(-1)
@@ -80,7 +88,7 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
             if disks[i].weight > 0.0:
                 renew(arena, scenery, i, fresh, beyond)
             i, j = j, np.int64(-1)
-    return DONE
+    return GOES_ON
 
 
 @pasted
@@ -98,13 +106,23 @@ def renew(arena: Arena, scenery: Scenery, i: int, fresh: bool, beyond: int) -> N
 def hit(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
     """Disks i and j hit each other."""
     a, b = arena.disks[i], arena.disks[j]
+    new_to_a, new_to_b = a.last != j, b.last != i
     impulse, cosine = collide(a, b, i, j, arena.grid.shift, arena.rules.restitution)
     if len(scenery) and arena.rules.falling:
         jolt(arena.walls, a)
         jolt(arena.walls, b)
     if b.weight > 0.0:
         b.count += 1
-    return ACCUMULATION if note(arena, a, i, j, impulse, cosine) else GOES_ON
+    crowded = note(arena, a, i, j, impulse, cosine)
+    if len(scenery) and (arena.rules.falling or arena.rules.restitution < 1.0):
+        e, lasting = arena.rules.restitution, arena.rules.lasting
+        if rattles_on_disk(arena.runs[i], a, b, e, impulse, new_to_a or lasting):
+            crowded = True
+            stop(arena, arena.runs[i].start, i, j)
+        if rattles_on_disk(arena.runs[j], b, a, e, impulse, new_to_b or lasting):
+            crowded = True
+            stop(arena, arena.runs[j].start, j, i)
+    return ACCUMULATION if crowded else GOES_ON
 
 
 @kernel
@@ -114,26 +132,6 @@ def alone(arena: Arena, i: int) -> int:
     if code >= WALL:
         return hit_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
     return leave(arena, i) if code == END else wrap(arena, i, code - WRAP)
-
-
-@kernel
-def hit_wall(arena: Arena, i: int, w: int, part: int) -> int:
-    """Disk `i` bounces off a wall, or comes to rest on its face.
-
-    It does where it has no normal speed left, and where its bounces accumulate: what they would still sweep then is
-    less high than a unit in the last place, so that nothing can come between them and their limit.
-    """
-    a, walls = arena.disks[i], arena.walls
-    impulse, cosine = collide_wall(walls, a, w, part, arena.rules.restitution)
-    jolt(walls, a)
-    crowded = note(arena, a, i, -1 - w, impulse, cosine)
-    over = a.bounces >= HITS if crowded else abs(across(walls, a, w, a.vx, a.vy)) <= a.noise
-    if over and part == 0 and a.wall < 0 and arena.rules.mixed and across(walls, a, w, a.pull_x, a.pull_y) < 0.0:
-        lie_down(walls, a, w)
-        if impulse == 0.0:  # a contact that begins to push without a hit
-            tell(arena, a.t, i, -1 - w, 0.0, 1.0)
-        return GOES_ON
-    return ACCUMULATION if crowded else GOES_ON
 
 
 @kernel
@@ -163,43 +161,6 @@ def wrap(arena: Arena, i: int, side: int) -> int:
     return REENTRY if arena.told[WHOM] >= 0 else GOES_ON
 
 
-@inlined
-def stop(arena: Arena, now: float, i: int, j: int) -> None:
-    """Tell when and for whom the answer ends, should it."""
-    arena.clock[STOP], arena.told[WHO], arena.told[WHOM] = arena.clock[BASE] + now, i, j
-
-
-@inlined
-def change(a: Any) -> None:
-    """Make void what others know of a disk, and forget what it hit last."""
-    a.count += 1
-    a.last = NOBODY
-
-
-@inlined
-def tell(arena: Arena, now: float, i: int, j: int, impulse: float, cosine: float) -> None:
-    """Write a hit into the log."""
-    log, k = arena.log, arena.told[LOGGED]
-    log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = arena.clock[BASE] + now, i, j, impulse, cosine
-    arena.told[LOGGED] += 1
-
-
-@inlined
-def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) -> bool:
-    """Count and log a hit; True if hits of disk `i` follow each other faster than float64 tells times apart."""
-    a.count += 1
-    if impulse > 0.0:
-        tell(arena, a.t, i, j, impulse, cosine)
-    a.mark_hits += 1
-    if a.mark_hits < HITS:
-        return False
-    since, a.mark_hits, a.mark_time = a.t - a.mark_time, 0, a.t
-    if since > arena.rules.crowd * np.spacing(arena.clock[BASE] + a.t):
-        return False
-    stop(arena, a.t - since, i, j)
-    return True
-
-
 @kernel
 def covered(disks: Disks, i: int) -> int:
     """A disk that overlaps disk `i`, -1 if there is none."""
@@ -216,7 +177,7 @@ def covered(disks: Disks, i: int) -> int:
 
 
 @kernel
-def begin_epoch(disks: Disks, tree: Tree, clock: Array) -> None:
+def begin_epoch(disks: Disks, tree: Tree, runs: Runs, clock: Array) -> None:
     """Count all times from EPOCH s later."""
     clock[BASE] += EPOCH
     for i in range(len(disks)):
@@ -225,6 +186,7 @@ def begin_epoch(disks: Disks, tree: Tree, clock: Array) -> None:
         a.pair_time -= EPOCH
         a.own_time -= EPOCH
         a.mark_time -= EPOCH
+        runs[i].start -= EPOCH
     for k in range(len(tree)):
         tree[k].time -= EPOCH
 
@@ -251,10 +213,7 @@ def pull(arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float
     a, now = arena.disks[i], at - arena.clock[BASE]
     fly(a, now, scenery)
     a.pull_x, a.pull_y = ax, ay
-    if a.wall >= 0 and across(arena.walls, a, a.wall, ax, ay) < 0.0:
-        lie_down(arena.walls, a, a.wall)
-    else:
-        take_off(a)
+    bear(arena.walls, a)
     change(a)
     ask_again(a, arena.tree, i, now)
 

@@ -84,7 +84,7 @@ def wall_time(walls: Walls, a: Any, w: int, part: int, until: float) -> float:
     for side in (1.0, -1.0):
         gap, v, p = side * height - a.radius, side * speed, side * pull
         if noise > 0.0 and side * height > 0.0:
-            if gap < ROUNDING * (abs(dx) + abs(dy) + a.radius):
+            if abs(gap) < ROUNDING * (abs(dx) + abs(dy) + a.radius):  # beside a wall's end it may be far below
                 gap = 0.0
             if abs(v) < noise:
                 v = 0.0

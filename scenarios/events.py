@@ -13,12 +13,38 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenarios import event_loop
-from scenarios.event_disks import DISK, NOBODY, NONE, Arena, Grid, Rules, Scenery, Walls
+from scenarios.event_disks import (
+    ACCUMULATION,
+    BASE,
+    DISK,
+    GOES_ON,
+    LEFT,
+    LOG_FULL,
+    LOGGED,
+    NOBODY,
+    NONE,
+    REENTRY,
+    ROUND_END,
+    RUN,
+    STOP,
+    WHO,
+    WHOM,
+    Arena,
+    Grid,
+    Rules,
+    Scenery,
+    Walls,
+)
 from scenarios.event_queue import empty_queue
 from scenarios.model import Array, Scene
 from scenarios.no_truth import NoTruth
 
 LOG_ROWS = 1 << 14
+EVENTS = 1 << 14  # in one go, some ms, without looking up for Ctrl-C
+MOST = 400_000  # events, less than a second, after which the time they took must account for them, ...
+NARROW, CROWDED = 1e4, 1e2  # ... at so many in all, and so many a disk, while the fastest flies the smallest radius
+MOST_AHEAD = 1e9  # events, some ten minutes, that may still be to come at the present pace
+SLOWEST = 0.9999  # the restitution up to which bounces are waited for to die out
 WIDER = 1 + 1e-9  # cells are wider than the largest disk by more than rounding, so that contacts are always next door
 
 
@@ -33,43 +59,70 @@ class EventEngine:
     def __init__(self, scene: Scene, torus: ArrayLike | None = None, cell: float = 0.0) -> None:
         box = None if torus is None else np.asarray(torus, float)
         refuse_box(scene, box)
-        refuse_walls(scene)
         self.scene = scene
-        (grid, low), rules = grid_of(scene, box, cell), rules_of(scene)
+        (grid, low), rules = grid_of(scene, box, cell), rules_of(scene, refuse_walls(scene))
         position = scene.position if box is None else low + np.mod(scene.position - low, box[1] - low)
         self.arena = Arena(
             disks_of(scene, position, low), empty_queue(scene.n), head=np.full(np.prod(grid.shape), NONE),
             near=np.full(scene.n + 9, NONE), grid=grid, rules=rules, walls=walls_of(scene, grid, low),
-            clock=np.zeros(2), log=np.zeros((LOG_ROWS, 5)), told=np.zeros(3, np.int64),
+            clock=np.zeros(2), log=np.zeros((LOG_ROWS, 5)), told=np.zeros(4, np.int64),
+            runs=np.zeros(scene.n, RUN).view(np.recarray),
         )  # fmt: skip
         self.kept: list[Array] = []
+        self.spent, self.since = 0, 0.0  # events since refuse_crawl has looked, and when that was, s
         self.scenery: Scenery = (True,) if rules.falling or rules.wrapped or len(scene.walls) else ()
         event_loop.begin(self.arena.disks, self.arena.head, self.arena.tree, grid)
         self.refuse_pairs()
 
     def advance(self, until: float) -> None:
         """Let all events up to `until` s happen; `NoTruth` if the answer ends before."""
-        status = event_loop.LOG_FULL
-        while status == event_loop.LOG_FULL:
-            self.drain()
+        status, told = GOES_ON, self.arena.told
+        while status in (GOES_ON, LOG_FULL):
+            told[LEFT] = EVENTS
             status = event_loop.advance(self.arena, self.scenery, until)
-        self.drain()
-        at, i, j = self.arena.clock[event_loop.STOP], self.arena.told[event_loop.WHO], self.arena.told[event_loop.WHOM]
-        if status == event_loop.ACCUMULATION:
-            other = f"disk {j}" if j >= 0 else f"wall {-1 - j}"
-            hits = f"{event_loop.HITS} hits of disk {i}, the last with {other}"
-            raise NoTruth(f"{hits}, come at once at {at:.9g} s: they accumulate", at)
-        if status == event_loop.REENTRY:
+            self.spent += EVENTS - int(told[LEFT])
+            self.drain()
+            if self.spent >= MOST:
+                self.refuse_crawl(until)
+        at, i, j = float(self.arena.clock[STOP]), int(told[WHO]), int(told[WHOM])
+        if status == ACCUMULATION:
+            raise NoTruth(f"the collisions of disk {i} on {self.partners(i, j, at)} accumulate at {at:.9g} s", at)
+        if status == REENTRY:
             raise NoTruth(f"disk {i} re-enters on top of disk {j} at {at:.9g} s", at)
-        if status == event_loop.ROUND_END:
+        if status == ROUND_END:
             raise NoTruth(f"disk {i} slides round the end of wall {-1 - j} at {at:.9g} s: no parabola goes there", at)
+
+    def refuse_crawl(self, until: float) -> None:
+        """`NoTruth` if the last `MOST` events took less time than the scene accounts for, or if too many are to come.
+
+        While the fastest disk flies its radius, or falls by it, a gas has some ten events a disk, and a disk that flies
+        to and fro in a gap has more as that is narrower: `CROWDED` and `NARROW` are far above both.
+        """
+        disks, radius = self.arena.disks, float(self.scene.radius.min())
+        now = min(until, float(self.arena.clock[BASE] + self.arena.tree[1].time))
+        speed = np.hypot(disks["vx"], disks["vy"]).max()
+        pull = np.hypot(disks["pull_x"], disks["pull_y"]).max()
+        rate, took = (NARROW + CROWDED * self.scene.n) * (speed / radius + np.sqrt(pull / radius)), now - self.since
+        # What is no number is no progress either.
+        if not (self.spent <= rate * took and self.spent * (until - now) <= MOST_AHEAD * took):
+            span = f"{self.spent} events from {self.since:.9g} s to {now:.9g} s"
+            raise NoTruth(f"{span} are too many to follow up to {until:.9g} s", now)
+        self.spent, self.since = 0, now
+
+    def partners(self, i: int, last: int, since: float) -> str:
+        """What disk `i` has hit since a time, in words; `last` was the last of it."""
+        log = np.concatenate([np.empty((0, 5)), *self.kept[-2:]])
+        log = log[log[:, 0] >= since * (1 - 1e-12)]
+        found = {last, *log[log[:, 1] == i, 2].astype(int).tolist(), *log[log[:, 2] == i, 1].astype(int).tolist()}
+        disks, walls = (sorted(j for j in found if j >= 0), sorted(-1 - j for j in found if j < 0))
+        return " and ".join([*(f"disk {j}" for j in disks), *(f"wall {w}" for w in walls)])
 
     def drain(self) -> None:
         """Keep what is in the log and empty it."""
         told = self.arena.told
-        if told[event_loop.LOGGED]:
-            self.kept.append(self.arena.log[: told[event_loop.LOGGED]].copy())
-            told[event_loop.LOGGED] = 0
+        if told[LOGGED]:
+            self.kept.append(self.arena.log[: told[LOGGED]].copy())
+            told[LOGGED] = 0
 
     def pull(self, disk: int, at: float, acceleration: Array) -> None:
         """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so, (2,) m/s2."""
@@ -80,7 +133,7 @@ class EventEngine:
     def look(self, at: float) -> tuple[Array, Array]:
         """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; nothing changes by looking."""
         out = np.empty((self.scene.n, 4))
-        event_loop.look(self.arena.disks, self.arena.clock[event_loop.BASE], at, out)
+        event_loop.look(self.arena.disks, self.arena.clock[BASE], at, out)
         return out[:, :2], out[:, 2:]
 
     @property
@@ -117,8 +170,9 @@ def refuse_pair(a: Any, b: Any, grid: Grid, i: int, j: int) -> None:
         raise NoTruth(f"disks {i} and {j} touch and close in at {speed:.3g} m/s at the start: leave a gap")
 
 
-def refuse_walls(scene: Scene) -> None:
-    """`NoTruth` if a disk that can move overlaps a wall, or touches it and closes in."""
+def refuse_walls(scene: Scene) -> bool:
+    """Whether a disk that can move touches a wall; `NoTruth` if one overlaps a wall, or touches it and closes in."""
+    leaning = False
     for w, (start, end) in enumerate(scene.walls):
         along = end - start
         share = np.clip((scene.position - start) @ along / (along @ along), 0, 1)
@@ -132,6 +186,8 @@ def refuse_walls(scene: Scene) -> None:
                 raise NoTruth(f"disk {i} overlaps wall {w} by {by:.3g} m at the start: move it {by:.3g} m away")
             if gap == 0 and closing < 0:
                 raise NoTruth(f"disk {i} touches wall {w} and closes in at the start: leave a gap")
+            leaning |= gap == 0
+    return leaning
 
 
 def exact_offset(position: Array, velocity: Array, start: Array, end: Array) -> tuple[Fraction, Fraction]:
@@ -157,14 +213,14 @@ def refuse_box(scene: Scene, torus: Array | None) -> None:
         raise NoTruth(f"the box is {narrow:g} m wide: its largest disk has a diameter of {widest:g} m")
 
 
-def rules_of(scene: Scene) -> Rules:
-    """The scene's physics as the kernels take it."""
+def rules_of(scene: Scene, leaning: bool) -> Rules:
+    """The scene's physics as the kernels take it; leaning: a disk touches a wall at the start."""
     falling, walled = bool(scene.gravity.any()), len(scene.walls) > 0
-    # What lies on a wall does not fall with the others; at e = 1 nothing comes to rest.
-    mixed = falling and ((walled and scene.restitution < 1) or bool(scene.static.any()))
+    # What lies on a wall does not fall with the others; at e = 1 nothing comes to rest that did not begin so.
+    mixed = falling and ((walled and (leaning or scene.restitution < 1)) or bool(scene.static.any()))
     # Where a bounce takes less than 1 / (1 - e) units in the last place, rounding the time gives back what it loses.
-    crowd = 1e3 / (1 - min(scene.restitution, 0.9999)) if scene.restitution < 1 else 1e3
-    return Rules(float(scene.restitution), falling, mixed, scene.wrap is not None, crowd)
+    crowd = 1e3 / (1 - min(scene.restitution, SLOWEST)) if scene.restitution < 1 else 1e3
+    return Rules(float(scene.restitution), falling, mixed, scene.wrap is not None, scene.restitution > SLOWEST, crowd)
 
 
 def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
@@ -224,5 +280,5 @@ def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:
     disks["ax"], disks["ay"] = disks["pull_x"], disks["pull_y"] = pull.T
     disks["radius"], disks["weight"] = scene.radius, 1 / scene.mass
     disks["pair_time"] = disks["own_time"] = np.inf
-    disks["last"], disks["wall"] = NOBODY, -1
+    disks["last"], disks["wall"], disks["corner"] = NOBODY, -1, -1
     return disks.view(np.recarray)

@@ -126,7 +126,7 @@ def test_a_brute_force_algorithm_finds_the_same_hits(seed):
     compare(seed)
 
 
-FILES = ("contact_times", "event_queue", "event_disks", "event_search", "event_impacts", "event_loop")
+FILES = ("contact_times", "event_queue", "event_disks", "event_search", "event_rest", "event_impacts", "event_loop")
 BUGS = {
     "stale record kept": ("b.count == a.partner_count", "True"),
     "nearest image": (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from test_event_brute_force import plain_kernels
 
@@ -84,7 +84,7 @@ def test_a_hit_on_a_lying_disk_is_the_limit_of_small_gaps(e):
 def test_a_hit_on_a_lying_disk_that_does_not_end_is_refused(e, mass):
     """As many hits at one instant as there are: when and whose."""
     scene = disks([[0.0, 0.5], [0.0, 2.0]], [[0, 0], [0, -1.0]], e, mass=[1.0, mass])
-    with pytest.raises(NoTruth, match=r"64 hits of disk \d, the last with (disk \d|wall 0), come at once at 0\.2316"):
+    with pytest.raises(NoTruth, match=r"the collisions of disk [01] on disk [01]( and wall 0)? accumulate at 0\.2316"):
         EventEngine(scene).advance(1.0)
 
 
@@ -96,6 +96,7 @@ def test_a_hit_on_a_lying_disk_is_one_on_a_disk_just_above_the_floor(seed):
     radius, mass, angle = draw.uniform(0.3, 1, 2), draw.uniform(0.5, 2, 2), draw.uniform(0.3, np.pi - 0.3)
     toward = np.array([np.cos(angle), np.sin(angle)])
     e, start = draw.uniform(0.7, 1), [0.0, radius[0]]
+    assume(start[1] + (radius.sum() + 1e-3) * toward[1] > radius[1])  # else the other starts below the floor
 
     def played(lift, gravity):
         position = np.array([start, start + (radius.sum() + 1e-3) * toward]) + [0, lift]
@@ -149,8 +150,8 @@ def test_without_mutual_help_nothing_stands_on_a_point_or_on_another_disk():
     pin = disks([[0.0, 2.0]], [[0.0, 0.0]], 0.5, walls=[[[0.0, -1.0], [0.0, 0.0]]])
     pile = disks([[0.0, 0.5], [0.0, 2.0]], [[0.0, 0.0], [0.0, 0.0]], 0.5)
     post = disks([[0.0, 0.5], [0.0, 2.0]], [[0.0, 0.0], [0.0, 0.0]], 0.5, mass=[np.inf, 1.0])
-    for scene, words in ((pin, "wall 0"), (pile, "(disk [01]|wall 0)"), (post, "disk [01]")):
-        with pytest.raises(NoTruth, match=f"64 hits of disk [01], the last with {words}, come at once"):
+    for scene, words in ((pin, "wall 0"), (pile, "disk [01]( and wall 0)?"), (post, "disk 0")):
+        with pytest.raises(NoTruth, match=f"the collisions of disk [01] on {words} accumulate at"):
             EventEngine(scene).advance(9.0)
 
 

@@ -1,0 +1,174 @@
+"""Random scenes that fall, pile up, wedge themselves into corners and touch: what every computation must get through.
+
+A scene depends on the seed and its own number only, so that the first of many are the same as few.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from scenarios.model import Array, Scenario, Scene, Thrust
+from scenarios.placing import box
+
+Draw = np.random.Generator
+
+INTERVAL = 1 / 16  # s; thrusts switch at samples, so that every step is pushed as a whole
+RESTITUTIONS = (0.0, 0.02, 0.5, 0.9, 1.0, None)  # None: anything from 0 to 1
+NEAREST = 1e-3  # m between things that do not touch
+GRID = 1 / 8  # m; multiples of it are exact in float64, and so is whether disks on it touch
+MOST_TRIES = 500
+
+
+def random_scenarios(count: int, seed: int = 0) -> list[Scenario]:
+    """So many scenarios of 1 to 3 s with 1 to 6 disks, without truths."""
+    return [random_scenario(seed, number) for number in range(count)]
+
+
+def random_scenario(seed: int, number: int) -> Scenario:
+    """The scenario of this number: its layout goes round, all else is drawn."""
+    draw = np.random.default_rng([seed, number])
+    layout = list(LAYOUTS)[number % len(LAYOUTS)]
+    walls = LAYOUTS[layout](draw)
+    position, radius = (lattice if layout == "touching" else scattered)(draw, walls, int(draw.integers(1, 7)))
+    n = len(radius)
+    fixed = draw.random(n) < 0.15
+    fixed[draw.integers(n)] = False
+    speed = 0.0 if layout == "touching" or draw.random() < 0.3 else 1.5
+    restitution = RESTITUTIONS[draw.integers(len(RESTITUTIONS))]
+    mass = np.where(fixed, np.inf, draw.uniform(0.3, 5, n))
+    scene = Scene(
+        position=position, velocity=np.where(fixed[:, None], 0.0, speed * draw.normal(size=(n, 2))),
+        radius=radius, mass=mass, restitution=draw.random() if restitution is None else restitution,
+        walls=walls, gravity=gravity(draw),
+    )  # fmt: skip
+    duration = float(draw.integers(1, 4))
+    return Scenario(
+        name=f"random_{layout}_{seed}_{number}",
+        asks="Does it end, whatever meets, and is it the same for all who answer?",
+        source="drawn",
+        scene=scene,
+        duration=duration,
+        sample_interval=INTERVAL,
+        substeps=(1, 2),
+        thrusts=thrusts(draw, mass, duration),
+        without_truth="nobody has asked for it",
+        seed=seed,
+    )
+
+
+def gravity(draw: Draw) -> Array:
+    """(2,) m/s2: none, straight down, or anywhere."""
+    kind, angle = draw.random(), draw.uniform(0, 2 * np.pi)
+    if kind < 0.25:
+        return np.zeros(2)
+    if kind < 0.6:
+        return np.array([0.0, -draw.choice([8.0, 9.81])])
+    return draw.uniform(0.5, 10) * np.array([np.cos(angle), np.sin(angle)])
+
+
+def thrusts(draw: Draw, mass: Array, duration: float) -> list[Thrust]:
+    """None in every other scene, else up to three, on at whole samples; some last to the end."""
+    samples, found = round(duration / INTERVAL), []
+    for _ in range(int(draw.integers(1, 4)) * int(draw.random() < 0.5)):
+        disk = int(draw.choice(np.flatnonzero(np.isfinite(mass))))
+        first, last = np.sort(draw.choice(samples + 1, 2, replace=False)).tolist()
+        last = samples if draw.random() < 0.3 else last
+        force = mass[disk] * draw.uniform(1, 12) * draw.normal(size=2)
+        found.append(Thrust(disk, first * INTERVAL, last * INTERVAL, force))
+    return found
+
+
+def scattered(draw: Draw, walls: Array, count: int) -> tuple[Array, Array]:
+    """Centres (n, 2) m and radii (n,) m of up to `count` disks that touch nothing; one at least."""
+    centres, radii = list[Array](), list[float]()
+    for _ in range(MOST_TRIES):
+        centre, radius = draw.uniform(-1.3, 1.3, 2), draw.uniform(0.08, 0.3)
+        others = [np.hypot(*(centre - other)) - r for other, r in zip(centres, radii)]
+        if min([*others, *distances(centre, walls)], default=np.inf) > radius + NEAREST:
+            centres.append(centre)
+            radii.append(radius)
+        if len(radii) == count:
+            break
+    return np.array(centres), np.array(radii)
+
+
+def lattice(draw: Draw, _walls: Array, count: int) -> tuple[Array, Array]:
+    """The same of equal disks that fill places of a square lattice from the corner on, touching exactly."""
+    radius = GRID * draw.choice([1, 2])
+    places = np.array([(column, row) for row in range(2) for column in range(4)])
+    kept = places[np.sort(draw.choice(len(places), count, replace=False, p=np.array([8, 6, 4, 2, 4, 2, 1, 1]) / 28))]
+    return np.array(CORNER) + radius * (2 * kept + 1), np.full(count, radius)
+
+
+def distances(point: Array, walls: Array) -> list[float]:
+    """m from a point to each wall."""
+    start, along = walls[:, 0], walls[:, 1] - walls[:, 0]
+    share = np.clip(((point - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
+    return np.hypot(*(point - start - share[:, None] * along).T).tolist()
+
+
+CORNER = (-1.5, -1.25)
+
+
+def toward(angle: Array | float) -> Array:
+    """(..., 2), the unit vector at an angle, rad."""
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def ring(corners: Array) -> Array:
+    """The walls around these corners."""
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+
+
+def upright_box(_draw: Draw) -> Array:
+    """Right angles, exactly."""
+    return box(CORNER, (1.75, 1.5))
+
+
+def tilted_box(draw: Draw) -> Array:
+    """Right angles, but for rounding."""
+    return ring(draw.uniform(1.6, 2.4) * toward(draw.uniform(0, np.pi / 2) + np.pi / 2 * np.arange(4)))
+
+
+def triangle(draw: Draw) -> Array:
+    """Three corners, most of them acute."""
+    return ring(2.2 * toward(draw.uniform(0, 2 * np.pi) + np.array([0.0, 2.0, 4.0]) + draw.uniform(-0.7, 0.7, 3)))
+
+
+def floor(draw: Draw) -> Array:
+    """Level, or an incline."""
+    along = toward(draw.choice([0.0, draw.uniform(-0.6, 0.6)]))
+    return np.array([[[0.0, -1.4] - 3 * along, [0.0, -1.4] + 3 * along]])
+
+
+def crossing(draw: Draw) -> Array:
+    """Two walls through one place, at right angles every other time."""
+    one = draw.uniform(0, np.pi)
+    other = one + draw.choice([np.pi / 2, draw.uniform(0.3, 2.8)])
+    place = draw.uniform(-0.4, 0.4, 2)
+    return np.array([[place - 2 * toward(angle), place + 2 * toward(angle)] for angle in (one, other)])
+
+
+def wedge(draw: Draw) -> Array:
+    """Two walls that end in one point and open upward, or anywhere."""
+    middle = draw.choice([np.pi / 2, draw.uniform(0, 2 * np.pi)])
+    half, tip = draw.uniform(0.15, 1.4), -1.2 * toward(middle)
+    return np.array([[tip, tip + 3 * toward(middle + side)] for side in (half, -half)])
+
+
+def loose(draw: Draw) -> Array:
+    """Some walls anywhere, with ends to meet."""
+    return draw.uniform(-1.6, 1.6, (int(draw.integers(2, 5)), 2, 2))
+
+
+def nothing(_draw: Draw) -> Array:
+    """No walls."""
+    return np.zeros((0, 2, 2))
+
+
+LAYOUTS: dict[str, Callable[[Draw], Array]] = {
+    "box": upright_box, "touching": upright_box, "tilted_box": tilted_box, "crossing": crossing, "wedge": wedge,
+    "triangle": triangle, "floor": floor, "loose": loose, "open": nothing,
+}  # fmt: skip
