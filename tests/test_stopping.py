@@ -15,6 +15,8 @@ import pandas as pd
 import pytest
 
 from reports.exits import STATUS, Stopped, broken_off, stoppable
+from reports.folders import replace_folder
+from reports.run_command import what_is_kept
 from tests.command_line import crosscheck, wait_for
 from tests.stopping import AT_MOST, Command, assert_ended, busyness
 from tests.sweeps import ended_in
@@ -224,6 +226,29 @@ def test_a_second_ctrl_c_does_not_cut_the_sentence_off(tmp_path: Path, capsys: p
 
     assert end.value.code == 143
     assert "Terminated. All is kept." in capsys.readouterr().err
+
+
+def test_a_finished_run_takes_its_place_whole_whenever_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """SIGTERM between the two renames: the old run is gone, the new one is there, and it is said that all is done."""
+    made, target, rename = tmp_path / "out.part", tmp_path / "out", Path.rename
+    for folder, text in ((made, "new"), (target, "old")):
+        folder.mkdir()
+        (folder / "journal.jsonl").write_text(text)
+
+    def rename_and_tell(path: Path, to: Path) -> Path:
+        signal.raise_signal(signal.SIGTERM)
+        return rename(path, to)
+
+    monkeypatch.setattr(Path, "rename", rename_and_tell)
+    with pytest.raises(SystemExit) as end, broken_off(made, lambda: what_is_kept(target)):
+        replace_folder(made, target)
+
+    assert end.value.code == 143
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert (target / "journal.jsonl").read_text() == "new"
+    assert f"Terminated. All is done: {target}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
