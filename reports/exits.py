@@ -78,6 +78,16 @@ def deaf() -> Iterator[None]:
 
 
 @contextmanager
+def unbroken() -> Iterator[None]:
+    """What must not be left half done and takes no time: a signal that comes meanwhile is heard after it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {*STATUS, signal.SIGALRM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
 def ends_when_told() -> Iterator[None]:
     """A command from its first word to its last; told to stop it exits with 130 or 143 and waits for no thread.
 

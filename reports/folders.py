@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from reports.archive import FILES, Archive
+from reports.exits import unbroken
 from reports.journal import JOURNAL, Busy, Journal
 
 OF_A_RUN = FILES.__contains__, "no run of crosscheck made"
@@ -124,10 +125,11 @@ def found(out: Path) -> Path:
 def replace_folder(made: Path, target: Path) -> None:
     """Put the finished folder `made` in the place of `target` in two renames; `target` is a run of ours or absent."""
     old = target.with_name(f".{target.name}.old-{os.getpid()}")
-    if target.exists():
-        target.rename(old)
-    made.rename(target)
-    shutil.rmtree(old, ignore_errors=True)
+    with unbroken():
+        if target.exists():
+            target.rename(old)
+        made.rename(target)
+        shutil.rmtree(old, ignore_errors=True)
 
 
 def may_write(target: Path, ours: Callable[[str], bool], strangers: str, option: str = "--out") -> None:

@@ -109,6 +109,8 @@ def carry_on(plan: Plan, means: Means, journal: Journal, out: Path) -> NoReturn:
 def what_is_kept(out: Path) -> str:
     """A sentence on what a run that was broken off has left, and how to go on."""
     part = part_of(out)
+    if not part.exists() and (out / JOURNAL).exists():
+        return f"All is done: {out}"
     ended = len(Archive.read(part).records) if (part / JOURNAL).exists() else 0
     if not ended:
         return "Nothing was played yet."

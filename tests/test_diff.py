@@ -180,3 +180,19 @@ def test_the_interval_holds_the_true_median_as_often_as_it_says():
 
     assert isinstance(found[0], Timing)
     assert sum(one.low <= 1 <= one.high for one in found) / 2000 > 0.985
+
+
+def test_a_scene_that_is_not_judged_any_more_is_worse(before: Path, after: Path):
+    """Its exact answer took too long: its numbers are gone, which no other row would tell; the other way is better."""
+    table = pd.read_csv(after / "deviations.csv", dtype=str, keep_default_na=False)
+    judged = table[(table.scenario != "slow_hit") | (table.versus != "truth")]
+    runs = table[table.scenario == "slow_hit"].drop_duplicates(["engine", "profile", "dt_s"])
+    why = "not judged: the exact answer took longer than 60 s (--timeout)"
+    lost = runs.assign(metric="status", value="", unit="", versus="truth", at_s="", note=why)
+    pd.concat([judged, lost]).to_csv(after / "deviations.csv", index=False)
+    worse, better = difference(before, after).statuses, difference(after, before).statuses
+
+    assert len(worse) == len(better) == len(runs) > 0
+    assert {(one.before, one.after, one.verdict) for one in worse} == {("judged", why, "worse")}
+    assert {(one.before, one.after, one.verdict) for one in better} == {(why, "judged", "better")}
+    assert exit_of(before, after) == 1

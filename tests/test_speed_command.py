@@ -35,13 +35,18 @@ def test_bad_input_is_one_clear_sentence(arguments: list[str], says: str, monkey
 
 def test_a_scene_without_an_exact_answer_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Exit 1 and the reason; nothing is left behind."""
-    monkeypatch.setattr("reports.speed.ladder.reach_of", lambda *_: (0, "two outcomes"))
+    monkeypatch.setattr("reports.speed.ladder.reach_of", no_reach)
     done = CliRunner().invoke(app, ["speed", "cradle_touching", "--out", str(tmp_path / "out")])
 
     assert done.exit_code == 1
     assert "cradle_touching" in done.stderr
     assert "no exact answer: two outcomes" in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def no_reach(*_: object) -> tuple[int, str]:
+    """What a worker says of a scene without an answer."""
+    return 0, "two outcomes"
 
 
 def test_one_scene_and_one_engine_are_measured_by_themselves(tmp_path: Path):

@@ -6,16 +6,21 @@ import os
 import shutil
 import signal
 import socket
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from reports.exits import STATUS, Stopped, broken_off, stoppable
-from tests.command_line import crosscheck
+from reports.folders import replace_folder
+from reports.run_command import what_is_kept
+from tests.command_line import crosscheck, wait_for
 from tests.stopping import AT_MOST, Command, assert_ended, busyness
 from tests.sweeps import ended_in
+from tests.test_kills import alive
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for what is left in /proc")
 
@@ -221,3 +226,63 @@ def test_a_second_ctrl_c_does_not_cut_the_sentence_off(tmp_path: Path, capsys: p
 
     assert end.value.code == 143
     assert "Terminated. All is kept." in capsys.readouterr().err
+
+
+def test_a_finished_run_takes_its_place_whole_whenever_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """SIGTERM between the two renames: the old run is gone, the new one is there, and it is said that all is done."""
+    made, target, rename = tmp_path / "out.part", tmp_path / "out", Path.rename
+    for folder, text in ((made, "new"), (target, "old")):
+        folder.mkdir()
+        (folder / "journal.jsonl").write_text(text)
+
+    def rename_and_tell(path: Path, to: Path) -> Path:
+        signal.raise_signal(signal.SIGTERM)
+        return rename(path, to)
+
+    monkeypatch.setattr(Path, "rename", rename_and_tell)
+    with pytest.raises(SystemExit) as end, broken_off(made, lambda: what_is_kept(target)):
+        replace_folder(made, target)
+
+    assert end.value.code == 143
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert (target / "journal.jsonl").read_text() == "new"
+    assert f"Terminated. All is done: {target}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("endless.js", "function integrate(sphere, dt) { while (true) {} }"),
+        ("endless.py", "def integrate(sphere, dt):\n    while True:\n        pass\n"),
+    ],
+)
+def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: str, text: str):
+    """`kill -9` of a process that waits, for 60 s, for a call: the process of the file does not stay behind."""
+    (tmp_path / name).write_text(text)
+    question = {"spheres": [[0.0] * 12], "calls": [["integrate", 0, 1e-3]], "world": False}
+    asks = (
+        "from pathlib import Path; from adapters.solver_process import SolverProcess; "
+        f"SolverProcess(Path({str(tmp_path / name)!r})).do('ask', {question}, 60.0)"
+    )
+    asking = subprocess.Popen([sys.executable, "-c", asks], stderr=subprocess.DEVNULL)
+    wait_for(lambda: asked_by(asking.pid) and busy(asked_by(asking.pid)[0]))
+    (solver,) = asked_by(asking.pid)
+    asking.kill()
+    asking.wait()
+    killed = time.monotonic()
+    wait_for(lambda: not alive(solver))
+
+    assert time.monotonic() - killed < 2.0 * busyness()
+
+
+def asked_by(parent: int) -> list[int]:
+    """The processes that a process has started."""
+    return [int(pid) for pid in Path(f"/proc/{parent}/task/{parent}/children").read_text().split()]
+
+
+def busy(pid: int) -> bool:
+    """Whether a process has loaded what it needs and is in its loop: 2 s of processor time."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") > 2.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Hashable, Mapping
 from contextlib import closing
@@ -87,7 +86,8 @@ def must_be_writable(folder: Path, asked: Path) -> None:
 def write_pages(pages: Mapping[Path, Lesson], links: Links, besides: dict[str, Callable[[], Any]]) -> dict[str, Any]:
     """Each page as soon as all its runs have ended, one for every setting of the sliders; returns what `besides` gave.
 
-    All run in workers, which can be stopped whatever they do; exits 1 if one of them fails.
+    They run in a worker, which can be stopped whatever it does, one after the other, as one lesson takes times; exits 1
+    if one of them fails.
     """
     tasks: dict[Hashable, Callable[[], Any]] = {
         (path, places): partial(told, lesson.name, places) for path, lesson in pages.items() for places in lesson.grid
@@ -97,7 +97,7 @@ def write_pages(pages: Mapping[Path, Lesson], links: Links, besides: dict[str, C
     found: dict[str, Any] = {}
     with Progress() as progress:
         progress.start(len(tasks), len(tasks))
-        with closing(run_all(tasks, os.cpu_count() or 1, SHOWING)) as results:
+        with closing(run_all(tasks, 1, SHOWING)) as results:
             for task, result in results:
                 if isinstance(result, Failure):
                     what = task if isinstance(task, str) else f"{pages[task[0]].title}, sliders at {task[1]}"

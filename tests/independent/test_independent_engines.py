@@ -64,7 +64,7 @@ def test_an_adapter_plays_what_its_engine_plays_when_called_directly(player: str
 @pytest.mark.parametrize(
     ("player", "scene", "setting", "value"),
     [
-        ("pymunk:matched", "falling_box", "iterations", 10),
+        ("pymunk:matched", "falling_box", "iterations", 7),
         ("pymunk:matched", "head_on_equal_e09", "elasticity", 0.9),
         ("box2d:matched", "falling_box", "velocity, position iterations", "7, 3"),
         ("box2d:matched", "slow_hit", "unit of time in s", 1.0),
