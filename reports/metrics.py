@@ -35,12 +35,12 @@ def over_judged(measure: Measure) -> Measure:
 
 
 def momentum_error(view: View) -> Value | None:
-    """Largest |P(t) - P(0) - impulse from outside| over the largest sum of m|v|; where that impulse is known."""
+    """Largest |P(t) - P(0) - impulse from outside|, where that is known, over all m|v| that flight can bring."""
     return _largest(violations.momentum(view), view)
 
 
 def angular_momentum_error(view: View) -> Value | None:
-    """Largest |L(t) - L(0) - angular impulse from outside|, about the origin, over the largest m|x||v| + I|w|."""
+    """Largest |L(t) - L(0) - angular impulse from outside|, about the origin, over all m|x||v| + I|w| of flight."""
     return _largest(violations.angular_momentum(view), view)
 
 
@@ -137,7 +137,7 @@ def position_max(view: View) -> Value | None:
 
 
 def position_max_radii(view: View) -> Value | None:
-    """Largest distance of any disk in any sample, in radii of that disk."""
+    """Largest distance of any disk in any sample, in radii of that disk; over an edge of the wrap if that is nearer."""
     return _largest_of_disks(view.apart / view.scenario.scene.radius, view)
 
 

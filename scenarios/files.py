@@ -229,7 +229,9 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
             normal = away[k] / distance[k] if distance[k] > rounding else np.array([-unit[1], unit[0]])
             one, two = number[row], number[w + first[row] + k]
             if overlap[k] > rounding:
-                yield min(one, two), max(one, two), overlap[k], normal * overlap[k] * np.sign(two - one) + 0.0
+                # Where the side cannot be told, the way out may lead across the middle: it is longer by that.
+                push = thick[row] + radius[near][k] - away[k] @ normal
+                yield min(one, two), max(one, two), overlap[k], normal * push * np.sign(two - one) + 0.0
 
 
 def write_scene_file(scenario: Scenario, path: str | Path) -> None:

@@ -2,9 +2,10 @@
 
 Motions from starts a rounding apart part exponentially; after that a distance to the exact answer says nothing about a
 solver. The horizon is when that happens. It comes from the oracle's own path: every number of the start may be off by
-a unit in the last place, each on its own, and what becomes of it is the derivative of flight and of every collision
+2^-52 of the largest, each on its own, and what becomes of it is the derivative of flight and of every collision
 (Dellago, Posch & Hoover, Phys. Rev. E 53, 1485, 1996; with falling disks and rest the same for parabolas and for
-motion along a wall). The derivative is wanted to a few per cent, so it is float64 along a path in many digits.
+motion along a wall). The derivative is wanted to a few per cent, so it is float64 along a path in many digits. A near
+miss by less than a rounding has no derivative and is not seen.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def horizon(scenario: Scenario, path: Path) -> float:
 
 
 def roundings(scene: Scene) -> tuple[Array, Array]:
-    """Two (n, d, 2): what a unit in the last place of the largest coordinate, or speed, in each of d numbers moves.
+    """Two (n, d, 2): what 2^-52 of the largest coordinate, or speed, in each of d numbers moves.
 
     Where all centres lie on one line along an axis and nothing moves across it, nothing is rounded across it either.
     """

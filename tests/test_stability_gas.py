@@ -96,7 +96,7 @@ def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literat
 def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
     """All of it, for two draws; a gas hotter by a fifth hits more often by a tenth."""
     for run in range(2):
-        scenario = CASES["thermometer"].scene(0.4, run, 2)
+        scenario = CASES["thermometer"].scene(0.4, run)
         assert not judge(WRONG_GAS, scenario, play_as(EXACT, scenario)).failed
     hot = replace(scenario, scene=replace(scenario.scene, velocity=scenario.scene.velocity * sqrt(1.2)))
     reading = verdict(WRONG_GAS, scenario, played(EXACT, hot))
@@ -111,7 +111,7 @@ def test_speeds_that_are_not_maxwells_are_noticed():
     drawn = rng.normal(size=(k, n, 2))
     angle = rng.uniform(0, 2 * pi, (k, n))
     same = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    scenario = CASES["thermometer"].scene(0.4, 0, 2)
+    scenario = CASES["thermometer"].scene(0.4, 0)
     one = played(EXACT, scenario)
     late = scenario.times[: k + 1][1:]
     shares = {
@@ -130,7 +130,7 @@ def test_speeds_that_are_not_maxwells_are_noticed():
 def test_equipartition_holds_in_an_exact_gas_up_to_a_mass_ratio_of_1e4_and_a_hotter_kind_is_noticed():
     """Block errors tell chance from heat: disks of twice the temperature fail, whatever their mass."""
     for ratio in (1.5, 100.0, 1e4):
-        scenario = CASES["equipartition"].scene(ratio, 0, 2)
+        scenario = CASES["equipartition"].scene(ratio, 0)
         one = played(EXACT, scenario)
         assert not verdict(TEMPERATURES_PART, scenario, one).failed
         heavy = scenario.scene.mass == ratio
@@ -140,7 +140,7 @@ def test_equipartition_holds_in_an_exact_gas_up_to_a_mass_ratio_of_1e4_and_a_hot
 
 def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_noticed():
     """float64 to 1e-14, float32 to 1e-6, in 1000 steps; one disk stopped at the end is one part in some twenty."""
-    scenario = wrapped_run(1000.0, 0, 1)
+    scenario = wrapped_run(1000.0, 0)
     for player, bound in (("reference:exercise", 1e-14), ("pymunk:matched", 1e-14), ("box2d:matched", 1e-6),
                           ("box2d_v3:matched", 1e-6)):  # fmt: skip
         one = played(player, scenario)
@@ -154,7 +154,7 @@ def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_
 
 def test_finding_hits_late_costs_a_dense_gas_its_rate_and_its_pressure():
     """At packing 0.6 an engine that waits for the end of a step hits a tenth too seldom; in order within it, not."""
-    scenario = CASES["thermometer"].scene(0.6, 0, 2)
+    scenario = CASES["thermometer"].scene(0.6, 0)
     late, in_order = (judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in LATE_AND_NOT)
     ought, one = literature(scenario), played(LATE_AND_NOT[0], scenario)
     hits = one.collisions
@@ -173,7 +173,7 @@ def test_pymunk_loses_energy_by_impulses_that_a_contact_inherits():
 
     Forgotten as soon as they part, contacts keep the energy but for what 50 iterations leave over.
     """
-    scenario = CASES["fast_gas"].scene(0.6, 0, 1)
+    scenario = CASES["fast_gas"].scene(0.6, 0)
     lost = {}
     for steps in (3, 1):
         run = play(changed_pymunk(collision_persistence=steps), "pymunk:changed", scenario, scenario.dt(10))

@@ -109,8 +109,9 @@ def drift(player: str, x: float, runs: int = 1) -> float:
 def test_a_bounce_gains_what_the_order_of_operations_says():
     """Three closed forms: pymunk 0, Box2D 2.3 +|v| dt, Box2D 3.1 about -|v| dt / substeps."""
     assert abs(drift("pymunk:matched", 0.02)) < 1e-9  # rounding of 1000 steps
-    # Higher orders in dt: a tenth at this step.
-    assert drift("box2d:matched", 0.01) == pytest.approx(1.0, rel=0.1)
+    # Higher orders in dt: a tenth at this step. Continuous collision takes the ball at the wall, and the gain with it.
+    assert drift("box2d:shipped", 0.01) == pytest.approx(1.0, rel=0.1)
+    assert abs(drift("box2d:matched", 0.01)) < 0.01
     assert drift("reference:lesson", 0.01) == pytest.approx(1.0, rel=0.1)
     # A soft contact gives back more or less with the phase of the collision in its step.
     assert drift("box2d_v3:matched", 0.01, runs=6) == pytest.approx(-1 / 4, rel=0.25)

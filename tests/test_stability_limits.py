@@ -90,7 +90,7 @@ def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
     assert row.fails_at < 0.006
 
 
-@pytest.mark.parametrize("player", ["reference:exercise", "reference:lesson", "box2d:matched"])
+@pytest.mark.parametrize("player", ["reference:exercise", "reference:lesson", "box2d:shipped"])
 def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(player: str):
     """At values, heights and phases that no form has played, the ball comes back wherever it is said to.
 

@@ -204,12 +204,12 @@ def test_an_answer_comes_back_from_its_file_bit_for_bit(tmp_path: Path, name: st
 
     assert back is not None
     assert back[1:] == one[1:]
-    assert bits(back.truth) == bits(one.truth)
+    assert bits(back.record) == bits(one.record)
     assert read_answer(tmp_path / "answer.npz") is None
 
 
 def bits(one: Any) -> Any:
-    """All that a truth holds, arrays as bytes, whatever fields it has."""
+    """All that a record holds, arrays as bytes, whatever fields it has."""
     if is_dataclass(one):
         return [bits(getattr(one, each.name)) for each in fields(one)]
     return one.tobytes() if isinstance(one, np.ndarray) else one
