@@ -176,7 +176,8 @@ def test_pymunk_loses_energy_by_impulses_that_a_contact_inherits():
     scenario = CASES["fast_gas"].scene(0.6, 0)
     lost = {}
     for steps in (3, 1):
-        run = play(changed_pymunk(collision_persistence=steps), "pymunk:changed", scenario, scenario.dt(10))
+        engine = changed_pymunk(collision_persistence=steps, iterations=50)
+        run = play(engine, "pymunk:changed", scenario, scenario.dt(10))
         assert run.trajectory is not None
         energy = laws.energy(run.trajectory, scenario.scene)
         lost[steps] = 1 - energy[-1] / energy[0]
