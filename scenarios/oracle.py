@@ -21,7 +21,7 @@ FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be 
 LEAST_GAIN = 1.05  # times as far must half as many bits again reach, or more will not help
 SPARE, LEFT = 1.3, 64  # times as many bits as the rate so far asks for, and so many to be left for the accuracy
 MOST_DISKS = 200
-WORK = 80_000  # steps of the event loop for one answer, all attempts together; half a minute to a minute
+WORK = 40_000  # steps of the event loop for one attempt, some twenty seconds; few attempts get so far
 HEAVY = 4096  # bits that make a step twice as dear as one of few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, HIT_BY_HIT, NOTHING = "closed form", "hit by hit, in many digits", "nothing"
@@ -104,11 +104,10 @@ def certified(scenario: Scenario, pushes: Sequence[Thrust]) -> TruthRecord | Non
 
     How far the first bits reach tells how many are needed for all: a motion loses them at a steady rate.
     """
-    bits, before, until, work = FEWEST_BITS, 0.0, scenario.duration, WORK
+    bits, before, until = FEWEST_BITS, 0.0, scenario.duration
     while bits <= MOST_BITS:
-        work //= 2
         try:
-            path = trace(scenario.scene, pushes, until, balls(bits), steps(work, bits))
+            path = trace(scenario.scene, pushes, until, balls(bits), steps(bits))
             error, reached = spread(path, until), until
             if error < ACCURACY:
                 return record_of(scenario, path, error, bits, "certified")
@@ -122,9 +121,9 @@ def certified(scenario: Scenario, pushes: Sequence[Thrust]) -> TruthRecord | Non
     return None
 
 
-def steps(work: int, bits: int) -> int:
-    """How many steps of the event loop in numbers of so many bits are the given work."""
-    return int(work / (1 + bits / HEAVY))
+def steps(bits: int) -> int:
+    """How many steps of the event loop in numbers of so many bits are the work of one attempt."""
+    return int(WORK / (1 + bits / HEAVY))
 
 
 def spread(path: Path, until: float) -> float:
@@ -143,10 +142,9 @@ def spread(path: Path, until: float) -> float:
 
 def two_precisions(scenario: Scenario, pushes: Sequence[Thrust], kind: Callable[[int], Numbers]) -> TruthRecord:
     """The record in numbers of one kind, up to where twice as many bits say the same."""
-    scene, until, bits, work = scenario.scene, scenario.duration, FEWEST_BITS, WORK // 2
+    scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     while True:
-        work //= 2
-        coarse, fine = (trace(scene, pushes, until, kind(each), steps(work, each)) for each in (bits, 2 * bits))
+        coarse, fine = (trace(scene, pushes, until, kind(each), steps(each)) for each in (bits, 2 * bits))
         parted, error = difference(coarse, fine, until, kind(2 * bits))
         end = min(coarse.end, fine.end, until)
         if parted >= end or 2 * bits >= MOST_BITS:
