@@ -153,11 +153,8 @@ def show_gravity(settings: Settings) -> Shown:
 
 def show_push_out(settings: Settings) -> Shown:
     """How an overlap that is there at the start is undone."""
-    scene = lay_out(
-        position=[[0.0, 0.0], [0.8, 0.0]], velocity=[[0.0, 0.0], [0.0, 0.0]], radius=[0.5, 0.5], mass=[np.inf, 2.0],
-        restitution=0.0,
-    )  # fmt: skip
-    scenario = asked(scene, 0.4)
+    x, still = [[0.0, 0.0], [0.8, 0.0]], np.zeros((2, 2))
+    scenario = asked(lay_out(position=x, velocity=still, radius=[0.5] * 2, mass=[np.inf, 2.0], restitution=0.0), 0.4)
     on = Switched(BOX2D, push_most=0.2, push_share=settings["share"], slop=settings["slop"] / 1e3)
     engine = changed_box2d(continuous=False, bullet=False, length_unit=1.0)
     runs = [play(engine, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
