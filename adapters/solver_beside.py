@@ -92,9 +92,9 @@ class Neighbours(SourceLoader, MetaPathFinder):
         """The text of a file; raises `OSError` for any other, such as one with code that was compiled before."""
         file = Path(os.fsdecode(path)).relative_to(self.folder).as_posix()
         if file not in self.texts:
-            raise OSError(f"{path} was not read with the solver")
+            raise OSError(f"{file} was not read with the solver")
         return self.texts[file].encode()
 
     def source_to_code(self, data: Any, path: Any = "<string>") -> CodeType:  # type: ignore[override]
-        """The code of a module."""
-        return compile(data, str(self.copies / Path(path).relative_to(self.folder)), "exec", dont_inherit=True)
+        """The code of a module; from text, for it is no more in the letters that its first line may name."""
+        return compile(data.decode(), str(self.copies / Path(path).relative_to(self.folder)), "exec", dont_inherit=True)
