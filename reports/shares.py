@@ -30,7 +30,7 @@ from reports.worker_process import Failure, allow
 from scenarios.model import Scenario
 
 # By which runs are compared.
-JUDGES = ("comparison", "metrics", "view", "delays", "laws", "collisions", "violations", "scales")
+JUDGES = ("comparison", "metrics", "view", "delays", "laws", "collisions", "faces", "violations", "scales")
 ANSWER = ".npz"  # how the file of an answer ends
 NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which nothing means NaN
 COMPARING = 300.0  # s that the comparison of a scene may take: all 38 of the default run take 30, on two cores
