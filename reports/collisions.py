@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from reports import laws
 from reports.delays import WINDOW
 from reports.faces import SAME, interval, on_faces
 from scenarios.model import Array, Collisions, Scene, Trajectory
@@ -211,10 +212,11 @@ def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, 
         alone = all(busy[k, disk] == 1 and (k + 1, disk) not in busy for disk in disks)
         if alone and 0 <= k < len(t) - 1 and not scene.static[i]:
             earlier, later = around(trajectory, scene, k, when)
-            if is_rounding(earlier, later, disks, rounding):
+            moving = [disk for disk in disks if not scene.static[disk]]
+            if is_rounding(earlier, later, moving, rounding):
                 below += 1
                 continue
-            turned = np.abs(spin[k + 1] - spin[k])[list(disks)].max() * scene.radius[i]
+            turned = np.abs(spin[k + 1] - spin[k]) * scene.radius
             closing, parting = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
             if closing > max(slowest, 0.0):
                 values.append(parting / closing)
@@ -229,32 +231,38 @@ def around(trajectory: Trajectory, scene: Scene, k: int, when: float) -> tuple[A
     return velocity[k] + falling * (when - t[k]), velocity[k + 1] - falling * (t[k + 1] - when)
 
 
-def is_rounding(earlier: Array, later: Array, disks: tuple[int, ...], rounding: float) -> bool:
-    """Whether the change of the first disk, which tells the normal, or that of both is below the floor."""
-    change = later[list(disks)] - earlier[list(disks)]
-    speed = np.linalg.norm(earlier[list(disks)], axis=1) + np.linalg.norm(later[list(disks)], axis=1)
-    between = change[0] - change[1] if len(disks) > 1 else change[0]
+def is_rounding(earlier: Array, later: Array, moving: list[int], rounding: float) -> bool:
+    """Whether the change of a disk that moves, or that of both to each other, is below the floor."""
+    change = later[moving] - earlier[moving]
+    speed = laws.lengths(earlier[moving]) + laws.lengths(later[moving])
+    between = change[0] - change[-1] if len(moving) > 1 else change[0]
     floor = FLOOR * rounding
-    return bool(np.linalg.norm(change[0]) <= floor * speed[0] or np.linalg.norm(between) <= floor * speed.sum())
+    return bool((laws.lengths(change) <= floor * speed).any() or laws.lengths(between) <= floor * speed.sum())
 
 
 def speeds_along_normal(
-    earlier: Array, later: Array, scene: Scene, i: int, j: int, turned: float
+    earlier: Array, later: Array, scene: Scene, i: int, j: int, turned: Array
 ) -> tuple[float, float]:
-    """m/s at which disk i and disk or wall j close before and part after a collision; `turned` m/s by its friction.
+    """m/s at which disk i and disk or wall j close before and part after a collision; `turned` (n,) m/s by friction.
 
+    The normal is that of the change of their velocity to each other, whichever of the two is named first.
     (nan, nan) if the change is not that of one frictionless collision.
     """
     change = later - earlier
-    normal = change[i] / (np.linalg.norm(change[i]) or 1.0)
+    one, two = (change[i], change[j]) if j >= 0 else (change[i], np.zeros(2))
+    between = one - two
+    normal = between / (np.linalg.norm(between) or 1.0)
     if j >= 0 and not scene.static[j]:
-        untold = np.linalg.norm(scene.mass[i] * change[i] + scene.mass[j] * change[j]) / scene.mass[i]
+        kicks = scene.mass[i] * one, scene.mass[j] * two
+        untold = np.linalg.norm(kicks[0] + kicks[1]) > CLEAN * max(map(np.linalg.norm, kicks))
+        slid = (turned[[i, j]] > CLEAN * laws.lengths(change[[i, j]])).any()
     elif j < 0:
         start, end = scene.walls[-1 - j]
-        untold = abs(change[i] @ (end - start)) / np.linalg.norm(end - start)
+        untold = abs(one @ (end - start)) > CLEAN * np.linalg.norm(end - start) * np.linalg.norm(one)
+        slid = turned[i] > CLEAN * np.linalg.norm(one)
     else:
-        untold = 0.0
-    if max(untold, turned) > CLEAN * np.linalg.norm(change[i]):
+        untold, slid = False, turned[i] > CLEAN * np.linalg.norm(one)
+    if untold or slid:
         return np.nan, np.nan
     before, after = (earlier[i] - earlier[j], later[i] - later[j]) if j >= 0 else (earlier[i], later[i])
     return float(-before @ normal), float(after @ normal)
