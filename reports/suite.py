@@ -97,6 +97,8 @@ def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) ->
     comparing: deque[Any] = deque(gathering.whole())
     progress.start(len(missing), len(tasks))
     limits = means.timeout, means.memory
+    if gathering.asked and not missing:
+        progress.say(waiting_for(gathering.asked))
     with closing(run_all(missing, means.workers, *limits, means.scheduler, alone, comparing)) as results:
         for task, result in results:
             if isinstance(task, Cell):
@@ -109,10 +111,18 @@ def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) ->
                 comparing.extend(gathering.came(task, result))
             else:
                 progress.done(*keep_answer(journal, plan, task, result))
+            if gathering.asked and not gathering.playing:
+                progress.say(waiting_for(gathering.asked))
     archive = Archive.read(folder)
     take_timings(archive, plan, means, journal, scenarios, progress)
     sweep(archive)
     journal.append({"footer": {"tasks": len(tasks), "played": len(missing), "seconds": progress.seconds}})
+
+
+def waiting_for(scenes: Sequence[str]) -> str:
+    """What is still to come when all is played."""
+    more = f" and {len(scenes) - 1} more" if len(scenes) > 1 else ""
+    return f"the exact answer to {Path(scenes[0]).stem}{more}"
 
 
 def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
