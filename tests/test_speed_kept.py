@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from reports import terminal
-from reports.folders import FolderTaken
+from reports.exits import FolderTaken
 from reports.journal import Journal
 from reports.speed import ladder, measure
 from reports.speed.effort import QUICK
