@@ -182,6 +182,7 @@ def test_a_link_to_nothing_is_refused(tmp_path: Path, command: str, to: str):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my.toml", "out"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_where_there_is_no_current_folder_any_more_it_is_said(tmp_path: Path, command: str):
     """It was deleted under the feet of the command: exit 2, one line, nothing is made."""
