@@ -9,12 +9,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
-from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import ENGINES, OWN
 from adapters.solver_file import KINDS, NotASolver
 from adapters.student import engine_file
+from reports.console import Console
 from reports.exits import DONE, FAILED, refuse, say
 from reports.folders import FolderTaken, found
 from reports.metrics import METRICS

@@ -18,6 +18,7 @@ from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
 from reports.check.verdict import NONE, FileCheck, check_file
 from reports.exits import BAD_INPUT, DONE, FAILED, refuse, say
+from reports.foreign_text import encoded
 from reports.runner import run_all
 from reports.worker_process import Failure
 
@@ -141,6 +142,6 @@ def smallest_here(file: Path, restitution: float) -> Smallest | None:
 def write(path: Path, text: str) -> None:
     """Write a file that was asked for; exits 2 if that is not possible."""
     try:
-        path.write_text(text, encoding="utf-8")
+        path.write_bytes(encoded(text))
     except OSError as fault:
         refuse([f"--junit {path}: {fault.strerror or fault}; name a file that can be written"])

@@ -14,6 +14,7 @@ from adapters.engines import ENGINES
 from reports.commands import unknown
 from reports.exits import FAILED, refuse, say
 from reports.folders import FolderTaken, may_write
+from reports.foreign_text import encoded, legible
 from reports.game.command import FIRST
 from reports.game.server import Game, application, serve
 from reports.lessons.catalogue import LESSONS
@@ -49,7 +50,7 @@ def write_one(name: str, path: Path) -> None:
         refuse([f"--export {path}: is there and no page of a lesson; name another file"])
     must_be_writable(path.parent, path)
     write_pages({path: LESSONS[name]}, ALONE, {})
-    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, opens without a server")
+    print(legible(f"{path}: {path.stat().st_size / 1e6:.1f} MB, opens without a server"))
 
 
 def write_all(folder: Path) -> None:
@@ -66,7 +67,7 @@ def write_all(folder: Path) -> None:
     rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[CONVENTIONS]
     put(folder / "index.html", index_page(FILES, rows))
     size = sum(path.stat().st_size for path in pages)
-    print(f"{folder / 'index.html'}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server")
+    print(legible(f"{folder / 'index.html'}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server"))
 
 
 def ours(path: Path) -> bool:
@@ -119,7 +120,7 @@ def put(path: Path, text: str) -> None:
     """A whole page or, if it cannot be written, the one that was there, and exit 2."""
     part = path.with_name(f".{path.name}.part")
     try:
-        part.write_text(text, encoding="utf-8")
+        part.write_bytes(encoded(text))
         part.replace(path)
     except OSError as fault:
         refuse([f"--export {path}: {fault.strerror or fault}"])

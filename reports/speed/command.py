@@ -12,13 +12,14 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rich.console import Console
 from rich.table import Table
 
 from reports import style
 from reports.commands import checked_engines, checked_scenes, opening
+from reports.console import Console
 from reports.exits import DONE, FAILED, broken_off, say
 from reports.folders import digest_of, given_back, open_part, replace_folder
+from reports.foreign_text import put_text
 from reports.journal import JOURNAL, Journal
 from reports.machine import about
 from reports.speed import figures
@@ -97,7 +98,7 @@ def is_ours(name: str) -> bool:
 
 def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:
     """Tables first, then the page, so that what was measured is kept whatever happens to the page."""
-    (folder / "machine.json").write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
+    put_text(folder / "machine.json", json.dumps(header, indent=1) + "\n")
     results.write(folder)
     if results.plan.whole:
         figures.write(folder / "speed_figures.csv", results, header)

@@ -185,4 +185,4 @@ class Results:
             "speed_budget": self.measured.budget, "speed_explained": self.explained, "speed_versus": self.versus,
         }  # fmt: skip
         for name, table in files.items():
-            table.to_csv(folder / f"{name}.csv", index=False)
+            table.to_csv(folder / f"{name}.csv", index=False, errors="backslashreplace")

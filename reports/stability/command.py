@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import NoReturn
 
 import pandas as pd
-from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import ENGINES, OWN
 from reports.commands import checked_engines, opening, unknown
+from reports.console import Console
 from reports.exits import DONE, FAILED, broken_off, refuse, say
 from reports.folders import given_back, may_go_on, open_part, replace_folder
 from reports.journal import JOURNAL, Journal
@@ -71,13 +71,13 @@ def gone_on_with(journal: Journal, plan: Plan, resume: bool) -> set[Task]:
 def write_files(folder: Path) -> Atlas:
     """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
     atlas = read(folder)
-    table(atlas.limits).to_csv(folder / "limits.csv", index=False)
+    table(atlas.limits).to_csv(folder / "limits.csv", index=False, errors="backslashreplace")
     laws = [(one.name, one.player, *at[:-1]) for one in atlas.laws for at in one.gaps]
     columns = ["scene", "player", *AtGap._fields[:-1]]
-    pd.DataFrame(laws, columns=columns).to_csv(folder / "laws.csv", index=False)
+    pd.DataFrame(laws, columns=columns).to_csv(folder / "laws.csv", index=False, errors="backslashreplace")
     cells = [(one.name, one.player, *cell) for one in atlas.maps for cell in one.cells]
     columns = ["map", "player", "x", "y", "reading", "failed", "event"]
-    pd.DataFrame(cells, columns=columns).to_csv(folder / "maps.csv", index=False)
+    pd.DataFrame(cells, columns=columns).to_csv(folder / "maps.csv", index=False, errors="backslashreplace")
     write_page(folder / "stability.html", folder, atlas)
     return atlas
 

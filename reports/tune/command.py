@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import NoReturn
 
 import pandas as pd
-from rich.console import Console
 from rich.table import Table
 
 from reports.commands import unknown
+from reports.console import Console
 from reports.exits import DONE, broken_off, refuse
 from reports.terminal import Progress
 from reports.tune.grid import MAKES
@@ -40,7 +40,7 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
             search = Search(engine, say=bar.note)
             bar.say(f"{engine}: setting by setting")
             tables.append(search.run())
-            pd.concat(tables).to_csv(out / NAME, index=False)
+            pd.concat(tables).to_csv(out / NAME, index=False, errors="backslashreplace")
     show(pd.concat(tables))
     Console().print(f"\n{out / NAME}", style="bold", highlight=False, soft_wrap=True)
     sys.exit(DONE)
