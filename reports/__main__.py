@@ -1,11 +1,18 @@
 """The command `crosscheck`, or `python -m reports`: it can be told to stop before it has imported what it needs."""
 
-from reports.exits import ends_when_told
+import sys
+
+from reports.exits import ends_when_told, refuse
+from reports.streams import printing
 
 
 def main() -> None:
     """Do what the command line asks for."""
-    with ends_when_told():
+    with ends_when_told(), printing():
+        if sys.flags.optimize > 1:
+            refuse(
+                ["PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are explained by; unset it"]
+            )
         from reports.cli import app  # which takes a second: what is raised while it is imported may be lost
 
         app()
