@@ -14,8 +14,9 @@ from typing import Any
 from adapters.conformance import no_answer
 from adapters.engines import Row
 from adapters.play import Run
-from reports.archive import Archive, from_trail, packed, stored_scene, trajectory_file
+from reports.archive import Archive, digest, from_trail, packed, stored_scene, trajectory_file
 from reports.cells import Cell, content_key, scene_hash
+from reports.foreign_text import put_bytes, put_text
 from reports.journal import Journal, plain
 from reports.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.machine import about
@@ -123,7 +124,7 @@ def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks
         if scene.endswith(".toml"):
             write_scene_file(scenarios[scene], stored_scene(folder, scenarios[scene].name))
     journal.append({"header": header})
-    (folder / "machine.json").write_text(json.dumps(plain(header), indent=2) + "\n")
+    put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
 
 
 def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
@@ -151,7 +152,7 @@ def had(archive: Archive, means: Means, scenarios: Mapping[str, Scenario]) -> se
     for record in archive.records:
         cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", record["substeps"])
         stopped = record["status"] == "timeout" and record["timeout_s"] < means.timeout
-        lost = record["step"] >= 0 and not trajectory_file(archive.folder, record["cell"]).exists()
+        lost = record["damage"]  # its trajectory is gone, or not what was written
         if cell.scene in hashes and record["cell"] == cell.key(hashes[cell.scene]) and not (stopped or lost):
             done.add(cell)
     return done
@@ -183,7 +184,7 @@ def keep_cell(
     scene = scene_hash(scenario)
     path = trajectory_file(journal.path.parent, cell.key(scene))
     if played.file:
-        path.write_bytes(played.file)
+        put_bytes(path, played.file)
     record = {
         "cell": cell.key(scene),
         "scene_hash": scene,
@@ -200,6 +201,7 @@ def keep_cell(
         "until_s": float(scenario.times[samples - 1]) if samples else float("nan"),
         "seconds": run.seconds,
         "timeout_s": means.timeout,
+        "file": digest(played.file) if played.file else "",
         "settings": run.settings,
         "versions": run.versions,
     }

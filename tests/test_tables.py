@@ -91,7 +91,7 @@ def test_a_share_that_is_not_there_or_not_whole_is_made_again(folder: Path, tmp_
     make_tables(Archive.read(copy), silent)
 
     assert (copy / "deviations.csv").read_bytes() == whole
-    assert {path.suffix for path in (copy / "compared").iterdir()} == {".csv", ANSWER}
+    assert {path.suffix for path in (copy / "compared").iterdir()} == {".csv", ANSWER, ".digest"}
 
 
 def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
