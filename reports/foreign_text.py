@@ -29,5 +29,9 @@ def put_text(path: Path, text: str) -> None:
 def put_bytes(path: Path, data: bytes) -> None:
     """Write a file of a run whole or not at all, as a part would be taken for the whole; raises `OSError`."""
     new = path.with_name(f"{path.name}.new")
-    new.write_bytes(data)
-    os.replace(new, path)
+    try:
+        new.write_bytes(data)
+        os.replace(new, path)
+    except OSError:
+        new.unlink(missing_ok=True)
+        raise
