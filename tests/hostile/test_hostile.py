@@ -1,41 +1,80 @@
 """Every hostile input ends in time, with a sentence or a result, and takes nothing of the user's away.
 
-The outcomes are kept in outcomes.csv: `uv run python -m tests.hostile.test_hostile` plays all and writes it anew.
+The outcomes are kept in outcomes.csv: `uv run python -m tests.hostile.test_hostile` plays all and writes it anew, some
+families if they are named, and then writes nothing.
 """
 
 from __future__ import annotations
 
 import csv
+import multiprocessing
+import os
 import sys
 from collections import Counter
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import perf_counter
 
 import pytest
 
 from tests.hostile import played
 from tests.hostile.command_lines import LINES
-from tests.hostile.played import BAD, HANG, LOST, SENTENCE, TRACEBACK, WRONG, Input, Outcome, outcome_of
+from tests.hostile.folders import FOLDERS
+from tests.hostile.journals import JOURNALS
+from tests.hostile.places import PLACES
+from tests.hostile.played import BAD, HANG, LEFT, LOST, SENTENCE, STRAY, TRACEBACK, WRONG, Input, Outcome, outcome_of
+from tests.hostile.scenes import SCENES
+from tests.hostile.servers import SERVERS
+from tests.hostile.small_run import finished_run
+from tests.hostile.solvers import SOLVERS
 
 FILE = Path(__file__).with_name("outcomes.csv")
-FAMILIES = {"command lines": LINES}
-ALL = [(family, tried) for family, inputs in FAMILIES.items() for tried in inputs]
+FAMILIES: dict[str, tuple[Input, ...]] = {
+    "scenes": SCENES, "folders": FOLDERS, "journals": JOURNALS, "places": PLACES, "command lines": LINES,
+    "solvers": SOLVERS, "servers": SERVERS,
+}  # fmt: skip
+ALL = {(family, tried.name): tried for family, inputs in FAMILIES.items() for tried in inputs}
+Key = tuple[str, str]  # family and name of an input
+
+
+def play(key: Key) -> tuple[Key, Outcome, float]:
+    """In a process of the pool: play an input; its outcome, and how long it took (s)."""
+    began = perf_counter()
+    with TemporaryDirectory() as folder:
+        return key, outcome_of(ALL[key], Path(folder) / "input"), perf_counter() - began
+
+
+def play_all(keys: Iterable[Key]) -> Iterator[tuple[Key, Outcome, float]]:
+    """Play these inputs, as many at once as there are cores; the slow ones, which start engines, are spread."""
+    finished_run()  # once, before the processes of the pool look for it
+    with ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(play, keys)
+
+
+@pytest.fixture(scope="module")
+def found(request: pytest.FixtureRequest) -> dict[Key, Outcome]:
+    """The outcomes of the inputs that are selected, played two or more at once."""
+    calls = [getattr(item, "callspec", None) for item in request.session.items]
+    keys = [call.params["key"] for call in calls if call is not None and "key" in call.params]
+    return {key: outcome for key, outcome, _ in play_all(keys)}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("family", "tried"), ALL, ids=lambda value: value.name if isinstance(value, Input) else value)
-def test_an_input_ends_as_it_should(family: str, tried: Input, tmp_path: Path):
+@pytest.mark.parametrize("key", ALL, ids=": ".join)
+def test_an_input_ends_as_it_should(found: dict[Key, Outcome], key: Key):
     """With the outcome that is kept, which is none of the bad ones."""
-    found = outcome_of(tried, tmp_path / "input")
+    word, code, printed = found[key]
 
-    assert found.word not in BAD, f"{found.word}, exit {found.code}:\n{found.printed}"
-    assert (found.word, found.code) == outcomes()[family, tried.name]
+    assert word not in BAD, f"{word}, exit {code}:\n{printed}"
+    assert (word, code) == outcomes()[key]
 
 
 def test_every_input_has_its_outcome_kept_and_none_of_them_is_bad():
     """At least 300, each once."""
-    assert set(outcomes()) == {(family, tried.name) for family, tried in ALL}
-    assert len(ALL) == len(outcomes())
+    assert list(outcomes()) == list(ALL)
+    assert len(ALL) == sum(map(len, FAMILIES.values())) >= 300
     assert not any(word in BAD for word, _ in outcomes().values())
 
 
@@ -44,51 +83,61 @@ def test_every_input_has_its_outcome_kept_and_none_of_them_is_bad():
     [
         ("python3 -c 'raise KeyError(1)'", TRACEBACK),
         ("python3 -c 'import warnings; warnings.warn(chr(97))'; exit 2", TRACEBACK),
+        ("echo 'ValueError: no' >&2; exit 2", TRACEBACK),
         ("kill -SEGV $$", TRACEBACK),
         ("sleep 60", HANG),
         ("rm mine.txt; echo no >&2; exit 2", LOST),
+        ("rmdir empty; echo no >&2; exit 2", LOST),
         ("echo more >> mine.txt; echo no >&2; exit 2", LOST),
+        ("touch new.txt; echo no >&2; exit 2", STRAY),
+        ("touch ../new.txt; echo no >&2; exit 2", STRAY),
+        ("setsid sleep 60 & echo no >&2; exit 2", LEFT),
         ("exit 2", WRONG),
         ("echo no >&2; exit 1", WRONG),
         ("printf 'no \\033[31m' >&2; exit 2", WRONG),
         ("echo yes >&2; exit 2", WRONG),
+        ("yes no | head -20 >&2; exit 2", WRONG),
         ("echo no >&2; exit 2", SENTENCE),
+        ("touch asked.txt; echo no >&2; exit 2", SENTENCE),
     ],
 )
 def test_a_program_that_ends_otherwise_is_noticed(
     shell: str, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """The negative controls, of every bad outcome; and one good one."""
-    monkeypatch.setattr(played, "SECONDS", 2.0)
-    tried = Input("control", files={"mine.txt": "mine"}, says="no" if word != TRACEBACK else "", shell=shell)
+    """The negative controls, of every bad outcome; and two good ones."""
+    monkeypatch.setattr(played, "SECONDS", 1.0)
+    monkeypatch.setattr(played, "GRACE", 0.3)
+    tried = Input(
+        "control", files={"mine.txt": "mine"}, prepare=lambda here: (here / "empty").mkdir(), writes=("asked.txt",),
+        says="" if word == TRACEBACK else "no", shell=shell,
+    )  # fmt: skip
 
     assert outcome_of(tried, tmp_path / "input").word == word
 
 
-def outcomes() -> dict[tuple[str, str], tuple[str, int]]:
-    """What is kept: (family, name) -> the outcome and its exit code."""
+def outcomes() -> dict[Key, tuple[str, int]]:
+    """What is kept: family and name -> the outcome and its exit code."""
     with FILE.open(newline="", encoding="utf-8") as file:
         return {(row["family"], row["input"]): (row["outcome"], int(row["exit"])) for row in csv.DictReader(file)}
 
 
-def play_all(families: list[str]) -> None:
-    """Play every input of these families, all if none is named; print the bad ones, and write the table."""
-    rows: list[tuple[str, str, Outcome]] = []
-    for family, tried in ALL:
-        if families and family not in families:
-            continue
-        with TemporaryDirectory() as folder:
-            found = outcome_of(tried, Path(folder) / "input")
-        rows.append((family, tried.name, found))
-        if found.word in BAD:
-            print(f"{family}: {tried.name}: {found.word}, exit {found.code}\n{found.printed}\n", flush=True)
-    print(*sorted(Counter((family, found.word) for family, _, found in rows).items()), sep="\n")
+def main(families: list[str]) -> None:
+    """Play every input of these families, all if none is named; print the bad ones, and write the table of all."""
+    rows: list[tuple[Key, Outcome]] = []
+    began, slow = perf_counter(), []
+    for key, outcome, seconds in play_all(key for key in ALL if not families or key[0] in families):
+        rows.append((key, outcome))
+        slow.append((round(seconds, 1), *key))
+        if outcome.word in BAD:
+            print(f"{': '.join(key)}: {outcome.word}, exit {outcome.code}\n{outcome.printed}\n", flush=True)
+    print(*sorted(Counter((key[0], outcome.word) for key, outcome in rows).items()), sep="\n")
+    print(f"{len(rows)} inputs in {perf_counter() - began:.0f} s; the slowest:", *sorted(slow)[-12:], sep="\n")
     if not families:
         with FILE.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(("family", "input", "exit", "outcome"))
-            writer.writerows((family, name, found.code, found.word) for family, name, found in rows)
+            writer.writerows((*key, found.code, found.word) for key, found in rows)
 
 
 if __name__ == "__main__":
-    play_all(sys.argv[1:])
+    main(sys.argv[1:])
