@@ -17,6 +17,12 @@ class Unsupported(Exception):
     """An engine cannot model this scene, and says why rather than approximate it."""
 
 
+class NotStarted(Exception):
+    """What an engine runs in cannot be had, as where memory is short: no fault of the engine's, and no result."""
+
+    outside = True
+
+
 class Hit(NamedTuple):
     """One contact that pushed during step `step` (from 0): i and j in either order, wall w as -1 - w; N s.
 

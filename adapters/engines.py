@@ -22,6 +22,7 @@ class Row:
         rounding: the relative rounding of the numbers the engine keeps.
         leaves_state: what it played before changes what it plays next, so that each cell needs a process of its own;
             true of none below (a test plays each after others, bit for bit).
+        source: what tells a solver's file that was saved from what it was; "" for an engine of this program.
     """
 
     make: Callable[[], Engine]
@@ -29,6 +30,7 @@ class Row:
     alpha: float
     rounding: float
     leaves_state: bool = False
+    source: str = ""
 
 
 def _exercise() -> Engine:
@@ -117,8 +119,11 @@ ENGINES: dict[str, Row] = {
 OWN = ":own"  # the profile of a solver's file, whose path is its engine
 
 
+_read: dict[str, Row] = {}  # the rows of solvers' files, as they were when the command began
+
+
 def row_of(name: str) -> Row:
-    """The row of an engine: of `ENGINES`, or of a solver's file as `PATH:own`.
+    """The row of an engine: of `ENGINES`, or of a solver's file as `PATH:own`, which is read once.
 
     Raises:
         KeyError: it is neither.
@@ -126,6 +131,12 @@ def row_of(name: str) -> Row:
     """
     if name in ENGINES or not name.endswith(OWN):
         return ENGINES[name]
+    return _read.get(name) or read_row(name)
+
+
+def read_row(name: str) -> Row:
+    """The row of a solver's file, `PATH:own`, as it is now; `row_of` gives it from now on. Raises `NotASolver`."""
     from adapters.student import engine_file
 
-    return engine_file(Path(name.removesuffix(OWN)))
+    _read[name] = row = engine_file(Path(name.removesuffix(OWN)))
+    return row

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Engine, Hit, Unsupported
+from adapters.engine import Engine, Hit, NotStarted, Unsupported
 from scenarios.model import Array, Collisions, Scenario, Scene, State, Thrust, Trajectory, frozen
 
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
@@ -58,8 +58,8 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callab
     """Play `scenario` in steps of `dt` s, which must divide its sample interval; `name` is `engine:profile`.
 
     `watch` is shown every good sample as soon as it is there, the start first: a crash leaves no other trace.
-    Refusals, exceptions and runaways become the run's status; only a dt that does not fit raises `ValueError`, and
-    want of memory `MemoryError`.
+    Refusals, exceptions and runaways become the run's status; only a dt that does not fit raises `ValueError`,
+    want of memory `MemoryError`, and an engine whose process cannot be had `NotStarted`.
     """
     engine_name, profile = name.split(":")
     substeps = round(scenario.sample_interval / dt)
@@ -86,7 +86,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callab
             watch(state)
     except Unsupported as refusal:
         status, reason = "unsupported", str(refusal)
-    except MemoryError:  # the limit is not the engine's: left to whoever set it
+    except (MemoryError, NotStarted):  # not the engine's fault: left to whoever set the limit
         raise
     except Exception as error:  # an engine may raise anything; the run says what
         status, reason = getattr(error, "status", "error"), f"{type(error).__name__}: {error}"

@@ -1,10 +1,16 @@
-"""Reads the file of somebody's solver as text, and says in a sentence why it cannot be one."""
+"""Reads the file of somebody's solver as text, and says in a sentence why it cannot be one.
+
+It is read once: what is played, checked and hashed is the text that was read, whatever is saved meanwhile.
+"""
 
 from __future__ import annotations
 
 import codecs
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+
+from adapters.solver_beside import modules_beside
 
 LARGEST = 2**20  # bytes; the exercise's file has about five thousand
 PATIENCE = 3  # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
@@ -51,33 +57,69 @@ def printable(text: str) -> str:
 
 @dataclass(frozen=True)
 class SolverText:
-    """A solver's file: where it is, "javascript" or "python", and its text with \\n at the end of lines."""
+    """A solver's file as it was when it was read, with all that it takes to play it on any machine.
+
+    Attributes:
+        path: where it was.
+        kind: "javascript" or "python".
+        text: with \\n at the end of lines.
+        digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
+        beside: the modules that it imports from its own folder: file, relative to the folder, -> text.
+    """
 
     path: Path
     kind: str
     text: str
+    digest: str
+    beside: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def source(self) -> str:
+        """16 hex digits over every text that decides what it does."""
+        return hashlib.sha256(repr((self.digest, self.beside)).encode()).hexdigest()[:16]
 
 
 def read_solver(path: Path) -> SolverText:
-    """The text of `path`; raises `NotASolver` with one sentence."""
+    """The text of `path`, and of what it imports from beside it; raises `NotASolver` with one sentence."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise NotASolver(f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file")
+    data = read_bytes(path, "name an Exercise.js or a solver.py")
+    text = decoded(path, data)
+    if not text.strip():
+        raise NotASolver(f"{path}: is empty; save your solver into it")
+    beside = read_beside(path, text) if kind == "python" else {}
+    return SolverText(path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(beside.items())))
+
+
+def read_beside(path: Path, text: str) -> dict[str, str]:
+    """The texts of the modules that a solver of that `text` imports from its own folder; raises `NotASolver`."""
+    itself, beside = path.resolve(), dict[str, str]()
+    for file, module in modules_beside(itself.parent, text, lambda one: text if one == itself else read_module(one)):
+        beside[file] = module
+        if sum(map(len, beside.values())) > LARGEST:
+            raise NotASolver(f"{path}: imports more than 1 MB from beside it; a solver has a few kilobytes")
+    return beside
+
+
+def read_module(path: Path) -> str:
+    """The text of a module beside a solver; raises `NotASolver`."""
+    return decoded(path, read_bytes(path, "a module that a solver imports is a file"))
+
+
+def read_bytes(path: Path, wanted: str) -> bytes:
+    """All of a small file; raises `NotASolver`, with what is `wanted` in the place of something that is no file."""
     try:
         if path.exists() and not path.is_file():
-            raise NotASolver(f"{path}: is no file; name an Exercise.js or a solver.py")  # a pipe would be waited for
+            raise NotASolver(f"{path}: is no file; {wanted}")  # a pipe would be waited for
         size = path.stat().st_size
         if size > LARGEST:
             raise NotASolver(f"{path}: has {size / 1e6:.1f} MB; a solver has a few kilobytes, at most 1 MB is read")
-        data = path.read_bytes()
+        return path.read_bytes()
     except OSError as fault:
         if dangling(path):
             raise NotASolver(f"{path}: is a link to {path.readlink()}, which is not there") from None
         raise NotASolver(f"{path}: {fault.strerror or fault}; name a file that can be read") from None
-    text = decoded(path, data).replace("\r\n", "\n").replace("\r", "\n")
-    if not text.strip():
-        raise NotASolver(f"{path}: is empty; save your solver into it")
-    return SolverText(path, kind, text)
 
 
 def dangling(path: Path) -> bool:
@@ -86,7 +128,12 @@ def dangling(path: Path) -> bool:
 
 
 def decoded(path: Path, data: bytes) -> str:
-    """Text from UTF-8, from UTF-16 or UTF-32 with its mark, or from Windows' Latin letters."""
+    """Text from UTF-8, from UTF-16 or UTF-32 with its mark, or from Windows' Latin letters; \\n ends its lines."""
+    return letters(path, data).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def letters(path: Path, data: bytes) -> str:
+    """The text of `decoded` with its own line ends."""
     if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
         return data.decode("utf-32", errors="replace")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import select
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
 from typing import Any
 
-from adapters.solver_file import PATIENCE, SolverFailed, read_solver
+from adapters.engine import NotStarted
+from adapters.solver_file import PATIENCE, SolverFailed, SolverText
+from adapters.solver_worker import HERE
 from scenarios.truth_cache import folder
 
 STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
@@ -25,7 +29,7 @@ Request = tuple[str, Any, float]
 
 
 class SolverProcess:
-    """A solver's file, loaded in a process of its own; use it in a `with`, or close it.
+    """A solver's text, loaded in a process of its own; use it in a `with`, or close it.
 
     Attributes:
         functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it replaced.
@@ -34,17 +38,20 @@ class SolverProcess:
         versions: library -> version.
 
     Raises:
-        NotASolver: the path is no JavaScript or Python text.
         SolverFailed: it cannot be loaded.
+        NotStarted: its process cannot be had.
     """
 
-    def __init__(self, path: Path, compiled: bool = False) -> None:
-        self.kind = read_solver(path).kind
+    def __init__(self, solver: SolverText, compiled: bool = False) -> None:
+        self.kind = solver.kind
+        kept = folder()
+        copies = kept_copies(solver, kept) if compiled and kept and self.kind == "python" else None
         # Plain Python gives the same bits as numba, and starts 20 s sooner.
-        settings = {"PYTHONDONTWRITEBYTECODE": "1"} | ({} if compiled else {"NUMBA_DISABLE_JIT": "1"})
-        if (kept := folder()) is not None:
+        settings = {"PYTHONDONTWRITEBYTECODE": "1"} | ({} if copies else {"NUMBA_DISABLE_JIT": "1"})
+        settings["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # as here, without the current folder
+        if kept is not None:
             settings["NUMBA_CACHE_DIR"] = str(kept / "numba")
-        hello = self.start(path, settings)
+        hello = self.start(pickle.dumps((solver, copies)).hex(), settings)
         if not isinstance(hello, dict) or not {"failed", "functions"} & hello.keys():
             self.close()
             raise SolverFailed("crashed", INTRUDED)
@@ -55,25 +62,37 @@ class SolverProcess:
         self.surface: str = hello["surface"]
         self.versions: dict[str, str] = hello["versions"]
 
-    def start(self, path: Path, settings: dict[str, str]) -> Any:
-        """Start the process and give it the file; what it says then.
+    def start(self, solver: str, settings: dict[str, str]) -> Any:
+        """Start the process and give it the solver; what it says then.
 
         It stops a file that does not load by itself. A process that says nothing at all is started once more before
         the file is blamed: a start of V8 has been seen to hang, so rarely that none of 1259 that were counted did.
         """
         for last in (False, True):
-            self.process: subprocess.Popen[bytes] | None = subprocess.Popen(
-                [sys.executable, "-P", "-m", "adapters.solver_worker"],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | settings,
-                start_new_session=True, bufsize=0,
-            )  # fmt: skip
             try:
-                return self.exchange(str(path), STARTING)
+                self.begin(settings)
+                return self.exchange(solver, STARTING)
             except BaseException as error:
                 self.close()
                 if last or not (isinstance(error, SolverFailed) and error.kind == "timeout"):
                     raise
         raise AssertionError("the second start returns or raises")
+
+    def begin(self, settings: dict[str, str]) -> None:
+        """Start the process and hear that it is there, with nothing of the solver in it; raises `NotStarted`."""
+        self.process: subprocess.Popen[bytes] | None = None
+        try:
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "adapters.solver_worker"],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | settings,
+                start_new_session=True, bufsize=0,
+            )  # fmt: skip
+            if self.receive(STARTING) == HERE:
+                return
+            why = "it said something else than that it is there"
+        except (OSError, SolverFailed) as fault:
+            why = str(fault)
+        raise NotStarted(f"the process for a solver's file could not be started: {why}")
 
     def __enter__(self) -> SolverProcess:
         return self
@@ -102,11 +121,16 @@ class SolverProcess:
         """One line there and one back."""
         assert self.process is not None
         assert self.process.stdin is not None
-        assert self.process.stdout is not None
         try:
             self.process.stdin.write(json.dumps(what).encode() + b"\n")
         except BrokenPipeError:
             raise self.lost() from None
+        return self.receive(limit)
+
+    def receive(self, limit: float) -> Any:
+        """One line from the process."""
+        assert self.process is not None
+        assert self.process.stdout is not None
         received, deadline = b"", monotonic() + limit
         while not received.endswith(b"\n"):
             ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, deadline - monotonic()))
@@ -144,3 +168,25 @@ class SolverProcess:
                 if stream is not None:
                     stream.close()
             self.process = None
+
+
+def kept_copies(solver: SolverText, kept: Path) -> Path | None:
+    """A folder below `kept` with the texts of a Python solver, named by what they are; None if it cannot be written.
+
+    numba keeps what it compiled from a file under that file's place and content of the moment. The file itself may have
+    been saved since it was read, and what it imports is compiled into it: both would be taken for what they were not.
+    """
+    copies = kept / "solvers" / solver.source
+    try:
+        for file, text in {**dict(solver.beside), solver.path.resolve().name: solver.text}.items():
+            copy = copies / file
+            if copy.is_file() and copy.read_bytes() == text.encode():
+                continue
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            handle, temporary = tempfile.mkstemp(dir=copy.parent)
+            with os.fdopen(handle, "wb") as written:
+                written.write(text.encode())
+            os.replace(temporary, copy)
+    except OSError:
+        return None
+    return copies

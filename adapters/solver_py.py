@@ -8,9 +8,11 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any
 
+from adapters.solver_beside import Neighbours
 from adapters.solver_file import PATIENCE, SolverFailed, SolverText
 
 LOAD_LIMIT = 3.0  # s; importing numba takes one
@@ -64,12 +66,14 @@ def number(x: Any) -> float:
 class PythonSolver:
     """The file as a module of this process. Raises `SolverFailed` if it cannot be loaded."""
 
-    def __init__(self, solver: SolverText) -> None:
-        self.name = str(solver.path)
-        sys.path.append(str(solver.path.resolve().parent))  # last, so that a neighbour never hides a library
+    def __init__(self, solver: SolverText, copies: Path | None = None) -> None:
+        """`copies`: where the texts lie as they were read, for numba: it keeps what it compiled by file and content."""
+        here = solver.path.resolve()
+        self.name = str(solver.path if copies is None else copies / here.name)
+        sys.meta_path.insert(0, Neighbours(here.parent, dict(solver.beside), copies or here.parent))
         random.seed(1)
         self.module = module = ModuleType("solver")
-        module.__file__ = str(solver.path.resolve())
+        module.__file__ = str(here)
         sys.modules["solver"] = module  # numba and dataclasses look a function's module up
         with self.guarded(LOAD_LIMIT, "while it is loaded"):
             exec(compile(solver.text, self.name, "exec"), module.__dict__)

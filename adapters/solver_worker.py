@@ -6,6 +6,7 @@ It runs with the rights of the user who started it: the limits are against accid
 from __future__ import annotations
 
 import os
+import pickle
 import resource
 import select
 import signal
@@ -15,19 +16,23 @@ from pathlib import Path
 from threading import Thread
 from typing import IO, Any
 
-from adapters.solver_file import SolverFailed, read_solver
+from adapters.solver_file import SolverFailed, SolverText
 
+HERE = "here"  # what is said before anything of the solver is in this process
 MEMORY = 2 * 2**30  # bytes of data; V8 sets aside far more addresses than it uses, so that these cannot be bounded
 
 
 def main() -> None:
-    """Load the file that the first line names, say what it has, then answer request by request until the input ends."""
+    """Load the text that the first line holds, say what it has, then answer request by request until the input ends."""
     requests, answers = private_pipes()
     Thread(target=end_with_parent, args=(requests,), daemon=True).start()
-    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    _, allowed = resource.getrlimit(resource.RLIMIT_DATA)  # which nobody but root may raise
+    most = MEMORY if allowed == resource.RLIM_INFINITY else min(MEMORY, allowed)
+    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    tell(answers, HERE)
     try:
-        solver = load(Path(loads(requests.readline())))
+        solver = load(*pickle.loads(bytes.fromhex(loads(requests.readline()))))
     except SolverFailed as failure:
         tell(answers, {"failed": vars(failure)})
         return
@@ -53,16 +58,15 @@ def end_with_parent(requests: IO[str]) -> None:
     os.killpg(os.getpid(), signal.SIGKILL)
 
 
-def load(path: Path) -> Any:
-    """The solver by its kind; raises `SolverFailed`."""
-    text = read_solver(path)
-    if text.kind == "javascript":
+def load(solver: SolverText, copies: Path | None) -> Any:
+    """The solver by its kind, its texts kept in `copies`; raises `SolverFailed`."""
+    if solver.kind == "javascript":
         from adapters.solver_js import JavaScriptSolver
 
-        return JavaScriptSolver(text)
+        return JavaScriptSolver(solver)
     from adapters.solver_py import PythonSolver
 
-    return PythonSolver(text)
+    return PythonSolver(solver, copies)
 
 
 def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from adapters.engine import Hit, Unsupported
 from adapters.engines import FLOAT64, Row
-from adapters.solver_file import SolverFailed, read_solver
+from adapters.solver_file import SolverFailed, SolverText, read_solver
 from adapters.solver_process import SolverProcess
 from scenarios.model import Array, Scene, State
 
@@ -21,7 +20,7 @@ REST = 1e-3  # largest difference between the file's restitution and the scene's
 
 
 class Student:
-    """Plays a file in a process of its own.
+    """Plays the text of a file in a process of its own, whatever becomes of the file.
 
     One with `advance` is played by it and plays what the reference solver plays. Of any other the functions
     `integrate` and `sphereSphereCollisionHandling` are called: all spheres, every pair i < j, then the wrap. Its
@@ -33,8 +32,8 @@ class Student:
 
     listening, wrapping = True, 0.0
 
-    def __init__(self, path: Path, patience: float = STEP_LIMIT) -> None:
-        self.path, self.patience, self.limit = path, patience, STEP_LIMIT
+    def __init__(self, solver: SolverText, patience: float = STEP_LIMIT) -> None:
+        self.solver, self.path, self.patience, self.limit = solver, solver.path, patience, STEP_LIMIT
         self.started: SolverProcess | None = None
 
     @property
@@ -42,7 +41,7 @@ class Student:
         """The process, started when it is first needed; raises `Unsupported` if the file cannot be loaded."""
         if self.started is None:
             try:
-                self.started = SolverProcess(self.path, compiled=True)
+                self.started = SolverProcess(self.solver, compiled=True)
             except SolverFailed as failure:
                 raise Unsupported(f"{self.path.name} {failure}") from None
         return self.started
@@ -103,11 +102,12 @@ class Student:
         """What the file decides."""
         own = "the scene's" if self.whole else f"{self.restitution:.6g}, written into the file"
         order = "the file's own advance" if self.whole else "integrate all, every pair i < j, wrap"
+        beside = ", ".join(file for file, _ in self.solver.beside)
         return {
             "restitution": (None, own),
             "order of a step": (None, order),
-            "file": (str(self.path), f"sha256 {file_hash(self.path)}"),
-        }
+            "file": (str(self.path), f"sha256 {self.solver.digest}"),
+        } | ({"from beside it": (None, f"{beside}; sha256 of all {self.solver.source}")} if beside else {})
 
     def versions(self) -> dict[str, str]:
         """Of the language's engine."""
@@ -143,12 +143,7 @@ def read_restitution(process: SolverProcess) -> float:
     return float(b[2] - a[2]) / 2.0
 
 
-def file_hash(path: Path) -> str:
-    """16 hex digits over the file's bytes."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-
-
 def engine_file(path: Path, patience: float = STEP_LIMIT) -> Row:
-    """The row of `ENGINES` that a solver's file stands for; raises `NotASolver` if the path is none."""
-    read_solver(path)
-    return Row(partial(Student, path, patience), f"your own solver, {path}", 1.0, FLOAT64)
+    """The row of `ENGINES` that a solver's file, as it is now, stands for; raises `NotASolver` if the path is none."""
+    solver = read_solver(path)
+    return Row(partial(Student, solver, patience), f"your own solver, {path}", 1.0, FLOAT64, source=solver.source)

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.engines import OWN
 from scenarios.model import Scenario
 
 PLAYERS = (
@@ -43,15 +42,17 @@ class Cell:
         name, profile = self.engine.split(":")
         return name, profile
 
-    def key(self, scene: str) -> str:
-        """Its `content_key`, where `scene` is the `scene_hash` of what is played."""
-        return content_key(scene, self.engine, self.substeps)
+    def key(self, scene: str, source: str) -> str:
+        """Its `content_key`: `scene` is the `scene_hash` of what is played, `source` that of the engine's row."""
+        return content_key(scene, self.engine, source, self.substeps)
 
 
 def content_key(*what: Hashable) -> str:
-    """16 hex digits of a hash over what decides a result: `what`, the versions, the players' source, own files."""
-    own = [Path(name.removesuffix(OWN)).read_bytes() for name in what if isinstance(name, str) and name.endswith(OWN)]
-    return hashlib.sha256(repr((*what, own, versions(), source_hash())).encode()).hexdigest()[:16]
+    """16 hex digits of a hash over what decides a result: `what`, the versions, the players' source.
+
+    No file but of this program is read here: what was read when the command began is in `what`, as `Row.source`.
+    """
+    return hashlib.sha256(repr((*what, versions(), source_hash())).encode()).hexdigest()[:16]
 
 
 def scene_hash(scenario: Scenario) -> str:

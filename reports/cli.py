@@ -153,7 +153,10 @@ def check(
         Path | None, typer.Option(metavar="PATH", parser=place, help="Where the page goes.  [default: check.html]")
     ] = None,
 ) -> None:
-    """Check a hand-written solver of the exercise, and say what is wrong with it. The file is run as you."""
+    """Check a hand-written solver of the exercise, and say what is wrong with it. The file is run as you.
+
+    In Python it may import what is installed, and modules beside it that are called otherwise.
+    """
     from reports.check.command import check as check_and_say
 
     check_and_say(path, as_json, junit, page)

@@ -8,7 +8,17 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from reports import laws
+from reports.delays import WINDOW
+from reports.faces import SAME, interval, on_faces
 from scenarios.model import Array, Collisions, Scene, Trajectory
+
+# Hits and steps lie on one grid, and so do halves of the time between hits. No bound is one of it, where rounding would
+# decide: all are roots of numbers that have none.
+CROWDED = 5**0.5  # dt; true hits of a pair that are closer cannot be told apart by any step
+FAR = 401**0.5  # dt; so late, or early, a match may always be
+ROUNDING = 1e-12  # of a sum of thousands of times
+HALF = 0.26**0.5  # of the time to the nearest other true hit: so late it may be too
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +52,16 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
     """Match hits pair by pair, in order, up to `end` s, for a player with steps of `dt` s.
 
     Where a pair has hit more often on one side, those hits are left over whose absence brings the others closest in
-    time. A match is no match if it is further off than half the time to the nearest other true hit of the pair (or
-    to the start), and than 20 dt: then one hit is missed and one invented.
+    time; the earlier if two are as close. A match is no match if it is further off than `HALF` the time to the nearest
+    other true hit of the pair (or to the start), and than `FAR` dt: then one hit is missed and one invented.
 
     Three kinds of hits are not judged: of a pair at rest against each other from the start (a true hit without
-    impulse), as what a player reports there is weight; true hits of a pair closer together than 2 dt, as no step
-    can tell them apart, with all that a player makes of them; and hits within 3 dt of `end`, which may be cut off.
+    impulse), as what a player reports there is weight; true hits of a pair closer together than `CROWDED` dt, as no
+    step can tell them apart, with all that a player makes of them; and hits within `WINDOW` dt of `end`, which may be
+    cut off.
     """
     resting = pair_keys(true)[true.impulse == 0]
-    mine, its = (by_pair(hits, resting, end) for hits in (played, true))
+    mine, its = (by_pair(hits, resting, end - SAME * dt) for hits in (played, true))
     pairs = np.union1d(mine.key, its.key)
     limits = [np.append(np.searchsorted(side.key, pairs), len(side.key)) for side in (mine, its)]
     partner, lost, extra = judge(mine.t, limits[0], its.t, limits[1], dt, end)
@@ -77,10 +88,10 @@ def pair_keys(hits: Collisions) -> np.ndarray:
 
 
 def by_pair(hits: Collisions, resting: np.ndarray, end: float) -> ByPair:
-    """The hits up to `end` s of pairs that are not `resting`."""
+    """The hits before `end` s of pairs that are not `resting`."""
     key = pair_keys(hits)
     order = np.argsort(key, kind="stable")
-    order = order[hits.t[order] <= end]
+    order = order[hits.t[order] < end]
     if len(resting):
         order = order[~np.isin(key[order], resting)]
     return ByPair(key[order], hits.t[order], hits.i[order], hits.j[order])
@@ -97,22 +108,22 @@ def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no
         mine, its = played[p:q], true[a:b]
         gap = gap_to_nearest(its)
         if q - p <= b - a:
-            chosen = closest_in_order(mine, its)
+            chosen = closest_in_order(mine, its, SAME * dt)
             for m in range(q - p):
                 partner[p + m] = a + chosen[m]
         else:
-            chosen = closest_in_order(its, mine)
+            chosen = closest_in_order(its, mine, SAME * dt)
             for m in range(b - a):
                 partner[p + chosen[m]] = a + m
-        lost[a:b] = (gap >= 2 * dt) & (its < end - 3 * dt)
+        lost[a:b] = (gap >= CROWDED * dt) & (its < end - WINDOW * dt)
         for m in range(p, q):
             t, other = played[m], partner[m]
-            if other >= 0 and abs(t - true[other]) > max(gap[other - a] / 2, 20 * dt):
+            if other >= 0 and abs(t - true[other]) > max(HALF * gap[other - a], FAR * dt):
                 partner[m] = other = -1
             if other >= 0:
                 lost[other] = False
             else:
-                extra[m] = t < end - 3 * dt and not among_crowded(t, its, gap, dt)
+                extra[m] = t < end - WINDOW * dt and not among_crowded(t, its, gap, dt)
     return partner, lost, extra
 
 
@@ -129,18 +140,20 @@ def gap_to_nearest(t):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def among_crowded(t, times, gap, dt):  # type: ignore[no-untyped-def]
-    """Whether `t` is within 3 dt of one of `times` that no step of dt can tell from its neighbour."""
+    """Whether `t` is within `WINDOW` dt of one of `times` that no step of dt can tell from its neighbour."""
     for k in range(len(times)):
-        if gap[k] < 2 * dt and abs(times[k] - t) <= 3 * dt:
+        if gap[k] < CROWDED * dt and abs(times[k] - t) <= WINDOW * dt:
             return True
     return False
 
 
 @njit(cache=True)
-def closest_in_order(few, many):  # type: ignore[no-untyped-def]
+def closest_in_order(few, many, same):  # type: ignore[no-untyped-def]
     """(len(few),) indices into `many`, increasing, with the least sum of |few - many[index]|; both sorted, in s.
 
-    Dynamic programming over how many of `many` have been skipped so far, one row per element of `few`.
+    Of sums that differ by less than `same` s the one that skips later, as a hit between two true ones on one grid may
+    be as far from both. Dynamic programming over how many of `many` have been skipped so far, one row per element of
+    `few`.
     """
     spare = len(many) - len(few)
     cost = np.zeros(spare + 1)
@@ -149,12 +162,12 @@ def closest_in_order(few, many):  # type: ignore[no-untyped-def]
         best = 0
         lowest = cost[0]
         for s in range(spare + 1):
-            if cost[s] <= lowest:
+            if cost[s] < lowest - same - ROUNDING * lowest:
                 best, lowest = s, cost[s]
             skipped[k, s] = best
             cost[s] = lowest + abs(few[k] - many[k + s])
     chosen = np.zeros(len(few), dtype=np.int64)
-    skips = np.argmin(cost)
+    skips = np.argmax(cost <= cost.min() * (1 + ROUNDING) + same)
     for k in range(len(few) - 1, -1, -1):
         chosen[k] = k + skips
         skips = skipped[k, skips]
@@ -186,22 +199,24 @@ def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, 
     velocities, and rounded as they are. Engines tell such collisions of a contact that lasts: Box2D 3.1 of a disk
     that slides along a wall whenever it comes nearer at any speed at all.
     """
-    t, spin, collisions = trajectory.t, trajectory.angular_velocity, trajectory.collisions
-    interval = np.searchsorted(t, collisions.t, side="left") - 1
+    t, spin, collisions = trajectory.t, trajectory.angular_velocity, on_faces(trajectory, scene)
+    # A hit at the instant of a sample, at the end of its step, belongs to the interval that ends there.
+    before = np.searchsorted(t, collisions.t - SAME * interval(trajectory), side="left") - 1
     busy: dict[tuple[int, int], int] = {}
-    for k, i, j in zip(interval, collisions.i, collisions.j):
+    for k, i, j in zip(before, collisions.i, collisions.j):
         for disk in (i, j):
             busy[k, disk] = busy.get((k, disk), 0) + 1
     values, times, below = [], [], 0
-    for k, i, j, when in zip(interval, collisions.i, collisions.j, collisions.t):
+    for k, i, j, when in zip(before, collisions.i, collisions.j, collisions.t):
         disks = (i, j) if j >= 0 else (i,)
         alone = all(busy[k, disk] == 1 and (k + 1, disk) not in busy for disk in disks)
         if alone and 0 <= k < len(t) - 1 and not scene.static[i]:
             earlier, later = around(trajectory, scene, k, when)
-            if is_rounding(earlier, later, disks, rounding):
+            moving = [disk for disk in disks if not scene.static[disk]]
+            if is_rounding(earlier, later, moving, rounding):
                 below += 1
                 continue
-            turned = np.abs(spin[k + 1] - spin[k])[list(disks)].max() * scene.radius[i]
+            turned = np.abs(spin[k + 1] - spin[k]) * scene.radius
             closing, parting = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
             if closing > max(slowest, 0.0):
                 values.append(parting / closing)
@@ -216,32 +231,38 @@ def around(trajectory: Trajectory, scene: Scene, k: int, when: float) -> tuple[A
     return velocity[k] + falling * (when - t[k]), velocity[k + 1] - falling * (t[k + 1] - when)
 
 
-def is_rounding(earlier: Array, later: Array, disks: tuple[int, ...], rounding: float) -> bool:
-    """Whether the change of the first disk, which tells the normal, or that of both is below the floor."""
-    change = later[list(disks)] - earlier[list(disks)]
-    speed = np.linalg.norm(earlier[list(disks)], axis=1) + np.linalg.norm(later[list(disks)], axis=1)
-    between = change[0] - change[1] if len(disks) > 1 else change[0]
+def is_rounding(earlier: Array, later: Array, moving: list[int], rounding: float) -> bool:
+    """Whether the change of a disk that moves, or that of both to each other, is below the floor."""
+    change = later[moving] - earlier[moving]
+    speed = laws.lengths(earlier[moving]) + laws.lengths(later[moving])
+    between = change[0] - change[-1] if len(moving) > 1 else change[0]
     floor = FLOOR * rounding
-    return bool(np.linalg.norm(change[0]) <= floor * speed[0] or np.linalg.norm(between) <= floor * speed.sum())
+    return bool((laws.lengths(change) <= floor * speed).any() or laws.lengths(between) <= floor * speed.sum())
 
 
 def speeds_along_normal(
-    earlier: Array, later: Array, scene: Scene, i: int, j: int, turned: float
+    earlier: Array, later: Array, scene: Scene, i: int, j: int, turned: Array
 ) -> tuple[float, float]:
-    """m/s at which disk i and disk or wall j close before and part after a collision; `turned` m/s by its friction.
+    """m/s at which disk i and disk or wall j close before and part after a collision; `turned` (n,) m/s by friction.
 
+    The normal is that of the change of their velocity to each other, whichever of the two is named first.
     (nan, nan) if the change is not that of one frictionless collision.
     """
     change = later - earlier
-    normal = change[i] / (np.linalg.norm(change[i]) or 1.0)
+    one, two = (change[i], change[j]) if j >= 0 else (change[i], np.zeros(2))
+    between = one - two
+    normal = between / (np.linalg.norm(between) or 1.0)
     if j >= 0 and not scene.static[j]:
-        untold = np.linalg.norm(scene.mass[i] * change[i] + scene.mass[j] * change[j]) / scene.mass[i]
+        kicks = scene.mass[i] * one, scene.mass[j] * two
+        untold = np.linalg.norm(kicks[0] + kicks[1]) > CLEAN * max(map(np.linalg.norm, kicks))
+        slid = (turned[[i, j]] > CLEAN * laws.lengths(change[[i, j]])).any()
     elif j < 0:
         start, end = scene.walls[-1 - j]
-        untold = abs(change[i] @ (end - start)) / np.linalg.norm(end - start)
+        untold = abs(one @ (end - start)) > CLEAN * np.linalg.norm(end - start) * np.linalg.norm(one)
+        slid = turned[i] > CLEAN * np.linalg.norm(one)
     else:
-        untold = 0.0
-    if max(untold, turned) > CLEAN * np.linalg.norm(change[i]):
+        untold, slid = False, turned[i] > CLEAN * np.linalg.norm(one)
+    if untold or slid:
         return np.nan, np.nan
     before, after = (earlier[i] - earlier[j], later[i] - later[j]) if j >= 0 else (earlier[i], later[i])
     return float(-before @ normal), float(after @ normal)

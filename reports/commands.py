@@ -12,9 +12,8 @@ from typing import NoReturn
 from rich.console import Console
 from rich.table import Table
 
-from adapters.engines import ENGINES, OWN
+from adapters.engines import ENGINES, OWN, read_row
 from adapters.solver_file import KINDS, NotASolver
-from adapters.student import engine_file
 from reports.exits import DONE, FAILED, refuse, say
 from reports.folders import FolderTaken, found
 from reports.metrics import METRICS
@@ -120,10 +119,10 @@ def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed
 
 
 def checked_engines(asked: Sequence[str]) -> list[str]:
-    """The rows that NAME, NAME:PROFILE or a solver's FILE stand for, files last; all of `ENGINES` if none is asked."""
+    """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; if none is asked all."""
     chosen, own, faults = set(), [], []
     for name in asked:
-        if (file := Path(name.removesuffix(OWN))).suffix in KINDS:
+        if (file := Path(name.removesuffix(OWN))).suffix.lower() in KINDS:
             own += [f"{file}{OWN}"]
             faults += faults_of_file(file)
             continue
@@ -141,7 +140,7 @@ def faults_of_file(file: Path) -> list[str]:
     if ":" in str(file):
         return [f"{file}: has a colon in its path, which parts engine and profile; rename it"]
     try:
-        engine_file(file)
+        read_row(f"{file}{OWN}")
     except NotASolver as refusal:
         return [str(refusal)]
     return []

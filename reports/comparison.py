@@ -11,6 +11,7 @@ import pandas as pd
 from adapters.engines import ENGINES, FLOAT64
 from adapters.play import Run
 from reports.delays import Jumps, jumps_of
+from reports.faces import SAME, interval
 from reports.metrics import METRICS
 from reports.view import Value, View, not_judged
 from scenarios.model import Collisions, Scenario, Trajectory
@@ -102,7 +103,8 @@ def cut(trajectory: Trajectory, k: int) -> Trajectory:
         return trajectory
     names = ("t", "position", "velocity", "angle", "angular_velocity")
     hits = trajectory.collisions
-    early = hits.t <= trajectory.t[k - 1]
+    # Steps, and so hits, lie on the grid of the samples: a hit at the last of them is kept, however it rounds.
+    early = hits.t <= trajectory.t[k - 1] + SAME * interval(trajectory)
     kept = Collisions(hits.t[early], hits.i[early], hits.j[early], hits.impulse[early])
     return replace(trajectory, **{name: getattr(trajectory, name)[:k] for name in names}, collisions=kept)
 

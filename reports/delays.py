@@ -13,14 +13,12 @@ import numpy as np
 from numba import njit
 
 from reports import laws
+from reports.faces import SAME
 from scenarios.model import Array, Scenario, Scene, Trajectory
 
 WINDOW = 10**0.5
 """dt by which a collision may be late or early: three steps. Irrational, as collisions and samples often lie on one
 grid with the steps: no multiple of dt, nor of a fraction of it, lies on the edge, where rounding would decide."""
-SAME = 1e-9
-"""Of the window: what is closer in time is at one instant, but for rounding. Of a collision at the instant of a sample
-the truth has the velocity before it or that after it, as its numbers round: both are tried."""
 SWEEPS = 100  # of `distance_to_range`; where all impulses lie along two axes, as in a box, one is exact
 
 
@@ -79,7 +77,8 @@ def nearest_velocity(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: fl
 
     They are the truth's at that instant, less the disk's own collisions just before, one after the other, or with
     those just after. Of two at one instant either may come first. A disk that lay on a floor when it was hit counts
-    before that as falling, not as carried: it may read g `WINDOW` dt too much.
+    before that as falling, not as carried: it may read g `WINDOW` dt too much. Of a collision at the instant of a
+    sample the truth has the velocity before it or that after it, as its numbers round: both are tried.
     """
     window = WINDOW * dt
     return nearest(played.t, played.velocity, truth.velocity, jumps.limits, jumps.when, jumps.change, window)

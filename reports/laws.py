@@ -69,10 +69,16 @@ def energies(trajectory: Trajectory, scene: Scene) -> Array:
     return linear * moving_mass(scene) + trajectory.angular_velocity**2 * moving_inertia(scene) / 2
 
 
+@once
+def centre(scene: Scene) -> Array:
+    """(2,) m, the centre of mass at the start of what can move; of nothing the origin."""
+    mass = moving_mass(scene)
+    return mass @ scene.position / (mass.sum() or 1.0)
+
+
 def angular_momentum(trajectory: Trajectory, scene: Scene) -> Array:
-    """(k,) kg m2/s about the origin: sum of m x cross v + I w."""
-    x, v = trajectory.position, trajectory.velocity
-    orbital = (x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]) @ moving_mass(scene)
+    """(k,) kg m2/s about the centre of mass at the start: sum of m x cross v + I w."""
+    orbital = cross(trajectory.position - centre(scene), trajectory.velocity) @ moving_mass(scene)
     return orbital + trajectory.angular_velocity @ moving_inertia(scene)
 
 

@@ -12,7 +12,8 @@ from functools import wraps
 import numpy as np
 
 from reports import laws, scales, violations
-from reports.collisions import pair_keys
+from reports.collisions import by_pair, pair_keys
+from reports.faces import SAME
 from reports.view import LEAST_SHARE, Value, View, not_judged
 from scenarios.model import Array
 
@@ -40,7 +41,7 @@ def momentum_error(view: View) -> Value | None:
 
 
 def angular_momentum_error(view: View) -> Value | None:
-    """Largest |L(t) - L(0) - angular impulse from outside|, about the origin, over all m|x||v| + I|w| of flight."""
+    """Largest |L(t) - L(0) - angular impulse from outside|, about the centre of mass, over all m|x||v| + I|w|."""
     return _largest(violations.angular_momentum(view), view)
 
 
@@ -177,17 +178,15 @@ def time_to_1pct_s(view: View) -> Value | None:
 
 def collision_count_error(view: View) -> Value | None:
     """Hits of the player less hits of the other, whenever they come; pairs at rest from the start are not counted."""
-    assert view.other is not None
-    resting = pair_keys(view.other.collisions)[view.other.collisions.impulse == 0]
-    played, true = (
-        int((~np.isin(pair_keys(hits), resting)).sum()) for hits in (view.played.collisions, view.other.collisions)
-    )
+    resting = pair_keys(view.hits[1])[view.hits[1].impulse == 0]
+    counted = (by_pair(hits, resting, view.end - SAME * view.dt) for hits in view.hits)
+    played, true = (len(hits.t) for hits in counted)
     return Value(played - true, note=f"{played} of {true}")
 
 
 def collisions_missed(view: View) -> Value | None:
     """Hits of the other, of those that a step can tell apart, that the player does not have at their time."""
-    return Value(len(view.matched.missed), note=f"of {len(view.other.collisions)}")  # type: ignore[union-attr]
+    return Value(len(view.matched.missed), note=f"of {len(view.hits[1])}")
 
 
 def collisions_invented(view: View) -> Value | None:

@@ -12,10 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
-from adapters.engines import ENGINES, Row, row_of
+from adapters.engines import ENGINES, OWN, Row, read_row, row_of
 from reports.archive import STATE, Archive, from_trail, load_trajectory, trajectory_file
 from reports.cells import Cell
-from reports.exits import DONE, FAILED, refuse
+from reports.exits import DONE, FAILED, refuse, say
 from reports.folders import FolderTaken, found
 from reports.playing import play_here
 from reports.scenes import played_scenario
@@ -33,7 +33,7 @@ def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = EN
         record = record_of(archive, name)
         scenario = played_scenario(archive.folder, record)
         player = f"{record['engine']}:{record['profile']}"
-        row = engines[player] if player in engines else row_of(player)
+        row = engines.get(player) or (read_row if player.endswith(OWN) else row_of)(player)
         before = recorded(archive, record)
     except FolderTaken as fault:
         refuse([str(fault)])
@@ -41,6 +41,9 @@ def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = EN
         refuse([f"{gone.args[0]} was played, but is not known to this version"])
     except (OSError, ValueError) as fault:
         refuse([str(fault)])
+    cell = Cell(record["scene"], record["seed"], player, record["substeps"])
+    if row.source and record["cell"] != cell.key(record["scene_hash"], row.source):
+        say(f"{player.removesuffix(OWN)} or a version has changed since: what is played is what is there now")
     k = len(before) - 1 if before is not None and record["status"] != "ok" else 0
     substeps = record["substeps"]
     print(f"{record['scenario']}  {record['engine']}:{record['profile']}  dt {record['dt_s']:.4g} s")

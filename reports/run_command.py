@@ -16,12 +16,10 @@ from reports.exits import FAILED, broken_off, refuse, say
 from reports.folders import open_again, open_new, part_of, replace_folder
 from reports.journal import JOURNAL, Journal
 from reports.report import make_report
-from reports.runner import NoScheduler, cluster
+from reports.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
 from reports.suite import Means, OtherVersions, Plan, carry_out
 from reports.terminal import Progress
 from scenarios.catalogue import SCENARIOS
-
-LEAST_MEMORY = 400  # MB: Python, numba and the engines take 120, compiling a kernel as much again
 
 
 def run_plan(
@@ -56,7 +54,7 @@ def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means
 
     `workers` 0: one a core; `memory` in MB, 0: the share of a worker.
     """
-    workers = workers or os.cpu_count() or 1
+    workers = affordable(workers or os.cpu_count() or 1)
     if 0 < memory < LEAST_MEMORY:
         refuse([f"--memory {memory}: a worker takes {LEAST_MEMORY} MB before it has played anything; allowed is more"])
     if scheduler:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import pickle
 import re
+import resource
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Generator, Hashable, Iterator, Mapping
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
@@ -13,11 +15,15 @@ from contextlib import contextmanager
 from queue import SimpleQueue
 from typing import Any
 
+from reports.exits import say
 from reports.worker import ATTEMPTS, CREW, in_worker
 from reports.worker_process import Failure
 
 TIMEOUT = 60.0  # s a task may take
 AHEAD = 2  # tasks a worker of this machine has been given at most, so that what is urgent comes soon, and none waits
+
+LEAST_MEMORY = 400  # MB: Python, numba and the engines take 120, compiling a kernel as much again
+LINES, OTHERS = 5, 100  # open files for a worker: what leads to it, twice while it starts; and those of all else
 
 Task = Callable[[], Any]
 
@@ -68,8 +74,23 @@ def run_all(
                 if lost[key] < ATTEMPTS:
                     waiting.append((key, task))
                     continue
-                outcome = Failure("crashed", f"no machine could carry it out: {error}")
+                outcome = Failure("crashed", f"no machine could carry it out: {error}", outside=True)
             yield key, pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
+
+
+def affordable(workers: int) -> int:
+    """As many workers of the `workers` asked for as can start on this machine; says so if those are fewer."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 1_000_000
+    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = {
+        f"memory of {memory} MB, of which each takes {LEAST_MEMORY}": max(1, memory // LEAST_MEMORY),
+        f"limit of {files} open files, of which each takes {LINES}": max(1, (files - OTHERS) // LINES),
+    }
+    why = min(most, key=lambda what: most[what])
+    if workers <= most[why]:
+        return workers
+    say(f"{workers} workers are more than can start here ({why}): {most[why]} do")
+    return most[why]
 
 
 @contextmanager

@@ -18,9 +18,9 @@ def momentum(scenario: Scenario) -> float:
 
 
 def angular_momentum(scenario: Scenario) -> float:
-    """kg m2/s: sum of m |x| |v| + I |w|, each disk as far and as fast as flight can bring it."""
+    """kg m2/s about the centre of mass: sum of m |x||v| + I |w|, each as far and as fast as flight can bring it."""
     scene, t = scenario.scene, scenario.duration
-    reach = np.linalg.norm(scene.position, axis=1) + top_speed(scenario) * t
+    reach = laws.lengths(scene.position - laws.centre(scene)) + top_speed(scenario) * t
     spin = np.abs(scene.angular_velocity) @ laws.moving_inertia(scene)
     return float((laws.moving_mass(scene) * reach) @ top_speed(scenario) + spin)
 

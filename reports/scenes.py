@@ -42,17 +42,18 @@ def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario
     Raises:
         ValueError: naming the scenario and the dt that does not divide its sample interval, or is too small.
     """
-    ladder = tuple(scenario.substeps)
+    ladder, interval = tuple(scenario.substeps), scenario.sample_interval
     most = MOST_STEPS // scenario.samples
     for dt in dts:
-        if 0 < dt < scenario.sample_interval / most:
+        if dt > 0 and interval / dt > most + 0.5:  # the nearest whole number is more
             raise ValueError(f"--dt {dt:g} gives {scenario.name} more than {MOST_STEPS} steps: allowed is "
-                             f"{scenario.sample_interval / most:.4g} s or more")  # fmt: skip
-        k = round(scenario.sample_interval / dt) if dt > 0 else 0
-        if k < 1 or abs(k * dt / scenario.sample_interval - 1) > 1e-9:
+                             f"{interval / most:.12g} s or more")  # fmt: skip
+        k = round(interval / dt) if dt > 0 else 0
+        if k < 1 or abs(k * dt / interval - 1) > 1e-9:
+            # Twelve digits: fewer may be another step than the one they stand for, and refused as this one is.
             raise ValueError(
-                f"--dt {dt:g} does not fit {scenario.name}: allowed is its sample interval "
-                f"{scenario.sample_interval:g} s divided by a whole number, e.g. {scenario.dt(ladder[-1]):g}"
+                f"--dt {dt:.12g} does not fit {scenario.name}: allowed is its sample interval "
+                f"{interval:.12g} s divided by a whole number, e.g. {scenario.dt(ladder[-1]):.12g}"
             )
     if dts:
         ladder = tuple(sorted({round(scenario.sample_interval / dt) for dt in dts}))

@@ -30,7 +30,7 @@ from reports.worker_process import Failure, allow
 from scenarios.model import Scenario
 
 # By which runs are compared.
-JUDGES = ("comparison", "metrics", "view", "delays", "laws", "collisions", "violations", "scales")
+JUDGES = ("comparison", "metrics", "view", "delays", "laws", "collisions", "faces", "violations", "scales")
 ANSWER = ".npz"  # how the file of an answer ends
 NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which nothing means NaN
 COMPARING = 300.0  # s that the comparison of a scene may take: all 38 of the default run take 30, on two cores
@@ -52,6 +52,7 @@ class Gathering:
         self.missing = Counter(cell.scene for cell in missing)
         self.records: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
         self.scenes: dict[Path, str] = {}  # of the tasks that were given out
+        self.had: set[Path] = set()  # of these, those that have ended
         self.unkept: dict[str, bytes] = {}
         self.failed: dict[str, Failure] = {}
         for record in archive.records:
@@ -86,9 +87,20 @@ class Gathering:
             self.scenes[path] = scene
             yield path, partial(share_of, self.folder, records, asked)
 
+    @property
+    def playing(self) -> bool:
+        """Whether a cell has not ended yet."""
+        return any(self.missing.values())
+
+    @property
+    def asked(self) -> list[str]:
+        """The scenes whose exact answer is being computed, or is about to be."""
+        return [scene for path, scene in self.scenes.items() if path.suffix == ANSWER and path not in self.had]
+
     def came(self, path: Path, result: Any) -> Iterator[Task]:
         """Keep what came of a task, and give out the next of its scene."""
         scene = self.scenes[path]
+        self.had.add(path)
         if path.suffix == ANSWER:
             put_answer(path, no_answer(result, self.timeout) if isinstance(result, Failure) else result)
             yield from self.task_of(scene)

@@ -89,7 +89,7 @@ def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) ->
     tasks = tasks_of(plan, scenarios)
     begin(plan, journal, scenarios, len(tasks))
     archive = Archive.read(folder)
-    done = had(archive, means, scenarios)
+    done = had(archive, plan, means, scenarios)
     missing = {task: work for task, work in tasks.items() if task not in done}
     cells = [task for task in missing if isinstance(task, Cell)]
     alone = {cell for cell in cells if plan.engines[cell.engine].leaves_state}
@@ -97,21 +97,32 @@ def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) ->
     comparing: deque[Any] = deque(gathering.whole())
     progress.start(len(missing), len(tasks))
     limits = means.timeout, means.memory
+    if gathering.asked and not missing:
+        progress.say(waiting_for(gathering.asked))
     with closing(run_all(missing, means.workers, *limits, means.scheduler, alone, comparing)) as results:
         for task, result in results:
             if isinstance(task, Cell):
-                line = keep_cell(journal, scenarios[task.scene], means, task, result)
+                key = task.key(scene_hash(scenarios[task.scene]), plan.engines[task.engine].source)
+                line = keep_cell(journal, scenarios[task.scene], means, task, key, result)
                 said = f"{line['scenario']}  {task.engine}  dt {line['dt_s']:.4g} s"
                 progress.done(said, line["status"], line["reason"])
                 comparing.extend(gathering.ended(line))
             elif isinstance(task, Path):
                 comparing.extend(gathering.came(task, result))
             else:
-                progress.done(*keep_answer(journal, task, result))
+                progress.done(*keep_answer(journal, plan, task, result))
+            if gathering.asked and not gathering.playing:
+                progress.say(waiting_for(gathering.asked))
     archive = Archive.read(folder)
     take_timings(archive, plan, means, journal, scenarios, progress)
     sweep(archive)
     journal.append({"footer": {"tasks": len(tasks), "played": len(missing), "seconds": progress.seconds}})
+
+
+def waiting_for(scenes: Sequence[str]) -> str:
+    """What is still to come when all is played."""
+    more = f" and {len(scenes) - 1} more" if len(scenes) > 1 else ""
+    return f"the exact answer to {Path(scenes[0]).stem}{more}"
 
 
 def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
@@ -139,54 +150,69 @@ def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callabl
     return tasks
 
 
-def had(archive: Archive, means: Means, scenarios: Mapping[str, Scenario]) -> set[Any]:
+def had(archive: Archive, plan: Plan, means: Means, scenarios: Mapping[str, Scenario]) -> set[Any]:
     """The tasks of which the journal has the result, by the same scene, settings and versions.
 
-    What was stopped for time is had only if it would be stopped now; not what has lost its trajectory.
+    What was stopped for time is had only if it would be stopped now; not what has lost its trajectory; and what failed
+    for a reason outside the engine is no result.
     """
-    done: set[Any] = {name for name, line in archive.conformance.items() if line["key"] == content_key(name)}
-    known = {line["of"]: line["key"] for line in archive.known_answers}
-    done |= {answer for answer in KNOWN_ANSWERS if known.get(repr(answer)) == content_key(repr(answer))}
+    keys = {line["of"]: line["key"] for line in (*archive.conformance.values(), *archive.known_answers)}
+    asked: tuple[KnownAnswer | str, ...] = (*plan.engines, *KNOWN_ANSWERS)
+    done: set[Any] = {task for task in asked if keys.get(name_of(task)) == answer_key(plan, task)}
     hashes = {scene: scene_hash(scenario) for scene, scenario in scenarios.items()}
     for record in archive.records:
         cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", record["substeps"])
+        if cell.scene not in hashes or cell.engine not in plan.engines:
+            continue
         stopped = record["status"] == "timeout" and record["timeout_s"] < means.timeout
         lost = record["step"] >= 0 and not trajectory_file(archive.folder, record["cell"]).exists()
-        if cell.scene in hashes and record["cell"] == cell.key(hashes[cell.scene]) and not (stopped or lost):
+        same = record["cell"] == cell.key(hashes[cell.scene], plan.engines[cell.engine].source)
+        if same and not (stopped or lost or record.get("outside")):
             done.add(cell)
     return done
 
 
-def keep_answer(journal: Journal, task: KnownAnswer | str, result: Any) -> tuple[str, str, str]:
+def name_of(task: KnownAnswer | str) -> str:
+    """How the journal calls the probes of an engine, or a known answer."""
+    return task if isinstance(task, str) else repr(task)
+
+
+def answer_key(plan: Plan, task: KnownAnswer | str) -> str:
+    """The `content_key` of the probes of an engine, or of a known answer."""
+    return content_key(name_of(task), plan.engines[task].source if isinstance(task, str) else "")
+
+
+def keep_answer(journal: Journal, plan: Plan, task: KnownAnswer | str, result: Any) -> tuple[str, str, str]:
     """Write what a known answer, or the probes of an engine, gave; returns what to say of it, its status, and why."""
     failure = result if isinstance(result, Failure) else None
     status, reason = (failure.status, failure.reason) if failure else ("ok", "")
     if isinstance(task, KnownAnswer):
-        line = {"known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}, "of": repr(task)}
+        line: dict[str, Any] = {"known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}}
         said = f"known answer: {task.column} at dt {task.dt_s:g} s"
     else:
         findings = [no_answer(task, status, reason)] if failure else result
-        line = {"conformance": [asdict(finding) for finding in findings], "of": task}
+        line = {"conformance": [asdict(finding) for finding in findings]}
         said = f"conformance of {task}"
-    journal.append(line | {"key": content_key(str(line["of"]))})
+    # A key that is nobody's: what failed for a reason outside the engine is asked again.
+    key = "" if failure and failure.outside else answer_key(plan, task)
+    journal.append(line | {"of": name_of(task), "key": key})
     return said, status, reason
 
 
 def keep_cell(
-    journal: Journal, scenario: Scenario, means: Means, cell: Cell, result: Played | Failure
+    journal: Journal, scenario: Scenario, means: Means, cell: Cell, key: str, result: Played | Failure
 ) -> dict[str, Any]:
-    """Write the trajectory of a cell, then its line, which is returned."""
+    """Write the trajectory of the cell of that `key`, then its line, which is returned."""
     played = failed(cell, scenario, result) if isinstance(result, Failure) else result
     run, samples = played.run, played.samples
     if played.played_by != player():
         raise OtherVersions("a worker has other versions or other source of the players than this machine")
-    scene = scene_hash(scenario)
-    path = trajectory_file(journal.path.parent, cell.key(scene))
+    path = trajectory_file(journal.path.parent, key)
     if played.file:
         path.write_bytes(played.file)
     record = {
-        "cell": cell.key(scene),
-        "scene_hash": scene,
+        "cell": key,
+        "scene_hash": scene_hash(scenario),
         "scene": cell.scene,
         "seed": cell.seed,
         "substeps": cell.substeps,
@@ -200,6 +226,7 @@ def keep_cell(
         "until_s": float(scenario.times[samples - 1]) if samples else float("nan"),
         "seconds": run.seconds,
         "timeout_s": means.timeout,
+        "outside": isinstance(result, Failure) and result.outside,
         "settings": run.settings,
         "versions": run.versions,
     }

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from functools import partial
 from typing import NoReturn
 
@@ -19,6 +20,7 @@ from reports.journal import plain
 from reports.runner import run_all
 from reports.scenes import open_scene
 from reports.style import number
+from reports.terminal import Progress
 from reports.worker_process import Failure
 from scenarios.model import Scenario
 from scenarios.oracle_record import TruthRecord
@@ -32,7 +34,8 @@ def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float
     (checked,) = checked_scenes([scene], [], False, seed)
     scenario = open_scene(checked, seed)
     # In a worker, which can be stopped whatever it is doing.
-    with closing(run_all({checked: partial(record_here, checked, seed)}, 1, timeout)) as results:
+    task = partial(record_here, checked, seed)
+    with waiting(f"the exact answer to {scenario.name}"), closing(run_all({checked: task}, 1, timeout)) as results:
         [(_, record)] = results
     if isinstance(record, Failure | str):
         why = f"no exact answer: {record}" if isinstance(record, str) else no_answer(record, timeout).reason
@@ -43,6 +46,17 @@ def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float
     else:
         print_truth(scenario, record, every)
     sys.exit(DONE)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Say on a terminal what is being computed, and for how long by now."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    with Progress() as progress:
+        progress.say(what)
+        yield
 
 
 def as_plain(scenario: Scenario, record: TruthRecord) -> dict:

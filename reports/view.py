@@ -12,9 +12,10 @@ from adapters.engines import FLOAT64
 from reports import laws
 from reports.collisions import Matched, Restitutions, effective_restitution, match
 from reports.delays import WINDOW, Jumps, collision_free, energy_range, momentum_outside, nearest_velocity
-from scenarios.model import Array, Scenario, Trajectory
+from reports.faces import on_faces
+from scenarios.model import Array, Collisions, Scenario, Trajectory
 
-TOUCHY = 3  # dt around a true hit: what `View.calm` leaves out
+SLOWEST = 401**0.5  # sample intervals of falling; irrational, as of a threshold that speeds may be equal to
 LEAST_SHARE = 0.1
 """Of the samples after the start that must carry a number for it to be judged by. An engine errs in collisions: what is
 left of a run in less than a tenth of its samples is mostly the flight before the first of them, where nobody errs."""
@@ -144,7 +145,7 @@ class View:
 
     @cached_property
     def calm(self) -> np.ndarray:
-        """(k,) False at samples within `TOUCHY` dt of a hit of the other; sample 0 always counts.
+        """(k,) False at samples within `WINDOW` dt of a hit of the other; sample 0 always counts.
 
         For the error budget, which takes runs from each other: no metric, as in a crowd nothing but the start is left.
         """
@@ -153,7 +154,7 @@ class View:
             nearest = np.searchsorted(hits, self.played.t)
             before = self.played.t - hits[np.maximum(nearest - 1, 0)]
             after = hits[np.minimum(nearest, len(hits) - 1)] - self.played.t
-            calm = np.minimum(np.abs(before), np.abs(after)) > TOUCHY * self.dt
+            calm = np.minimum(np.abs(before), np.abs(after)) > WINDOW * self.dt
             calm[0] = True
         return calm
 
@@ -165,12 +166,23 @@ class View:
         """
         if self.scenario.thrusts:
             return Restitutions(np.zeros(0), np.zeros(0), 0)
-        slowest = 20 * float(np.linalg.norm(self.scenario.scene.gravity)) * self.scenario.sample_interval
-        return effective_restitution(self.played, self.scenario.scene, slowest, self.rounding)
+        scene = self.scenario.scene
+        slowest = SLOWEST * float(np.linalg.norm(scene.gravity)) * self.scenario.sample_interval
+        return effective_restitution(self.played, scene, slowest, self.rounding)
+
+    @cached_property
+    def hits(self) -> tuple[Collisions, Collisions]:
+        """Of the player and of the other, by what a disk can tell apart (faces.py)."""
+        assert self.other is not None
+        return on_faces(self.played, self.scenario.scene), on_faces(self.other, self.scenario.scene)
+
+    @property
+    def end(self) -> float:
+        """s, of the samples both have."""
+        assert self.other is not None
+        return float(min(self.played.t[-1], self.other.t[-1]))
 
     @cached_property
     def matched(self) -> Matched:
         """The hits of the two."""
-        assert self.other is not None
-        end = float(min(self.played.t[-1], self.other.t[-1]))
-        return match(self.played.collisions, self.other.collisions, end, self.dt)
+        return match(*self.hits, self.end, self.dt)

@@ -30,17 +30,18 @@ def momentum(view: View) -> Array | None:
 
 
 def angular_momentum(view: View) -> Array | None:
-    """|L(t) - L(0) - angular impulse from outside|, about the origin, over the sum of m|x||v| + I|w| at hand.
+    """|L(t) - L(0) - angular impulse from outside| over the sum of m|x||v| + I|w| at hand, about the centre of mass.
 
-    The weight of the whole, at the centre of mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts
-    where its disk is, which only the player knows, and a wrap moves disks: there the law says nothing.
+    About that of the start, so that it does not matter where the origin is. The weight of the whole, at the centre of
+    mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts where its disk is, which only the player knows,
+    and a wrap moves disks: there the law says nothing.
     """
     scene, played = view.scenario.scene, view.played
     silent = scene.wrap is not None or view.scenario.thrusts or not knows_impulses(view.scenario)
     if view.other is not None or silent:
         return None
     m, g, t = laws.moving_mass(scene), scene.gravity, played.t
-    lever = np.outer(t, m @ played.position[0]) + np.outer(t**2 / 2, m @ played.velocity[0])
+    lever = np.outer(t**2 / 2, m @ played.velocity[0])
     actual = laws.angular_momentum(played, scene)
     expected = actual[0] + lever[:, 0] * g[1] - lever[:, 1] * g[0]
     return np.abs(actual - expected) / (scales.angular_momentum(view.scenario) or 1.0)

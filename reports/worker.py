@@ -23,6 +23,7 @@ STARTING = 120.0  # s for Python to start and to import what a task is made of, 
 ATTEMPTS = 3  # at a task whose worker was killed from outside
 OUTSIDE = {-signal.SIGKILL, -signal.SIGTERM, 0}  # exits that no engine makes by a fault of its own
 PRINTED = 65536  # bytes of what a task prints that are kept: faulthandler writes up to 100 lines a thread
+ASKING = "adapters/solver_process.py"  # waits for what a solver's file answers
 INNERMOST = re.compile(r'most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)')
 
 
@@ -39,9 +40,10 @@ class Worker:
         self.connection, theirs = Pipe()
         self.output, printing = os.pipe()
         self.trail = nameless_file()
-        path = os.pathsep.join(folder or os.getcwd() for folder in sys.path)
+        # As here, so that it finds what a task is made of, but nothing that only lies where this command was started.
+        path = os.pathsep.join(filter(None, sys.path))
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "reports.worker_process", *map(str, (theirs.fileno(), self.trail, memory))],
+            [sys.executable, "-P", "-m", "reports.worker_process", *map(str, (theirs.fileno(), self.trail, memory))],
             stdin=subprocess.DEVNULL, stdout=printing, stderr=printing, pass_fds=(theirs.fileno(), self.trail),
             env=os.environ | {"PYTHONPATH": path},
         )  # fmt: skip
@@ -56,17 +58,18 @@ class Worker:
         self.printed = b""
         os.ftruncate(self.trail, 0)
         os.lseek(self.trail, 0, os.SEEK_SET)
+        limit, begun = STARTING, False
         try:
             self.connection.send_bytes(pickle.dumps(task))
-            limit = STARTING
             while (answer := self.answer(limit)).startswith(CLOCK):
-                limit = max(float(answer.removeprefix(CLOCK)), timeout)
+                limit, begun = max(float(answer.removeprefix(CLOCK)), timeout), True
             return answer
         except (EOFError, ConnectionError):
-            return self.death()
+            return self.death(begun)
         except TimeoutError:
             where = self.abort()
-            return Failure("timeout", f"stopped after {limit:g} s{where}", self.left())
+            said = f"stopped after {limit:g} s{where}" if begun else f"its worker did not start in {limit:g} s{where}"
+            return Failure("timeout", said, self.left(), outside=not begun)
 
     def answer(self, timeout: float) -> bytes:
         """The next message; what is printed meanwhile is kept. Raises `TimeoutError`, or `EOFError` if it died."""
@@ -89,14 +92,15 @@ class Worker:
             sys.stderr.write(new.decode(errors="replace"))
         return len(new)
 
-    def death(self) -> Failure | None:
-        """How a process that hung up has ended; None if not by a fault of its task."""
+    def death(self, begun: bool) -> Failure | None:
+        """How a process that hung up has ended, its task `begun` or not; None if it was ended from outside."""
         while self.listen():
             pass
         code = self.process.wait()
         if code in OUTSIDE:
             return None
-        return Failure("crashed", f"worker died: {name_of_exit(code)}{self.place()}", self.left())
+        what = "worker died" if begun else "its worker could not start"
+        return Failure("crashed", f"{what}: {name_of_exit(code)}{self.place()}", self.left(), outside=not begun)
 
     def abort(self) -> str:
         """Kill a process that hangs; returns where in Python it was."""
@@ -113,7 +117,10 @@ class Worker:
         printed = self.printed.decode(errors="replace")
         before, fatal, dump = printed.rpartition("Fatal Python error: ")
         found = INNERMOST.search(dump)
-        place = f" in {found[3]}, line {found[2]} of {'/'.join(Path(found[1]).parts[-2:])}" if found else ""
+        file = "/".join(Path(found[1]).parts[-2:]) if found else ""
+        place = f" in {found[3]}, line {found[2]} of {file}" if found else ""
+        if file == ASKING:  # somebody's solver runs in a process of its own, and where, nobody here can tell
+            place = ", while the solver's file had not come back from a call"
         said = [line for line in (before if fatal else printed).splitlines() if line.strip()]
         return place + (f'; it had printed "{said[-1].strip()[:200]}"' if said else "")
 
@@ -203,7 +210,8 @@ def in_worker(task: Callable[[], Any], timeout: float, memory: int, alone: bool)
             return outcome
         if worker.stopped:
             break
-    return Failure("crashed", f"its worker was killed {ATTEMPTS} times: by the system for want of memory?")
+    why = f"its worker was killed {ATTEMPTS} times: by the system for want of memory?"
+    return Failure("crashed", why, outside=True)
 
 
 def name_of_exit(code: int) -> str:

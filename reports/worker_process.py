@@ -24,11 +24,20 @@ _parent: Connection | None = None
 
 
 class Failure(NamedTuple):
-    """A task without a result: "crashed", "timeout" or "error" as in `STATUSES` of play.py, why, and what it left."""
+    """A task without a result.
+
+    Attributes:
+        status: "crashed", "timeout" or "error", as in `STATUSES` of play.py.
+        reason: why.
+        trail: what it left.
+        outside: whether it failed for a reason outside what it plays: the machine, the memory, this program. Another
+            time it may not.
+    """
 
     status: str
     reason: str
     trail: bytes = b""
+    outside: bool = False
 
 
 def leave(parts: Sequence[Any]) -> None:
@@ -53,15 +62,21 @@ def serve(connection: Connection, memory: int) -> None:
             return
         try:
             task = pickle.loads(packed)
+        except Exception as error:
+            why = f"the worker cannot read its task: {type(error).__name__}: {error}"
+            connection.send_bytes(pickle.dumps(Failure("error", why, outside=True)))
+            continue
+        try:
             allow()
             answer = pickle.dumps(task())
         except MemoryError as error:
             error.__traceback__ = None  # lets go of the frames, and so of what they hold
             limit = f"more than {memory / 1e6:.0f} MB (--memory)" if memory else "more than there is"
-            connection.send_bytes(pickle.dumps(Failure("error", f"MemoryError: took {limit}")))
+            connection.send_bytes(pickle.dumps(Failure("error", f"MemoryError: took {limit}", outside=True)))
             return  # what is not let go of ends with the process
         except Exception as error:  # an engine may raise anything
-            answer = pickle.dumps(Failure("error", f"{type(error).__name__}: {error}"))
+            outside = bool(getattr(error, "outside", False))  # of `NotStarted`; an import of it here would take long
+            answer = pickle.dumps(Failure("error", f"{type(error).__name__}: {error}", outside=outside))
         connection.send_bytes(answer)
 
 

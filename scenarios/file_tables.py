@@ -11,16 +11,50 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 MOST_DISKS = 100_000
 MOST_STEPS = 10_000_000  # over the whole dt ladder, for one engine
+SMALLEST, LARGEST = 1e-9, 1e9
+"""The scale of a scene, SI: no number of it is larger than `LARGEST`, nothing that has a size (radius, mass, time,
+wall, box) is smaller than `SMALLEST`. So no square, energy or path that is made of a few of them leaves float64."""
 
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Real = Annotated[float, Field(strict=True)]
+
+def in_scale(value: float) -> float:
+    """Any number of a scene but those that may be infinite, or have a size."""
+    if abs(value) > LARGEST:
+        raise ValueError(f"out of scale; must be from {-LARGEST:g} to {LARGEST:g} (SI)")
+    return value
+
+
+def of_size(value: float, power: int = 1) -> float:
+    """What is positive; `power`: the product of so many such numbers. What is not positive has another fault."""
+    smallest, largest = SMALLEST**power, LARGEST**power
+    if value > 0 and not smallest <= value <= largest:
+        raise ValueError(f"out of scale; must be from {smallest:g} to {largest:g} (SI)")
+    return value
+
+
+def finite_in_scale(value: float) -> float:
+    """A number that may be infinite."""
+    return value if math.isinf(value) else in_scale(value)
+
+
+Strict = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Finite = Annotated[Strict, AfterValidator(in_scale)]
+Size = Annotated[Strict, AfterValidator(of_size)]
+Time = Annotated[float, Field(strict=True), AfterValidator(finite_in_scale)]
 Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
-Count = Annotated[int, Field(strict=True, ge=1, le=MOST_STEPS)]
+Count = Annotated[int, Field(strict=True, ge=1)]
+
+
+def inertia_of_size(value: float) -> float:
+    """Of kg m m; what is infinite does not turn."""
+    return value if math.isinf(value) else of_size(value, power=3)
+
+
+Inertia = Annotated[float, Field(strict=True), AfterValidator(inertia_of_size)]
 
 
 class _Table(BaseModel):
@@ -33,11 +67,11 @@ class DiskTable(_Table):
     static: bool = Field(False, strict=True, description="true or false")
     position: Pair = Field(description="two finite numbers [x, y] (m)")
     velocity: Pair | None = Field(None, validate_default=True, description="two finite numbers [x, y] (m/s)")
-    radius: Finite = Field(gt=0, description="positive and finite (m)")
-    mass: Finite | None = Field(
+    radius: Size = Field(gt=0, description="positive and finite (m)")
+    mass: Size | None = Field(
         None, gt=0, validate_default=True, description="positive and finite (kg); left out if static"
     )
-    inertia: Real | None = Field(None, gt=0, description="positive (kg m2); inf: it does not turn")
+    inertia: Inertia | None = Field(None, gt=0, description="positive (kg m2); inf: it does not turn")
     angle: Finite = Field(0.0, description="a finite number (rad)")
     angular_velocity: Finite = Field(0.0, description="a finite number (rad/s)")
 
@@ -65,8 +99,11 @@ class WallTable(_Table):
     @field_validator("end")
     @classmethod
     def _has_length(cls, end: list[float], info: ValidationInfo) -> list[float]:
-        if end == info.data.get("start"):
+        start = info.data.get("start", [math.inf, math.inf])
+        if end == start:
             raise ValueError("the wall has no length; must differ from its start")
+        if (length := math.dist(start, end)) < SMALLEST:
+            raise ValueError(f"out of scale: a wall of {length:g} m; must be {SMALLEST:g} m from its start or more")
         return end
 
 
@@ -82,6 +119,8 @@ class CornersTable(_Table):
         low = info.data.get("low", high)
         if low is not high and not (low[0] < high[0] and low[1] < high[1]):
             raise ValueError(f"not above low = {low}; must be greater in both x and y (m)")
+        if low is not high and min(high[0] - low[0], high[1] - low[1]) < SMALLEST:
+            raise ValueError(f"out of scale: too near to low = {low}; must be {SMALLEST:g} m above it or more")
         return high
 
 
@@ -90,7 +129,7 @@ class ThrustTable(_Table):
 
     disk: int = Field(strict=True, description="the number of a disk in this file, from 0")
     start: Finite = Field(ge=0, description="finite and at least 0 (s)")
-    stop: Real = Field(description="after start (s); inf: to the end")
+    stop: Time = Field(description="after start (s); inf: to the end")
     force: Pair = Field([0.0, 0.0], description="two finite numbers [x, y] (N)")
     torque: Finite = Field(0.0, description="a finite number (N m)")
     frame: Literal["world", "body"] = Field("world", description='"world" or "body"')
@@ -117,18 +156,25 @@ class SceneTable(_Table):
 
     name: str = Field(pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z", description="at most 100 of a-z, 0-9, '_' and '-'")
     asks: str | None = Field(None, description="a question, a string")
-    duration: Finite = Field(gt=0, description="positive and finite (s)")
-    sample_interval: Finite = Field(gt=0, description="positive and finite (s)")
+    duration: Size = Field(gt=0, description="positive and finite (s)")
+    sample_interval: Size = Field(gt=0, description="positive and finite (s)")
     substeps: list[Count] = Field(
         [1, 2, 4, 8], min_length=1, validate_default=True, description="whole numbers from 1, increasing"
     )
     gravity: Pair = Field([0.0, 0.0], description="two finite numbers [x, y] (m/s2)")
-    restitution: Finite = Field(ge=0, le=1, description="from 0 to 1")
+    restitution: Strict = Field(ge=0, le=1, description="from 0 to 1")
     disk: list[DiskTable] = Field(min_length=1, max_length=MOST_DISKS, description=f"1 to {MOST_DISKS} [[disk]] tables")
     wall: list[WallTable] = Field([], description="[[wall]] tables")
     box: CornersTable | None = Field(None, description="one [box] table with low and high")
     wrap: CornersTable | None = Field(None, description="one [wrap] table with low and high")
     thrust: list[ThrustTable] = Field([], description="[[thrust]] tables")
+
+    @field_validator("restitution")
+    @classmethod
+    def _is_no_rounding_of_0(cls, restitution: float) -> float:
+        if 0 < restitution < SMALLEST:
+            raise ValueError(f"out of scale; must be 0, or from {SMALLEST:g} to 1")
+        return restitution
 
     @field_validator("sample_interval")
     @classmethod
@@ -147,6 +193,8 @@ class SceneTable(_Table):
     def _is_a_ladder(cls, substeps: list[int], info: ValidationInfo) -> list[int]:
         if any(fine <= coarse for coarse, fine in pairwise(substeps)):
             raise ValueError("not increasing; must be whole numbers from 1, increasing")
+        if substeps[-1] > MOST_STEPS:
+            raise ValueError(f"more than {MOST_STEPS} steps in all; must give at most {MOST_STEPS}")
         interval = info.data.get("sample_interval", math.inf)
         steps = round(info.data.get("duration", 0.0) / interval) * sum(substeps)
         if steps > MOST_STEPS:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import difflib
 import json
 import math
+import os
 import re
+import stat
 import tomllib
 from collections.abc import Iterable, Iterator
 from itertools import islice
@@ -63,7 +65,9 @@ def read_scene_file(path: str | Path) -> Scenario:
 
 def _parsed(path: Path) -> dict[str, Any]:
     try:
-        with path.open("rb") as file:
+        with open(path, "rb", opener=_without_waiting) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise SceneFileError(["is a pipe or a device; must be a readable TOML file"])
             data = file.read(MOST_BYTES + 1)
         text = data[:MOST_BYTES].decode()
         if len(data) > MOST_BYTES:
@@ -84,6 +88,11 @@ def _parsed(path: Path) -> dict[str, Any]:
         raise SceneFileError([f"{where}: {what[0].lower()}{what[1:]}; must be TOML"]) from None
     except ValueError as error:  # Python's own limits: a null byte in a path, an integer of 4300 digits
         raise SceneFileError([f"{str(error).split(';')[0].lower()}; must be a readable TOML file"]) from None
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Opens as `open` does, but does not wait for somebody to write into a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _checked(table: dict[str, Any]) -> SceneTable:
@@ -190,8 +199,7 @@ def _overlaps(scene: Scene, free_walls: int) -> Iterator[str]:
     sides = ("left", "bottom", "right", "top")
     names += [f"the {side} of [box]" for side in sides[: len(scene.walls) - free_walls]]
     names += [f"disk[{i}]" for i in range(scene.n)]
-    with np.errstate(over="ignore", invalid="ignore"):  # disks 1e308 m apart do not overlap
-        found = sorted(islice(_overlapping(scene), MOST_OVERLAPS + 1), key=lambda each: each[:2])
+    found = sorted(islice(_overlapping(scene), MOST_OVERLAPS + 1), key=lambda each: each[:2])
     for first, second, overlap, (x, y) in found[:MOST_OVERLAPS]:
         where = f"{names[second]}.position = {scene.position[second - len(scene.walls)].tolist()}"
         cure = f"must be shifted by [{x:.15g}, {y:.15g}] m or more"

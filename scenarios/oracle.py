@@ -25,7 +25,7 @@ WORK = 40_000  # steps of the event loop for one attempt, some twenty seconds; f
 HEAVY = 4096  # bits that make a step twice as dear as one of few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, HIT_BY_HIT, NOTHING = "closed form", "hit by hit, in many digits", "nothing"
-ACCURACY = 1e-12  # m; two precisions that differ by more have parted
+ACCURACY = 1e-12  # radii of the smallest disk, and s; two precisions that differ by more have parted
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +104,12 @@ def certified(scenario: Scenario, pushes: Sequence[Thrust]) -> TruthRecord | Non
 
     How far the first bits reach tells how many are needed for all: a motion loses them at a steady rate.
     """
-    bits, before, until = FEWEST_BITS, 0.0, scenario.duration
+    bits, before, until, accuracy = FEWEST_BITS, 0.0, scenario.duration, accuracy_of(scenario)
     while bits <= MOST_BITS:
         try:
             path = trace(scenario.scene, pushes, until, balls(bits), steps(bits))
             error, reached = spread(path, until), until
-            if error < ACCURACY:
+            if error < accuracy:
                 return record_of(scenario, path, error, bits, "certified")
         except Undecided as doubt:
             reached = doubt.t
@@ -145,7 +145,7 @@ def two_precisions(scenario: Scenario, pushes: Sequence[Thrust], kind: Callable[
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     while True:
         coarse, fine = (trace(scene, pushes, until, kind(each), steps(each)) for each in (bits, 2 * bits))
-        parted, error = difference(coarse, fine, until, kind(2 * bits))
+        parted, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
         if parted >= end or 2 * bits >= MOST_BITS:
             break
@@ -169,12 +169,17 @@ def _out_of_scale(scenario: Scenario) -> str:
     }  # fmt: skip
     for name, values in sizes.items():
         if values.size and (most := float(np.abs(values).max())) > LARGEST:
-            return f"the largest {name} is {most:g} (SI), above {LARGEST:g}: too large to follow to {ACCURACY:g} m"
+            return f"the largest {name} is {most:g} (SI), above {LARGEST:g}: too large to follow exactly"
     return ""
 
 
-def difference(coarse: Path, fine: Path, until: float, k: Numbers) -> tuple[float, float]:
-    """When the two part, s, or inf: the first event in which they differ by `ACCURACY`; and the error until then, m."""
+def accuracy_of(scenario: Scenario) -> float:
+    """m, `ACCURACY` of the smallest radius: the same in any unit of length."""
+    return ACCURACY * float(scenario.scene.radius.min())
+
+
+def difference(coarse: Path, fine: Path, until: float, k: Numbers, accuracy: float) -> tuple[float, float]:
+    """When the two part, s, or inf: the first event in which they differ by `accuracy` m; the error until then, m."""
     parted, errors = np.inf, [(0.0, 0.0)]
     end = min(coarse.end, fine.end, until)
     with k.precise():
@@ -183,7 +188,7 @@ def difference(coarse: Path, fine: Path, until: float, k: Numbers) -> tuple[floa
                 parted = min(parted, float(leg.t)) if float(leg.t) < end - ACCURACY else parted
             for one, other in zip(mine, theirs):
                 t = min(float(one.t), float(other.t))
-                if t < end and (error := _apart(one, other, end - t)) > ACCURACY:
+                if t < end and (error := _apart(one, other, end - t)) > accuracy:
                     parted = min(parted, t)
                     break
                 errors.append((t, error if t < end else 0.0))

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenarios.closed_forms import Hit, answer, world_pushes
-from scenarios.horizon import horizon
+from scenarios.horizon import ASTRAY, horizon
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.oracle_path import Event, Path
 
 EPS = float(np.finfo(float).eps)
+ROUNDINGS = 4 * EPS  # of the largest coordinate and of the longest way: a few for a leg's start, a time, a sample
 LEAST = 1e-4  # s; of the bounces that die out those that last less are not listed, as in `walls.bouncing_ball_e09`
 TOUCH = 1e-6  # m, what is closer to a wall at the end may be pushed by it
 NONE: Array = frozen(np.zeros((0, 1)))
@@ -96,14 +97,11 @@ def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
 
 def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: str) -> TruthRecord:
     """The record of a path that is right to `error` m up to its end."""
+    path = within_float64(scenario, path, error)
     end = min(path.end, scenario.duration) if path.reason else np.inf
-    flights = [(i, leg) for i, legs in enumerate(path.legs) for leg in legs if float(leg.t) < end or leg is legs[0]]
-    legs = np.array([[i, *map(float, leg.numbers), *[0.0] * (11 - len(leg.numbers))] for i, leg in flights])
+    legs = legs_of(path, end)
     rows = [_row(event) for event in path.events if float(event.t) < end]
     rows += [hit for leg, stop in bouncing(legs, end) for hit in bounces(scenario.scene, leg, stop)]
-    # Legs and samples are float64: a few roundings of the largest coordinate and of the longest way since a hit.
-    speeds = np.abs(legs[:, 4:6]).max() + legs[:, 10].max()
-    reach = np.abs(legs[:, 2:4]).max() + min(end, scenario.duration) * speeds
     outcomes = [
         [k, i, *map(float, v)] for k, one in enumerate(path.outcomes) for i, v in one.velocities.items()
         if i < scenario.scene.n
@@ -114,7 +112,7 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         events=frozen(np.array(sorted(rows, key=lambda row: row[:3])).reshape(-1, 5)),
         # The instant at which the answer is lost already belongs to what is not known.
         valid_until=max(float(np.nextafter(end, 0)), 0.0) if path.reason else np.inf,
-        error_bound=error + 4 * EPS * float(reach),
+        error_bound=error + ROUNDINGS * reach(legs, min(end, scenario.duration)),
         bits=bits,
         method=method,
         reason=path.reason,
@@ -123,6 +121,41 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         orders=frozen(np.array(orders).reshape(-1, 3)),
         remains=tuple(remains(scenario.scene, legs, path.disks, end)) if path.disks else (),
     )
+
+
+def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
+    """The path up to where legs and samples, which are float64, tell it as exactly as is promised.
+
+    What is promised is `ASTRAY` radii of the smallest disk, as it is by that that engines are held to an answer. Far
+    from the origin, and after a long way, the rounding of float64 is more.
+    """
+    end = min(path.end, scenario.duration) if path.reason else scenario.duration
+    legs = legs_of(path, end)
+    room = (ASTRAY * float(scenario.scene.radius.min()) - error) / ROUNDINGS
+    if reach(legs, end) <= room:
+        return path
+    held, lost = 0.0, end
+    for _ in range(64):  # halvings: to the last place of float64
+        held, lost = (middle, lost) if reach(legs, middle := (held + lost) / 2) <= room else (held, middle)
+    reason = f"the rounding of float64 is more than {ASTRAY:g} of the smallest radius from t = {held:.9g} s on"
+    return replace(path, end=held, reason=reason, disks=[], outcomes=[], named=[])
+
+
+def legs_of(path: Path, end: float) -> Array:
+    """(l, 12), as of `TruthRecord.legs`, those that begin before `end` s."""
+    flights = [(i, leg) for i, legs in enumerate(path.legs) for leg in legs if float(leg.t) < end or leg is legs[0]]
+    return np.array([[i, *map(float, leg.numbers), *[0.0] * (11 - len(leg.numbers))] for i, leg in flights])
+
+
+def reach(legs: Array, until: float) -> float:
+    """m, what is rounded up to `until` s: the largest coordinate, and how far the largest speed goes in that time."""
+    begun = legs[:, 1] <= until
+    follows = np.append(legs[1:, 0] == legs[:-1, 0], False)
+    stop = np.minimum(np.where(follows, np.append(legs[1:, 1], until), until), until)
+    s, (x, v, a) = np.maximum(stop - legs[:, 1], 0.0)[:, None], (legs[:, 2:4], legs[:, 4:6], legs[:, 6:8])
+    far = np.maximum(np.abs(x), np.abs(x + (v + a * s / 2) * s)) + np.abs(a) * s**2 / 8  # between the two an apex
+    speed = np.maximum(np.abs(v), np.abs(v + a * s)) + legs[:, 10:11]
+    return float(far[begun].max() + until * speed[begun].max())
 
 
 def _row(event: Event) -> list[float]:

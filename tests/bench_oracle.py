@@ -17,7 +17,7 @@ import numpy as np
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario
 from scenarios.numbers import digits
-from scenarios.oracle import ACCURACY, computed, difference
+from scenarios.oracle import accuracy_of, computed, difference
 from scenarios.oracle_events import trace
 from scenarios.oracle_record import TruthRecord
 from tests.exercise_box import boxed, lasting
@@ -70,10 +70,10 @@ def said(one: Scenario, record: TruthRecord) -> Row:
 
 
 def growth(one: Scenario, bits: int = 128) -> float:
-    """1/s, of the distance of runs with so many and twice as many bits, from 2^-bits to `ACCURACY` when they part."""
+    """1/s, of the distance of runs with so many and twice as many bits, from 2^-bits to what they may be off."""
     coarse, fine = (trace(one.scene, [], one.duration, digits(each)) for each in (bits, 2 * bits))
-    parted, _ = difference(coarse, fine, one.duration, digits(2 * bits))
-    return (bits * log(2) + log(ACCURACY)) / parted
+    parted, _ = difference(coarse, fine, one.duration, digits(2 * bits), accuracy_of(one))
+    return (bits * log(2) + log(accuracy_of(one))) / parted
 
 
 def main() -> None:

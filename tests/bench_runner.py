@@ -17,7 +17,7 @@ import numpy as np
 
 from adapters.engines import ENGINES
 from reports.archive import Archive
-from reports.cells import Cell
+from reports.cells import Cell, scene_hash
 from reports.journal import Journal
 from reports.playing import play_here
 from reports.runner import run_all
@@ -51,7 +51,8 @@ def played(scenarios: Mapping[str, Scenario], cells: list[Cell], workers: int, f
     with Journal(folder) as journal:
         begin(plan, journal, scenarios, len(tasks))
         for cell, result in run_all(tasks, workers, timeout=3600.0):
-            line = keep_cell(journal, scenarios[cell.scene], Means(workers), cell, result)
+            key = cell.key(scene_hash(scenarios[cell.scene]), "")
+            line = keep_cell(journal, scenarios[cell.scene], Means(workers), cell, key, result)
             assert line["status"] == "ok", line["reason"]
             inside += line["seconds"]
     return Cost(perf_counter() - started, inside, sum(processor()) - before)

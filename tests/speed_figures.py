@@ -1,6 +1,7 @@
-"""README's sentences on speed and accuracy, from the kept tables: `python -m tests.speed_figures` prints them.
+"""What README.md and reports/speed/README.md say in numbers, from the kept tables.
 
-A sentence names every engine of which it does not hold, so that none can be spoken for by the others.
+`python -m tests.speed_figures` prints it. Every engine is named of which a statement does not hold, so that none can be
+spoken for by the others.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from reports.speed import explained, figures
 from reports.speed.figures import AGAINST, AGAINST_BARE
 from reports.speed.tables import no_nearer
 from reports.speed.versus import LATE, OWN
-from scenarios.catalogue import scenario
 
 SHIPPED = tuple(name for name in ENGINES if name.endswith(":shipped"))
 MATCHED = tuple(name for name in ENGINES if name.endswith(":matched"))
@@ -26,44 +26,51 @@ def named(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(name=table.engine + ":" + table.profile)
 
 
-def nearer(orders: pd.DataFrame) -> str:
-    """In how many scenes finer steps bring an engine no nearer, engine by engine."""
-    rows = named(orders)
-    none = rows[no_nearer(rows)].groupby("name").size()
-    counts = {name: int(none.get(name, 0)) for name in (*SHIPPED, *MATCHED)}
-    shipped = listed([f"{name.split(':')[0]} {counts[name]}" for name in SHIPPED])
-    matched = listed([f"{name.split(':')[0]} {counts[name]}" for name in MATCHED])
+def caption(kept: pd.DataFrame) -> str:
+    """Of the picture: what half a step buys with end-of-step detection, and who reaches a millionth of a radius."""
+    late = [OWN, *MATCHED]
+    falls, grows = (table.loc[late].to_numpy() for table in pooled(kept))
+    falls, grows = falls[:, :-1] / falls[:, 1:], grows[:, 1:] / grows[:, :-1]
+    rows = named(kept[(kept.figure == "cost at accuracy") & (kept["at"] == MILLIONTH)]).set_index("name")
+    got = {name: of(rows.note[name])[0] for name in rows.index}
+    failed = named(kept[kept.figure == "pooled error"])
+    lost = max(int(of(note)[0]) for note in failed[failed.name == "event_driven:float64"].note)
+    reached = [got[name] for name in (OWN, *LATE)]
     return (
-        f"From its coarsest to its finest step the error falls by less than a tenth in so many of "
-        f"{rows.scenario.nunique()} scenes: shipped, {shipped}; matched, {matched}."
+        f"half the step divides the error by {falls.min():.1f} to {falls.max():.1f} and multiplies the cost by "
+        f"{grows.min():.1f} to {grows.max():.1f}. They reach a millionth of a radius in {min(reached)} to "
+        f"{max(reached)} of {of(rows.note.iloc[0])[1]} scenes, `reference:ordered` in {got['reference:ordered']}, the "
+        f"event-driven engine in {got['event_driven:float64']} (it fails in {lost})."
     )
-
-
-def spelt(table: pd.DataFrame) -> str:
-    """How much of the errors is explained, and over how much of the scenes."""
-    return explained.sentence(table) + "."
 
 
 def costs(kept: pd.DataFrame) -> str:
     """In how many scenes our own solver costs least at the same steps; who costs less elsewhere, and where."""
     rows, bare = (named(kept[(kept.figure == figure) & (kept["at"] == "")]) for figure in (AGAINST, AGAINST_BARE))
     total = max(int(of(note)[1]) for note in rows.note)
-    less = {row.name: where(row.note) for row in rows.set_index("name", drop=False).itertuples(index=False)}
-    scenes = sorted({scene for each in less.values() for scene in each})
-    said = f"Of the engines with end-of-step detection, `{OWN}` costs least in {total - len(scenes)} of {total} scenes"
-    if scenes:
-        said += f"; in {listed(scenes)} {listed([name for name, each in less.items() if each])} cost less"
-    if scenes and all(scenario(scene).thrusts for scene in scenes):
-        said += ", as a force in every step is a call from Python in every step"
-    without = sorted({scene for note in bare.note for scene in where(note)})
-    if without != scenes:
-        said += f" (without what an idle step costs, in {listed(without) if without else 'none'})"
+    less = scenes_of(rows)
+    said = f"Of the engines with end-of-step detection, `{OWN}` costs least in {total - len(less)} of {total} scenes"
+    said += ". In the others these cost less:\n\n| scene | engines |\n|---|---|\n" if less else ".\n"
+    said += "".join(f"| {scene} | {', '.join(names)} |\n" for scene, names in less.items())
+    without = scenes_of(bare)
+    if set(without) != set(less):
+        said += f"\nWithout what an idle step costs, some engine costs less in {len(without)} scenes: "
+        said += f"{', '.join(without) if without else 'none'}.\n"
     changed = named(kept[(kept.figure == AGAINST) & (kept["at"] != "")])
-    cheaper = [f"{name} with {change}" for name, change, note in zip(changed.name, changed["at"], changed.note)
-               if where(note)]  # fmt: skip
+    cheaper = scenes_of(changed.assign(name=changed.name + " with " + changed["at"]))
     if cheaper:
-        return f"{said}. Changed in a setting, {listed(cheaper)} cost less, too."
-    return f"{said}. None of {len(changed)} changed settings of the matched engines costs less in any scene tried."
+        names = dict.fromkeys(name for names in cheaper.values() for name in names)
+        return f"{said}\nWith one setting changed: {', '.join(names)} cost less in {', '.join(cheaper)}.\n"
+    return f"{said}\nNone of {len(changed)} changed settings of the matched engines costs less in any scene tried.\n"
+
+
+def scenes_of(rows: pd.DataFrame) -> dict[str, list[str]]:
+    """Scene -> the engines that cost less there."""
+    found: dict[str, list[str]] = {}
+    for row in rows.itertuples(index=False):
+        for scene in where(row.note):
+            found.setdefault(scene, []).append(row.name)
+    return dict(sorted(found.items()))
 
 
 def where(note: str) -> list[str]:
@@ -78,47 +85,47 @@ def of(note: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-def as_far(kept: pd.DataFrame) -> str:
-    """How far off the matched engines are at the same step, over our own solver, and what a halved step does."""
+def pooled(kept: pd.DataFrame) -> list[pd.DataFrame]:
+    """Error in radii and cost, pooled over the scenes: a row an engine, a column a step, coarse to fine."""
     table = named(kept)
-    error, cost = (table[table.figure == f"pooled {what}"].pivot(index="name", columns="at", values="value")
-                   for what in ("error", "cost"))  # fmt: skip
+    return [table[table.figure == f"pooled {what}"].pivot(index="name", columns="at", values="value")
+            for what in ("error", "cost")]  # fmt: skip
+
+
+def as_far(kept: pd.DataFrame) -> str:
+    """How far off the matched engines are at the same step, over our own solver."""
+    error, _ = pooled(kept)
     over = error.loc[list(MATCHED)] / error.loc[OWN]
-    late = [OWN, *MATCHED]
-    falls, grows = (table.loc[late].to_numpy() for table in (error, cost))
-    falls, grows = falls[:, :-1] / falls[:, 1:], grows[:, 1:] / grows[:, :-1]
     return (
         f"At the same step the matched engines are {over.min(axis=None):.1f} to {over.max(axis=None):.1f} times as far "
-        f"off as it is. Halving the step divides their errors by {falls.min():.1f} to {falls.max():.1f} and multiplies "
-        f"the cost by {grows.min():.1f} to {grows.max():.1f}"
+        f"off as `{OWN}`.\n"
     )
 
 
-def millionth(kept: pd.DataFrame) -> str:
-    """In how many scenes each engine gets to a millionth of a radius."""
-    rows = named(kept[(kept.figure == "cost at accuracy") & (kept["at"] == MILLIONTH)]).set_index("name")
-    got = {name: of(rows.note[name])[0] for name in rows.index}
-    total, late = of(rows.note.iloc[0])[1], [got[name] for name in (OWN, *LATE)]
-    ordered, driven = got["reference:ordered"], got["event_driven:float64"]
-    failed = named(kept[kept.figure == "pooled error"])
-    lost = max(int(of(note)[0]) for note in failed[failed.name == "event_driven:float64"].note)
-    return (
-        f"With end-of-step detection an engine gets to a millionth of a radius in {min(late)} to {max(late)} of "
-        f"{total} scenes; `reference:ordered` in {ordered}, and the event-driven engine, which fails {lost}, in "
-        f"{driven}"
+def nearer(orders: pd.DataFrame) -> str:
+    """In how many scenes finer steps bring an engine no nearer, engine by engine."""
+    rows = named(orders)
+    none = rows[no_nearer(rows)].groupby("name").size()
+    said = (
+        f"From the coarsest to the finest step the error falls by less than a tenth in so many of "
+        f"{rows.scenario.nunique()} scenes:\n\n| engine | shipped | matched |\n|---|---|---|\n"
     )
+    for pair in zip(SHIPPED, MATCHED, strict=True):
+        said += f"| {pair[0].split(':')[0]} | {' | '.join(str(none.get(name, 0)) for name in pair)} |\n"
+    return said
 
 
-def listed(words: list[str]) -> str:
-    """As a sentence lists them."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+def budget(table: pd.DataFrame) -> str:
+    """How much of the errors is explained, and over how much of the scenes."""
+    said = explained.sentence(table)
+    return f"{said[0].upper()}{said[1:]}.\n"
 
 
-def sentences() -> list[str]:
-    """All of them, as README holds them but for its line breaks."""
+def measured() -> str:
+    """All that reports/speed/README.md says in numbers, as it stands there."""
     kept, orders, table = (figures.read(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED))
-    return [costs(kept), as_far(kept), millionth(kept), nearer(orders), spelt(table)]
+    return "\n".join([costs(kept), as_far(kept), nearer(orders), budget(table)])
 
 
 if __name__ == "__main__":
-    print("\n\n".join(sentences()))
+    print(caption(figures.read(figures.KEPT)), measured(), sep="\n\n")

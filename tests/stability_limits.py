@@ -99,7 +99,7 @@ PLAYERS = ("reference:exercise", "pymunk:matched", "box2d:shipped", "box2d:match
 
 
 def readme_table() -> str:
-    """The table of README.md: where players fail; a dash: not as far as was tried."""
+    """The table of reports/stability/README.md: where players fail; a dash: not as far as was tried."""
     found = {(row.case, row.player): row for row in kept()}
     heads = [player.replace(":", "<br>") for player in PLAYERS]
     lines = [f"| fails at | {' | '.join(heads)} |", "|---|" + "---|" * len(PLAYERS)]

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adapters.solver_file import read_solver
 from adapters.solver_js import GL_MATRIX
 from adapters.solver_process import SolverProcess
 from reports.check.questions import QUESTIONS, Ball, ask
@@ -184,7 +185,7 @@ def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path)
     seen = {}
     for name, text in {"with.js": code + "// vec2\n", "without.js": code}.items():
         (tmp_path / name).write_text(text)
-        with SolverProcess(tmp_path / name) as process:
+        with SolverProcess(read_solver(tmp_path / name)) as process:
             seen[name] = ask(process, {"push": QUESTIONS["push"]})["push"].last[0].alpha
 
     assert seen == {"with.js": 1.0, "without.js": 2.0}
@@ -193,7 +194,7 @@ def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path)
 def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():
     """A call that does nothing to a sphere far away leaves its 12 numbers, bit for bit, in both languages."""
     for name in ("plain.js", "plain.py"):
-        with SolverProcess(CORRECT[0].parent / name) as process:
+        with SolverProcess(read_solver(CORRECT[0].parent / name)) as process:
             far = QUESTIONS["touch"]._replace(balls=(Ball((0.1, 0.2), (1 / 3, 0.7)), Ball((9.0, 1e-7), m=5e-324)))
             answer = ask(process, {"far": far})["far"]
 

@@ -13,6 +13,7 @@ import jsonschema
 import pytest
 from playwright.sync_api import Browser
 
+from adapters.solver_file import read_solver
 from adapters.solver_process import SolverProcess
 from reports.check import command
 from reports.check.machine import SCHEMA
@@ -139,7 +140,7 @@ def test_pytest_runs_the_rows_as_tests(folder: Path):
 @pytest.fixture(scope="module")
 def smallest(folder: Path) -> Smallest:
     """The smallest scene that shows the wrong file's fault."""
-    with SolverProcess(folder / "ben" / "Exercise.js") as process:
+    with SolverProcess(read_solver(folder / "ben" / "Exercise.js")) as process:
         found = smallest_scene(process, 0.9)
     assert found is not None
     return found
@@ -156,7 +157,7 @@ def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smalle
 def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Without any time to draw scenes, a pair that hits is tried."""
     monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
-    with SolverProcess(folder / "ben" / "Exercise.js") as process:
+    with SolverProcess(read_solver(folder / "ben" / "Exercise.js")) as process:
         found = smallest_scene(process, 0.9)
 
     assert found is not None
@@ -165,7 +166,7 @@ def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pyt
 
 def test_a_right_solver_has_no_failing_scene():
     """The negative control of the search: nothing is found in what is right."""
-    with SolverProcess(RIGHT) as process:
+    with SolverProcess(read_solver(RIGHT)) as process:
         assert smallest_scene(process, 0.9) is None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from py_mini_racer import JSTimeoutException
 
 from adapters.solver_file import NotASolver, read_solver
 from adapters.solver_js import JavaScriptSolver
+from adapters.solver_worker import HERE
 
 SECONDS = 16.0  # for a process that starts and is stopped late, on a busy machine
 JS = (Path(__file__).parent / "solvers/correct/plain.js").read_text()
@@ -49,13 +51,15 @@ def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Pat
     """V8 stops the loop after its limit; nobody is there to hear it, and no process is left behind."""
     (tmp_path / "Exercise.js").write_text("while (true) {}")
     worker = subprocess.Popen(
-        [sys.executable, "-m", "adapters.solver_worker"],
+        [sys.executable, "-P", "-m", "adapters.solver_worker"],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     assert worker.stdin is not None
     assert worker.stdout is not None
+    assert json.loads(worker.stdout.readline()) == HERE
     worker.stdout.close()
-    worker.stdin.write(json.dumps(str(tmp_path / "Exercise.js")).encode() + b"\n")
+    solver = pickle.dumps((read_solver(tmp_path / "Exercise.js"), None)).hex()
+    worker.stdin.write(json.dumps(solver).encode() + b"\n")
     worker.stdin.close()
     try:
         worker.wait(SECONDS)

@@ -1,6 +1,7 @@
 """The command line as people and scripts use it: files, words, exit status."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 from adapters.engines import ENGINES
 from reports.comparison import COLUMNS
 from reports.metrics import METRICS
+from reports.truth_command import waiting
 from scenarios.catalogue import SCENARIOS
 from tests.command_line import crosscheck, process
 
@@ -147,6 +149,27 @@ def test_truth_says_why_there_is_none(tmp_path: Path):
 
     assert done.returncode == 1
     assert "no exact answer: a push that turns with its disk" in done.stderr
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_who_waits_for_an_exact_answer_is_told_so_on_a_terminal_only(
+    terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """A script reads the error stream."""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: terminal)
+    with waiting("the exact answer to it"):
+        pass
+    assert ("the exact answer to it" in capsys.readouterr().err) == terminal
+
+
+@pytest.mark.parametrize("words", [["run", "--out", "new"], ["truth"], ["stability", "--vary", "speed"], ["play"]])
+def test_a_pipe_for_a_scene_hangs_no_command(words: list[str], tmp_path: Path):
+    """Nobody writes into it."""
+    os.mkfifo(tmp_path / "pipe.toml")
+    done = process(words[0], "pipe.toml", *words[1:], cwd=tmp_path)
+    assert done.returncode == 2
+    assert "pipe.toml: is a pipe or a device; must be a readable TOML file" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_truth_tells_what_comes_to_rest_and_all_outcomes(tmp_path: Path):

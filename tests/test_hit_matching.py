@@ -38,7 +38,7 @@ def test_a_player_that_drifts_late_keeps_its_hits_until_it_is_half_a_gap_late():
 
 
 def test_a_hit_that_the_end_cuts_off_is_not_blamed():
-    """A true hit less than 3 dt before the end may fall behind it for a late player."""
+    """A true hit less than `WINDOW` dt before the end may fall behind it for a late player."""
     assert match(hits(1.0), hits(1.0, 9.98), 10.0, 0.01).missed == []
     assert match(hits(1.0), hits(1.0, 9.96), 10.0, 0.01).missed == [(9.96, 0, 1)]
 
@@ -66,7 +66,7 @@ def test_matching_in_order_is_the_closest_there_is():
     for _ in range(100):
         many = np.sort(rng.uniform(size=rng.integers(0, 7)))
         few = np.sort(rng.uniform(size=rng.integers(0, len(many) + 1)))
-        chosen = closest_in_order(few, many)
+        chosen = closest_in_order(few, many, 0.0)
         best = min(np.abs(few - many[list(some)]).sum() for some in combinations(range(len(many)), len(few)))
 
         assert (np.diff(chosen) > 0).all()

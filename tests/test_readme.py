@@ -1,4 +1,4 @@
-"""What the README says to type works as it stands."""
+"""What README.md and the README.md of each folder say to type works as it stands."""
 
 import re
 import shlex
@@ -17,15 +17,33 @@ from tests.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS
 
 ROOT = Path(__file__).parent.parent
-TEXT = (ROOT / "README.md").read_text()
-BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
-LINES = [line for kind, block in BLOCKS[1:] if kind == "sh" for line in block.splitlines() if line.strip()]
+TOP = ("reference_impl", "scenarios", "adapters", "reports", "tests")
+DOCUMENTS = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md")]
+DOCUMENTS += sorted(path for top in TOP for path in (ROOT / top).rglob("README.md") if "out" not in path.parts)
+TEXTS = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in DOCUMENTS}
+TEXT = TEXTS["README.md"]
+
+
+def blocks_of(text: str) -> list[tuple[str, str]]:
+    """(language, text) of every block of code."""
+    return re.findall(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+LINES = list(dict.fromkeys(
+    line.split("  #")[0].strip()
+    for text in TEXTS.values() for kind, block in blocks_of(text) if kind == "sh"
+    for line in block.splitlines() if line.startswith("uv run")
+))  # fmt: skip
 CLUSTER = [line for line in LINES if "--extra cluster" in line]
+MINUTES = {"uv run crosscheck speed"}  # and the tests themselves
+SLOW = (" stability ", " speed ")  # ten seconds each
 COMMANDS = [
-    pytest.param(line, marks=[pytest.mark.slow] if " stability " in line else [])  # ten seconds each
+    pytest.param(line, marks=[pytest.mark.slow] if any(word in line for word in SLOW) else [])
     for line in LINES
-    if line not in CLUSTER
+    if line not in CLUSTER and line not in MINUTES and not (line.startswith("uv run pytest") and "--solver" not in line)
 ]
+# Files of a run, and what the exercise's author calls a solver.
+WRITTEN = {"deviations.csv", "runs.csv", "machine.json", "limits.csv", "speed_budget.csv", "solver.py"}
 BIN = Path(sys.executable).parent
 
 
@@ -33,8 +51,10 @@ BIN = Path(sys.executable).parent
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that the README shows, under the names it gives them."""
     where = tmp_path_factory.mktemp("readme")
-    for name, block in re.findall(r"`(\w+\.toml)`[^`]*?:\n\n```toml\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL):
-        (where / name).write_text(block)
+    shown = re.compile(r"`(\w+\.toml)`[^`]*?:\n\n```toml\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+    for text in TEXTS.values():
+        for name, block in shown.findall(text):
+            (where / name).write_text(block)
     solver = ROOT / "tests" / "solvers" / "correct" / "plain.js"
     (where / "class" / "anna").mkdir(parents=True)
     for path in (where, where / "class" / "anna"):
@@ -44,21 +64,19 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_first_block_is_the_two_commands():
     """They set up and run everything; the gate runs them as they are written."""
-    kind, block = BLOCKS[0]
+    kind, block = blocks_of(TEXT)[0]
 
     assert kind == "sh"
     assert block.splitlines() == ["pip install uv && uv run crosscheck", "uv run pytest"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_command_of_the_readme_succeeds(command: str, folder: Path):
+def test_a_command_of_a_readme_succeeds(command: str, folder: Path):
     """Every line of a shell block, run in order in one folder, exits with 0."""
     words = shlex.split(command, comments=True)
 
     assert words[:2] == ["uv", "run"]
     program, *arguments = words[2:]
-    if program == "pytest" and "--solver" not in arguments:
-        pytest.skip("runs the tests themselves")
     if program == "crosscheck":
         done = crosscheck(*arguments, cwd=folder)
     else:
@@ -97,15 +115,15 @@ def test_the_python_blocks_run_one_after_the_other(folder: Path, monkeypatch: py
     monkeypatch.chdir(folder)
     names: dict[str, object] = {}
 
-    blocks = [block for kind, block in BLOCKS if kind == "python"]
+    blocks = [block for text in TEXTS.values() for kind, block in blocks_of(text) if kind == "python"]
     assert blocks
     for block in blocks:
         exec(block, names)
 
 
 def test_the_readme_counts_as_the_tables_do():
-    """Scenes, players, probes and lessons are as many as it says."""
-    patterns = (r"(\d+) scenes through\s+(\d+) players", r"answers (\d+) probes", r"has (\d+) lessons")
+    """Scenes, engines, probes and lessons are as many as it says."""
+    patterns = (r"(\d+) scenes through\s+(\d+) engines", r"answers (\d+) probes", r"lesson`: (\d+) lessons")
     said = [re.search(pattern, TEXT) for pattern in patterns]
 
     assert [int(number) for one in said if one for number in one.groups()] == [
@@ -115,17 +133,35 @@ def test_the_readme_counts_as_the_tables_do():
 
 def test_the_readme_counts_the_solvers_of_the_confusion_table():
     """As many faulty and correct ones as the catalogue has, and the table a row for each."""
-    said = re.search(r"what it says of (\d+) solvers with one fault each and of (\d+) without", TEXT)
+    said = re.search(
+        r"what it says of (\d+) solvers with one fault each and of (\d+) without", TEXTS["reports/check/README.md"]
+    )
 
     assert said is not None
     assert [int(number) for number in said.groups()] == [len(MUTANTS), len(CORRECT)]
     assert len((ROOT / "tests" / "confusion.csv").read_text().splitlines()) == 1 + len(MUTANTS) + len(CORRECT)
 
 
-def test_every_file_the_readme_names_exists():
-    """Paths in backquotes that look like files of the repository are files of the repository."""
-    named = set(re.findall(r"`((?:reference_impl|scenarios|adapters|reports|tests|\.ci)/[\w./]*)`", TEXT))
+@pytest.mark.parametrize("document", TEXTS)
+def test_every_file_that_a_document_names_exists(document: str):
+    """Links, and paths in backquotes that look like files of the repository or of the document's own folder."""
+    folder = (ROOT / document).parent
+    links = re.findall(r"\]\((?!https?:)([^)#]+)\)", TEXTS[document])
+    named = set(re.findall(r"`((?:reference_impl|scenarios|adapters|reports|tests|\.ci)/[\w./]*)`", TEXTS[document]))
+    beside = set(re.findall(r"`(\w+\.(?:py|csv|json|html\.j2))`", TEXTS[document]))
 
-    assert named
+    assert links or named or beside
+    for path in links:
+        assert (folder / path).exists(), path
     for path in named:
         assert (ROOT / path).exists() or path.startswith("reports/out/"), path  # the latter is there after a run
+    for path in beside - WRITTEN:
+        assert (folder / path).exists(), path
+
+
+def test_the_front_page_is_short_and_leads_to_every_other():
+    """A page, and two clicks at most."""
+    linked = re.findall(r"\]\(([^)]+)\)", TEXT + TEXTS["ARCHITECTURE.md"])
+
+    assert len(TEXT.splitlines()) <= 120
+    assert set(TEXTS) - {"README.md"} <= {f"{path}/README.md" if "." not in path else path for path in linked}

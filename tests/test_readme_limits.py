@@ -1,4 +1,4 @@
-"""What the README says of limits is what the table of the full form says, for every engine it names."""
+"""What reports/stability/README.md says of limits is what the full form found, for every engine it names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from reports.stability.cases import CASES
 from reports.stability.limits import FULL, QUICK
 from tests.stability_limits import IN_README, PLAYERS, in_words, kept
 
-TEXT = (Path(__file__).parent.parent / "README.md").read_text()
+TEXT = (Path(__file__).parent.parent / "reports/stability/README.md").read_text("utf-8")
 FOUND = {(row.case, row.player): row for row in kept()}
 
 

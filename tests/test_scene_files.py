@@ -149,7 +149,7 @@ def scenarios(draw: st.DrawFn) -> Scenario:
         velocity=np.where(static[:, None], 0.0, column(coordinate, 2)),
         radius=radius,
         mass=mass,
-        restitution=draw(st.floats(0, 1)),
+        restitution=draw(st.just(0.0) | st.floats(1e-9, 1)),
         angle=column(coordinate),
         angular_velocity=np.where(static, -0.0, column(coordinate)),
         inertia=np.where(column(st.booleans()), solid, odd),

@@ -1,4 +1,4 @@
-"""The kept tables are those of this code, and README's sentences on speed follow from them, engine by engine."""
+"""The kept tables are those of this code, and the documents' statements on speed follow from them, engine by engine."""
 
 from __future__ import annotations
 
@@ -79,10 +79,10 @@ def orders(**stays: int) -> pd.DataFrame:
 
 def test_the_sentence_on_finer_steps_counts_each_engine():
     """What is true of both Box2Ds is not said of pymunk."""
-    assert speed_figures.nearer(orders(box2d=1, box2d_v3=2)) == (
-        "From its coarsest to its finest step the error falls by less than a tenth in so many of 2 scenes: "
-        "shipped, pymunk 0, box2d 1 and box2d_v3 2; matched, pymunk 0, box2d 0 and box2d_v3 0."
-    )
+    said = speed_figures.nearer(orders(box2d=1, box2d_v3=2)).splitlines()
+
+    assert said[0].endswith("falls by less than a tenth in so many of 2 scenes:")
+    assert said[-3:] == ["| pymunk | 0 | 0 |", "| box2d | 1 | 0 |", "| box2d_v3 | 2 | 0 |"]
     assert speed_figures.nearer(orders(pymunk=1)) != speed_figures.nearer(orders(box2d=1))
 
 
@@ -116,15 +116,18 @@ def test_who_costs_less_than_our_own_solver_is_named():
     thrust = {"pymunk:matched": "1 of 2: ship_thrust"}
 
     assert alone == (
-        f"Of the engines with end-of-step detection, `{OWN}` costs least in 2 of 2 scenes. "
-        "None of 1 changed settings of the matched engines costs less in any scene tried."
+        f"Of the engines with end-of-step detection, `{OWN}` costs least in 2 of 2 scenes.\n\n"
+        "None of 1 changed settings of the matched engines costs less in any scene tried.\n"
     )
     said = speed_figures.costs(against(thrust, thrust))
-    assert "costs least in 1 of 2 scenes; in ship_thrust pymunk:matched cost less, as a force in every step" in said
+    assert "costs least in 1 of 2 scenes. In the others these cost less:" in said
+    assert "| ship_thrust | pymunk:matched |" in said
+    assert "idle step" not in said
     other = speed_figures.costs(against({"box2d:matched": "1 of 2: free_fall"}, thrust))
-    assert "in free_fall box2d:matched cost less (without what an idle step costs, in ship_thrust)." in other
+    assert "| free_fall | box2d:matched |" in other
+    assert "Without what an idle step costs, some engine costs less in 1 scenes: ship_thrust." in other
     changed = speed_figures.costs(against({}, {}, "1 of 1: free_fall"))
-    assert changed.endswith("2 of 2 scenes. Changed in a setting, pymunk:matched with sleeping cost less, too.")
+    assert changed.endswith("With one setting changed: pymunk:matched with sleeping cost less in free_fall.\n")
 
 
 def pooled(worse: str = "") -> pd.DataFrame:
@@ -144,23 +147,23 @@ def test_the_sentence_on_errors_at_the_same_step_holds_for_the_worst_and_the_bes
     assert speed_figures.as_far(pooled()).startswith("At the same step the matched engines are 1.0 to 1.0 times as far")
     for name in MATCHED:
         assert "are 1.0 to 3.0 times as far" in speed_figures.as_far(pooled(name))
-    assert speed_figures.as_far(pooled()).endswith("errors by 2.0 to 2.0 and multiplies the cost by 2.0 to 2.0")
 
 
-def test_the_sentence_on_a_millionth_counts_failures():
+def test_the_caption_counts_scenes_and_failures():
     """Of the event-driven engine, too."""
-    assert speed_figures.millionth(pooled()) == (
-        "With end-of-step detection an engine gets to a millionth of a radius in 0 to 1 of 2 scenes; "
-        "`reference:ordered` in 1, and the event-driven engine, which fails 1, in 1"
+    assert speed_figures.caption(pooled()) == (
+        "half the step divides the error by 2.0 to 2.0 and multiplies the cost by 2.0 to 2.0. They reach a millionth "
+        "of a radius in 0 to 1 of 2 scenes, `reference:ordered` in 1, the event-driven engine in 1 (it fails in 1)."
     )
 
 
 def test_the_readme_says_how_much_each_form_measures():
     """Disks of the quick and of the full form; steps of a scene in the default run."""
-    text = " ".join((Path(__file__).parent.parent / "README.md").read_text().split())
+    root = Path(__file__).parent.parent
+    text = " ".join((root / "reports" / "speed" / "README.md").read_text("utf-8").split())
 
     assert f"the cost of up to {QUICK.sizes[-1]} disks" in text
     assert f"`--full` takes all scenes and {FULL.sizes[-1]:,} disks".replace(",", " ") in text
     assert set(FULL.scenes) == set(SCENARIOS)
     assert {len(scenario(name).substeps) for name in SCENARIOS} == {4}
-    assert "at 4 step sizes" in text
+    assert "at 4 step sizes" in (root / "README.md").read_text("utf-8")

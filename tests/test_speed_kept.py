@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from adapters.engines import read_row
 from reports import terminal
 from reports.folders import FolderTaken
 from reports.journal import Journal
 from reports.speed import ladder, measure
+from reports.speed.command import kept_of
 from reports.speed.effort import QUICK
 from reports.speed.kept import Kept
 from reports.speed.measure import done
+from reports.speed.plan import Plan
 from reports.terminal import Progress
 from scenarios.catalogue import scenario
 from tests.command_line import crosscheck
@@ -40,6 +44,23 @@ def test_what_has_ended_is_not_measured_again(tmp_path: Path):
             Kept(journal, {"seed": 0}, resume=False)
     with Journal(tmp_path) as journal:  # nothing was lost by asking
         assert len(Kept(journal, {"seed": 0}, resume=True)) == 1
+
+
+def test_what_was_measured_of_a_solver_that_was_saved_since_is_of_something_else(tmp_path: Path):
+    """Its rows would stand beside those of another text under one name."""
+    solver = tmp_path / "solver.js"
+    solver.write_text("function integrate(sphere, dt) {}")
+    plan = Plan(("slow_hit",), [f"{solver}:own"], QUICK, 0, 1, whole=False)
+    header: dict[str, Any] = {"seed": 0, "versions": {}, "machine": ""}
+    read_row(f"{solver}:own")
+    with Journal(tmp_path) as journal:
+        kept_of(plan, header, journal, resume=False).add(("error", "scene", 1), [{"reason": "no"}])
+    with Journal(tmp_path) as journal:
+        assert len(kept_of(plan, header, journal, resume=True)) == 1
+        solver.write_text("function integrate(sphere, dt) { }")
+        read_row(f"{solver}:own")
+        with pytest.raises(FolderTaken, match="of something else"):
+            kept_of(plan, header, journal, resume=True)
 
 
 def fails() -> None:

@@ -15,6 +15,7 @@ from reports import laws
 from reports.stability.cases import CASES
 from reports.stability.cases_gas import RADIUS, gas, wrapped_run
 from reports.stability.hard_disks import compressibility, gas_in_box
+from reports.stability.limits import QUICK, Search
 from reports.stability.players import play_as
 from reports.stability.predicates import judge
 from reports.stability.predicates_gas import (
@@ -200,3 +201,21 @@ def test_what_pymunk_tells_of_its_hits_is_what_it_gives_only_if_it_forgets_conta
 
     assert told[1] == pytest.approx(1.0, abs=1e-9)
     assert told[3] > 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pymunk:shipped", "box2d:matched"])
+def test_the_limit_of_a_fast_gas_is_that_of_other_draws_too(engine: str):
+    """Sixteen other gases move it by less than a half; the first of them that fails comes at any value."""
+
+    def fails_at(seeds: int, by_chance: float) -> float:
+        case = CASES["fast_gas"]
+        other = replace(case, scene=lambda x, run: case.scene(x, run + seeds), by_chance=by_chance)
+        return Search(other, engine, QUICK).limit().fails_at
+
+    limits = [fails_at(seeds, CASES["fast_gas"].by_chance) for seeds in (0, 100, 200)]
+    first = [fails_at(seeds, 0.0) for seeds in (0, 100, 200)]
+    print(limits, first)
+
+    assert max(limits) < 1.5 * min(limits)
+    assert min(first) < 0.75 * min(limits)

@@ -263,8 +263,9 @@ def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: st
     (tmp_path / name).write_text(text)
     question = {"spheres": [[0.0] * 12], "calls": [["integrate", 0, 1e-3]], "world": False}
     asks = (
-        "from pathlib import Path; from adapters.solver_process import SolverProcess; "
-        f"SolverProcess(Path({str(tmp_path / name)!r})).do('ask', {question}, 60.0)"
+        "from pathlib import Path; from adapters.solver_file import read_solver; "
+        "from adapters.solver_process import SolverProcess; "
+        f"SolverProcess(read_solver(Path({str(tmp_path / name)!r}))).do('ask', {question}, 60.0)"
     )
     asking = subprocess.Popen([sys.executable, "-c", asks], stderr=subprocess.DEVNULL)
     wait_for(lambda: asked_by(asking.pid) and busy(asked_by(asking.pid)[0]))

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adapters.solver_file import KINDS, SolverFailed, dangling
+from adapters.solver_file import KINDS, SolverFailed, SolverText, dangling
 from adapters.solver_process import SolverProcess
 from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
@@ -114,8 +114,8 @@ def make_page(path: Path, one: FileCheck) -> None:
     from reports.check.page import write_page
 
     smallest: Smallest | None = None
-    if one.faults and one.restitution is not None:
-        task: dict[Hashable, Any] = {path: partial(smallest_here, one.path, one.restitution)}
+    if one.faults and one.restitution is not None and one.solver is not None:
+        task: dict[Hashable, Any] = {path: partial(smallest_here, one.solver, one.restitution)}
         with closing(run_all(task, 1, CHECKING)) as results:
             [(_, found)] = results
         smallest = None if isinstance(found, Failure) else found  # the rows say how it failed
@@ -127,12 +127,12 @@ def make_page(path: Path, one: FileCheck) -> None:
     say(f"{path.resolve()}")
 
 
-def smallest_here(file: Path, restitution: float) -> Smallest | None:
-    """In a worker: the smallest scene that shows a fault of a file; None if none is found, or the file fails."""
+def smallest_here(solver: SolverText, restitution: float) -> Smallest | None:
+    """In a worker: the smallest scene that shows a fault of a solver; None if none is found, or the solver fails."""
     from reports.check.smallest import smallest_scene
 
     try:
-        with SolverProcess(file) as process:
+        with SolverProcess(solver) as process:
             return smallest_scene(process, restitution)
     except SolverFailed:
         return None

@@ -6,7 +6,6 @@ from importlib.metadata import version
 from pathlib import Path
 
 from adapters.play import Run
-from adapters.student import file_hash
 from reports import style
 from reports.check.rows import TASKS, shown
 from reports.check.smallest import DT, Smallest
@@ -32,7 +31,7 @@ def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
         replay="" if smallest is None else pack_layers(smallest.scenario, layers),
         ratio=1 if smallest is None else ratio_of(smallest.scenario, layers),
         looks_json=looks_as_json(looks), generator=GENERATOR, version=version("crosscheck2d"),
-        digest=file_hash(check.path),
+        digest="" if check.solver is None else check.solver.digest,
     )  # fmt: skip
     path.write_text(html, encoding="utf-8")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.solver_file import SolverFailed, read_solver
+from adapters.solver_file import SolverFailed, SolverText, read_solver
 from adapters.solver_process import SolverProcess
 from reports.check.detection import detection_rows
 from reports.check.functions import implemented
@@ -29,19 +29,18 @@ def check_solver(path: Path | str) -> list[Row]:
     Raises:
         NotASolver: the path is no JavaScript or Python text.
     """
-    return examine(Path(path))[0]
+    return examine(read_solver(Path(path)))[0]
 
 
-def examine(path: Path) -> tuple[list[Row], float | None]:
-    """The rows of a file, and the restitution that its scenes are judged by; raises `NotASolver`."""
-    text = read_solver(path).text
+def examine(solver: SolverText) -> tuple[list[Row], float | None]:
+    """The rows of a file, and the restitution that its scenes are judged by."""
     try:
-        process = SolverProcess(path)
+        process = SolverProcess(solver)
     except SolverFailed as failure:
         return [judged("loads", "file", LOADS, f"no: {failure}", "yes", False, str(failure))], None
     try:
         with process:
-            return rows_of(process, text)
+            return rows_of(process, solver.text)
     except SolverFailed as failure:
         lost = judged(
             "answers", "file", "Does it answer when its functions are called?", "no", "yes", False, str(failure)

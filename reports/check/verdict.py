@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from adapters.solver_file import NotASolver
+from adapters.solver_file import NotASolver, SolverText, read_solver
 from reports.check.rows import FOLLOWS, TASKS, Row, Verdict, worst
 from reports.check.solver import examine
 
@@ -16,12 +16,16 @@ NONE = "holds no .js and no .py file"
 
 @dataclass(frozen=True)
 class FileCheck:
-    """One file, its rows and the restitution its scenes have; or why it is no solver at all, and then no rows."""
+    """One file, its rows and the restitution its scenes have; or why it is no solver at all, and then no rows.
+
+    solver: the text that was checked; None if there is none.
+    """
 
     path: Path
     rows: Sequence[Row]
     refused: str = ""
     restitution: float | None = None
+    solver: SolverText | None = None
 
     @property
     def faults(self) -> list[Row]:
@@ -69,7 +73,8 @@ def check_file(path: Path) -> FileCheck:
     if path.is_dir():
         return FileCheck(path, [], f"{path}: {NONE}")
     try:
-        rows, restitution = examine(path)
-        return FileCheck(path, rows, restitution=restitution)
+        solver = read_solver(path)
+        rows, restitution = examine(solver)
+        return FileCheck(path, rows, restitution=restitution, solver=solver)
     except NotASolver as refusal:
         return FileCheck(path, [], str(refusal))

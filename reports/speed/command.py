@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 from rich.console import Console
 from rich.table import Table
 
+from adapters.engines import OWN, row_of
 from reports import style
 from reports.commands import checked_engines, checked_scenes, opening
 from reports.exits import DONE, FAILED, broken_off, say
@@ -73,6 +74,7 @@ def nothing_measured(part: Path, results: Results) -> NoReturn:
 def kept_of(plan: Plan, header: Mapping[str, Any], journal: Journal, resume: bool) -> Kept:
     """What is kept of an interrupted measurement of this plan, by the same versions on the same machine."""
     files = {scene: digest_of(scene) for scene in plan.scenes if scene.endswith(".toml")}
+    files |= {name: row_of(name).source for name in plan.engines if name.endswith(OWN)}
     asked = {
         "scenes": plan.scenes, "files": files, "engines": plan.engines, "effort": asdict(plan.effort),
         "whole": plan.whole,

@@ -162,18 +162,21 @@ LONG = (1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6)
 # Where a block error is 2 % an exact gas reads 4 of them and 5 % off once in 6000 times (Student's t, 9 degrees), and
 # 16 runs are 112 readings: that would be a limit of what has none.
 BY_CHANCE = 1 / 16
+# A gas comes upon a bad cluster of contacts sooner or later: one in 20 of pymunk's is off by 1 % from v dt = 0.25 R on,
+# half of them at none up to 2 R. The first of them is a matter of the draw; that more than a quarter are is not.
+RARELY = 1 / 4
 SEEDS = 16  # runs at a value
 OTHER = "in its own order of insertion"
 
 GAS = (
     Case(
         "dense_gas", FAMILY, "Up to which packing does a gas of 100 disks keep its energy over 200 steps?",
-        "packing", "1", PACKINGS, dense, ENERGY_DRIFTS, runs=SEEDS, also=("pymunk:matched+fifty_iterations",),
-        quick_values=PACKINGS[:-1], ratio=1.25,
+        "packing", "1", PACKINGS, dense, ENERGY_DRIFTS, runs=SEEDS, by_chance=RARELY,
+        also=("pymunk:matched+fifty_iterations",), quick_values=PACKINGS[:-1], ratio=1.25,
     ),
     Case(
         "fast_gas", FAMILY, "How far may the disks of a gas of packing 0.3 fly in a step, over 300 steps?",
-        "v dt / R", "1", FAST, coarse, ENERGY_DRIFTS, runs=SEEDS, quick_values=FAST[:-2], ratio=1.1,
+        "v dt / R", "1", FAST, coarse, ENERGY_DRIFTS, runs=SEEDS, by_chance=RARELY, quick_values=FAST[:-2], ratio=1.1,
     ),
     Case(
         "long_gas", FAMILY, "For how many steps does a gas of 20 disks keep its energy?",
@@ -187,7 +190,8 @@ GAS = (
     ),
     Case(
         "heavy_in_gas", FAMILY, "How heavy may one disk of a gas be?",
-        "m2 / m1", "1", (1.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8), heavy_one, ENERGY_DRIFTS, runs=SEEDS, ratio=1.5,
+        "m2 / m1", "1", (1.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8), heavy_one, ENERGY_DRIFTS, runs=SEEDS,
+        by_chance=RARELY, ratio=1.5,
     ),
     Case(
         "equipartition", FAMILY, "Do light and heavy disks of a gas keep the same temperature?",

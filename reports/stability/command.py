@@ -17,6 +17,7 @@ from reports.commands import checked_engines, opening, unknown
 from reports.exits import DONE, FAILED, broken_off, refuse, say
 from reports.folders import given_back, may_go_on, open_part, replace_folder
 from reports.journal import JOURNAL, Journal
+from reports.runner import affordable
 from reports.stability.atlas import Atlas, Plan, Task, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
@@ -43,7 +44,7 @@ def find_limits(
     if files := [name.removesuffix(OWN) for name in players if name not in ENGINES]:
         how = "a file is not driven to its limits: crosscheck check judges it, crosscheck run plays it"
         refuse([f"--engine {file}: {how}" for file in files])
-    plan = Plan(cases, maps, touching, players, form, workers or os.cpu_count() or 1, command)
+    plan = Plan(cases, maps, touching, players, form, affordable(workers or os.cpu_count() or 1), command)
     out = out.resolve()
     with opening(out):
         journal = open_part(out, FILES.__contains__, "crosscheck stability did not make")

@@ -64,7 +64,8 @@ class Case:
         quick_values: to scan in the quick form, where a run is long: some of `values`.
         refines: whether the first edge is bisected, and the full form scans between the values.
         ratio: how close the bracket is made at best, where a run is long or what is drawn differs much.
-        by_chance: share of the runs at a value that may fail by chance, where what is read is a statistic.
+        by_chance: share of the runs at a value that may fail by chance, where what is read is a statistic or the worst
+            of it depends on what is drawn.
         beside: what a failing run is shown beside.
     """
 
