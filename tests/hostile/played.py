@@ -20,7 +20,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests.hostile.talks import free_port, hear
+from tests.hostile.talks import NOT_ANY_MORE, free_port, hear
 
 SENTENCE, DONE, FINDINGS, STOPPED = "clear sentence", "done", "done, with findings", "stopped when told"
 TRACEBACK, HANG, LOST, STRAY = "traceback", "hang", "file lost", "file where none was asked for"
@@ -121,9 +121,8 @@ def word_of(
         return LOST if lost else STRAY if stray else LEFT
     refusal = [line for line in stderr.splitlines() if line.strip()]
     clear = 0 < len(refusal) <= LINES if code == 2 else code != 1 or both.strip()
-    if code not in tried.codes or tried.says not in both + heard or not clear or CONTROL.search(both):
-        return WRONG
-    return BY_CODE[code]
+    right = code in tried.codes and tried.says in both + heard and NOT_ANY_MORE not in heard
+    return BY_CODE[code] if right and clear and not CONTROL.search(both) else WRONG
 
 
 def kept(user: Path, writes: tuple[str, ...]) -> dict[str, str]:

@@ -60,7 +60,7 @@ REQUESTS: dict[str, tuple[Talk, str]] = {
     "a version of the future": (sends(b"GET / HTTP/9.9\r\nHost: localhost\r\n\r\n"), ""),
     "an upgrade to what does not exist": (sends(GET % (b"/", b"Upgrade: teapot\r\n")), ""),
     "an upgrade without a key": (sends(GET.replace(b"Connection: close\r\n", b"") % (b"/fly", UPGRADE)), ""),
-    "an upgrade of a page": (says(path="/"), "404"),
+    "an upgrade of a page": (says(path="/"), "403"),
     "an upgrade of a lesson": (says(path="/lesson"), ""),
     "another origin": (says(origin="http://evil.example"), "403"),
     "no origin": (says(origin=""), "403"),
@@ -90,7 +90,7 @@ TABS: dict[str, tuple[Talk, str]] = {
     "a message of 10 MB": (says("x" * 10_000_000), "1009"),
     "a hundred faulty messages": (says(*["{"] * 100), "more than 50 faulty messages"),
     "a thousand messages at once": (says(*[message(do="key", key="w", down=True)] * 1000, FRAME, wait=False), ""),
-    "a fault, and then a frame": (says("{", FRAME), '"frame": 1'),
+    "a fault, and then a frame": (says("{", FRAME), '"frame":1'),
 }  # fmt: skip
 
 
@@ -112,7 +112,7 @@ SERVERS = (
     *(Input(f"{words[0]}: {what}", words, codes=STOPPED, says=heard, talk=talk)
       for number, (what, (talk, heard)) in enumerate(REQUESTS.items())
       for words in [(PLAY, LESSON)[number % 2]]),
-    *(Input(f"a tab that sends {what}", PLAY, codes=STOPPED, says='"kind": "fault"', talk=says(text))
+    *(Input(f"a tab that sends {what}", PLAY, codes=STOPPED, says='"kind":"fault"', talk=says(text))
       for what, text in FAULTY.items()),
     *(Input(f"a tab that sends {what}", PLAY, codes=STOPPED, says=heard, talk=talk)
       for what, (talk, heard) in TABS.items()),

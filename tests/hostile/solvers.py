@@ -52,7 +52,8 @@ LOADING: dict[str, tuple[str, str | bytes, str]] = {
     "an exception with escape codes": ("mine.py", "raise ValueError('\\x1b[31m\\r\\n\\x07[/nope]')\n", "\\x1b[31m"),
     "an exception of megabytes": ("mine.py", "raise ValueError('x' * 10**7)\n", "xxx ..."),
     "thousands of causes": (
-        "mine.py", "e = ValueError()\nfor k in range(5000):\n  n = ValueError(k); n.__cause__ = e; e = n\nraise e\n", "",
+        "mine.py", "e = ValueError()\nfor k in range(5000):\n  n = ValueError(k); n.__cause__ = e; e = n\nraise e\n",
+        "",
     ),
     "input": ("mine.py", "n = input('how many? ')\n", "nobody is there to answer"),
     "a module that is not there": ("mine.py", "import nothing_of_the_kind\n", "nothing_of_the_kind"),
