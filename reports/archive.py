@@ -4,6 +4,7 @@ journal.jsonl   a header, a line a cell as it ends, a footer; after a run was re
 trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to its last good state
 scenes/         copies of the scene files
 machine.json    machine, versions, command, seed
+made.json       what of all this was written by whom, so that nothing else is ever replaced
 compared/       the scenarios' exact answers and shares of deviations.csv, so that a report does not measure again
 deviations.csv, runs.csv, report.html
 """
@@ -23,7 +24,6 @@ from adapters.play import Run
 from reports.journal import JOURNAL, lines_of
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
-FILES = (JOURNAL, "trajectories", "scenes", "compared", "machine.json", "deviations.csv", "runs.csv", "report.html")
 FIELDS: dict[str, type | tuple[type, ...]] = {  # of the line of a cell
     "cell": str, "scene_hash": str, "scene": str, "seed": int, "substeps": int, "scenario": str, "engine": str,
     "profile": str, "dt_s": (int, float), "status": str, "reason": str, "step": int,

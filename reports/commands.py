@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import difflib
+import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import ENGINES, OWN, read_row
 from adapters.solver_file import KINDS, NotASolver
-from reports.exits import DONE, FAILED, refuse, say
-from reports.folders import FolderTaken, found
+from reports.exits import DONE, FAILED, FolderTaken, refuse, say
+from reports.folders import found
 from reports.metrics import METRICS
 from reports.report import Report, make_report
 from reports.scenes import open_scene, with_steps
@@ -94,8 +95,13 @@ def _line(name: str) -> str:
     return f"{one.asks} ({answered_by(one)}{'; drawn from --seed' if name in DRAWN else ''})"
 
 
-def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int) -> list[str]:
-    """The scenes asked for, once each; exits 2 with every fault of every scene, one line each."""
+def checked_scenes(
+    scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int, files: Mapping[str, Path] | None = None
+) -> list[str]:
+    """The scenes asked for, once each; exits 2 with every fault of every scene, one line each.
+
+    `files`: what is read instead of a scene's path.
+    """
     scenes = list(dict.fromkeys(scenes))
     faults: list[str] = []
     names: dict[str, str] = {}
@@ -104,7 +110,7 @@ def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed
             faults.append(unknown("scenario", scene, SCENARIOS) + " (a scene file ends in .toml)")
             continue
         try:
-            name = with_steps(open_scene(scene, seed), dts, full).name
+            name = with_steps(open_scene(str((files or {}).get(scene, scene)), seed), dts, full).name
         except SceneFileError as error:
             faults += error.faults
         except ValueError as error:
@@ -133,6 +139,21 @@ def checked_engines(asked: Sequence[str]) -> list[str]:
     if faults:
         refuse(faults)
     return [row for row in ENGINES if row in chosen or not asked] + list(dict.fromkeys(own))
+
+
+def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> None:
+    """Go to the folder where a run was begun, if the file of one of its solvers is meant from there.
+
+    Raises:
+        FolderTaken: that folder is gone: a file of that name elsewhere is another one.
+        OSError: one may not go there.
+    """
+    meant = [name.removesuffix(OWN) for name in engines if name.endswith(OWN)]
+    near = [name for name in meant if not Path(name).is_absolute()]
+    if near and "folder" in header:
+        if not Path(header["folder"]).is_dir():
+            raise FolderTaken(f"{near[0]}: was in {header['folder']}, which is gone; put it there again")
+        os.chdir(header["folder"])
 
 
 def faults_of_file(file: Path) -> list[str]:

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 from reports.diff import FACTOR, Change, Difference, Timing, difference
-from reports.exits import DONE, FAILED, refuse
-from reports.folders import FolderTaken, found
+from reports.exits import DONE, FAILED, FolderTaken, refuse
+from reports.folders import found
 
 SHOWN = 12  # changes, the worst first
 

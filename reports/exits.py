@@ -23,6 +23,10 @@ class Stopped(KeyboardInterrupt):
         self.status = status
 
 
+class FolderTaken(Exception):
+    """An output folder, or file, that may not be written to, and why."""
+
+
 class Listening:
     """The handler of both signals. `status`: of the first that came, 0 if none has."""
 
@@ -115,7 +119,7 @@ def ends_when_told() -> Iterator[None]:
 def broken_off(part: Path, kept: Callable[[], str]) -> Iterator[None]:
     """What writes into `part` for long: broken off, or without room on the disk, it says what is `kept` of it.
 
-    Exits 130 after Ctrl-C, 143 after SIGTERM, 1 if something cannot be written.
+    Exits 130 after Ctrl-C, 143 after SIGTERM, 1 if something cannot be written, or may not any more.
     """
     with stoppable():
         try:
@@ -125,6 +129,9 @@ def broken_off(part: Path, kept: Callable[[], str]) -> Iterator[None]:
                 status = stopped.status if isinstance(stopped, Stopped) else INTERRUPTED
                 say(f"\n{'Terminated' if status == TERMINATED else 'Interrupted'}. {kept()}")
                 sys.exit(status)
+        except FolderTaken as fault:
+            say(f"{fault}. {kept()}")
+            sys.exit(FAILED)
         except OSError as fault:
             say(f"cannot write to {part}: {fault.strerror or fault}. {kept()}")
             sys.exit(FAILED)

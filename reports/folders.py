@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 
-from reports.archive import FILES, Archive
-from reports.exits import unbroken
+from reports.archive import Archive
+from reports.exits import FolderTaken, unbroken
 from reports.journal import JOURNAL, Busy, Journal
+from reports.made import Kind, Made, may_replace, may_write, put_made, read_made, stranger_in
 
-OF_A_RUN = FILES.__contains__, "no run of crosscheck made"
-
-
-class FolderTaken(Exception):
-    """An output folder that may not be written to, and why."""
+RUN = Kind(
+    "crosscheck run",
+    r"journal\.jsonl|trajectories/[0-9a-f]{16}\.npz(\.\w+)?|compared/[a-z0-9_-]+-[0-9a-f]{16}\.(npz|csv)(\.new)?",
+    ("trajectories", "scenes", "compared"),
+)
 
 
 def part_of(out: Path) -> Path:
@@ -25,13 +26,35 @@ def part_of(out: Path) -> Path:
     return out.parent / f"{out.name}.part"
 
 
-def open_part(out: Path, ours: Callable[[str], bool], strangers: str) -> Journal:
-    """The journal of what will be `out`, where that is while it is made; raises as `may_write`, or `OSError`."""
+def place_of(out: Path, option: str = "--out") -> Path:
+    """The folder that is meant, links followed.
+
+    Raises:
+        FolderTaken: a link to nothing, that is not what an interrupted command has left of one.
+        OSError: there is no current folder any more.
+    """
+    place = Path(os.path.realpath(out))  # of a link to itself `resolve` makes an error of another kind
+    if out.is_symlink() and not out.exists() and not part_of(place).exists():
+        raise FolderTaken(f"{option} {out}: is a link to nothing; name a folder")
+    return place
+
+
+def open_part(out: Path, kind: Kind) -> Journal:
+    """The journal of what will be `out`, where that is while it is made; raises as `may_replace`, or `OSError`."""
     part = part_of(out)
-    for folder in (out, part):
-        may_write(folder, ours, strangers)
+    may_replace(out, kind)
+    may_write(part, kind)
     part.mkdir(parents=True, exist_ok=True)
-    return held(part, out)
+    journal = held(part, out)
+    with given_back(journal):
+        begun(part, kind)
+    return journal
+
+
+def begun(part: Path, kind: Kind) -> None:
+    """Record in a folder that it is this program's, and not finished; what it has recorded before stays."""
+    made = read_made(part) or Made(kind.command, False, {})
+    put_made(part, made._replace(finished=False))
 
 
 @contextmanager
@@ -46,7 +69,7 @@ def given_back(journal: Journal) -> Iterator[None]:
 
 def open_new(out: Path) -> Journal:
     """The journal of a new run into `out`; raises `FolderTaken`, or `OSError` where nothing can be written."""
-    journal = open_part(out, *OF_A_RUN)
+    journal = open_part(out, RUN)
     part = journal.path.parent
     with given_back(journal):
         if had := ended_in(journal):
@@ -86,16 +109,30 @@ def may_go_on(part: Path, had: int, fits: bool, resume: bool) -> None:
 
 
 def open_again(out: Path) -> Journal:
-    """The journal of a run into `out` that is to be completed; raises as `open_new`, `ValueError` if there is none."""
+    """The journal of a run into `out` that is to be completed, locked where it is; nothing is moved yet.
+
+    Raises:
+        FolderTaken: no run is there, or another process has it, or somebody else's files are there.
+        OSError: it cannot be opened.
+    """
     part = part_of(out)
-    if not (part / JOURNAL).is_file():
-        if not (out / JOURNAL).is_file():
-            raise FolderTaken(f"--resume {out}: no run is there, neither finished nor interrupted ({part.name})")
-        Archive.read(out)
-        may_write(out, *OF_A_RUN)
-        held(out, out).__exit__()
-        out.rename(part)
-    return held(part, out)
+    may_write(part, RUN, "--resume")
+    may_replace(out, RUN, "--resume")
+    if (part / JOURNAL).is_file():
+        return held(part, out)
+    if not (out / JOURNAL).is_file():
+        raise FolderTaken(f"--resume {out}: no run is there, neither finished nor interrupted ({part.name})")
+    return held(out, out)
+
+
+def reopened(journal: Journal, out: Path) -> None:
+    """Move a finished run to where it is while it is written; its journal stays locked meanwhile."""
+    part = part_of(out)
+    if journal.path.parent == out:
+        with unbroken():
+            out.rename(part)
+            journal.path = part / JOURNAL
+    begun(part, RUN)
 
 
 def held(folder: Path, out: Path) -> Journal:
@@ -106,14 +143,6 @@ def held(folder: Path, out: Path) -> Journal:
         raise FolderTaken(f"{out} is being written by another crosscheck; wait for it, or name another --out") from None
 
 
-def digest_of(path: str) -> str:
-    """What tells whether a scene file is still the same; "" if it cannot be read."""
-    try:
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
-    except OSError:
-        return ""
-
-
 def found(out: Path) -> Path:
     """The folder of a run into `out`: itself, or where it is while it lasts; raises `FolderTaken` if there is none."""
     for folder in (out, part_of(out)):
@@ -122,25 +151,56 @@ def found(out: Path) -> Path:
     raise FolderTaken(f"{out}: has no {JOURNAL}, so it is not the folder of a run")
 
 
-def replace_folder(made: Path, target: Path) -> None:
-    """Put the finished folder `made` in the place of `target` in two renames; `target` is a run of ours or absent."""
-    old = target.with_name(f".{target.name}.old-{os.getpid()}")
-    with unbroken():
-        if target.exists():
-            target.rename(old)
-        made.rename(target)
-        shutil.rmtree(old, ignore_errors=True)
+def replace_folder(made: Path, target: Path, kind: Kind) -> None:
+    """Put the finished folder `made` in the place of `target`, which is moved aside until that is done.
 
-
-def may_write(target: Path, ours: Callable[[str], bool], strangers: str, option: str = "--out") -> None:
-    """Raise `FolderTaken` unless `target`, named by `option`, is absent, empty, or holds only names that are `ours`.
-
-    Every command has its own files; of any other it is said that they are `strangers`, as the end of a sentence.
+    Raises:
+        FolderTaken: `target` is not what the command made alone, maybe since a moment ago; both stay as they are.
+        OSError: it cannot be moved; `target` is where it was.
     """
-    if target == Path.cwd() or target in Path.cwd().parents:
-        raise FolderTaken(f"{option} {target}: is where you are, or above it; name another folder, or go elsewhere")
-    if target.is_file():
-        raise FolderTaken(f"{option} {target}: is a file; name a folder that does not exist yet")
-    strange = sorted(path.name for path in target.iterdir() if not ours(path.name)) if target.exists() else []
-    if strange:
-        raise FolderTaken(f"{option} {target}: holds {strange[0]}, which {strangers}; name another folder")
+    may_replace(target, kind)
+    record = read_made(made)
+    assert record is not None
+    with unbroken():
+        put_made(made, record._replace(finished=True))
+        old = next(old for k in count() if not os.path.lexists(old := target.with_name(f"{target.name}.old{k or ''}")))
+        replaced = target.exists()
+        if replaced:
+            target.rename(old)
+        try:
+            made.rename(target)
+        except OSError:
+            if replaced:
+                old.rename(target)
+            raise
+        if replaced:
+            shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
+    """A folder beside `target` to write into: it takes the place of that when all is well, and else is gone.
+
+    Raises:
+        FolderTaken: as `may_replace`, before and after.
+        OSError: it cannot be made.
+    """
+    may_replace(target, kind, option)
+    part = target.with_name(f"{target.name}.part-{os.getpid()}")
+    part.mkdir(parents=True)
+    try:
+        begun(part, kind)
+        yield part
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
+    try:
+        replace_folder(part, target, kind)
+    except FolderTaken as fault:
+        raise FolderTaken(f"{fault}; what was made is in {part}") from None
+
+
+def discard(part: Path, kind: Kind) -> None:
+    """Delete what a command has made of no use, unless somebody has put something there."""
+    if not stranger_in(part, kind):
+        shutil.rmtree(part)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import io
+import os
 import pickle
 import sys
 from collections.abc import Mapping
@@ -15,8 +16,9 @@ from typing import Any, NoReturn
 from adapters.engines import ENGINES, OWN, Row, read_row, row_of
 from reports.archive import STATE, Archive, from_trail, load_trajectory, trajectory_file
 from reports.cells import Cell
-from reports.exits import DONE, FAILED, refuse, say
-from reports.folders import FolderTaken, found
+from reports.commands import go_where_files_are
+from reports.exits import DONE, FAILED, FolderTaken, refuse, say
+from reports.folders import found
 from reports.playing import play_here
 from reports.scenes import played_scenario
 from reports.worker import Worker
@@ -29,10 +31,11 @@ REMEMBERED = ", the last good state (what the engine remembers beside it begins 
 def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = ENGINES) -> NoReturn:
     """Play the cell of the run in `out` whose key begins with `name`; exits 0, 1 (it failed again) or 2."""
     try:
-        archive = Archive.read(found(out))
+        archive = Archive.read(found(Path(os.path.abspath(out))))
         record = record_of(archive, name)
         scenario = played_scenario(archive.folder, record)
         player = f"{record['engine']}:{record['profile']}"
+        go_where_files_are(archive.header, [player])
         row = engines.get(player) or (read_row if player.endswith(OWN) else row_of)(player)
         before = recorded(archive, record)
     except FolderTaken as fault:

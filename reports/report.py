@@ -11,8 +11,11 @@ import pandas as pd
 from reports.archive import Archive
 from reports.comparison import Comparison
 from reports.findings import findings
+from reports.made import writing
 from reports.page import write_page
-from reports.tables import comparisons_of, make_tables
+from reports.tables import TABLES, comparisons_of, make_tables
+
+PAGE = "report.html"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +40,18 @@ class Report:
 
 
 def make_report(folder: Path, say: Callable[[str], None]) -> Report:
-    """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what is being done."""
+    """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what is being done.
+
+    Raises:
+        FolderTaken: one of the three is there and is not this program's.
+        ValueError: the journal cannot be used, or a scene is not the one that was played.
+    """
+    with writing(folder, (*TABLES, PAGE)):
+        return made_report(folder, say)
+
+
+def made_report(folder: Path, say: Callable[[str], None]) -> Report:
+    """As `make_report`, over whatever is there."""
     archive = Archive.read(folder)
     header = archive.header
     tables = make_tables(archive, say)
@@ -54,7 +68,7 @@ def make_report(folder: Path, say: Callable[[str], None]) -> Report:
     untrusted = {f"{row['engine']}:{row['profile']}" for rows in asked for row in rows if row["verdict"] == "breaks"}
     sentences = findings(comparisons, untrusted)
     write_page(
-        folder / "report.html",
+        folder / PAGE,
         comparisons,
         findings=sentences,
         untrusted=untrusted,

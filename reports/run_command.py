@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from adapters.engines import row_of
-from reports.archive import Archive
-from reports.commands import checked_engines, checked_scenes, finish, opening, refusing
+from reports.archive import Archive, stored_scene
+from reports.commands import checked_engines, checked_scenes, finish, go_where_files_are, opening, refusing
 from reports.exits import FAILED, broken_off, refuse, say
-from reports.folders import open_again, open_new, part_of, replace_folder
+from reports.folders import RUN, given_back, open_again, open_new, part_of, place_of, reopened, replace_folder
 from reports.journal import JOURNAL, Journal
 from reports.report import make_report
 from reports.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
@@ -34,6 +34,8 @@ def run_plan(
     command: str,
 ) -> NoReturn:
     """Play, compare, report into `out`; exits 0, 1 (an engine or a scene could not be compared), 2, 130 or 143."""
+    with opening(out):
+        out, folder = place_of(out), os.getcwd()
     plan = Plan(
         scenes=checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
         engines={name: row_of(name) for name in checked_engines(engines)},
@@ -42,8 +44,8 @@ def run_plan(
         full=full,
         timings=timings,
         command=command,
+        folder=folder,
     )
-    out = out.resolve()
     with opening(out):
         journal = open_new(out)
     carry_on(plan, means, journal, out)
@@ -74,20 +76,37 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
     if not alone:
         refuse(["--resume goes on with a run as it was asked for: it takes no scenarios, --engine, --dt, --full, "
                 "--seed, --timings and --out"])  # fmt: skip
-    out = out.resolve()
     with refusing(f"--resume {out}"):
+        out = place_of(out, "--resume")
         journal = open_again(out)
-        plan = plan_of(journal.path.parent)
+        with given_back(journal):
+            plan = plan_of(journal.path.parent, part_of(out))
+            reopened(journal, out)
     carry_on(plan, means, journal, out)
 
 
-def plan_of(folder: Path) -> Plan:
-    """What was asked for, as the journal has it; of a scene file that is gone the copy is played."""
-    header = Archive.read(folder).header
-    names = ("seed", "dts", "full", "timings", "command")
-    scenes = checked_scenes(header["scenes"], header["dts"], header["full"], header["seed"])
+def plan_of(folder: Path, part: Path) -> Plan:
+    """What was asked for, as the journal has it, wherever one is now; of a scene file that is gone the copy is played.
+
+    `part`: where `folder` will be when that is carried out. Exits 2 where a scene file, or a solver's, is at fault.
+    """
+    header = {"folder": os.getcwd()} | Archive.read(folder).header
+    files = {scene: file_of(scene, folder, header) for scene in header["scenes"] if scene.endswith(".toml")}
+    scenes = checked_scenes(header["scenes"], header["dts"], header["full"], header["seed"], files)
+    go_where_files_are(header, header["engines"])
     engines = {name: row_of(name) for name in checked_engines(header["engines"])}
-    return Plan(scenes=scenes, engines=engines, **{name: header[name] for name in names})
+    moved = {
+        scene: part / path.relative_to(folder) if path.is_relative_to(folder) else path for scene, path in files.items()
+    }
+    names = ("seed", "dts", "full", "timings", "command", "folder")
+    return Plan(scenes=scenes, engines=engines, files=moved, **{name: header[name] for name in names})
+
+
+def file_of(scene: str, folder: Path, header: Mapping[str, Any]) -> Path:
+    """The file of a scene, from where the run was begun, or where that is gone the copy in the run's folder."""
+    path = Path(header["folder"], scene)
+    copy = stored_scene(folder, header.get("names", {}).get(scene, ""))
+    return copy if not path.exists() and copy.exists() else path
 
 
 def carry_on(plan: Plan, means: Means, journal: Journal, out: Path) -> NoReturn:
@@ -97,7 +116,7 @@ def carry_on(plan: Plan, means: Means, journal: Journal, out: Path) -> NoReturn:
         with broken_off(part, partial(what_is_kept, out)), journal, Progress() as progress:
             carry_out(plan, means, journal, progress)
             report = make_report(part, progress.say)
-            replace_folder(part, out)
+            replace_folder(part, out, RUN)
     except (NoScheduler, OtherVersions) as fault:
         say(f"{fault}. {what_is_kept(out)}")
         sys.exit(FAILED)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,16 +17,18 @@ from adapters.engines import Row
 from adapters.play import Run
 from reports.archive import Archive, from_trail, packed, stored_scene, trajectory_file
 from reports.cells import Cell, content_key, scene_hash
+from reports.folders import RUN
 from reports.journal import Journal, plain
 from reports.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.machine import about
+from reports.made import put_text, writing
 from reports.playing import Played, conform_here, play_here, player, time_here
 from reports.runner import TIMEOUT, run_all
 from reports.scenes import open_scene, with_steps
 from reports.shares import Gathering
 from reports.terminal import Progress
 from reports.worker_process import Failure
-from scenarios.files import write_scene_file
+from scenarios.files import scene_text
 from scenarios.model import Scenario
 
 
@@ -41,6 +44,8 @@ class Plan:
         full: two finer steps for every scenario.
         timings: rounds of timings after all is played.
         command: how to ask for the same again.
+        folder: where it was asked for, from where paths that are not absolute are meant.
+        files: what is read instead of a scene's path, such as the copy of a file that is gone.
     """
 
     scenes: Sequence[str]
@@ -50,15 +55,18 @@ class Plan:
     full: bool
     timings: int
     command: str
+    folder: str = field(default_factory=os.getcwd)
+    files: Mapping[str, Path] = field(default_factory=dict)
 
     def scenario(self, scene: str) -> Scenario:
         """The scenario behind one of `scenes`, with the steps asked for."""
-        return with_steps(open_scene(scene, self.seed), self.dts, self.full)
+        return with_steps(open_scene(str(self.files.get(scene, scene)), self.seed), self.dts, self.full)
 
     def header(self) -> dict[str, Any]:
         """What the journal begins with, and `Plan` is made from again when a run is resumed."""
         asked = {name: list(getattr(self, name)) for name in ("scenes", "engines", "dts")}
-        return about(self.command, self.seed) | asked | {"full": self.full, "timings": self.timings}
+        same = {name: getattr(self, name) for name in ("full", "timings", "folder")}
+        return about(self.command, self.seed) | asked | same
 
 
 @dataclass(frozen=True)
@@ -127,14 +135,22 @@ def waiting_for(scenes: Sequence[str]) -> str:
 
 def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
     """Make the folders, copy the scene files, write the header to the journal and to machine.json."""
-    folder, header = journal.path.parent, plan.header() | {"tasks": tasks}
+    folder = journal.path.parent
     for name in ("trajectories", "scenes", "compared"):
         (folder / name).mkdir(exist_ok=True)
-    for scene in plan.scenes:
-        if scene.endswith(".toml"):
-            write_scene_file(scenarios[scene], stored_scene(folder, scenarios[scene].name))
+    named = {scene: scenarios[scene].name for scene in plan.scenes if scene.endswith(".toml")}
+    copies = {
+        copy: scene_text(scenarios[scene])
+        for scene, name in named.items()
+        if (copy := stored_scene(folder, name)) != plan.files.get(scene)  # else it is what is left of the file
+    }
+    header = plan.header() | {"tasks": tasks, "names": named}
+    about_it = folder / "machine.json"
+    with writing(folder, [path.relative_to(folder).as_posix() for path in (*copies, about_it)]):
+        for path, text in copies.items():
+            put_text(path, text)
+        put_text(about_it, json.dumps(plain(header), indent=2) + "\n")
     journal.append({"header": header})
-    (folder / "machine.json").write_text(json.dumps(plain(header), indent=2) + "\n")
 
 
 def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
@@ -278,5 +294,5 @@ def sweep(archive: Archive) -> None:
     """Delete the trajectories that no line of the journal speaks of any more."""
     spoken_of = {record["cell"] for record in archive.records}
     for path in (archive.folder / "trajectories").iterdir():
-        if path.stem not in spoken_of:
+        if path.stem not in spoken_of and RUN.names(f"trajectories/{path.name}"):
             path.unlink()

@@ -16,6 +16,7 @@ import pandas as pd
 from reports.answers import Answer, read_answer
 from reports.archive import Archive, run_of
 from reports.comparison import Comparison, answered
+from reports.folders import RUN
 from reports.journal import JOURNAL
 from reports.runner import run_all
 from reports.shares import (
@@ -31,6 +32,8 @@ from reports.shares import (
     share_file,
 )
 from reports.worker_process import Failure
+
+TABLES = ("deviations.csv", "runs.csv")
 
 
 class Tables(NamedTuple):
@@ -149,9 +152,10 @@ def write_deviations(path: Path, shares: Mapping[str, Path], unkept: Mapping[str
 
 
 def sweep(folder: Path, kept: Set[Path]) -> None:
-    """Delete the answers and shares that are of something else."""
+    """Delete the answers and shares that are of something else, and nothing that is no answer or share."""
     for other in set(folder.iterdir()) - kept:
-        other.unlink()
+        if RUN.names(f"{folder.name}/{other.name}"):
+            other.unlink()
 
 
 def settled(name: str, pair: Sequence[Any]) -> str:

@@ -221,8 +221,8 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
 @pytest.mark.parametrize(
     ("words", "file", "said"),
     [
-        (SMALL, "limits.csv", "holds limits.csv, which no run of crosscheck made"),
-        (["stability", "slow_hit"], "runs.csv", "holds runs.csv, which crosscheck stability did not make"),
+        (SMALL, "limits.csv", "holds limits.csv, and no made.json says that crosscheck run made it"),
+        (["stability", "slow_hit"], "runs.csv", "holds runs.csv, and no made.json says that crosscheck stability made"),
     ],
 )
 def test_a_folder_of_another_command_is_left_alone(words: list[str], file: str, said: str, tmp_path: Path):

@@ -59,7 +59,9 @@ def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: 
     lesson.context.close()
 
     assert (done.returncode, again.returncode) == (0, 0)
-    assert sorted(path.name for path in (tmp_path / "all").iterdir()) == ["index.html", "mixing.html", "order.html"]
+    assert sorted(path.name for path in (tmp_path / "all").iterdir()) == [
+        "index.html", "made.json", "mixing.html", "order.html",
+    ]  # fmt: skip
     assert sorted(links) == ["mixing.html", "order.html"]
     assert around == ["index.html", "mixing.html"]
     assert "pymunk 7.3.1" in text
@@ -76,8 +78,8 @@ def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: 
         (["order", "--export", "nowhere/a.html"], "nowhere/a.html: No such file or directory"),
         (["order", "--export", "/proc/a.html"], "/proc/a.html: No such file or directory"),
         (["order", "--export", ""], "name a file"),
-        (["--export", "folder"], "holds other.txt, which is no page of a lesson"),
-        (["--export", "other.html"], "--export other.html: is a file"),
+        (["--export", "folder"], "holds other.txt, and no made.json says that crosscheck lesson made it"),
+        (["--export", "other.html"], "other.html: is a file"),
         (["--export", "/proc/all"], "/proc/all: "),
     ],
 )

@@ -11,7 +11,7 @@ import pytest
 
 from adapters.engines import read_row
 from reports import terminal
-from reports.folders import FolderTaken
+from reports.exits import FolderTaken
 from reports.journal import Journal
 from reports.speed import ladder, measure
 from reports.speed.command import kept_of

@@ -15,7 +15,8 @@ import pandas as pd
 import pytest
 
 from reports.exits import STATUS, Stopped, broken_off, stoppable
-from reports.folders import replace_folder
+from reports.folders import RUN, begun, replace_folder
+from reports.made import Made, put_made
 from reports.run_command import what_is_kept
 from tests.command_line import crosscheck, wait_for
 from tests.stopping import AT_MOST, Command, assert_ended, busyness
@@ -236,6 +237,8 @@ def test_a_finished_run_takes_its_place_whole_whenever_it_is_told(
     for folder, text in ((made, "new"), (target, "old")):
         folder.mkdir()
         (folder / "journal.jsonl").write_text(text)
+    begun(made, RUN)
+    put_made(target, Made(RUN.command, True, {}))
 
     def rename_and_tell(path: Path, to: Path) -> Path:
         signal.raise_signal(signal.SIGTERM)
@@ -243,7 +246,7 @@ def test_a_finished_run_takes_its_place_whole_whenever_it_is_told(
 
     monkeypatch.setattr(Path, "rename", rename_and_tell)
     with pytest.raises(SystemExit) as end, broken_off(made, lambda: what_is_kept(target)):
-        replace_folder(made, target)
+        replace_folder(made, target, RUN)
 
     assert end.value.code == 143
     assert [path.name for path in tmp_path.iterdir()] == ["out"]

@@ -17,15 +17,16 @@ from adapters.solver_process import SolverProcess
 from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
 from reports.check.verdict import NONE, FileCheck, check_file
-from reports.exits import BAD_INPUT, DONE, FAILED, refuse, say
+from reports.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
+from reports.made import may_overwrite, put_text
 from reports.runner import run_all
 from reports.worker_process import Failure
 
 if TYPE_CHECKING:
     from reports.check.smallest import Smallest
 
-# What an earlier file of ours has among its first HEAD bytes, and nothing else has: it may be written over.
-PAGE, JUNIT, HEAD = b'<meta name="generator" content="crosscheck check">', b'<testsuites name="crosscheck check"', 4096
+# What an earlier file of ours begins with, and nothing else does: it may be written over.
+PAGE, JUNIT = b'<meta name="generator" content="crosscheck check">', b'<testsuites name="crosscheck check"'
 CHECKING = 600.0  # s that a file may take: what each of its calls may take adds up to less
 NOBODYS = (".", "__", "node_modules")  # how the names of files and folders begin that no student wrote
 HANDED_OUT = ("gl-matrix.js", "gl-matrix-min.js", "mainScript.js")  # lie beside a student's file
@@ -76,17 +77,18 @@ def files_of(path: Path) -> list[Path]:
 
 def places_for(page: Path | None, junit: Path | None) -> None:
     """Exit 2, before anything is checked, if what is to be written has no place or would take somebody else's."""
-    if page is not None and junit is not None and page.resolve() == junit.resolve():
+    if page is not None and junit is not None and os.path.realpath(page) == os.path.realpath(junit):
         refuse([f"--junit {junit}: is where the page goes; name another file"])
-    for option, path, mark, what in (("--page", page, PAGE, "page"), ("--junit", junit, JUNIT, "JUnit file")):
+    marks = ("--page", page, PAGE, "page of a check"), ("--junit", junit, JUNIT, "JUnit file of a check")
+    for option, path, mark, what in marks:
         if path is None:
             continue
         try:
             if path.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            if path.is_file() and mark not in path.read_bytes()[:HEAD]:
-                refuse([f"{option} {path}: is there and no {what} of a check; name another file"])
-            path.parent.stat()
+            may_overwrite(path, mark, what, option)
+        except FolderTaken as fault:
+            refuse([str(fault)])
         except OSError as fault:
             refuse([f"{option} {path}: {fault.strerror or fault}; name another file"])
 
@@ -141,6 +143,6 @@ def smallest_here(solver: SolverText, restitution: float) -> Smallest | None:
 def write(path: Path, text: str) -> None:
     """Write a file that was asked for; exits 2 if that is not possible."""
     try:
-        path.write_text(text, encoding="utf-8")
+        put_text(path, text)
     except OSError as fault:
         refuse([f"--junit {path}: {fault.strerror or fault}; name a file that can be written"])

@@ -11,6 +11,7 @@ from reports.check.rows import TASKS, shown
 from reports.check.smallest import DT, Smallest
 from reports.check.verdict import FileCheck
 from reports.documents import looks_as_json, render
+from reports.made import put_text
 from reports.replay import pack_layers, ratio_of
 from scenarios.model import Scenario, Trajectory
 
@@ -33,7 +34,7 @@ def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
         looks_json=looks_as_json(looks), generator=GENERATOR, version=version("crosscheck2d"),
         digest="" if check.solver is None else check.solver.digest,
     )  # fmt: skip
-    path.write_text(html, encoding="utf-8")
+    put_text(path, html)
 
 
 def layers_of(name: str, smallest: Smallest | None) -> list[tuple[Run | None, Trajectory]]:

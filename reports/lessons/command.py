@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Hashable, Mapping
-from contextlib import closing
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -12,23 +12,25 @@ from typing import Any
 
 from adapters.engines import ENGINES
 from reports.commands import unknown
-from reports.exits import FAILED, refuse, say
-from reports.folders import FolderTaken, may_write
+from reports.exits import FAILED, FolderTaken, refuse, say
+from reports.folders import made_anew, place_of
 from reports.game.command import FIRST
 from reports.game.server import Game, application, serve
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson
 from reports.lessons.pages import ALONE, FILES, ROUTES, Links, index_page, offline, told
+from reports.made import Kind, may_overwrite, put_text, writing
 from reports.runner import run_all
 from reports.terminal import Progress
 from reports.worker_process import Failure
 
-# What a page of ours has among its first HEAD bytes, and nothing else has: it may be written over.
-MARK, HEAD = b'<meta name="generator" content="crosscheck lesson">', 4096
+# What a page of ours begins with, and nothing else does: it may be written over.
+MARK = b'<meta name="generator" content="crosscheck lesson">'
+ALL = Kind("crosscheck lesson")  # the folder of all of them
 
 SHOWING = 300.0  # s that one setting of the sliders may take: the slowest needs some 5, once its engines are compiled
-CONVENTIONS = "the conventions of the engines"
+INDEX, CONVENTIONS = "index.html", "the conventions of the engines"
 
 
 def open_lesson(name: str, port: int, opens: bool, export: Path | None) -> None:
@@ -45,40 +47,34 @@ def write_one(name: str, path: Path) -> None:
     """One self-contained page."""
     if path.is_dir():
         refuse([f"--export {path}: is a folder; name a file, or leave out {name} to write all lessons there"])
-    if path.exists() and not ours(path):
-        refuse([f"--export {path}: is there and no page of a lesson; name another file"])
-    must_be_writable(path.parent, path)
-    write_pages({path: LESSONS[name]}, ALONE, {})
+    with exporting(path):
+        may_overwrite(path, MARK, "page of a lesson", "--export")
+        with TemporaryFile(dir=path.parent):  # so that it is known before any run whether it can be written
+            pass
+        write_pages({path: LESSONS[name]}, ALONE, {})
     print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, opens without a server")
 
 
 def write_all(folder: Path) -> None:
     """All lessons and their list, a page each, with links between them."""
+    with exporting(folder):
+        folder = place_of(folder, "--export")
+        with made_anew(folder, ALL, "--export") as part:
+            pages = {part / f"{name}.html": lesson for name, lesson in LESSONS.items()}
+            with writing(part, [*(path.name for path in pages), INDEX]):
+                rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[CONVENTIONS]
+                put_text(part / INDEX, index_page(FILES, rows))
+    size = sum(path.stat().st_size for path in folder.glob("*.html"))
+    print(f"{folder / INDEX}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server")
+
+
+@contextmanager
+def exporting(asked: Path) -> Iterator[None]:
+    """What writes to the place that is asked for: exits 2 if it may not, or cannot."""
     try:
-        may_write(folder, lambda name: ours(folder / name), "is no page of a lesson", "--export")
-        folder.mkdir(parents=True, exist_ok=True)
+        yield
     except FolderTaken as fault:
         refuse([str(fault)])
-    except OSError as fault:
-        refuse([f"--export {folder}: {fault.strerror or fault}; name another folder"])
-    must_be_writable(folder, folder)
-    pages = {folder / f"{name}.html": lesson for name, lesson in LESSONS.items()}
-    rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[CONVENTIONS]
-    put(folder / "index.html", index_page(FILES, rows))
-    size = sum(path.stat().st_size for path in pages)
-    print(f"{folder / 'index.html'}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server")
-
-
-def ours(path: Path) -> bool:
-    """Whether an earlier export wrote this file."""
-    return path.is_file() and MARK in path.read_bytes()[:HEAD]
-
-
-def must_be_writable(folder: Path, asked: Path) -> None:
-    """Exit 2, before any run, if nothing can be written in `folder`."""
-    try:
-        with TemporaryFile(dir=folder):
-            pass
     except OSError as fault:
         refuse([f"--export {asked}: {fault.strerror or fault}; name another place"])
 
@@ -111,17 +107,5 @@ def write_pages(pages: Mapping[Path, Lesson], links: Links, besides: dict[str, C
                 answers[path][task[1]] = result
                 progress.done(f"{lesson.number} {lesson.title}")
                 if len(answers[path]) == len(lesson.grid):
-                    put(path, offline(lesson, answers.pop(path), links))
+                    put_text(path, offline(lesson, answers.pop(path), links))
     return found
-
-
-def put(path: Path, text: str) -> None:
-    """A whole page or, if it cannot be written, the one that was there, and exit 2."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    except OSError as fault:
-        refuse([f"--export {path}: {fault.strerror or fault}"])
-    finally:
-        part.unlink(missing_ok=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
@@ -19,9 +18,10 @@ from adapters.engines import OWN, row_of
 from reports import style
 from reports.commands import checked_engines, checked_scenes, opening
 from reports.exits import DONE, FAILED, broken_off, say
-from reports.folders import digest_of, given_back, open_part, replace_folder
-from reports.journal import JOURNAL, Journal
+from reports.folders import discard, given_back, open_part, place_of, replace_folder
+from reports.journal import Journal
 from reports.machine import about
+from reports.made import Kind, digest_of, writing
 from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
 from reports.speed.explained import sentence
@@ -34,7 +34,8 @@ from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal import Progress
 
-PAGE = "speed.html"
+MACHINE, FIGURES, PAGE = "machine.json", "speed_figures.csv", "speed.html"
+SPEED = Kind("crosscheck speed", r"journal\.jsonl")
 
 
 def run_speed(
@@ -45,10 +46,10 @@ def run_speed(
     named = checked_scenes(scenes, [], False, seed)  # none named: all that the effort has, sizes and features besides
     effort = replace(effort, scenes=tuple(named)) if named else effort
     plan = Plan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
-    out = out.resolve()
     header = about(command, seed)
     with opening(out):
-        journal = open_part(out, is_ours, "crosscheck speed did not make")
+        out = place_of(out)
+        journal = open_part(out, SPEED)
         with given_back(journal):
             kept = kept_of(plan, header, journal, resume)
     part = kept.journal.path.parent
@@ -57,14 +58,14 @@ def run_speed(
         if not results.measured.errors.size:
             nothing_measured(part, results)
         write_all(part, results, header)
-        replace_folder(part, out)
+        replace_folder(part, out, SPEED)
     print_summary(results, str(out / PAGE))
     sys.exit(DONE)
 
 
 def nothing_measured(part: Path, results: Results) -> NoReturn:
     """Leave nothing behind, and say why there is no answer to set a time against; exits 1."""
-    shutil.rmtree(part)
+    discard(part, SPEED)
     for what, why in results.left_out:
         say(f"{what}: {why}")
     say("no scene that was asked for has an exact answer, so there is no error to set against time")
@@ -92,18 +93,14 @@ def carry_out(plan: Plan, header: dict[str, Any], kept: Kept, resume: bool) -> t
         return results, header | {"seconds": progress.seconds, "load": results.measured.busy}
 
 
-def is_ours(name: str) -> bool:
-    """Whether a file of that name is of this command."""
-    return name.startswith("speed") or name in ("machine.json", JOURNAL)
-
-
 def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:
     """Tables first, then the page, so that what was measured is kept whatever happens to the page."""
-    (folder / "machine.json").write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
-    results.write(folder)
-    if results.plan.whole:
-        figures.write(folder / "speed_figures.csv", results, header)
-    write_page(folder / PAGE, results, header)
+    with writing(folder, (MACHINE, *results.files, FIGURES, PAGE)):
+        (folder / MACHINE).write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
+        results.write(folder)
+        if results.plan.whole:
+            figures.write(folder / FIGURES, results, header)
+        write_page(folder / PAGE, results, header)
 
 
 def print_summary(results: Results, page: str) -> None:

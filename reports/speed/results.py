@@ -175,14 +175,19 @@ class Results:
         })  # fmt: skip
         return wide.assign(name=wide.engine + ":" + wide.profile)
 
-    def write(self, folder: Path) -> None:
-        """The tables as CSV files."""
-        files = {
+    @cached_property
+    def files(self) -> dict[str, pd.DataFrame]:
+        """The tables, by the names of their CSV files."""
+        tables = {
             "speed_samples": self.measured.samples, "speed_errors": self.measured.errors, "speed": self.points,
             "speed_pooled": self.pooled, "speed_orders": self.orders, "speed_reached": self.reached,
             "speed_sizes": self.sizes, "speed_features": self.features, "speed_driving": self.driving,
             "speed_noise": self.noise, "speed_models": self.models, "speed_dials": self.dials,
             "speed_budget": self.measured.budget, "speed_explained": self.explained, "speed_versus": self.versus,
         }  # fmt: skip
-        for name, table in files.items():
-            table.to_csv(folder / f"{name}.csv", index=False)
+        return {f"{name}.csv": table for name, table in tables.items()}
+
+    def write(self, folder: Path) -> None:
+        """The tables as CSV files."""
+        for name, table in self.files.items():
+            table.to_csv(folder / name, index=False)

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.folders import digest_of
 from reports.journal import JOURNAL, Journal, lines_of, numbers, plain
 from reports.machine import about
+from reports.made import digest_of, put_text, writing
 from reports.runner import run_all
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
@@ -99,7 +99,8 @@ def carry_out(plan: Plan, journal: Journal, done: Collection[Task], progress: Pr
     files = {path: digest_of(path) for path, _, _ in (name.rpartition(":") for name in plan.cases) if path}
     header = about(plan.command, 0) | {"form": plan.form, "files": files}
     journal.append({"header": header})
-    (folder / "machine.json").write_text(json.dumps(plain(header), indent=2) + "\n")
+    with writing(folder, ["machine.json"]):
+        put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
     wanted = tasks_of(plan)
     tasks: dict[Any, Callable[[], Any]] = {task: partial(task, folder) for task in wanted if task not in done}
     progress.start(len(tasks), len(wanted))

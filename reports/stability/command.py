@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,8 +16,9 @@ from rich.table import Table
 from adapters.engines import ENGINES, OWN
 from reports.commands import checked_engines, opening, unknown
 from reports.exits import DONE, FAILED, broken_off, refuse, say
-from reports.folders import given_back, may_go_on, open_part, replace_folder
-from reports.journal import JOURNAL, Journal
+from reports.folders import given_back, may_go_on, open_part, place_of, replace_folder
+from reports.journal import Journal
+from reports.made import Kind, writing
 from reports.runner import affordable
 from reports.stability.atlas import Atlas, Plan, Task, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
@@ -30,7 +32,11 @@ from reports.terminal import Progress
 from scenarios.files import SceneFileError, read_scene_file
 
 SEE = "limits.csv and stability.html have the names of all, or tests/stability_limits.csv; for --vary see --help"
-FILES = (JOURNAL, "trajectories", "machine.json", "limits.csv", "maps.csv", "laws.csv", "stability.html")
+LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
+PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in ENGINES)
+STABILITY = Kind(
+    "crosscheck stability", rf"journal\.jsonl|trajectories/.+\.({PLAYED_BY})[^/.]*\.npz", ("trajectories",)
+)
 
 
 def find_limits(
@@ -45,9 +51,9 @@ def find_limits(
         how = "a file is not driven to its limits: crosscheck check judges it, crosscheck run plays it"
         refuse([f"--engine {file}: {how}" for file in files])
     plan = Plan(cases, maps, touching, players, form, affordable(workers or os.cpu_count() or 1), command)
-    out = out.resolve()
     with opening(out):
-        journal = open_part(out, FILES.__contains__, "crosscheck stability did not make")
+        out = place_of(out)
+        journal = open_part(out, STABILITY)
         with given_back(journal):
             done = gone_on_with(journal, plan, resume)
     part = journal.path.parent
@@ -56,7 +62,7 @@ def find_limits(
         carry_out(plan, journal, done, progress)
         progress.say("writing the tables and the page")
         found = write_files(part)
-        replace_folder(part, out)
+        replace_folder(part, out, STABILITY)
     finish(found, out)
 
 
@@ -72,14 +78,15 @@ def gone_on_with(journal: Journal, plan: Plan, resume: bool) -> set[Task]:
 def write_files(folder: Path) -> Atlas:
     """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
     atlas = read(folder)
-    table(atlas.limits).to_csv(folder / "limits.csv", index=False)
     laws = [(one.name, one.player, *at[:-1]) for one in atlas.laws for at in one.gaps]
-    columns = ["scene", "player", *AtGap._fields[:-1]]
-    pd.DataFrame(laws, columns=columns).to_csv(folder / "laws.csv", index=False)
     cells = [(one.name, one.player, *cell) for one in atlas.maps for cell in one.cells]
-    columns = ["map", "player", "x", "y", "reading", "failed", "event"]
-    pd.DataFrame(cells, columns=columns).to_csv(folder / "maps.csv", index=False)
-    write_page(folder / "stability.html", folder, atlas)
+    with writing(folder, FILES):
+        table(atlas.limits).to_csv(folder / LIMITS, index=False)
+        columns = ["scene", "player", *AtGap._fields[:-1]]
+        pd.DataFrame(laws, columns=columns).to_csv(folder / LAWS, index=False)
+        columns = ["map", "player", "x", "y", "reading", "failed", "event"]
+        pd.DataFrame(cells, columns=columns).to_csv(folder / MAP, index=False)
+        write_page(folder / PAGE, folder, atlas)
     return atlas
 
 

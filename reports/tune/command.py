@@ -5,43 +5,53 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import NoReturn
 
 import pandas as pd
 from rich.console import Console
 from rich.table import Table
 
-from reports.commands import unknown
+from reports.commands import opening, unknown
 from reports.exits import DONE, broken_off, refuse
+from reports.folders import made_anew, place_of
+from reports.made import Kind, may_replace, writing
 from reports.terminal import Progress
 from reports.tune.grid import MAKES
 from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, Search
 
 NAME = "matched.csv"
+TUNE = Kind("crosscheck tune")
 
 
 def tune(engines: Sequence[str], out: Path) -> NoReturn:
     """Search the settings of `engines`, all that have any if none is named; write matched.csv into `out`; exits 0.
 
     The table of an engine is written as soon as its search has ended. Exits 2 on a name that is no engine with
-    settings, 130 and 143 when broken off.
+    settings, or where `out` may not be written, 130 and 143 when broken off.
     """
     if faults := [unknown("engine", name, MAKES) for name in engines if name not in MAKES]:
         refuse(faults)
-    out = out.resolve()
+    with opening(out):
+        out = place_of(out)
+        may_replace(out, TUNE)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=out.parent):  # so that it is known before the search whether it can be written
+            pass
     tables: list[pd.DataFrame] = []
     with (
-        broken_off(out, lambda: f"What has ended is in {out / NAME}." if tables else "Nothing is kept."),
+        broken_off(out, lambda: f"What had ended is in {out / NAME}." if tables else "No search had ended."),
         Progress() as bar,
     ):
-        out.mkdir(parents=True, exist_ok=True)
         for engine in dict.fromkeys(engines or MAKES):
             bar.say(f"{engine}: the exact answers, and what is matched now")
             search = Search(engine, say=bar.note)
             bar.say(f"{engine}: setting by setting")
-            tables.append(search.run())
-            pd.concat(tables).to_csv(out / NAME, index=False)
-    show(pd.concat(tables))
+            found = pd.concat([*tables, search.run()])
+            with made_anew(out, TUNE, "--out") as part, writing(part, [NAME]):
+                found.to_csv(part / NAME, index=False)
+            tables = [found]
+    show(found)
     Console().print(f"\n{out / NAME}", style="bold", highlight=False, soft_wrap=True)
     sys.exit(DONE)
 
