@@ -31,6 +31,7 @@ from tests.hostile.small_run import finished_run
 from tests.hostile.solvers import SOLVERS
 
 FILE = Path(__file__).with_name("outcomes.csv")
+SHOWN = 2000  # characters of what a bad one printed
 FAMILIES: dict[str, tuple[Input, ...]] = {
     "scenes": SCENES, "folders": FOLDERS, "journals": JOURNALS, "places": PLACES, "command lines": LINES,
     "solvers": SOLVERS, "servers": SERVERS,
@@ -129,7 +130,7 @@ def main(families: list[str]) -> None:
         rows.append((key, outcome))
         slow.append((round(seconds, 1), *key))
         if outcome.word in BAD:
-            print(f"{': '.join(key)}: {outcome.word}, exit {outcome.code}\n{outcome.printed}\n", flush=True)
+            print(f"{': '.join(key)}: {outcome.word}, exit {outcome.code}\n{outcome.printed[:SHOWN]}\n", flush=True)
     print(*sorted(Counter((key[0], outcome.word) for key, outcome in rows).items()), sep="\n")
     print(f"{len(rows)} inputs in {perf_counter() - began:.0f} s; the slowest:", *sorted(slow)[-12:], sep="\n")
     if not families:
