@@ -43,7 +43,7 @@ def main() -> None:
 
 def private_pipes() -> tuple[IO[str], IO[str]]:
     """The two ends of the talk with the parent; what the solver prints or reads goes nowhere."""
-    requests, answers = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
+    requests, answers = os.fdopen(os.dup(0), encoding="utf-8"), os.fdopen(os.dup(1), "w", encoding="utf-8")
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(nowhere, stream)

@@ -1,14 +1,21 @@
 """The command `crosscheck`, or `python -m reports`: it can be told to stop before it has imported what it needs."""
 
+import sys
+
 from reports.safe_path import leave_out_current_folder
 
 
 def main() -> None:
     """Do what the command line asks for."""
     leave_out_current_folder()  # before anything else is imported
-    from reports.exits import ends_when_told
+    from reports.exits import ends_when_told, refuse
+    from reports.streams import printing
 
-    with ends_when_told():
+    with ends_when_told(), printing():
+        if sys.flags.optimize > 1:
+            refuse(
+                ["PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are explained by; unset it"]
+            )
         from reports.cli import app  # which takes a second: what is raised while it is imported may be lost
 
         app()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +13,7 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 
 from reports.comparison import answered
+from reports.foreign_text import put_bytes
 from reports.scenes import open_scene
 from reports.worker_process import Failure
 from scenarios.model import Scenario
@@ -71,22 +74,23 @@ def no_answer(failure: Failure, timeout: float) -> Answer:
 
 def put_answer(path: Path, answer: Answer) -> None:
     """Write it whole or not at all."""
-    new = path.with_name(f"{path.name}.new")
-    new.write_bytes(b"" if answer.record is None else packed(vars(answer.record)))
-    with ZipFile(new, "a") as file:
+    whole = io.BytesIO(b"" if answer.record is None else packed(vars(answer.record)))
+    with ZipFile(whole, "a") as file:
         file.writestr(SAID, json.dumps(answer[1:]))
-    new.replace(path)
+    put_bytes(path, whole.getvalue())
 
 
 def read_answer(path: Path) -> Answer | None:
-    """What `put_answer` wrote; None if it is not there or torn."""
+    """What `put_answer` wrote; None if it is not there or not that any more, as the sums in the file tell."""
     try:
         with ZipFile(path) as file:
-            said, whole = json.loads(file.read(SAID)), len(file.namelist()) > 1
+            (status, reason, timeout), whole = json.loads(file.read(SAID)), len(file.namelist()) > 1
         fields = unpacked(path) if whole else None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):
+    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile, zlib.error):
         return None
-    return None if whole and fields is None else Answer(TruthRecord(**fields) if fields else None, *said)
+    if whole and fields is None:
+        return None
+    return Answer(TruthRecord(**fields) if fields else None, status, reason, timeout)
 
 
 def record_here(scene: str, seed: int) -> TruthRecord | str:

@@ -1,7 +1,9 @@
 """The files of a run, read back; everything is made from the journal and the trajectories.
 
-journal.jsonl   a header, a line a cell as it ends, a footer; after a run was resumed, another header and footer
-trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to its last good state
+journal.jsonl   a header, a line a cell as it ends, a footer; after a run was resumed, another header and footer; what
+                a line holds is said in journal_lines.py
+trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to its last good state;
+                the line of the cell has the file's digest, and what does not match it is as good as none
 scenes/         copies of the scene files
 machine.json    machine, versions, command, seed
 made.json       what of all this was written by whom, so that nothing else is ever replaced
@@ -11,25 +13,22 @@ deviations.csv, runs.csv, report.html
 
 from __future__ import annotations
 
+import hashlib
 import io
 from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
-from zipfile import BadZipFile
 
 import numpy as np
 
 from adapters.play import Run
 from reports.journal import JOURNAL, lines_of
+from reports.journal_lines import kind_of
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
-FIELDS: dict[str, type | tuple[type, ...]] = {  # of the line of a cell
-    "cell": str, "scene_hash": str, "scene": str, "seed": int, "substeps": int, "scenario": str, "engine": str,
-    "profile": str, "dt_s": (int, float), "status": str, "reason": str, "step": int,
-    "timeout_s": (int, float), "settings": dict, "versions": dict,
-}  # fmt: skip
-HEADER = ("versions", "seed", "scenes", "engines")
+Numbered = dict[Hashable, tuple[int, dict[str, Any]]]  # what a line is of -> its number, and the line
 STATE = ("position", "velocity", "angle", "angular_velocity")
 HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
 
@@ -41,7 +40,7 @@ class Archive:
     Attributes:
         folder: where it is.
         header: command, seed, machine, versions, and what was asked for.
-        records: the lines of the cells that ended.
+        records: the lines of the cells that ended, `as_found`.
         conformance: `engine:profile` -> its line.
         known_answers: the lines of the known answers that were made again.
         timings: key of a cell -> s, its timings, each taken alone.
@@ -60,29 +59,32 @@ class Archive:
 
     @staticmethod
     def read(folder: Path) -> Archive:
-        """Read the journal of a folder, once; raises `ValueError` if it cannot be used."""
+        """Read the journal of a folder, once; raises `ValueError`, naming the line, if it cannot be used."""
         header: dict[str, Any] = {}
-        last: dict[str, dict[Hashable, dict[str, Any]]] = {"cell": {}, "conformance": {}, "known_answer": {}}
+        last: dict[str, dict[Hashable, tuple[int, dict[str, Any]]]] = {
+            "cell": {},
+            "conformance": {},
+            "known_answer": {},
+        }
         timings: dict[str, list[float]] = {}
         seconds, complete = 0.0, False
         for number, line in enumerate(lines_of(folder), 1):
-            if fault := fault_of(line):
-                raise ValueError(f"{folder / JOURNAL}: line {number} {fault}; delete it, or play again")
-            complete = "footer" in line
+            kind = kind_of_line(folder, number, line)
+            complete = kind == "footer"
             if complete:
                 seconds += line["footer"]["seconds"]
-            elif "header" in line:
+            elif kind == "header":
                 header = line["header"]
-            elif "timing" in line:
+            elif kind == "timing":
                 timings.setdefault(line["timing"], []).append(line["seconds"])
-            elif "cell" in line:
-                last["cell"][line["scene"], line["seed"], line["engine"], line["profile"], line["substeps"]] = line
             else:
-                kind = "conformance" if "conformance" in line else "known_answer"
-                last[kind][line["of"]] = line
+                last[kind][what_of(line) if kind == "cell" else line["of"]] = number, line
         if not header:
             raise ValueError(f"{folder / JOURNAL}: has no header, so nothing was played")
-        records, conformance, known = ([*last[kind].values()] for kind in last)
+        for number, record in last["cell"].values():
+            if fault := stranger(record, header):
+                raise ValueError(no_use(folder, number, fault))
+        records, conformance, known = ([line for _, line in last[kind].values()] for kind in last)
         records = [as_found(folder, record) for record in records]
         by_engine = {line["of"]: line for line in conformance}
         return Archive(
@@ -90,47 +92,86 @@ class Archive:
         )
 
 
-def fault_of(line: Any) -> str:
-    """What is wrong with a line of the journal, as the end of a sentence; "" if it can be used."""
-    if not isinstance(line, dict):
-        return "is no table"
-    if "cell" in line:
-        wrong = [name for name, kind in FIELDS.items() if not isinstance(line.get(name), kind)]
-        return f"has no {wrong[0]} that can be used, of a cell" if wrong else ""
-    if "header" in line:
-        wrong = [name for name in HEADER if name not in line["header"]]
-        return f"has no {wrong[0]} in its header" if wrong else ""
-    known = "footer" in line or "timing" in line or "of" in line
-    return "" if known else "is none of a header, a footer, a cell, a timing, an answer"
+def kind_of_line(folder: Path, number: int, line: Any) -> str:
+    """Which of `KINDS` it is; raises `ValueError`, naming the line and what does not fit."""
+    try:
+        return kind_of(line)
+    except (ValueError, RecursionError) as fault:
+        raise ValueError(no_use(folder, number, str(fault))) from None
+
+
+def no_use(folder: Path, number: int, fault: str) -> str:
+    """A sentence on a line that cannot be used."""
+    return f"{folder / JOURNAL}: line {number}: {fault}; delete that line, and run --resume plays what it was of"
+
+
+def what_of(record: dict[str, Any]) -> tuple:
+    """What the line of a cell is of."""
+    return tuple(record[name] for name in ("scene", "seed", "engine", "profile", "substeps"))
+
+
+def stranger(record: dict[str, Any], header: dict[str, Any]) -> str:
+    """Why the line of a cell is none of its run; "" if it is."""
+    name = f"{record['engine']}:{record['profile']}"
+    if record["scene"] not in header["scenes"]:
+        return f"scene = {record['scene']!r}: must be one of the scenes of the header"
+    if name not in header["engines"]:
+        return f"engine = {name!r}: must be one of the engines of the header"
+    return "" if record["seed"] == header["seed"] else f"seed = {record['seed']}: must be that of the header"
 
 
 def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
-    """The line of a cell; an error where it was played and its trajectory is gone."""
+    """The line of a cell with `damage`, why its trajectory cannot be used, or ""; a played one is then an error.
+
+    A sum over a file is not made again while the file is the same to the system.
+    """
     path = trajectory_file(folder, record["cell"])
-    lost = record["status"] == "ok" and not path.exists()
-    return record | {"status": "error", "reason": f"{path.name} is missing"} if lost else record
+    why = f"{path.name} was never written" if record["status"] == "ok" else ""
+    if record["file"]:
+        try:
+            found = path.stat()
+            same = digest_of_file(path, found.st_ino, found.st_size, found.st_mtime_ns) == record["file"]
+            why = "" if same else f"{path.name} is not what was written"
+        except OSError as fault:
+            gone = isinstance(fault, FileNotFoundError)
+            why = f"{path.name} {'is missing' if gone else f'cannot be read: {fault.strerror}'}"
+    failed = {"status": "error", "reason": why} if why and record["status"] == "ok" else {}
+    return record | failed | {"damage": why}
+
+
+def digest(data: bytes) -> str:
+    """16 hex digits of a hash over the bytes of a file."""
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+@cache
+def digest_of_file(path: Path, *_: int) -> str:
+    """The same of a file that is there, once for every inode, size and time of change."""
+    return digest(path.read_bytes())
 
 
 def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -> Run:
     """The run behind a line, its trajectory read back if it has one and it is wanted."""
-    path = trajectory_file(folder, record["cell"])
-    status, reason, trajectory = record["status"], record["reason"], None
-    try:
-        trajectory = load_trajectory(path) if with_trajectory and path.exists() else None
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as fault:
-        status, reason = "error", f"{path.name} cannot be read: {fault}"
+    record = as_found(folder, record)
+    trajectory = stored_trajectory(folder, record) if with_trajectory else None
     return Run(
         engine=record["engine"],
         profile=record["profile"],
         scenario=record["scenario"],
         dt=record["dt_s"],
-        status=status,
-        reason=reason,
+        status=record["status"],
+        reason=record["reason"],
         trajectory=trajectory,
         seconds=record["seconds"],
         settings={name: tuple(pair) for name, pair in record["settings"].items()},
         versions=record["versions"],
     )
+
+
+def stored_trajectory(folder: Path, record: dict[str, Any]) -> Trajectory | None:
+    """The samples that the run has of a cell, by its line `as_found`; None if it has none, or not what was written."""
+    whole = record["file"] and not record["damage"]
+    return load_trajectory(trajectory_file(folder, record["cell"])) if whole else None
 
 
 def trajectory_file(folder: Path, key: str) -> Path:

@@ -45,7 +45,8 @@ Memory = Annotated[
 ]
 Scheduler = Annotated[str, typer.Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")]
 Timings = Annotated[
-    int, typer.Option(min=0, metavar="N", help="Rounds of timings after all is played, nothing beside them.")
+    int,
+    typer.Option(min=0, max=10_000, metavar="N", help="Rounds of timings after all is played, nothing beside them."),
 ]
 Resume = Annotated[
     Path | None, typer.Option(metavar="OUT", help="Play what is missing or changed in a run, as it was asked for.")

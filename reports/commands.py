@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import ENGINES, OWN, read_row
 from adapters.solver_file import KINDS, NotASolver
+from reports.console import Console
 from reports.exits import DONE, FAILED, FolderTaken, refuse, say
 from reports.folders import found
 from reports.metrics import METRICS

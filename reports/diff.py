@@ -14,7 +14,9 @@ import pandas as pd
 
 from reports.archive import Archive
 from reports.comparison import COLUMNS
+from reports.foreign_text import encoded
 from reports.metrics import METRICS
+from reports.tables import is_sealed
 from reports.view import NOT_JUDGED
 
 # Measured on two cores under a load of 15 to 20 (no idler machine could be had), 3 scenes and --timings 5. 8 runs of
@@ -114,12 +116,17 @@ def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
     if before["seed"] != after["seed"]:
         said.append(f"seed: {before['seed']} before, {after['seed']} after")
     said += [f"{archive.folder} is not complete" for archive in (one, other) if not archive.complete]
+    for archive in (one, other):
+        if damaged := [record["damage"] for record in archive.records if record["damage"]]:
+            more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+            said.append(f"{archive.folder}: trajectories/{damaged[0]}{more}; "
+                        f"crosscheck run --resume {archive.folder} plays it again")  # fmt: skip
     return said, like
 
 
 def by_name(archive: Archive) -> dict[tuple, dict[str, Any]]:
-    """(scenario, `engine:profile`, dt in s) -> the line of the cell."""
-    return {(r["scenario"], f"{r['engine']}:{r['profile']}", r["dt_s"]): r for r in archive.records}
+    """(scenario, `engine:profile` as the table has it, dt in s) -> the line of the cell."""
+    return {(r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r for r in archive.records}
 
 
 def equal_keys(before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]) -> set[tuple]:
@@ -162,14 +169,17 @@ def reasons(table: pd.DataFrame) -> dict[tuple[tuple, str], str]:
 
 
 def table_of(folder: Path) -> pd.DataFrame:
-    """deviations.csv as text: what is written the same has the same bits."""
+    """deviations.csv as text: what is written the same has the same bits; raises `ValueError` if it is another one."""
+    path = folder / "deviations.csv"
     try:
-        table = pd.read_csv(folder / "deviations.csv", dtype=str, keep_default_na=False)
+        same, table = is_sealed(folder), pd.read_csv(path, dtype=str, keep_default_na=False)
     except (OSError, ValueError) as fault:
-        raise ValueError(f"{folder / 'deviations.csv'}: {fault}; make it: crosscheck report {folder}") from fault
-    if list(table.columns) != list(COLUMNS):
-        raise ValueError(f"{folder / 'deviations.csv'}: its columns are not those of this version; "
-                         f"make it again: crosscheck report {folder}")  # fmt: skip
+        why = getattr(fault, "strerror", None) or str(fault)
+        raise ValueError(f"{path}: {why}; make it: crosscheck report {folder}") from fault
+    columns = list(table.columns) == list(COLUMNS)
+    if not (columns and same):
+        why = "is not what was written" if columns else "its columns are not those of this version"
+        raise ValueError(f"{path}: {why}; make it again: crosscheck report {folder}")
     return table
 
 

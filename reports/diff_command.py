@@ -7,9 +7,9 @@ from math import inf
 from pathlib import Path
 from typing import NoReturn
 
-from rich.console import Console
 from rich.table import Table
 
+from reports.console import Console
 from reports.diff import FACTOR, Change, Difference, Timing, difference
 from reports.exits import DONE, FAILED, FolderTaken, refuse
 from reports.folders import found
@@ -21,7 +21,9 @@ def show_difference(before: Path, after: Path) -> NoReturn:
     """Print it; exits 0, 1 (something got worse) or 2 (a folder cannot be used)."""
     try:
         changed = difference(found(before), found(after))
-    except (FolderTaken, ValueError, OSError) as fault:
+    except OSError as fault:
+        refuse([f"{fault.filename or f'{before}, {after}'}: {fault.strerror or fault}"])
+    except (FolderTaken, ValueError) as fault:
         refuse([str(fault)])
     console = Console()
     for warning in changed.warnings:

@@ -38,7 +38,9 @@ def render(template: str, scripts: Sequence[str], styles: Sequence[str], connect
 def css() -> str:
     """The style sheet of all pages with the colours of style.py in front, for light and for dark."""
     light, dark = style.css_variables(dark=False), style.css_variables(dark=True)
-    return f":root{{{light}}}@media(prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (HERE / "page.css").read_text()
+    return f":root{{{light}}}@media(prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (HERE / "page.css").read_text(
+        encoding="utf-8"
+    )
 
 
 def looks_as_json(looks: Mapping[str, style.Look]) -> Markup:

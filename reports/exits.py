@@ -10,6 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
+from reports.foreign_text import legible
+
 DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 STATUS = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}
 AGAIN = 1.0  # s between two times that a command is told
@@ -25,6 +27,10 @@ class Stopped(KeyboardInterrupt):
 
 class FolderTaken(Exception):
     """An output folder, or file, that may not be written to, and why."""
+
+
+class Unusable(ValueError):
+    """A file of a run that does not fit the others: which, why, and what to do."""
 
 
 class Listening:
@@ -119,7 +125,8 @@ def ends_when_told() -> Iterator[None]:
 def broken_off(part: Path, kept: Callable[[], str]) -> Iterator[None]:
     """What writes into `part` for long: broken off, or without room on the disk, it says what is `kept` of it.
 
-    Exits 130 after Ctrl-C, 143 after SIGTERM, 1 if something cannot be written, or may not any more.
+    Exits 130 after Ctrl-C, 143 after SIGTERM, 1 if something cannot be written, or may not any more, 2 if what was kept
+    before does not fit.
     """
     with stoppable():
         try:
@@ -135,6 +142,9 @@ def broken_off(part: Path, kept: Callable[[], str]) -> Iterator[None]:
         except OSError as fault:
             say(f"cannot write to {part}: {fault.strerror or fault}. {kept()}")
             sys.exit(FAILED)
+        except Unusable as fault:
+            say(f"{fault}. {kept()}")
+            sys.exit(BAD_INPUT)
 
 
 def refuse(faults: Sequence[str]) -> NoReturn:
@@ -145,5 +155,5 @@ def refuse(faults: Sequence[str]) -> NoReturn:
 
 
 def say(line: str) -> None:
-    """One line on standard error, as it is."""
-    print(line, file=sys.stderr)
+    """One line on standard error."""
+    print(legible(line), file=sys.stderr)

@@ -16,7 +16,7 @@ from reports.made import Kind, Made, may_replace, may_write, put_made, read_made
 
 RUN = Kind(
     "crosscheck run",
-    r"journal\.jsonl|trajectories/[0-9a-f]{16}\.npz(\.\w+)?|compared/[a-z0-9_-]+-[0-9a-f]{16}\.(npz|csv)(\.new)?",
+    r"journal\.jsonl|trajectories/[0-9a-f]{16}\.npz|compared/([a-z0-9_-]+-[0-9a-f]{16}\.(npz|csv)|deviations\.digest)",
     ("trajectories", "scenes", "compared"),
 )
 

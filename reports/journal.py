@@ -70,7 +70,7 @@ def lines_of(folder: Path) -> Iterator[dict[str, Any]]:
         for number, line in enumerate(journal, start=1):
             try:
                 yield json.loads(line)
-            except ValueError as error:
+            except (ValueError, RecursionError) as error:  # of brackets in brackets in brackets
                 if line.endswith(b"\n"):
                     raise ValueError(f"{folder / JOURNAL}: line {number} is not JSON: {error}") from error
 

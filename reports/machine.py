@@ -42,14 +42,14 @@ def busy_cores(seconds: float = 0.5) -> float:
 
 def _ticks() -> tuple[int, int]:
     """All ticks of all cores since the system began, and those without work (man 5 proc: idle and iowait)."""
-    ticks = [int(field) for field in Path("/proc/stat").read_text().splitlines()[0].split()[1:]]
+    ticks = [int(field) for field in Path("/proc/stat").read_text(encoding="utf-8").splitlines()[0].split()[1:]]
     return sum(ticks[:8]), ticks[3] + ticks[4]
 
 
 def processor() -> str:
     """The processor's name where the system tells it."""
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
         return platform.processor() or "unknown"
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]

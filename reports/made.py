@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from reports.exits import FolderTaken
+from reports.foreign_text import is_part, put_text
 from reports.journal import JOURNAL
 
 MADE = "made.json"
-OWN = re.compile(r"made\.json|(.*/)?\.crosscheck-\d+\.part")  # the record, and what a `put_text` that was killed leaves
 HEAD = 4096  # bytes at the beginning of a file among which its mark is
 
 
@@ -68,22 +68,6 @@ def put_made(folder: Path, made: Made) -> None:
     put_text(folder / MADE, json.dumps(made._asdict(), indent=1) + "\n")
 
 
-def put_text(path: Path, text: str) -> None:
-    """Write a whole file, or leave the one that is there; a pipe or a device is written to as it comes."""
-    path = path.resolve()
-    if path.exists() and not path.is_file():
-        path.write_text(text, encoding="utf-8", newline="")
-        return
-    part = path.with_name(f".crosscheck-{os.getpid()}.part")
-    try:
-        with part.open("x", encoding="utf-8", newline="") as file:
-            file.write(text)
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
-
-
 def stranger_in(folder: Path, kind: Kind) -> str:
     """What in a folder the command did not make, as the rest of a sentence; "" if there is nothing of the kind.
 
@@ -99,7 +83,7 @@ def stranger_in(folder: Path, kind: Kind) -> str:
     for path in files_below(folder, kind.folders):
         name = path.relative_to(folder).as_posix()
         mode = path.lstat().st_mode
-        if not stat.S_ISREG(mode) or not (OWN.fullmatch(name) or kind.names(name) or name in made.files):
+        if not stat.S_ISREG(mode) or not (name == MADE or is_part(path) or kind.names(name) or name in made.files):
             return f"holds {name}, which {kind.command} did not make"
         if not as_written(path, made.files.get(name)):
             return f"holds {name}, which is not as {kind.command} left it"

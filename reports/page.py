@@ -22,6 +22,7 @@ from reports import overview, style
 from reports.charts import CHARTS, POINTS, Drawing
 from reports.comparison import Comparison
 from reports.documents import content_policy, css, looks_as_json
+from reports.foreign_text import encoded, put_text
 from reports.known_answers import MEANING
 from reports.lessons.catalogue import LESSONS
 from reports.metrics import METRICS
@@ -81,7 +82,7 @@ def write_page(
     names = overview.names_of(comparisons)
     common = overview.common_settings(comparisons)
     sections = [section_of(comparison, names, common) for comparison in comparisons]
-    plotly, scripts = get_plotlyjs(), [(HERE / script).read_text() for script in SCRIPTS]
+    plotly, scripts = get_plotlyjs(), [(HERE / script).read_text(encoding="utf-8") for script in SCRIPTS]
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
@@ -98,7 +99,7 @@ def write_page(
         heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, lessons=LESSONS, truth_of=truth_of,
         common=by_name(common), trust=how_far_to_trust(comparisons), searched=by_engine(searched()),
     )  # fmt: skip
-    path.write_text(html, encoding="utf-8")
+    put_text(path, html)
 
 
 def section_of(comparison: Comparison, names: Sequence[str], common: overview.Settings) -> Section:
@@ -137,7 +138,7 @@ def packed_charts(drawings: Mapping[str, Drawing]) -> str:
 
 def deflated(text: str) -> str:
     """Text, deflated, as base64: what `unpack` of player.js reads."""
-    return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
+    return base64.b64encode(zlib.compress(encoded(text), 9)).decode()
 
 
 def by_family(sections: Sequence[Section]) -> dict[str, list[Section]]:

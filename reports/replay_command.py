@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from adapters.engines import ENGINES, OWN, Row, read_row, row_of
-from reports.archive import STATE, Archive, from_trail, load_trajectory, trajectory_file
+from reports.archive import STATE, Archive, from_trail, load_trajectory, stored_trajectory
 from reports.cells import Cell
 from reports.commands import go_where_files_are
 from reports.exits import DONE, FAILED, FolderTaken, refuse, say
 from reports.folders import found
+from reports.foreign_text import legible
 from reports.playing import play_here
 from reports.scenes import played_scenario
 from reports.worker import Worker
@@ -49,16 +50,21 @@ def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = EN
         say(f"{player.removesuffix(OWN)} or a version has changed since: what is played is what is there now")
     k = len(before) - 1 if before is not None and record["status"] != "ok" else 0
     substeps = record["substeps"]
-    print(f"{record['scenario']}  {record['engine']}:{record['profile']}  dt {record['dt_s']:.4g} s")
-    print(f"was:    {ending(record['status'], record['reason'])}")
-    print(f"from:   step {k * substeps}, {scenario.times[k]:g} s{REMEMBERED if k else ', the start'}", flush=True)
+    show(f"{record['scenario']}  {record['engine']}:{record['profile']}  dt {record['dt_s']:.4g} s")
+    show(f"was:    {ending(record['status'], record['reason'])}")
+    show(f"from:   step {k * substeps}, {scenario.times[k]:g} s{REMEMBERED if k else ', the start'}")
     status, reason, after = again(record, row, continued(scenario, substeps, before, k), timeout)
     step = k * substeps + (len(after) - 1 if after is not None else 0)
-    print(f"now:    {ending(status, reason)}")
-    print(f"as far: step {step} of {scenario.samples * substeps}, {step * record['dt_s']:g} s")
+    show(f"now:    {ending(status, reason)}")
+    show(f"as far: step {step} of {scenario.samples * substeps}, {step * record['dt_s']:g} s")
     if record["status"] == status == "ok":
-        print(f"bits:   {'as' if same(before, after, substeps) else 'other than'} recorded")
+        show(f"bits:   {'as' if same(before, after, substeps) else 'other than'} recorded")
     sys.exit(DONE if status == "ok" else FAILED)
+
+
+def show(line: str) -> None:
+    """One line on standard output, at once: what the engine prints comes after it."""
+    print(legible(line), flush=True)
 
 
 def ending(status: str, reason: str) -> str:
@@ -120,8 +126,9 @@ def again(record: dict[str, Any], row: Row, scenario: Scenario, timeout: float) 
 
 def recorded(archive: Archive, record: dict[str, Any]) -> Trajectory | None:
     """The samples that the run has of a cell; None if it has none."""
-    path = trajectory_file(archive.folder, record["cell"])
-    return load_trajectory(path) if path.exists() else None
+    if record["damage"]:
+        say(f"{archive.folder / 'trajectories'}: {record['damage']}, so the cell is played from the start")
+    return stored_trajectory(archive.folder, record)
 
 
 def same(before: Trajectory | None, after: Trajectory | None, substeps: int) -> bool:

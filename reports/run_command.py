@@ -105,7 +105,7 @@ def plan_of(folder: Path, part: Path) -> Plan:
 def file_of(scene: str, folder: Path, header: Mapping[str, Any]) -> Path:
     """The file of a scene, from where the run was begun, or where that is gone the copy in the run's folder."""
     path = Path(header["folder"], scene)
-    copy = stored_scene(folder, header.get("names", {}).get(scene, ""))
+    copy = stored_scene(folder, header["names"].get(scene, ""))
     return copy if not path.exists() and copy.exists() else path
 
 

@@ -9,6 +9,8 @@ from typing import Any
 
 from reports.archive import stored_scene
 from reports.cells import scene_hash
+from reports.exits import Unusable
+from reports.journal import JOURNAL
 from scenarios.catalogue import SCENARIOS
 from scenarios.catalogue import scenario as from_catalogue
 from scenarios.file_tables import MOST_STEPS
@@ -22,18 +24,25 @@ def open_scene(scene: str, seed: int) -> Scenario:
 
 
 def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
-    """What was played, by the line of a cell in the run of `folder`.
-
-    Raises:
-        ValueError: the scene is another one now.
-    """
+    """What was played, by the line of a cell in the run of `folder`; raises `Unusable` if it does not fit its scene."""
     scene = record["scene"] if record["scene"] in SCENARIOS else str(stored_scene(folder, record["scenario"]))
     scenario = open_scene(scene, record["seed"])
     if scene_hash(scenario) != record["scene_hash"]:
-        raise ValueError(
+        raise Unusable(
             f"{scenario.name} is not the scene any more that was played; crosscheck run --resume plays it again"
         )
+    must_fit(folder, scenario, record)
     return scenario
+
+
+def must_fit(folder: Path, scenario: Scenario, record: dict[str, Any]) -> None:
+    """Raise `Unusable` if the line of a cell is not one of that scenario."""
+    for name, value in {"scenario": scenario.name, "dt_s": scenario.dt(record["substeps"])}.items():
+        if record[name] != value:
+            raise Unusable(
+                f"{folder / JOURNAL}: the line of the cell {record['cell']}: {name} = {record[name]!r}: must be "
+                f"{value!r}, that of {record['scene']} with {record['substeps']} substeps; delete that line"
+            )
 
 
 def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario:

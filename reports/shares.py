@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -21,10 +20,11 @@ import pandas as pd
 
 from adapters.play import Run
 from reports.answers import Answer, answer_of, no_answer, put_answer, read_answer
-from reports.archive import Archive, run_of, trajectory_file
+from reports.archive import Archive, as_found, digest, run_of
 from reports.cells import Cell, versions
 from reports.comparison import COLUMNS, Comparison, compare
-from reports.scenes import played_scenario
+from reports.foreign_text import put_bytes
+from reports.scenes import must_fit, played_scenario
 from reports.view import NOT_JUDGED
 from reports.worker_process import Failure, allow
 from scenarios.model import Scenario
@@ -33,6 +33,7 @@ from scenarios.model import Scenario
 JUDGES = ("comparison", "metrics", "view", "delays", "laws", "collisions", "faces", "violations", "scales")
 ANSWER = ".npz"  # how the file of an answer ends
 NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which nothing means NaN
+PATHS = "surrogateescape"  # so that the path of a solver that is not UTF-8 is the same when it is read back
 COMPARING = 300.0  # s that the comparison of a scene may take: all 38 of the default run take 30, on two cores
 Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order of the tables
 Task = tuple[Path, Callable[[], Any]]  # where its result is kept, and what makes it in a worker
@@ -83,7 +84,7 @@ class Gathering:
         if asked not in self.scenes and (answer is None or answer.may_be_had(self.timeout)):
             self.scenes[asked] = scene
             yield asked, partial(answer_here, self.folder, records)
-        elif answer is not None and not (path := share_file(self.folder, records, answer)).exists():
+        elif answer is not None and not is_kept(path := share_file(self.folder, records, answer)):
             self.scenes[path] = scene
             yield path, partial(share_of, self.folder, records, asked)
 
@@ -144,7 +145,12 @@ def share_of(folder: Path, records: Records, answered: Path) -> Share:
     if answer.lost and not (lost := not_judged(comparison.runs, answer.lost, "truth")).empty:
         table = pd.concat([table, lost])
     damaged = any(run.status != record["status"] for run, record in zip(comparison.runs, records))
-    return Share(table.to_csv(index=False).encode(), damaged)
+    return Share(csv_of(table), damaged)
+
+
+def csv_of(table: pd.DataFrame, header: bool = True) -> bytes:
+    """What `read_share` reads."""
+    return table.to_csv(index=False, header=header).encode(errors=PATHS)
 
 
 def compared(folder: Path, records: Records, answer: Answer) -> Comparison:
@@ -161,22 +167,38 @@ def not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
 
 
 def scenario_of(folder: Path, records: Records) -> Scenario:
-    """What was played, with the steps that were played; raises `ValueError` if the scene is another one now."""
+    """What was played, with the steps that were played; raises `Unusable` if a line does not fit the scene as it is."""
     [scenario] = [played_scenario(folder, record) for record in {one["scene_hash"]: one for one in records}.values()]
+    for record in records:
+        must_fit(folder, scenario, record)
     return replace(scenario, substeps=tuple(sorted({record["substeps"] for record in records})))
 
 
 def keep_share(path: Path, csv: bytes) -> None:
-    """Write it whole or not at all, as a part would be taken for the whole."""
-    new = path.with_name(f"{path.name}.new")
-    new.write_bytes(csv)
-    os.replace(new, path)
+    """Write it whole or not at all, its digest in a line before it."""
+    put_bytes(path, f"{digest(csv)}\n".encode() + csv)
 
 
-def read_share(share: Path | bytes) -> pd.DataFrame:
+def kept_share(path: Path) -> bytes:
+    """What `keep_share` wrote; raises `OSError`, or `ValueError` if it is that no more."""
+    first, _, csv = path.read_bytes().partition(b"\n")
+    if first != digest(csv).encode():
+        raise ValueError(f"{path}: is not what was written; delete it, and it is made again")
+    return csv
+
+
+def is_kept(path: Path) -> bool:
+    """Whether a share is there as it was written."""
+    try:
+        return bool(kept_share(path))
+    except (OSError, ValueError):
+        return False
+
+
+def read_share(csv: bytes) -> pd.DataFrame:
     """The table, bit for bit as it was written."""
     empty = {column: [""] for column in NUMBERS}
-    return pd.read_csv(io.BytesIO(share) if isinstance(share, bytes) else share, keep_default_na=False, na_values=empty)
+    return pd.read_csv(io.BytesIO(csv), keep_default_na=False, na_values=empty, encoding_errors=PATHS)
 
 
 def answer_file(folder: Path, records: Records) -> Path:
@@ -186,11 +208,9 @@ def answer_file(folder: Path, records: Records) -> Path:
 
 def share_file(folder: Path, records: Records, answer: Answer) -> Path:
     """Where the share of a scene is kept: named by all that decides it, its answer, the judge and the files too."""
-    sizes = []
-    for record in records:
-        path = trajectory_file(folder, record["cell"])
-        sizes.append((record["cell"], record["status"], record["reason"], path.stat().st_size if path.exists() else -1))
-    return named_by(folder, records, (sizes, judge(), answer.lost), ".csv")
+    found = [as_found(folder, record) for record in records]
+    files = [tuple(record[name] for name in ("cell", "status", "reason", "file", "damage")) for record in found]
+    return named_by(folder, records, (files, judge(), answer.lost), ".csv")
 
 
 def named_by(folder: Path, records: Records, what: tuple, suffix: str) -> Path:

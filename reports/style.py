@@ -6,6 +6,8 @@ import math
 from typing import NamedTuple
 from zlib import crc32
 
+from reports.foreign_text import encoded
+
 TRUTH = "truth"
 
 
@@ -84,7 +86,7 @@ HEAT_DARK = (
 
 def look(engine: str, profile: str = "") -> Look:
     """How `engine:profile` is drawn; an engine without a row gets one of `OTHERS` by its name."""
-    light, dark, shape = ENGINE.get(engine) or OTHERS[crc32(engine.encode()) % len(OTHERS)]
+    light, dark, shape = ENGINE.get(engine) or OTHERS[crc32(encoded(engine)) % len(OTHERS)]
     dash = SWITCHED if "+" in profile else DASHED.get(profile, ())
     return Look(light, dark, dash, shape, not dash)
 

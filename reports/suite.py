@@ -15,13 +15,14 @@ from typing import Any
 from adapters.conformance import no_answer
 from adapters.engines import Row
 from adapters.play import Run
-from reports.archive import Archive, from_trail, packed, stored_scene, trajectory_file
+from reports.archive import Archive, digest, from_trail, packed, stored_scene, trajectory_file
 from reports.cells import Cell, content_key, scene_hash
 from reports.folders import RUN
+from reports.foreign_text import put_bytes, put_text
 from reports.journal import Journal, plain
 from reports.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.machine import about
-from reports.made import put_text, writing
+from reports.made import writing
 from reports.playing import Played, conform_here, play_here, player, time_here
 from reports.runner import TIMEOUT, run_all
 from reports.scenes import open_scene, with_steps
@@ -181,9 +182,9 @@ def had(archive: Archive, plan: Plan, means: Means, scenarios: Mapping[str, Scen
         if cell.scene not in hashes or cell.engine not in plan.engines:
             continue
         stopped = record["status"] == "timeout" and record["timeout_s"] < means.timeout
-        lost = record["step"] >= 0 and not trajectory_file(archive.folder, record["cell"]).exists()
+        lost = record["damage"]  # its trajectory is gone, or not what was written
         same = record["cell"] == cell.key(hashes[cell.scene], plan.engines[cell.engine].source)
-        if same and not (stopped or lost or record.get("outside")):
+        if same and not (stopped or lost or record["outside"]):
             done.add(cell)
     return done
 
@@ -225,7 +226,7 @@ def keep_cell(
         raise OtherVersions("a worker has other versions or other source of the players than this machine")
     path = trajectory_file(journal.path.parent, key)
     if played.file:
-        path.write_bytes(played.file)
+        put_bytes(path, played.file)
     record = {
         "cell": key,
         "scene_hash": scene_hash(scenario),
@@ -243,6 +244,7 @@ def keep_cell(
         "seconds": run.seconds,
         "timeout_s": means.timeout,
         "outside": isinstance(result, Failure) and result.outside,
+        "file": digest(played.file) if played.file else "",
         "settings": run.settings,
         "versions": run.versions,
     }

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
-import shutil
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence, Set
 from contextlib import closing
@@ -14,17 +14,21 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from reports.answers import Answer, read_answer
-from reports.archive import Archive, run_of
+from reports.archive import Archive, digest, run_of
 from reports.comparison import Comparison, answered
 from reports.folders import RUN
+from reports.foreign_text import encoded, is_part, put_text, whole
 from reports.journal import JOURNAL
 from reports.runner import run_all
 from reports.shares import (
     ANSWER,
+    PATHS,
     Gathering,
     Records,
     answer_file,
+    csv_of,
     in_order,
+    kept_share,
     name_of,
     not_judged,
     read_share,
@@ -73,10 +77,11 @@ def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
     unjudged = {by_scene[scene][0]["scenario"]: answer.lost for scene, answer in had.items() if answer.lost}
     unjudged |= {unkept[scene].scenario.name: not_compared(failure) for scene, failure in gathering.failed.items()}
     say("writing the tables")
-    write_deviations(folder / "deviations.csv", shares, unkept)
-    sweep(folder / "compared", {*shares.values(), *(answer_file(folder, records) for records in by_scene.values())})
+    write_deviations(folder, shares, unkept)
+    had_from = {answer_file(folder, records) for records in by_scene.values()}
+    sweep(folder / "compared", {*shares.values(), *had_from, seal_of(folder)})
     runs = table_of_runs([record for records in by_scene.values() for record in records], archive, unkept)
-    runs.to_csv(folder / "runs.csv", index=False)
+    put_text(folder / "runs.csv", runs.to_csv(index=False))
     return Tables(runs, had, shares, unkept, unjudged)
 
 
@@ -86,8 +91,8 @@ def compare_missing(archive: Archive, by_scene: Mapping[str, Records], say: Call
     # As much time as the cells had: it is the same option.
     gathering = Gathering(archive, [], max(record["timeout_s"] for record in archive.records))
     tasks = deque(gathering.whole())
-    for scene in set(gathering.scenes.values()):
-        scenario_of(archive.folder, by_scene[scene])  # a scene that is another one now is found here
+    for records in by_scene.values():
+        scenario_of(archive.folder, records)  # a scene that is another one now is found here
     with closing(run_all({}, os.cpu_count() or 1, gathering.timeout, urgent=tasks)) as results:
         for path, result in results:
             name = by_scene[gathering.scenes[path]][0]["scenario"]
@@ -125,7 +130,7 @@ def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
         scenario, truth = answered(tables.answers[scene].given_to(scenario_of(archive.folder, records)))
         middle = scenario.substeps[len(scenario.substeps) // 2]
         runs = [run_of(archive.folder, record, with_trajectory=record["substeps"] == middle) for record in records]
-        comparisons.append(Comparison(scenario, truth, runs, read_share(tables.shares[scene])))
+        comparisons.append(Comparison(scenario, truth, runs, read_share(kept_share(tables.shares[scene]))))
     return comparisons
 
 
@@ -138,23 +143,33 @@ def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
     return {scene: in_order(records, players) for scene, records in by_scene.items() if records}
 
 
-def write_deviations(path: Path, shares: Mapping[str, Path], unkept: Mapping[str, Comparison]) -> None:
-    """Put the scenes' shares one after the other."""
-    with path.open("wb") as whole:
+def write_deviations(folder: Path, shares: Mapping[str, Path], unkept: Mapping[str, Comparison]) -> None:
+    """Put the scenes' shares one after the other into deviations.csv, and its digest beside them."""
+    all_of_it = hashlib.sha256()
+    with whole(folder / "deviations.csv") as file:
         for number, (scene, share) in enumerate(shares.items()):
-            if scene in unkept:
-                whole.write(unkept[scene].table.to_csv(index=False, header=not number).encode())
-                continue
-            with share.open("rb") as part:
-                if number:
-                    part.readline()  # the names of the columns
-                shutil.copyfileobj(part, whole)
+            csv = csv_of(unkept[scene].table) if scene in unkept else kept_share(share)
+            rows = csv.partition(b"\n")[2] if number else csv  # the names of the columns once
+            text = encoded(rows.decode(errors=PATHS))
+            all_of_it.update(text)
+            file.write(text)
+    put_text(seal_of(folder), all_of_it.hexdigest()[:16])
+
+
+def seal_of(folder: Path) -> Path:
+    """Where the digest of deviations.csv is kept: `diff` believes no other table."""
+    return folder / "compared" / "deviations.digest"
+
+
+def is_sealed(folder: Path) -> bool:
+    """Whether deviations.csv is as it was written."""
+    return seal_of(folder).read_bytes() == digest((folder / "deviations.csv").read_bytes()).encode()
 
 
 def sweep(folder: Path, kept: Set[Path]) -> None:
     """Delete the answers and shares that are of something else, and nothing that is no answer or share."""
     for other in set(folder.iterdir()) - kept:
-        if RUN.names(f"{folder.name}/{other.name}"):
+        if is_part(other) or RUN.names(f"{folder.name}/{other.name}"):
             other.unlink()
 
 

@@ -6,13 +6,14 @@ from pathlib import Path
 from time import perf_counter
 from types import TracebackType
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
 from adapters.play import STATUSES
 from reports import overview
+from reports.console import Console
+from reports.foreign_text import legible
 from reports.report import Report
 
 QUIET = 30.0  # s between two lines where there is no terminal that a bar could be drawn on
@@ -23,8 +24,9 @@ class Progress:
 
     def __init__(self) -> None:
         self.bar = Bar(
-            TextColumn("{task.description:<44.44}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-            TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[each]}"), console=Console(stderr=True),
+            TextColumn("{task.description:<44.44}", markup=False), BarColumn(), MofNCompleteColumn(),
+            TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[each]}"),
+            console=Console(stderr=True),
         )  # fmt: skip
 
     def __enter__(self) -> Progress:
@@ -38,11 +40,11 @@ class Progress:
 
     def say(self, what: str) -> None:
         """Say what is being done."""
-        self.bar.update(self.task, description=what)
+        self.bar.update(self.task, description=legible(what))
 
     def note(self, sentence: str) -> None:
         """A line that stays."""
-        self.bar.console.print(sentence, highlight=False, markup=False)
+        self.bar.console.print(sentence, highlight=False)
 
     def start(self, missing: int, total: int, what: str = "") -> None:
         """From now on count to `total`, of which some may be `missing` only."""
@@ -55,7 +57,7 @@ class Progress:
         """One more is done."""
         if status != "ok":
             why = f" ({reason})" if status not in ("unsupported", "ok") else ""
-            self.bar.console.print(f"  {what}: {status}{why}", style="yellow", highlight=False, markup=False)
+            self.bar.console.print(f"  {what}: {status}{why}", style="yellow", highlight=False)
         self.counted += 1
         now = perf_counter()
         each = (now - self.since) / self.counted

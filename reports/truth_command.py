@@ -10,11 +10,11 @@ from functools import partial
 from typing import NoReturn
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from reports.answers import no_answer, record_here
 from reports.commands import checked_scenes
+from reports.console import Console
 from reports.exits import DONE, FAILED, say
 from reports.journal import plain
 from reports.runner import run_all

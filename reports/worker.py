@@ -17,6 +17,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from reports.foreign_text import legible
 from reports.worker_process import CLOCK, Failure
 
 STARTING = 120.0  # s for Python to start and to import what a task is made of, on a machine that is busy
@@ -89,7 +90,7 @@ class Worker:
         new = os.read(self.output, PRINTED)
         self.printed = (self.printed + new)[-PRINTED:]
         if self.show:
-            sys.stderr.write(new.decode(errors="replace"))
+            sys.stderr.write(legible(new.decode(errors="replace")))
         return len(new)
 
     def death(self, begun: bool) -> Failure | None:

@@ -12,11 +12,13 @@ import pytest
 
 from adapters.engines import ENGINES
 from reports import suite
+from reports.archive import digest
 from reports.diff import Timing, difference, timing
 from reports.diff_command import show_difference
 from reports.journal import JOURNAL, Journal, lines_of
 from reports.report import make_report
 from reports.suite import Means, Plan, carry_out
+from reports.tables import seal_of
 from reports.terminal import Progress
 
 PLAN = Plan(
@@ -52,6 +54,12 @@ def edit(folder: Path, change: Callable[[dict], None]) -> None:
     for line in lines:
         change(line)
     (folder / JOURNAL).write_text("".join(json.dumps(line) + "\n" for line in lines))
+
+
+def put_table(table: pd.DataFrame, folder: Path) -> None:
+    """Other numbers, as another run would have written them."""
+    table.to_csv(folder / "deviations.csv", index=False)
+    seal_of(folder).write_text(digest((folder / "deviations.csv").read_bytes()))
 
 
 def exit_of(before: Path, after: Path) -> object:
@@ -91,7 +99,7 @@ def test_one_bit_in_a_cell_that_is_the_same_is_worse(before: Path, after: Path):
     table = pd.read_csv(after / "deviations.csv", dtype=str, keep_default_na=False)
     row = table.index[(table.metric == "position_max") & (table.versus == "truth")][0]
     table.loc[row, "value"] = repr(float(table.loc[row, "value"]) * (1 - 2**-53))
-    table.to_csv(after / "deviations.csv", index=False)
+    put_table(table, after)
     [change] = difference(before, after).numbers
 
     assert (change.verdict, "same cell, other bits" in change.what) == ("worse", True)
@@ -111,7 +119,7 @@ def test_where_versions_differ_the_metric_says_what_is_worse(before: Path, after
     edit(after, other_version)
     table = pd.read_csv(after / "deviations.csv")
     table.loc[table.metric == "position_max", "value"] *= factor
-    table.to_csv(after / "deviations.csv", index=False)
+    put_table(table, after)
     changed = difference(before, after)
 
     assert "version: pymunk: 7.3.1 before, 8.0 after" in changed.warnings
@@ -189,7 +197,7 @@ def test_a_scene_that_is_not_judged_any_more_is_worse(before: Path, after: Path)
     runs = table[table.scenario == "slow_hit"].drop_duplicates(["engine", "profile", "dt_s"])
     why = "not judged: the exact answer took longer than 60 s (--timeout)"
     lost = runs.assign(metric="status", value="", unit="", versus="truth", at_s="", note=why)
-    pd.concat([judged, lost]).to_csv(after / "deviations.csv", index=False)
+    put_table(pd.concat([judged, lost]), after)
     worse, better = difference(before, after).statuses, difference(after, before).statuses
 
     assert len(worse) == len(better) == len(runs) > 0

@@ -86,12 +86,12 @@ def test_a_share_that_is_not_there_or_not_whole_is_made_again(folder: Path, tmp_
     make_tables(Archive.read(copy), silent)
     whole = (copy / "deviations.csv").read_bytes()
     for path in (copy / "compared").iterdir():
-        path.with_name(f"{path.name}.new").write_bytes(path.read_bytes()[:100])
+        path.with_name(".crosscheck-1.part").write_bytes(path.read_bytes()[:100])
         path.unlink()
     make_tables(Archive.read(copy), silent)
 
     assert (copy / "deviations.csv").read_bytes() == whole
-    assert {path.suffix for path in (copy / "compared").iterdir()} == {".csv", ANSWER}
+    assert {path.suffix for path in (copy / "compared").iterdir()} == {".csv", ANSWER, ".digest"}
 
 
 def test_a_worker_that_is_killed_while_it_compares_loses_nothing(

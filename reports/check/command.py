@@ -18,7 +18,8 @@ from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
 from reports.check.verdict import NONE, FileCheck, check_file
 from reports.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
-from reports.made import may_overwrite, put_text
+from reports.foreign_text import put_text
+from reports.made import may_overwrite
 from reports.runner import run_all
 from reports.worker_process import Failure
 

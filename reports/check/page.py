@@ -11,7 +11,7 @@ from reports.check.rows import TASKS, shown
 from reports.check.smallest import DT, Smallest
 from reports.check.verdict import FileCheck
 from reports.documents import looks_as_json, render
-from reports.made import put_text
+from reports.foreign_text import put_text
 from reports.replay import pack_layers, ratio_of
 from scenarios.model import Scenario, Trajectory
 

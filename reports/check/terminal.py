@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
-from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
+from rich.text import Text
 
 from adapters.solver_file import printable
 from reports.check.rows import TASKS
 from reports.check.verdict import FileCheck
+from reports.console import Console
+from reports.foreign_text import legible
 
 STYLE = {"right": "green", "fault": "bold red", "note": "yellow", "not asked": "dim"}
 SHORT = {"right": "ok", "note": "ok", "fault": "FAULT", "not asked": "-"}
@@ -22,7 +23,7 @@ def print_file(one: FileCheck) -> None:
     """The sentences, the verdict of every task, then the faults and the free choices."""
     console = Console()
     for k, sentence in enumerate(one.sentences):
-        console.print(escape(sentence if one.passed else f"{k + 1}. {sentence}"), highlight=False)
+        console.print(sentence if one.passed else f"{k + 1}. {sentence}", highlight=False)
     console.print()
     table = Table("task", "verdict", "questions", "faults", box=None, padding=(0, 2, 0, 0))
     for task, title in TASKS.items():
@@ -30,13 +31,12 @@ def print_file(one: FileCheck) -> None:
         if rows:
             asked = sum(row.verdict != "not asked" for row in rows)
             faults = sum(row.verdict == "fault" for row in rows)
-            table.add_row(title, f"[{STYLE[word]}]{word}", str(asked), str(faults or ""))
+            table.add_row(title, Text(word, STYLE[word]), str(asked), str(faults or ""))
     console.print(table)
     details = Table("task", "row", "came", "expected", "cause or choice", box=None, padding=(0, 2, 0, 0))
     shown = [row for row in one.rows if row.verdict in ("fault", "note")]
     for row in shown:
-        colour = STYLE[row.verdict]
-        details.add_row(row.task, f"[{colour}]{row.name}", escape(row.got), escape(row.expected), escape(row.cause))
+        details.add_row(row.task, Text(row.name, STYLE[row.verdict]), row.got, row.expected, row.cause)
     if shown:
         console.print()
         console.print(details)
@@ -62,14 +62,15 @@ def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
     widest = {task: max(len(task), *(len(SHORT[one.tasks[task]]) for one in checks)) for task in TASKS}
     room = console.width - sum(width + 1 for width in widest.values()) - 1
     for one in checks:
-        words = [f"[{STYLE[word]}]{SHORT[word]}" for word in one.tasks.values()]
-        table.add_row(escape(elided(name_in(folder, one), room)), *words)
+        words = [Text(SHORT[word], STYLE[word]) for word in one.tasks.values()]
+        table.add_row(elided(name_in(folder, one), room), *words)
     console.print(table)
     first = {name_in(folder, one): one.sentences[0].removeprefix(f"{one.path}: ") for one in checks if not one.passed}
     if first:
         console.print("\nTo begin with:")
     for name, sentence in first.items():
-        console.print(Padding(f"[bold]{escape(name)}[/bold]: {escape(sentence)}", (0, 0, 0, 2)), highlight=False)
+        begin = Text.assemble((name, "bold"), ": ", legible(sentence))
+        console.print(Padding(begin, (0, 0, 0, 2)), highlight=False)
     right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
     rest = f"; {refused} not checked" if refused else ""
     console.print(f"\n{right} of {len(checks) - refused} files without a fault{rest}.", highlight=False)

@@ -14,13 +14,14 @@ from adapters.engines import ENGINES
 from reports.commands import unknown
 from reports.exits import FAILED, FolderTaken, refuse, say
 from reports.folders import made_anew, place_of
+from reports.foreign_text import legible, put_text
 from reports.game.command import FIRST
 from reports.game.server import Game, application, serve
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson
 from reports.lessons.pages import ALONE, FILES, ROUTES, Links, index_page, offline, told
-from reports.made import Kind, may_overwrite, put_text, writing
+from reports.made import Kind, may_overwrite, writing
 from reports.runner import run_all
 from reports.terminal import Progress
 from reports.worker_process import Failure
@@ -52,7 +53,7 @@ def write_one(name: str, path: Path) -> None:
         with TemporaryFile(dir=path.parent):  # so that it is known before any run whether it can be written
             pass
         write_pages({path: LESSONS[name]}, ALONE, {})
-    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, opens without a server")
+    print(legible(f"{path}: {path.stat().st_size / 1e6:.1f} MB, opens without a server"))
 
 
 def write_all(folder: Path) -> None:

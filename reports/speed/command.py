@@ -11,14 +11,15 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import OWN, row_of
 from reports import style
 from reports.commands import checked_engines, checked_scenes, opening
+from reports.console import Console
 from reports.exits import DONE, FAILED, broken_off, say
 from reports.folders import discard, given_back, open_part, place_of, replace_folder
+from reports.foreign_text import put_text
 from reports.journal import Journal
 from reports.machine import about
 from reports.made import Kind, digest_of, writing
@@ -96,7 +97,7 @@ def carry_out(plan: Plan, header: dict[str, Any], kept: Kept, resume: bool) -> t
 def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:
     """Tables first, then the page, so that what was measured is kept whatever happens to the page."""
     with writing(folder, (MACHINE, *results.files, FIGURES, PAGE)):
-        (folder / MACHINE).write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
+        put_text(folder / MACHINE, json.dumps(header, indent=1) + "\n")
         results.write(folder)
         if results.plan.whole:
             figures.write(folder / FIGURES, results, header)

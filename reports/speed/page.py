@@ -14,6 +14,7 @@ from plotly.offline import get_plotlyjs
 
 from reports import style
 from reports.charts import Drawing
+from reports.foreign_text import put_text
 from reports.page import SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
 from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import TOTALS, UNEXPLAINED
@@ -41,7 +42,7 @@ class Section(NamedTuple):
 
 def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     """Write the page of `results`; `about` holds command, seed, machine, versions, started, seconds, load."""
-    plotly, scripts = get_plotlyjs(), [(HERE.parent / script).read_text() for script in SCRIPTS]
+    plotly, scripts = get_plotlyjs(), [(HERE.parent / script).read_text(encoding="utf-8") for script in SCRIPTS]
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
@@ -61,7 +62,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
     )  # fmt: skip
-    path.write_text(html, encoding="utf-8")
+    put_text(path, html)
 
 
 def section(

@@ -190,4 +190,4 @@ class Results:
     def write(self, folder: Path) -> None:
         """The tables as CSV files."""
         for name, table in self.files.items():
-            table.to_csv(folder / name, index=False)
+            table.to_csv(folder / name, index=False, errors="backslashreplace")

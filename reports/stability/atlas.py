@@ -15,9 +15,10 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from reports.foreign_text import put_text
 from reports.journal import JOURNAL, Journal, lines_of, numbers, plain
 from reports.machine import about
-from reports.made import digest_of, put_text, writing
+from reports.made import digest_of, writing
 from reports.runner import run_all
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out

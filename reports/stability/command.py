@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import NoReturn
 
 import pandas as pd
-from rich.console import Console
 from rich.table import Table
 
 from adapters.engines import ENGINES, OWN
 from reports.commands import checked_engines, opening, unknown
+from reports.console import Console
 from reports.exits import DONE, FAILED, broken_off, refuse, say
 from reports.folders import given_back, may_go_on, open_part, place_of, replace_folder
 from reports.journal import Journal
@@ -81,11 +81,11 @@ def write_files(folder: Path) -> Atlas:
     laws = [(one.name, one.player, *at[:-1]) for one in atlas.laws for at in one.gaps]
     cells = [(one.name, one.player, *cell) for one in atlas.maps for cell in one.cells]
     with writing(folder, FILES):
-        table(atlas.limits).to_csv(folder / LIMITS, index=False)
+        table(atlas.limits).to_csv(folder / LIMITS, index=False, errors="backslashreplace")
         columns = ["scene", "player", *AtGap._fields[:-1]]
-        pd.DataFrame(laws, columns=columns).to_csv(folder / LAWS, index=False)
+        pd.DataFrame(laws, columns=columns).to_csv(folder / LAWS, index=False, errors="backslashreplace")
         columns = ["map", "player", "x", "y", "reading", "failed", "event"]
-        pd.DataFrame(cells, columns=columns).to_csv(folder / MAP, index=False)
+        pd.DataFrame(cells, columns=columns).to_csv(folder / MAP, index=False, errors="backslashreplace")
         write_page(folder / PAGE, folder, atlas)
     return atlas
 

@@ -15,6 +15,7 @@ from plotly.offline import get_plotlyjs
 from adapters.play import Run
 from reports import style
 from reports.charts import Drawing, Line, figure_of, shortened
+from reports.foreign_text import put_text
 from reports.page import HERE, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
 from reports.replay import pack_layers, ratio_of
 from reports.stability import overview
@@ -69,8 +70,9 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
     names = [limit.player for limit in limits] + [one.player for one in maps] + [one.player for one in laws]
     names = list(dict.fromkeys(names))
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
-    plotly, scripts = get_plotlyjs(), [(HERE / script).read_text() for script in SCRIPTS]
-    scripts.append((HERE / "stability" / "stability.js").read_text())
+    plotly, scripts = get_plotlyjs(), [(HERE / script).read_text(encoding="utf-8") for script in SCRIPTS]
+    scripts.append((HERE / "stability" / "stability.js").read_text(encoding="utf-8"))
+    sheet = (HERE / "stability" / "stability.css").read_text(encoding="utf-8")
     environment = Environment(
         loader=FileSystemLoader(HERE / "stability"), autoescape=True, trim_blocks=True, lstrip_blocks=True,
         undefined=StrictUndefined,
@@ -81,11 +83,11 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
         players=[name for name in names if "+" not in name], looks=looks, cell_of=overview.cell_of,
         maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, gaps=GAPS,
         words=overview, exact=EXACT,
-        form=FORMS[atlas.header["form"]], css=Markup(css() + (HERE / "stability" / "stability.css").read_text()),
+        form=FORMS[atlas.header["form"]], css=Markup(css() + sheet),
         looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
     )  # fmt: skip
-    path.write_text(html, encoding="utf-8")
+    put_text(path, html)
 
 
 def section_of(case: Case, limits: list[Limit], folder: Path) -> Section:

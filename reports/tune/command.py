@@ -9,10 +9,10 @@ from tempfile import TemporaryFile
 from typing import NoReturn
 
 import pandas as pd
-from rich.console import Console
 from rich.table import Table
 
 from reports.commands import opening, unknown
+from reports.console import Console
 from reports.exits import DONE, broken_off, refuse
 from reports.folders import made_anew, place_of
 from reports.made import Kind, may_replace, writing
@@ -49,7 +49,7 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
             bar.say(f"{engine}: setting by setting")
             found = pd.concat([*tables, search.run()])
             with made_anew(out, TUNE, "--out") as part, writing(part, [NAME]):
-                found.to_csv(part / NAME, index=False)
+                found.to_csv(part / NAME, index=False, errors="backslashreplace")
             tables = [found]
     show(found)
     Console().print(f"\n{out / NAME}", style="bold", highlight=False, soft_wrap=True)

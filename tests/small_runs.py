@@ -1,0 +1,42 @@
+"""A run of two scenes, one of them a file, on two engines, made in this process and so within a second or two."""
+
+from pathlib import Path
+
+from adapters.conformance import Finding
+from adapters.engines import ENGINES
+from reports.cells import Cell
+from reports.journal import Journal
+from reports.known_answers import KNOWN_ANSWERS
+from reports.playing import play_here
+from reports.suite import Means, Plan, begin, keep_answer, keep_cell, tasks_of
+
+PLAYERS = ("pymunk:shipped", "pymunk:matched")
+
+
+def make(folder: Path, scene_file: Path) -> Path:
+    """Its folder, complete but for its tables: every kind of line is in its journal."""
+    plan = Plan(
+        ["slow_hit", str(scene_file)], {name: ENGINES[name] for name in PLAYERS}, 0, [], False, 0, "made by a test"
+    )
+    scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
+    cells = [task for task in tasks_of(plan, scenarios) if isinstance(task, Cell)]
+    folder.mkdir()
+    with Journal(folder) as journal:
+        begin(plan, journal, scenarios, len(cells))
+        for name in PLAYERS:
+            finding = Finding(
+                *name.split(":"), "read_copies", "Does read give copies?", "copies", "copies", 0.0, "keeps"
+            )
+            keep_answer(journal, name, [finding])
+        keep_answer(journal, KNOWN_ANSWERS[0], 18808.3)
+        for cell in cells:
+            line = keep_cell(
+                journal,
+                scenarios[cell.scene],
+                Means(1),
+                cell,
+                play_here(cell, ENGINES[cell.engine], scenarios[cell.scene]),
+            )
+        journal.append({"timing": line["cell"], "round": 0, "seconds": 0.5})
+        journal.append({"footer": {"tasks": len(cells), "played": len(cells), "seconds": 1.0}})
+    return folder
