@@ -26,7 +26,7 @@ def scene(disks: str, walls: str = "", top: str = "", duration: float = 2.0, int
     return text
 
 
-SQUARE = "-0.5 -0.5 0.5 -0.5; 0.5 -0.5 0.5 0.5; 0.5 0.5 -0.5 0.5; -0.5 0.5 -0.5 -0.5".replace(";", ";")
+SQUARE = "-0.5 -0.5 0.5 -0.5; 0.5 -0.5 0.5 0.5; 0.5 0.5 -0.5 0.5; -0.5 0.5 -0.5 -0.5"
 FALL = "gravity = [0.0, -9.81]\n"
 PUSH = "[[thrust]]\ndisk = 0\nstart = 0.0\nstop = 1.0\nforce = [{}, 0.0]\n"
 ROW = ";".join(f"{k * 0.5} 0.0 0.0 0.0" for k in range(1, 11))
@@ -38,12 +38,12 @@ HARD: dict[str, tuple[str, tuple[int, ...], str]] = {
         scene("0 2 0.25 0 0.25", "-1 -1 1 1; -1 1 1 -1", "gravity = [0.0, -2.0]\nrestitution = 0.0"), (0,), "horizon",
     ),
     "a million seconds in a box": (
-        scene("0 0 -2.1938 2.0846 0.3", SQUARE, "restitution = 1.0", 1e6, 1.0), (0, 1), "",
+        scene("0 0 -2.1938 2.0846 0.3", SQUARE, "restitution = 1.0\nsubsteps = [1]", 1e6, 1.0), (0,), "horizon",
     ),
     "a hundred thousand seconds at rest": (scene("0 0 0 0", "", "", 1e5, 1.0), (0,), "horizon"),
     "a bounce that takes ever less time": (scene("0 1 0 0", "-3 0 3 0", f"{FALL}restitution = 0.5"), (0,), "ends"),
     "a bounce that never ends": (scene("0 1 0 0", "-3 0 3 0", f"{FALL}restitution = 1.0", 20.0), (0,), "horizon"),
-    "a row of ten that touch, and one that comes": (scene(f"-3 0 2 0; {ROW}"), (0,), "simultaneous"),
+    "a row of ten that touch, and one that comes": (scene(f"-3 0 2 0; {ROW}"), (0,), "none is the truth"),
     "two that touch and move apart": (scene("-0.25 0 -1 0; 0.25 0 1 0"), (0,), "horizon"),
     "two that touch and press": (scene("-0.25 0 1 0; 0.25 0 -1 0"), (0,), ""),
     "a disk that rests on a floor": (scene("0 0.25 0 0", "-3 0 3 0", FALL), (0,), "horizon"),
@@ -61,7 +61,7 @@ HARD: dict[str, tuple[str, tuple[int, ...], str]] = {
     "a corner that is met at once": (scene("0 0 1 1", "1 -1 1 1; -1 1 1 1"), (0,), "horizon"),
     "a thrust without end": (scene("0 0 0 0", "", PUSH.format(1.0).replace("stop = 1.0", "stop = inf")), (0,),
                              "horizon"),
-    "a thrust of a thousand million newtons": (scene("0 0 0 0; 3 0 0 0", "", PUSH.format(1e9)), (0,), ""),
+    "a thrust of a thousand million newtons": (scene("0 0 0 0; 3 0 0 0", "", PUSH.format(1e9)), (1,), "too large to follow"),
     "a thrust of the smallest float": (scene("0 0 0 0", "", PUSH.format(5e-324)), (0,), "horizon"),
     "a disk of a thousandth of a millimetre beside one of a kilometre": (
         scene("0 0 0 0 1000; -1001 0 1 0 0.000001"), (0,), "horizon",

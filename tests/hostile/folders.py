@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
@@ -54,12 +55,11 @@ def link(to: str, here: Path) -> None:
 
 def bound(here: Path) -> None:
     """A socket of the file system."""
-    os.chdir(here)  # its path may not be long
-    with socket.socket(socket.AF_UNIX) as one:
+    with contextlib.chdir(here), socket.socket(socket.AF_UNIX) as one:  # whose path may not be long
         one.bind("out")
 
 
-PATHS: dict[str, tuple[str, Prepare | None]] = {
+PATHS: dict[str, tuple[str, Prepare | None]] = {  # of which its last words must be said
     "where one is": (".", None),
     "above where one is": ("..", None),
     "the top of all": ("/", None),
@@ -77,7 +77,7 @@ PATHS: dict[str, tuple[str, Prepare | None]] = {
     "a socket": ("out", bound),
 }
 NO_PLACE = tuple(
-    Input(f"{command} into {what}", (*OUT[command], path), SCENE, prepare=prepare, says=path[:20])
+    Input(f"{command} into {what}", (*OUT[command], path), SCENE, prepare=prepare, says=path.strip("./")[:20] or "where you are")
     for number, (what, (path, prepare)) in enumerate(PATHS.items())
     for command in [("run", "speed", "stability", "tune", "lesson")[number % 5],
                     ("lesson", "run", "run", "stability", "run")[number % 5]]

@@ -28,7 +28,7 @@ LEFT, WRONG = "process left behind", "wrong exit code or sentence"
 GOOD, BAD = (SENTENCE, DONE, FINDINGS, STOPPED), (TRACEBACK, HANG, LOST, STRAY, LEFT, WRONG)
 BY_CODE = {0: DONE, 1: FINDINGS, 2: SENTENCE, 130: STOPPED, 143: STOPPED}
 SECONDS = 90.0  # that an input may take on a busy machine; what is bounded by its own --timeout takes a fraction of it
-LINES = 12  # of a refusal: one sentence a fault, and a few faults at once
+LINES = 101  # of a refusal: one sentence a fault, as many as the reader of scenes lists, and one that there are more
 GRACE = 3.0  # s in which a process that has been told to end is gone
 LOADED = ["reports.cli", "reports.commands", "reports.run_command", "reports.truth_command", "reports.diff_command",
           "reports.replay_command", "reports.check.command", "reports.speed.command", "reports.stability.command",

@@ -7,10 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.hostile.played import Input
-from tests.hostile.small_run import TWO
+from tests.hostile.small_run import TWO as WALLED
 
 CORRECT = Path(__file__).parent.parent / "solvers" / "correct"
 PY, JS = (CORRECT / "plain.py").read_text(), (CORRECT / "plain.js").read_text()
+TWO = WALLED[: WALLED.index("[[wall]]")]  # the exercise's functions know no walls
 PLAYED = ("run", "two.toml", "--dt", "0.02", "--workers", "1", "--timeout", "5", "--out", "out", "--engine")
 STEP, HIT = "def integrate(sphere, dt):\n", "def sphereSphereCollisionHandling(sphereA, sphereB):\n"
 JS_STEP = "function integrate(sphere, dt) {\n"
@@ -178,12 +179,11 @@ BESIDE = (
 NAMES = (
     Input("check: a name in capitals", ("check", "UPPER.PY"), {"UPPER.PY": PY}, codes=(0,), writes=WRITES),
     Input("run: a name in capitals", (*PLAYED, "UPPER.PY"), {"two.toml": TWO, "UPPER.PY": PY}, codes=(0,),
-          writes=WRITES, says="UPPER.PY"),
+          writes=WRITES, says="All 1 cells have ended: 1 ok"),
     Input("run: a name with a colon", ("run", "free_fall", "--engine", "a:b.py"), {"a:b.py": PY}, says="colon"),
-    Input("check: a name in markup", ("check", "[/nope].py"), {"[/nope].py": PY}, codes=(0,), writes=WRITES,
-          says="[/nope].py"),
+    Input("check: a name in markup", ("check", "[/nope].py"), {"[/nope].py": PY}, codes=(0,), writes=WRITES),
     Input("check: a name with escape codes", ("check", "a\x1b[31m.py"), {"a\x1b[31m.py": PY}, codes=(0,),
-          writes=WRITES, says="a\\x1b[31m.py"),
+          writes=WRITES),
     Input("check: a name with a line end", ("check", "a\nb.py"), {"a\nb.py": PY}, codes=(0,), writes=WRITES),
     Input("check: a name like an option", ("check", "--", "--json.py"), {"--json.py": PY}, codes=(0,), writes=WRITES),
     Input("check: letters of another encoding", ("check", "mine.py"),
