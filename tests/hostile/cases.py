@@ -61,7 +61,8 @@ HARD: dict[str, tuple[str, tuple[int, ...], str]] = {
     "a corner that is met at once": (scene("0 0 1 1", "1 -1 1 1; -1 1 1 1"), (0,), "horizon"),
     "a thrust without end": (scene("0 0 0 0", "", PUSH.format(1.0).replace("stop = 1.0", "stop = inf")), (0,),
                              "horizon"),
-    "a thrust of a thousand million newtons": (scene("0 0 0 0; 3 0 0 0", "", PUSH.format(1e9)), (1,), "too large to follow"),
+    "a thrust of a thousand million newtons": (scene("0 0 0 0; 3 0 0 0", "", PUSH.format(1e9)), (1,),
+                                               "too large to follow"),
     "a thrust of the smallest float": (scene("0 0 0 0", "", PUSH.format(5e-324)), (0,), "horizon"),
     "a disk of a thousandth of a millimetre beside one of a kilometre": (
         scene("0 0 0 0 1000; -1001 0 1 0 0.000001"), (0,), "horizon",

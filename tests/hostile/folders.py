@@ -59,7 +59,7 @@ def bound(here: Path) -> None:
         one.bind("out")
 
 
-PATHS: dict[str, tuple[str, Prepare | None]] = {  # of which its last words must be said
+PATHS: dict[str, tuple[str, Prepare | None]] = {
     "where one is": (".", None),
     "above where one is": ("..", None),
     "the top of all": ("/", None),
@@ -77,7 +77,8 @@ PATHS: dict[str, tuple[str, Prepare | None]] = {  # of which its last words must
     "a socket": ("out", bound),
 }
 NO_PLACE = tuple(
-    Input(f"{command} into {what}", (*OUT[command], path), SCENE, prepare=prepare, says=path.strip("./")[:20] or "where you are")
+    Input(f"{command} into {what}", (*OUT[command], path), SCENE, prepare=prepare,
+          says=path.strip("./")[:20] or "where you are")
     for number, (what, (path, prepare)) in enumerate(PATHS.items())
     for command in [("run", "speed", "stability", "tune", "lesson")[number % 5],
                     ("lesson", "run", "run", "stability", "run")[number % 5]]
@@ -115,7 +116,7 @@ def unfinished(here: Path) -> None:
     """The run was killed: it is where it was while it lasted, and not finished."""
     moved("out", "out.part", here)
     made = json.loads((here / "out.part" / "made.json").read_text())
-    (here / "out.part" / "made.json").write_text(json.dumps(made | {"finished": False}))
+    (here / "out.part" / "made.json").write_text(json.dumps(made | {"finished": False}, indent=1) + "\n")
 
 
 AGAIN = (*RUN, "--out", "out")

@@ -175,7 +175,7 @@ SPOILT = [
     Input(f"{what}, {words[0]}", words, prepare=torn(change, TRAJECTORY), codes=codes, writes=WRITES, says=says)
     for what, change in BYTES.items()
     for words, codes, says in (
-        (REPORT, (0, 1), "is not what was written"), (DIFF, (1,), "is not what was written"),
+        (REPORT, (1,), "1 error"), (DIFF, (1,), "is not what was written"),
         (REPLAY, (0, 1, 2), ""), (RESUME, (0,), "All 2 cells have ended: 2 ok"),
     )
 ]  # fmt: skip
