@@ -46,7 +46,7 @@ Memory = Annotated[
 Scheduler = Annotated[str, typer.Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")]
 Timings = Annotated[
     int,
-    typer.Option(min=0, max=10_000, metavar="N", help="Rounds of timings after all is played, nothing beside them."),
+    typer.Option(min=0, max=10_000, metavar="N", help="Rounds of timings after all is played, one at a time."),
 ]
 Resume = Annotated[
     Path | None, typer.Option(metavar="OUT", help="Play what is missing or changed in a run, as it was asked for.")

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from adapters.conformance import Finding
 from adapters.engines import ENGINES
-from reports.cells import Cell
-from reports.journal import Journal
+from reports.cells import Cell, scene_hash
+from reports.folders import RUN, open_new, part_of, replace_folder
 from reports.known_answers import KNOWN_ANSWERS
 from reports.playing import play_here
 from reports.suite import Means, Plan, begin, keep_answer, keep_cell, tasks_of
@@ -20,23 +20,19 @@ def make(folder: Path, scene_file: Path) -> Path:
     )
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
     cells = [task for task in tasks_of(plan, scenarios) if isinstance(task, Cell)]
-    folder.mkdir()
-    with Journal(folder) as journal:
+    with open_new(folder) as journal:
         begin(plan, journal, scenarios, len(cells))
         for name in PLAYERS:
             finding = Finding(
                 *name.split(":"), "read_copies", "Does read give copies?", "copies", "copies", 0.0, "keeps"
             )
-            keep_answer(journal, name, [finding])
-        keep_answer(journal, KNOWN_ANSWERS[0], 18808.3)
+            keep_answer(journal, plan, name, [finding])
+        keep_answer(journal, plan, KNOWN_ANSWERS[0], 18808.3)
         for cell in cells:
-            line = keep_cell(
-                journal,
-                scenarios[cell.scene],
-                Means(1),
-                cell,
-                play_here(cell, ENGINES[cell.engine], scenarios[cell.scene]),
-            )
+            scenario, row = scenarios[cell.scene], ENGINES[cell.engine]
+            key = cell.key(scene_hash(scenario), row.source)
+            line = keep_cell(journal, scenario, Means(1), cell, key, play_here(cell, row, scenario))
         journal.append({"timing": line["cell"], "round": 0, "seconds": 0.5})
         journal.append({"footer": {"tasks": len(cells), "played": len(cells), "seconds": 1.0}})
+    replace_folder(part_of(folder), folder, RUN)
     return folder
