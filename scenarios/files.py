@@ -62,7 +62,8 @@ def read_scene_file(path: str | Path) -> Scenario:
     if len(faults) > MOST_FAULTS:
         faults[MOST_FAULTS:] = [f"more than {MOST_FAULTS} faults; must be none (the rest is not listed)"]
     if faults:
-        raise SceneFileError(f"{path}: {fault}" for fault in faults)
+        named = str(path).replace("\n", "\\n")  # for a fault is a line
+        raise SceneFileError(f"{named}: {fault}" for fault in faults)
     return scenario
 
 

@@ -1,7 +1,7 @@
 """Every hostile input ends in time, with a sentence or a result, and takes nothing of the user's away.
 
-The outcomes are kept in outcomes.csv: `uv run python -m tests.hostile.test_hostile` plays all and writes it anew, some
-families if they are named, and then writes nothing.
+The outcomes are kept in outcomes.csv: `uv run python -m tests.hostile.test_hostile` plays all and writes it anew; or
+the families that are named, as `scenes`, and writes their rows.
 """
 
 from __future__ import annotations
@@ -116,28 +116,29 @@ def test_a_program_that_ends_otherwise_is_noticed(
     assert outcome_of(tried, tmp_path / "input").word == word
 
 
-def outcomes() -> dict[Key, tuple[str, int]]:
+def outcomes() -> dict[Key, tuple[str, int | None]]:
     """What is kept: family and name -> the outcome and its exit code."""
     with FILE.open(newline="", encoding="utf-8") as file:
-        return {(row["family"], row["input"]): (row["outcome"], int(row["exit"])) for row in csv.DictReader(file)}
+        rows = [(row["family"], row["input"], row["outcome"], row["exit"]) for row in csv.DictReader(file)]
+    return {(family, name): (word, int(code) if code else None) for family, name, word, code in rows}
 
 
 def main(families: list[str]) -> None:
-    """Play every input of these families, all if none is named; print the bad ones, and write the table of all."""
-    rows: list[tuple[Key, Outcome]] = []
-    began, slow = perf_counter(), []
+    """Play every input of these families, all if none is named; print the bad ones, and write their rows anew."""
+    rows, began, seconds_of = outcomes(), perf_counter(), {}
     for key, outcome, seconds in play_all(key for key in ALL if not families or key[0] in families):
-        rows.append((key, outcome))
-        slow.append((round(seconds, 1), *key))
+        rows[key], seconds_of[key] = (outcome.word, outcome.code), seconds
         if outcome.word in BAD:
             print(f"{': '.join(key)}: {outcome.word}, exit {outcome.code}\n{outcome.printed[:SHOWN]}\n", flush=True)
-    print(*sorted(Counter((key[0], outcome.word) for key, outcome in rows).items()), sep="\n")
-    print(f"{len(rows)} inputs in {perf_counter() - began:.0f} s; the slowest:", *sorted(slow)[-12:], sep="\n")
-    if not families:
-        with FILE.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(("family", "input", "exit", "outcome"))
-            writer.writerows((*key, found.code, found.word) for key, found in rows)
+    slowest = sorted(seconds_of, key=seconds_of.__getitem__)[-12:]
+    print(f"{len(seconds_of)} in {perf_counter() - began:.0f} s; the slowest (s):")
+    print(*(f"{seconds_of[key]:.1f} {': '.join(key)}" for key in slowest), sep="\n")
+    rows = {key: rows[key] for key in ALL if key in rows}
+    print(*sorted(Counter((family, word) for (family, _), (word, _) in rows.items()).items()), sep="\n")
+    with FILE.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("family", "input", "exit", "outcome"))
+        writer.writerows((*key, code, word) for key, (word, code) in rows.items())
 
 
 if __name__ == "__main__":
