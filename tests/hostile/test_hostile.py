@@ -125,7 +125,7 @@ def outcomes() -> dict[Key, tuple[str, int | None]]:
 
 def main(families: list[str]) -> None:
     """Play every input of these families, all if none is named; print the bad ones, and write their rows anew."""
-    rows, began, seconds_of = outcomes(), perf_counter(), {}
+    rows, began, seconds_of = {}, perf_counter(), {}
     for key, outcome, seconds in play_all(key for key in ALL if not families or key[0] in families):
         rows[key], seconds_of[key] = (outcome.word, outcome.code), seconds
         if outcome.word in BAD:
@@ -133,12 +133,12 @@ def main(families: list[str]) -> None:
     slowest = sorted(seconds_of, key=seconds_of.__getitem__)[-12:]
     print(f"{len(seconds_of)} in {perf_counter() - began:.0f} s; the slowest (s):")
     print(*(f"{seconds_of[key]:.1f} {': '.join(key)}" for key in slowest), sep="\n")
-    rows = {key: rows[key] for key in ALL if key in rows}
+    rows = {key: row for key, row in (outcomes() | rows).items() if key in ALL}
     print(*sorted(Counter((family, word) for (family, _), (word, _) in rows.items()).items()), sep="\n")
     with FILE.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("family", "input", "exit", "outcome"))
-        writer.writerows((*key, code, word) for key, (word, code) in rows.items())
+        writer.writerows((*key, *rows[key][::-1]) for key in ALL if key in rows)
 
 
 if __name__ == "__main__":
