@@ -43,7 +43,16 @@ COMMANDS = [
     if line not in CLUSTER and line not in MINUTES and not (line.startswith("uv run pytest") and "--solver" not in line)
 ]
 # Files of a run, and what the exercise's author calls a solver.
-WRITTEN = {"deviations.csv", "runs.csv", "machine.json", "limits.csv", "speed_budget.csv", "solver.py"}
+WRITTEN = {
+    "deviations.csv",
+    "runs.csv",
+    "machine.json",
+    "limits.csv",
+    "speed_budget.csv",
+    "solver.py",
+    "made.json",
+    "random.py",
+}
 BIN = Path(sys.executable).parent
 
 
