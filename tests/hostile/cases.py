@@ -38,7 +38,7 @@ HARD: dict[str, tuple[str, tuple[int, ...], str]] = {
         scene("0 2 0.25 0 0.25", "-1 -1 1 1; -1 1 1 -1", "gravity = [0.0, -2.0]\nrestitution = 0.0"), (0,), "horizon",
     ),
     "a million seconds in a box": (
-        scene("0 0 -2.1938 2.0846 0.3", SQUARE, "restitution = 1.0\nsubsteps = [1]", 1e6, 1.0), (0,), "horizon",
+        scene("0 0 -2.1938 2.0846 0.3", SQUARE, "restitution = 1.0\nsubsteps = [1]", 1e6, 1.0), (1,), "longer than 5 s",
     ),
     "a hundred thousand seconds at rest": (scene("0 0 0 0", "", "", 1e5, 1.0), (0,), "horizon"),
     "a bounce that takes ever less time": (scene("0 1 0 0", "-3 0 3 0", f"{FALL}restitution = 0.5"), (0,), "ends"),
@@ -65,9 +65,9 @@ HARD: dict[str, tuple[str, tuple[int, ...], str]] = {
                                                "too large to follow"),
     "a thrust of the smallest float": (scene("0 0 0 0", "", PUSH.format(5e-324)), (0,), "horizon"),
     "a disk of a thousandth of a millimetre beside one of a kilometre": (
-        scene("0 0 0 0 1000; -1001 0 1 0 0.000001"), (0,), "horizon",
+        scene("0 0 0 0 1000; -1001 0 1 0 0.000001"), (1,), "no exact answer",
     ),
-    "a disk that is a million kilometres away": (scene("1e9 0 0 0; 999999999 0 1 0"), (0,), ""),
+    "a disk that is a million kilometres away": (scene("1e9 0 0 0; 999999999 0 1 0"), (1,), "too large to follow"),
     "a million metres in a second": (scene("-1 0 1e6 0; 1 0 0 0"), (0,), "horizon"),
     "thirty in a box": (
         scene(";".join(f"{x - 2.5} {y - 2} {(x * 7 + y) % 5 - 2}.37 {(x + y * 3) % 5 - 2}.21" for x in range(6)
@@ -82,7 +82,7 @@ HARD: dict[str, tuple[str, tuple[int, ...], str]] = {
     "letters of other alphabets": (TWO.replace("Does a", "Хранит ли 保存 هل Does a"), (0,), "保存"),
     "samples at the smallest step": (scene("0 0 1 0", "", "", 1e-6, 1e-9), (0,), "horizon"),
     "a scene that has no number at all in common with a second": (scene("0 0 1e-9 0 1e-9", duration=1e-9,
-                                                                          interval=1e-9), (0,), "horizon"),
+                                                                          interval=1e-9), (1,), "no exact answer"),
 }  # fmt: skip
 # What `run` is asked, with all that belongs to it; a few, as it starts processes.
 RUN: dict[str, tuple[str, tuple[int, ...], str]] = {
@@ -91,7 +91,7 @@ RUN: dict[str, tuple[str, tuple[int, ...], str]] = {
     "a question in markup": (TWO.replace("Does a", "[/nope] [red] \\u001b]0;x\\u0007 Does a"), (0,), "All 4 cells"),
     "a disk that leaves at once": (scene("0 0 1e9 0; 3 0 0 0"), (0, 1), "cells have ended"),
     "an answer that takes too long": (
-        scene("0 0 -2.1938 2.0846 0.3", SQUARE, "restitution = 1.0\nsubsteps = [1]", 1e5, 1.0), (0, 1), "",
+        scene("0 0 -2.1938 2.0846 0.3", SQUARE, "restitution = 1.0\nsubsteps = [1]", 1e5, 1.0), (1,), "longer than 5 s",
     ),
 }  # fmt: skip
 CASES = (

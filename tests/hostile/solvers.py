@@ -36,7 +36,7 @@ LOADING: dict[str, tuple[str, str | bytes, str]] = {
         "  except (OSError, ValueError): pass\nwhile True: pass\n", "",
     ),
     "sleep without end": ("mine.py", "import time\ntime.sleep(1e9)\n", "does not come back"),
-    "all memory": ("mine.py", "x = [bytearray(10**8) for _ in range(10**4)]\n", "memory"),
+    "all memory": ("mine.py", "x = bytearray(10**11)\n", "memory"),
     "all memory in JavaScript": ("mine.js", "var a = []; for (;;) a.push(new Array(1e6).fill(1));", "memory"),
     "sys.exit with success": ("mine.py", "import sys\nsys.exit(0)\n", "SystemExit"),
     "sys.exit with words": ("mine.py", "raise SystemExit('\\x1b[31mno')\n", "SystemExit"),

@@ -1,7 +1,7 @@
 """Every hostile input ends in time, with a sentence or a result, and takes nothing of the user's away.
 
 The outcomes are kept in outcomes.csv: `uv run python -m tests.hostile.test_hostile` plays all and writes it anew; or
-the families that are named, as `scenes`, and writes their rows.
+the families and inputs that are named, as `scenes`, and writes their rows.
 """
 
 from __future__ import annotations
@@ -123,10 +123,10 @@ def outcomes() -> dict[Key, tuple[str, int | None]]:
     return {(family, name): (word, int(code) if code else None) for family, name, word, code in rows}
 
 
-def main(families: list[str]) -> None:
-    """Play every input of these families, all if none is named; print the bad ones, and write their rows anew."""
+def main(named: list[str]) -> None:
+    """Play these families and inputs, all if none is named; print the bad ones, and write their rows anew."""
     rows, began, seconds_of = {}, perf_counter(), {}
-    for key, outcome, seconds in play_all(key for key in ALL if not families or key[0] in families):
+    for key, outcome, seconds in play_all(key for key in ALL if not named or {*key} & {*named}):
         rows[key], seconds_of[key] = (outcome.word, outcome.code), seconds
         if outcome.word in BAD:
             print(f"{': '.join(key)}: {outcome.word}, exit {outcome.code}\n{outcome.printed[:SHOWN]}\n", flush=True)
