@@ -87,7 +87,7 @@ CALLED: dict[str, tuple[str, str, str]] = {
     "positions that are gone": ("mine.py", within("del sphere.position", "return"), ""),
     "a coroutine": ("mine.py", PY.replace("def integrate", "async def integrate"), "async def"),
     "a generator": ("mine.py", within("yield"), "runs nothing"),
-    "megabytes that are printed": ("mine.py", within("print('x' * 10**6)"), ""),
+    "megabytes that are printed": ("mine.py", within("print('x' * 10**5)"), ""),
     "escape codes that are printed": ("mine.py", within("print('\\x1b[2J\\x1b]0;mine\\x07')"), ""),
     "answers that are forged": (
         "mine.py", within("import os", "for k in range(3, 30):", "    try: os.write(k, b'[]\\n')",
@@ -95,7 +95,7 @@ CALLED: dict[str, tuple[str, str, str]] = {
     ),
     "threads without end": ("mine.py", within("import threading, time",
                                               "threading.Thread(target=time.sleep, args=(600,)).start()"), ""),
-    "a process that goes on": ("mine.py", within("import subprocess", "subprocess.Popen(['sleep', '600'])"), ""),
+    "a process that goes on": ("mine.py", f"import subprocess\nsubprocess.Popen(['sleep', '600'])\n{PY}", ""),
     "warnings": ("mine.py", within("import warnings; warnings.warn('mine')"), ""),
     "chance": ("mine.py", within("import random, time; sphere.position.x += random.Random(time.time()).random()"), ""),
 }  # fmt: skip
@@ -123,7 +123,7 @@ ENGINES = tuple(
 
 # It does something to where it is: that stays the user's own doing, and what the program does is not changed by it.
 DELETES = within("import os", "if os.path.exists(__file__): os.remove(__file__)")
-WRITING = within("open('made_by_me.txt', 'w').write('x')")
+WRITING = f"open('made_by_me.txt', 'w').write('x')\n{PY}"
 OWN_DOING = (
     Input("check: deletes itself", ("check", "mine.py"), {"mine.py": DELETES}, codes=(0, 1),
           writes=(*WRITES, "mine.py")),
