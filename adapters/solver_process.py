@@ -151,8 +151,10 @@ class SolverProcess:
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
         ends_v8 = self.kind == "javascript" and -code in (signal.SIGTRAP, signal.SIGABRT)  # V8's word for a full heap
-        if ends_v8 or -code == signal.SIGKILL:
+        if ends_v8:
             return SolverFailed("memory", "wants more memory than it is given, and its process was ended")
+        if -code == signal.SIGKILL:
+            return SolverFailed("crashed", "its process was ended by SIGKILL, as a system does that runs out of memory")
         if -code == signal.SIGABRT:
             return SolverFailed("crashed", "its process was ended by SIGABRT")
         name = signal.Signals(-code).name if code < 0 else f"exit status {code}"

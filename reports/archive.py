@@ -24,10 +24,11 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from adapters.play import Run
-from reports.journal import JOURNAL, lines_of
+from reports.journal import JOURNAL, MISSED, lines_of
 from reports.journal_lines import kind_of
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
+ASKED = "without it nobody knows what was asked for: play it again into another --out"
 Numbered = dict[Hashable, tuple[int, dict[str, Any]]]  # what a line is of -> its number, and the line
 STATE = ("position", "velocity", "angle", "angular_velocity")
 HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
@@ -61,11 +62,7 @@ class Archive:
     def read(folder: Path) -> Archive:
         """Read the journal of a folder, once; raises `ValueError`, naming the line, if it cannot be used."""
         header: dict[str, Any] = {}
-        last: dict[str, dict[Hashable, tuple[int, dict[str, Any]]]] = {
-            "cell": {},
-            "conformance": {},
-            "known_answer": {},
-        }
+        last: dict[str, Numbered] = {"cell": {}, "conformance": {}, "known_answer": {}}
         timings: dict[str, list[float]] = {}
         seconds, complete = 0.0, False
         for number, line in enumerate(lines_of(folder), 1):
@@ -83,7 +80,7 @@ class Archive:
             raise ValueError(f"{folder / JOURNAL}: has no header, so nothing was played")
         for number, record in last["cell"].values():
             if fault := stranger(record, header):
-                raise ValueError(no_use(folder, number, fault))
+                raise ValueError(no_use(folder, number, fault, MISSED))
         records, conformance, known = ([line for _, line in last[kind].values()] for kind in last)
         records = [as_found(folder, record) for record in records]
         by_engine = {line["of"]: line for line in conformance}
@@ -97,12 +94,13 @@ def kind_of_line(folder: Path, number: int, line: Any) -> str:
     try:
         return kind_of(line)
     except (ValueError, RecursionError) as fault:
-        raise ValueError(no_use(folder, number, str(fault))) from None
+        head = isinstance(line, dict) and "header" in line
+        raise ValueError(no_use(folder, number, str(fault), ASKED if head else MISSED)) from None
 
 
-def no_use(folder: Path, number: int, fault: str) -> str:
-    """A sentence on a line that cannot be used."""
-    return f"{folder / JOURNAL}: line {number}: {fault}; delete that line, and run --resume plays what it was of"
+def no_use(folder: Path, number: int, fault: str, cure: str) -> str:
+    """A sentence on a line that cannot be used, and what to do."""
+    return f"{folder / JOURNAL}: line {number}: {fault}; {cure}"
 
 
 def what_of(record: dict[str, Any]) -> tuple:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 JOURNAL = "journal.jsonl"
+MISSED = "delete that line, and run --resume plays what it was of"  # what to do about one that cannot be used
 
 
 class Busy(Exception):
@@ -69,10 +70,10 @@ def lines_of(folder: Path) -> Iterator[dict[str, Any]]:
     with (folder / JOURNAL).open("rb") as journal:
         for number, line in enumerate(journal, start=1):
             try:
-                yield json.loads(line)
+                yield json.loads(line.decode())  # for null bytes are taken for UTF-32 else
             except (ValueError, RecursionError) as error:  # of brackets in brackets in brackets
                 if line.endswith(b"\n"):
-                    raise ValueError(f"{folder / JOURNAL}: line {number} is not JSON: {error}") from error
+                    raise ValueError(f"{folder / JOURNAL}: line {number}: is not JSON: {error}; {MISSED}") from error
 
 
 def plain(value: Any) -> Any:

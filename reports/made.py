@@ -137,9 +137,11 @@ def writing(folder: Path, names: Sequence[str]) -> Iterator[None]:
         if path.exists() and not as_written(path, made.files[name]):
             raise FolderTaken(f"{folder}: holds {name}, which is not as {made.command} left it; {MOVE_IT}")
     put_made(folder, made._replace(files=made.files | dict.fromkeys(names)))
-    yield
-    written: dict[str, str | None] = {name: digest_of(folder / name) for name in names if (folder / name).exists()}
-    put_made(folder, made._replace(files=made.files | written))
+    try:
+        yield
+    finally:  # also of what was refused, which has written nothing: the record is then what it was
+        written: dict[str, str | None] = {name: digest_of(folder / name) for name in names if (folder / name).exists()}
+        put_made(folder, made._replace(files=made.files | written))
 
 
 MOVE_IT = "move it to another folder, or delete it"

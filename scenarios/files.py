@@ -24,7 +24,7 @@ from scenarios.oracle import with_oracle
 from scenarios.placing import box
 
 MOST_BYTES = 5_000_000
-MOST_OVERLAPS = 100  # listed; n disks in one place would make n2 / 2 lines
+MOST_FAULTS = 100  # listed; n disks in one place would make n2 / 2 lines
 
 # Disks placed to touch are off by the rounding of their coordinates; a few thousand roundings are forgiven.
 TOUCHING = 1e-12
@@ -45,7 +45,8 @@ def read_scene_file(path: str | Path) -> Scenario:
     """The scenario a TOML file describes; its source is the file's name, its truth is the oracle's, if it has one.
 
     Raises:
-        SceneFileError: with one line per fault, `FILE: KEY = VALUE: what is wrong; what is allowed`.
+        SceneFileError: with one line per fault, `FILE: KEY = VALUE: what is wrong; what is allowed`, at most
+            `MOST_FAULTS`, and one that says that there are more.
     """
     try:
         file = _checked(_parsed(Path(path)))
@@ -58,8 +59,11 @@ def read_scene_file(path: str | Path) -> Scenario:
         faults = ["arrays in arrays in arrays; must be as flat as a scene is"]
     except ValueError as error:  # what passes here, say a radius whose square is 0, the nouns still refuse
         faults = str(error).split("; ")
+    if len(faults) > MOST_FAULTS:
+        faults[MOST_FAULTS:] = [f"more than {MOST_FAULTS} faults; must be none (the rest is not listed)"]
     if faults:
-        raise SceneFileError(f"{path}: {fault}" for fault in faults)
+        named = str(path).replace("\n", "\\n")  # for a fault is a line
+        raise SceneFileError(f"{named}: {fault}" for fault in faults)
     return scenario
 
 
@@ -194,18 +198,16 @@ def _outside_wrap(file: SceneTable) -> Iterator[str]:
 
 
 def _overlaps(scene: Scene, free_walls: int) -> Iterator[str]:
-    """A line for each disk on a wall or an earlier disk, at most `MOST_OVERLAPS` and one that says so."""
+    """A line for each disk on a wall or an earlier disk, at most one more than `MOST_FAULTS`."""
     names = [f"wall[{w}]" for w in range(free_walls)]
     sides = ("left", "bottom", "right", "top")
     names += [f"the {side} of [box]" for side in sides[: len(scene.walls) - free_walls]]
     names += [f"disk[{i}]" for i in range(scene.n)]
-    found = sorted(islice(_overlapping(scene), MOST_OVERLAPS + 1), key=lambda each: each[:2])
-    for first, second, overlap, (x, y) in found[:MOST_OVERLAPS]:
+    found = sorted(islice(_overlapping(scene), MOST_FAULTS + 1), key=lambda each: each[:2])
+    for first, second, overlap, (x, y) in found:
         where = f"{names[second]}.position = {scene.position[second - len(scene.walls)].tolist()}"
         cure = f"must be shifted by [{x:.15g}, {y:.15g}] m or more"
         yield f"{where}: overlaps {names[first]} by {overlap:.6g} m; {cure}"
-    if len(found) > MOST_OVERLAPS:
-        yield f"more than {MOST_OVERLAPS} overlaps; must be none (the rest is not listed)"
 
 
 def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:

@@ -94,7 +94,16 @@ def test_a_pile_in_one_place_gives_a_bounded_message(tmp_path: Path) -> None:
     """A thousand disks in one place are half a million overlaps; a hundred are listed."""
     faults = faults_of(TWO + DISK * 1000, tmp_path)
     assert len(faults) == 101
-    assert faults[-1] == "more than 100 overlaps; must be none (the rest is not listed)"
+    assert faults[-1] == "more than 100 faults; must be none (the rest is not listed)"
+
+
+def test_so_many_faulty_tables_give_a_bounded_message(tmp_path: Path) -> None:
+    """As an editor's slip in a file of a thousand disks does."""
+    faults = faults_of(TWO + DISK.replace("radius", "raduis") * 1000, tmp_path)
+
+    assert len(faults) == 101
+    assert faults[0].startswith("disk[2].radius: missing")
+    assert faults[-1] == "more than 100 faults; must be none (the rest is not listed)"
 
 
 def test_touching_disks_are_no_overlap(tmp_path: Path) -> None:

@@ -330,6 +330,19 @@ def test_what_was_being_written_when_it_was_killed_is_ours(tmp_path: Path):
     assert "holds report.html" in stranger_in(part, RUN)
 
 
+def test_what_is_refused_before_it_is_written_leaves_the_record_as_it_was(tmp_path: Path):
+    """So that a table that somebody edits after that is still seen not to be ours."""
+    begun(tmp_path, RUN)
+    with writing(tmp_path, ["runs.csv"]):
+        (tmp_path / "runs.csv").write_text("as it was played")
+    before = (tmp_path / MADE).read_bytes()
+    with pytest.raises(ZeroDivisionError), writing(tmp_path, ["runs.csv", "report.html"]):
+        raise ZeroDivisionError
+    assert (tmp_path / MADE).read_bytes() == before
+    (tmp_path / "runs.csv").write_text("as I would have it")
+    assert "holds runs.csv, which is not as" in stranger_in(tmp_path, RUN)
+
+
 def test_what_is_made_anew_takes_its_place_whole_or_not_at_all(tmp_path: Path):
     """The folder of lessons, and of settings: the old one stays if it fails, or if somebody has put something there."""
     kind, target = Kind("crosscheck lesson"), tmp_path / "all"
