@@ -129,4 +129,4 @@ def test_a_header_without_what_it_should_have_is_told(parts: dict[str, Path], tm
     done = crosscheck("report", "out.part", cwd=tmp_path)
 
     assert done.returncode == 2
-    assert "line 1 has no versions in its header" in done.stderr
+    assert "line 1: header.versions: missing" in done.stderr

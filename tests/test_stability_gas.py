@@ -15,7 +15,7 @@ from reports import laws
 from reports.stability.cases import CASES
 from reports.stability.cases_gas import RADIUS, gas, wrapped_run
 from reports.stability.hard_disks import compressibility, gas_in_box
-from reports.stability.limits import QUICK, Search
+from reports.stability.limits import QUICK
 from reports.stability.players import play_as
 from reports.stability.predicates import judge
 from reports.stability.predicates_gas import (
@@ -30,6 +30,7 @@ from reports.stability.predicates_gas import (
     literature,
     shares_of_speeds,
 )
+from reports.stability.search import Search
 from scenarios.catalogue import SCENARIOS
 from scenarios.model import Scenario, Trajectory, frozen
 

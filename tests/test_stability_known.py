@@ -12,9 +12,10 @@ import pytest
 from adapters.features import changed_box2d, changed_box2d_v3
 from reports.stability.cases import CASES
 from reports.stability.cases_alone import ball, far, on_spring, oscillator
-from reports.stability.limits import QUICK, Limit, Search
+from reports.stability.limits import QUICK, Limit
 from reports.stability.players import PLAYERS, Player, play_as, played
 from reports.stability.predicates import apex_drift
+from reports.stability.search import Search
 from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, answers, law_of, named
 from scenarios.model import Trajectory
 

@@ -8,8 +8,9 @@ from functools import cache
 import pytest
 
 from reports.stability.cases import CASES
-from reports.stability.limits import NEVER_FAILS, QUICK, Limit, Search, players_of
+from reports.stability.limits import NEVER_FAILS, QUICK, Limit, players_of
 from reports.stability.players import PLAYERS
+from reports.stability.search import Search
 from tests.stability_limits import Kept, agrees, in_words, kept
 
 KEPT = kept()

@@ -14,9 +14,10 @@ from reports.cli import VARIED
 from reports.stability.cases import CASES
 from reports.stability.cures import CURES, cure_of, faster, larger, slower, smaller, why_played
 from reports.stability.explain import explained, tried_out
-from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Search, Trial
+from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
 from reports.stability.players import PLAYERS, play_as
 from reports.stability.reasons import reason_of
+from reports.stability.search import Search
 from reports.stability.vary import VARIES, case_of_file, varied
 from scenarios.files import read_scene_file
 from scenarios.oracle import with_oracle

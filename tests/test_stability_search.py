@@ -25,9 +25,10 @@ from reports.stability.cases_gas import gas
 from reports.stability.cases_hits import at_speed
 from reports.stability.explain import explained
 from reports.stability.failures import AFTER, BEFORE, keep_failure, kept_failure, near, part_of
-from reports.stability.limits import FULL, QUICK, Case, Limit, Search, Trial
+from reports.stability.limits import FULL, QUICK, Case, Limit, Trial
 from reports.stability.players import Player, play_as
 from reports.stability.predicates import Predicate, Reading, judge
+from reports.stability.search import Search
 from reports.worker_process import Failure
 from scenarios.model import Scenario, Trajectory
 from scenarios.placing import lay_out

@@ -13,8 +13,9 @@ from adapters.features import changed_pymunk
 from adapters.habits import FLIGHT, FRICTION, HABITS, PUSH_OUT, RESTITUTION, habits_of
 from reports.stability.cases import CASES
 from reports.stability.explain import explained
-from reports.stability.limits import QUICK, Limit, Search, Trial
+from reports.stability.limits import QUICK, Limit, Trial
 from reports.stability.players import PLAYERS, Player, play_as
+from reports.stability.search import Search
 from reports.stability.twins import HITS_WAIT, LATE, Twins, told, twin_of
 from scenarios.catalogue import scenario
 

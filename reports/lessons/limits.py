@@ -15,9 +15,10 @@ from reports.comparison import Comparison
 from reports.lessons.lesson import Chart, Curve, Lesson, Settings, Shown, Slider
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
-from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Search, Trial, players_of
+from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, players_of
 from reports.stability.overview import bracket, why
 from reports.stability.players import PLAYERS
+from reports.stability.search import Search
 from reports.style import TRUTH, number
 from scenarios.model import Array, Scenario, Trajectory
 

@@ -23,8 +23,9 @@ from reports.runner import run_all
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
 from reports.stability.failures import keep_failure
-from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Search, Trial, players_of
+from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Trial, players_of
 from reports.stability.maps import MAPS, MapOf, map_of
+from reports.stability.search import Search
 from reports.stability.touching import TOUCHING, LawOf, law_of
 from reports.stability.vary import case_of_file
 from reports.terminal import Progress

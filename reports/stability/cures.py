@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.stability.limits import NOT_KNOWN, Limit, Search
+from reports.stability.limits import NOT_KNOWN, Limit
 from reports.stability.players import play_as
 from reports.stability.predicates import judge
+from reports.stability.search import Search
 from reports.stability.twins import HITS_WAIT, told
 from reports.stability.vary import at_offset, at_scale, at_tempo
 from scenarios.model import Scenario

@@ -10,8 +10,9 @@ from dataclasses import replace
 
 from reports.stability.cases import CASES
 from reports.stability.cures import SAYS_SO, cure_of, why_played
-from reports.stability.limits import NEVER_FAILS, Limit, Search
+from reports.stability.limits import NEVER_FAILS, Limit
 from reports.stability.reasons import Reason, reason_of
+from reports.stability.search import Search
 from reports.stability.twins import LATE, told, twin_of
 
 NEAR = 1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a hit lost by degrees

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from reports.archive import STATE, load_trajectory, packed
 from reports.replay import HITS
-from reports.stability.limits import Limit, Search, Trial
+from reports.stability.limits import Limit, Trial
+from reports.stability.search import Search
 from scenarios.model import Collisions, Scenario, Trajectory, frozen
 from scenarios.no_truth import NoTruth
 

@@ -25,9 +25,10 @@ from adapters.habits import (
     habits_of,
     with_habits,
 )
-from reports.stability.limits import Case, Limit, Search
+from reports.stability.limits import Case, Limit
 from reports.stability.players import Player
 from reports.stability.predicates import Reading, judge
+from reports.stability.search import Search
 from scenarios.model import Scenario
 
 LATE = "late hits"  # a twin without any habit

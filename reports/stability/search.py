@@ -1,0 +1,103 @@
+"""Finds the limit up to which an engine works: the first failure on the way from gentle to harsh, then bisection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import isfinite, isnan, nan
+
+from adapters.play import Run
+from reports.stability.limits import ALL, LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Form, Limit, Trial
+from reports.stability.players import PLAYERS
+from reports.stability.predicates import Reading, judge
+from scenarios.model import Scenario
+
+
+@dataclass
+class Search:
+    """One case on one player; remembers what was read at each value and the first failing run there."""
+
+    case: Case
+    player: str
+    form: Form
+    readings: dict[float, list[Reading]] = field(default_factory=dict)
+    seen: dict[float, tuple[Scenario, Run]] = field(default_factory=dict)
+
+    def limit(self) -> Limit:
+        """Scan until the first failure, bisect between it and what works before; then see what works again beyond."""
+        scan = self.case.scan(self.form)
+        first = next((k for k, value in enumerate(scan) if not self.trial(value, self.few).works), len(scan))
+        while first and not self.trial(scan[first - 1]).works:  # the few runs on the way did not show it
+            first -= 1
+        works = [True] * first + [self.trial(value).works for value in scan[first:]]
+        if all(works):
+            return self.limit_of(NEVER_FAILS, scan[-1], nan)
+        if not any(works):
+            return self.limit_of(NEVER_WORKS, nan, scan[0])
+        edge = next((k for k in range(1, len(scan)) if works[k - 1] and not works[k]), None)
+        if edge is not None:
+            return self.limit_of(LIMIT, *self.bracket(scan[edge - 1], scan[edge]))
+        edge = works.index(True)
+        return self.limit_of(ONLY_BEYOND, *self.bracket(scan[edge], scan[edge - 1]))
+
+    def bracket(self, good: float, bad: float) -> tuple[float, float]:
+        """What works and what fails, brought together by bisection as close as form and case say."""
+        ratio = max(self.form.ratio, self.case.ratio)
+        while self.case.refines and (middle := self.case.half_way(good, bad, ratio)) is not None:
+            good, bad = (middle, bad) if self.trial(middle).works else (good, middle)
+        return good, bad
+
+    def trial(self, value: float, runs: int = ALL, to_the_end: bool = False) -> Trial:
+        """Play a value up to so many runs; it is left where more have failed than may, unless the form is the full one.
+
+        Where a run has failed that may have by chance, all are played.
+        """
+        most, readings = self.case.runs, self.readings.setdefault(value, [])
+        failed = sum(reading.failed for reading in readings)
+        while len(readings) < (most if failed or to_the_end else min(runs, most)):
+            if failed > self.allowed and not (self.form.whole or to_the_end):
+                break
+            scenario, run = self.case.play(PLAYERS[self.player], self.case.scene(value, len(readings)))
+            readings.append(judge(self.case.predicate, scenario, run))
+            failed += readings[-1].failed
+            if readings[-1].failed:
+                self.seen.setdefault(value, (scenario, run))
+        return self.tried(value)
+
+    @property
+    def few(self) -> int:
+        """Runs at a value that is only passed on the way: half of them at least where some may fail by chance."""
+        return max(self.form.few, self.case.runs // 2) if self.case.by_chance else self.form.few
+
+    @property
+    def allowed(self) -> int:
+        """How many runs at a value may fail by chance."""
+        return int(self.case.by_chance * self.case.runs)
+
+    def tried(self, value: float) -> Trial:
+        """What is known of a value."""
+        readings = self.readings[value]
+        count, failed = len(readings), sum(reading.failed for reading in readings)
+        worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
+        if not failed:
+            return Trial(value, count, failed, worst)
+        first = next(k for k, reading in enumerate(readings) if reading.failed)
+        one, left = readings[first], count < self.case.runs
+        return Trial(value, count, failed, worst, first, one.at, one.event, one.broken, one.disk, self.allowed, left)
+
+    def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
+        """The limit, with all that was tried from gentle to harsh; at its failure every run is played."""
+        if not isnan(fails_at):
+            self.trial(fails_at, to_the_end=True)
+        trials = tuple(self.tried(value) for value in sorted(self.readings, key=lambda x: self.case.harsher * x))
+        changes = sum(one.works != other.works for one, other in pairwise(trials))
+        until = [trial.value for trial in trials]
+        if verdict == LIMIT:
+            until = until[: until.index(fails_at) + 1]
+        spacing = max((max(one / other, other / one) for one, other in pairwise(until)), default=nan)
+        names = self.case.name, self.player, self.form.name
+        return Limit(*names, verdict, works_at, fails_at, trials, changes <= 1, spacing)
+
+    def failure(self, limit: Limit) -> tuple[Scenario, Run] | None:
+        """The first run that failed at the limit, for the replay; None if none failed."""
+        return self.seen.get(limit.fails_at)
