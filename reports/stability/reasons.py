@@ -105,7 +105,7 @@ REASONS = (
         "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched", IMPULSE,
     ),
     Reason(
-        "bounce_drift", "box2d_v3:matched*", "the soft contact takes about |v| dt / substeps of height a bounce",
+        "bounce_drift", "box2d_v3:matched*", "the soft contact takes up to |v| dt / substeps of height a bounce",
         "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched+16_substeps", IMPULSE,
     ),
     Reason(
