@@ -77,7 +77,7 @@ def centre(scene: Scene) -> Array:
 
 
 def angular_momentum(trajectory: Trajectory, scene: Scene) -> Array:
-    """(k,) kg m2/s about the centre of mass at the start: sum of m x cross v + I w."""
+    """(k,) kg m2/s about the centre of mass of the scene, where it is at the start: sum of m x cross v + I w."""
     orbital = cross(trajectory.position - centre(scene), trajectory.velocity) @ moving_mass(scene)
     return orbital + trajectory.angular_velocity @ moving_inertia(scene)
 

@@ -41,7 +41,7 @@ def momentum_error(view: View) -> Value | None:
 
 
 def angular_momentum_error(view: View) -> Value | None:
-    """Largest |L(t) - L(0) - angular impulse from outside|, about the centre of mass, over all m|x||v| + I|w|."""
+    """Largest |L(t) - L(0) - outer angular impulse|, about the scene's centre of mass, over all m|x||v| + I|w|."""
     return _largest(violations.angular_momentum(view), view)
 
 

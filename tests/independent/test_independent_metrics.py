@@ -109,14 +109,14 @@ def momentum_error(one: Trajectory, _: None, scenario: Scenario) -> float | None
 
 
 def angular_momentum_error(one: Trajectory, _: None, scenario: Scenario) -> float | None:
-    """Of x cross m v + I w about where the centre of mass is at the start, where nothing from outside turns it.
+    """Of x cross m v + I w about the centre of mass of the scene, where nothing from outside turns it.
 
     Over the sum of m|x||v| + I|w| that the scene can have: with the speeds of the start, and as far as they carry.
     """
     if not alone(scenario) or scenario.scene.gravity.any() or scenario.thrusts or scenario.scene.wrap is not None:
         return None
     mass, inertia = moving(scenario), scenario.scene.inertia
-    centre = (mass[:, None] * one.position[0]).sum(axis=0) / mass.sum()
+    centre = (mass[:, None] * scenario.scene.position).sum(axis=0) / mass.sum()
     x, v, w = one.position - centre, one.velocity, one.angular_velocity
     momentum = (mass * (x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]) + inertia * w).sum(axis=1)
     start = scenario.scene
