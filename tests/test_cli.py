@@ -259,7 +259,7 @@ def test_a_trajectory_that_is_gone_is_a_failure_of_its_cell(small_run: Path, tmp
         path.unlink()
 
     assert some.returncode in (0, 1)  # 1 if it was the only cell of its engine
-    assert runs[runs.status == "error"].reason.str.contains("cannot be read").tolist() == [True]
+    assert runs[runs.status == "error"].reason.str.contains("is not what was written").tolist() == [True]
     assert crosscheck("report", "copy", cwd=tmp_path).returncode == 1
     assert set(pd.read_csv(copy / "runs.csv").status) == {"error"}
 
