@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import io
 import json
-import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from reports.worker_process import Failure
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
 from scenarios.oracle import CLOSED_FORM, OracleTruth, TruthRecord
-from scenarios.truth_cache import packed, unpacked
+from scenarios.truth_cache import UNREADABLE, packed, unpacked
 
 OK, NONE = "ok", "none"
 SAID = "answer.json"  # in the file of an answer, beside the arrays of its record
@@ -86,7 +85,7 @@ def read_answer(path: Path) -> Answer | None:
         with ZipFile(path) as file:
             (status, reason, timeout), whole = json.loads(file.read(SAID)), len(file.namelist()) > 1
         fields = unpacked(path) if whole else None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile, zlib.error):
+    except UNREADABLE:
         return None
     if whole and fields is None:
         return None

@@ -64,6 +64,12 @@ def look_up(key: str) -> dict[str, Any] | None:
     return None if where is None else unpacked(where / f"{key}.npz")
 
 
+# What reading a torn or foreign archive raises: it is as good as none. One bit makes an unknown compression
+# (NotImplementedError), an encrypted file (RuntimeError), or an array larger than any memory.
+UNREADABLE = (OSError, ValueError, LookupError, EOFError, TypeError, RuntimeError, MemoryError, SyntaxError,
+              zipfile.BadZipFile, zlib.error)  # fmt: skip
+
+
 def packed(fields: dict[str, Any]) -> bytes:
     """The fields of a record as the bytes of an .npz."""
     file = io.BytesIO()
@@ -80,8 +86,7 @@ def unpacked(path: Path) -> dict[str, Any] | None:
             numbers = json.loads(str(saved["numbers"]))
         if any(arrays[name].shape[1:] != (width,) for name, width in ARRAYS.items()) or set(numbers) != set(NUMBERS):
             return None
-    # A torn or foreign file is as good as none.
-    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error):
+    except UNREADABLE:
         return None
     return arrays | numbers | {"remains": tuple(numbers["remains"])}
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reports.answers import Answer, put_answer, read_answer
 from scenarios import oracle, truth_cache
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario
@@ -134,3 +135,32 @@ def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert truth_cache.folder() == tmp_path / "xdg" / "crosscheck2d"
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "own"))
     assert truth_cache.folder() == tmp_path / "own"
+
+
+@pytest.mark.slow
+def test_an_answer_with_any_bit_turned_is_what_was_written_or_none(tmp_path: Path):
+    """Nothing but the answer is ever read, and no bit ends in an error: its sums tell, or its header cannot be read."""
+    path = tmp_path / "answer.npz"
+    put_answer(path, Answer(record_of(scenario("slow_hit")), "ok", "", 60.0))
+    whole, data = read_answer(path), path.read_bytes()
+    assert whole is not None
+    told = 0
+    for k in range(8 * len(data)):
+        turned = bytearray(data)
+        turned[k // 8] ^= 1 << k % 8
+        path.write_bytes(turned)
+        found = read_answer(path)
+        told += found is None
+        assert found is None or same(found, whole), f"bit {k % 8} of byte {k // 8}"
+
+    assert told > 4 * len(data)  # the rest: dates and attributes, which nobody reads
+
+
+def same(one: Answer, other: Answer) -> bool:
+    """To the bit."""
+    if one.record is None or other.record is None:
+        return False
+    mine, its = vars(one.record), vars(other.record)
+    return one[1:] == other[1:] and all(
+        np.array_equal(mine[name], its[name]) or repr(mine[name]) == repr(its[name]) for name in mine
+    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from contextlib import suppress
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from reports.stability.limits import Limit, Trial
 from reports.stability.search import Search
 from scenarios.model import Collisions, Scenario, Trajectory, frozen
 from scenarios.no_truth import NoTruth
+from scenarios.truth_cache import UNREADABLE
 
 BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 
@@ -43,7 +43,7 @@ def kept_failure(limit: Limit, folder: Path) -> tuple[Trajectory, Trajectory | N
     beside = beside_file(path)
     try:
         return load_trajectory(path), load_trajectory(beside) if beside.exists() else None
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # torn by a crash: what it was found from is not
+    except UNREADABLE:  # torn by a crash: what it was found from is not
         return None
 
 
