@@ -66,7 +66,7 @@ def write_all(folder: Path) -> None:
                 rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[CONVENTIONS]
                 put_text(part / INDEX, index_page(FILES, rows))
     size = sum(path.stat().st_size for path in folder.glob("*.html"))
-    print(f"{folder / INDEX}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server")
+    print(legible(f"{folder / INDEX}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server"))
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from reports.foreign_text import put_text
 from reports.speed.results import Results
 
 KEPT = Path(__file__).parent / "figures.csv"
@@ -63,7 +64,7 @@ def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
     }  # fmt: skip
     lines = "".join(f"# {key}: {value}\n" for key, value in about.items())
     table = figures(results).to_csv(index=False, float_format="%.4g")
-    path.write_text(lines + table, encoding="utf-8")
+    put_text(path, lines + table)
 
 
 def keep(folder: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from reports.foreign_text import put_text
 from reports.speed import explained, models, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.pareto import ACCURACIES, FAILED, NOT_TIMED, UNREACHABLE
@@ -190,4 +191,4 @@ class Results:
     def write(self, folder: Path) -> None:
         """The tables as CSV files."""
         for name, table in self.files.items():
-            table.to_csv(folder / name, index=False, errors="backslashreplace")
+            put_text(folder / name, table.to_csv(index=False))

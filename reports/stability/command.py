@@ -17,6 +17,7 @@ from reports.commands import checked_engines, opening, unknown
 from reports.console import Console
 from reports.exits import DONE, FAILED, broken_off, refuse, say
 from reports.folders import given_back, may_go_on, open_part, place_of, replace_folder
+from reports.foreign_text import put_text
 from reports.journal import Journal
 from reports.made import Kind, writing
 from reports.runner import affordable
@@ -81,11 +82,11 @@ def write_files(folder: Path) -> Atlas:
     laws = [(one.name, one.player, *at[:-1]) for one in atlas.laws for at in one.gaps]
     cells = [(one.name, one.player, *cell) for one in atlas.maps for cell in one.cells]
     with writing(folder, FILES):
-        table(atlas.limits).to_csv(folder / LIMITS, index=False, errors="backslashreplace")
+        put_text(folder / LIMITS, table(atlas.limits).to_csv(index=False))
         columns = ["scene", "player", *AtGap._fields[:-1]]
-        pd.DataFrame(laws, columns=columns).to_csv(folder / LAWS, index=False, errors="backslashreplace")
+        put_text(folder / LAWS, pd.DataFrame(laws, columns=columns).to_csv(index=False))
         columns = ["map", "player", "x", "y", "reading", "failed", "event"]
-        pd.DataFrame(cells, columns=columns).to_csv(folder / MAP, index=False, errors="backslashreplace")
+        put_text(folder / MAP, pd.DataFrame(cells, columns=columns).to_csv(index=False))
         write_page(folder / PAGE, folder, atlas)
     return atlas
 

@@ -15,6 +15,7 @@ from reports.commands import opening, unknown
 from reports.console import Console
 from reports.exits import DONE, broken_off, refuse
 from reports.folders import made_anew, place_of
+from reports.foreign_text import put_text
 from reports.made import Kind, may_replace, writing
 from reports.terminal import Progress
 from reports.tune.grid import MAKES
@@ -49,7 +50,7 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
             bar.say(f"{engine}: setting by setting")
             found = pd.concat([*tables, search.run()])
             with made_anew(out, TUNE, "--out") as part, writing(part, [NAME]):
-                found.to_csv(part / NAME, index=False, errors="backslashreplace")
+                put_text(part / NAME, found.to_csv(index=False))
             tables = [found]
     show(found)
     Console().print(f"\n{out / NAME}", style="bold", highlight=False, soft_wrap=True)
