@@ -12,9 +12,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent))  # the tests are not insta
 
 from labels import MARGIN, named
 
+from reports.commands.serve import application
 from reports.game.command import FIRST
-from reports.game.server import Game, application
-from reports.lessons.pages import ROUTES
+from reports.game.server import Game
 from tests.browsing import chromium, served
 
 DRAW = """([annotations, right]) => Plotly.relayout(document.querySelector('#pooled .plot'),
@@ -49,7 +49,7 @@ def pooled_chart(browser: Browser, page: str) -> None:
     tab.evaluate(DRAW, [[], MARGIN])  # anew, to the width that it has without the legend
     seen = tab.evaluate(SEE)
     tab.evaluate(DRAW, [named(seen["lines"], (seen["width"], seen["height"])), MARGIN])
-    clip(tab, "speed.png", "#pooled .chart", "#pooled .chart")
+    clip(tab, "speed/speed.png", "#pooled .chart", "#pooled .chart")
 
 
 def game(browser: Browser, url: str) -> None:
@@ -62,7 +62,7 @@ def game(browser: Browser, url: str) -> None:
     tab.evaluate("game.say('')")
     tab.add_style_tag(content="#banner,.touch,.wishes,#pace{display:none!important}")
     tab.wait_for_timeout(500)
-    clip(tab, "game.png", ".cockpit", ".engines")
+    clip(tab, "game/game.png", ".cockpit", ".engines")
 
 
 def lesson(browser: Browser, url: str) -> None:
@@ -73,7 +73,7 @@ def lesson(browser: Browser, url: str) -> None:
     tab.locator(".sliders [name=order]").fill("2")
     tab.evaluate("lesson.ready")
     tab.add_style_tag(content=".stage-lesson .player{display:none!important}:focus{outline:none!important}")
-    clip(tab, "lesson.png", "h1", ".facts-table")
+    clip(tab, "lessons/lesson.png", "h1", ".facts-table")
 
 
 def clip(tab: Page, name: str, first: str, last: str) -> None:
@@ -90,7 +90,7 @@ def main(what: str) -> None:
     """One picture."""
     with chromium() as browser:
         if what in ("game", "lesson"):
-            with served(application(Game(FIRST), ROUTES)) as url:
+            with served(application(Game(FIRST))) as url:
                 {"game": game, "lesson": lesson}[what](browser, url)
         else:
             pooled_chart(browser, what)

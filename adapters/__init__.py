@@ -1,1 +1,1 @@
-"""The players: one file an engine, and the one loop that plays a scenario."""
+"""The engines, and the one loop that plays a scenario."""

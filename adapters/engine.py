@@ -1,7 +1,9 @@
-"""What an engine must be able to do to take part: a few verbs, no base class."""
+"""What an engine must be able to do to take part, a few verbs and no base class, and what its row says of it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from scenarios.model import Array, Scene, State
@@ -11,6 +13,9 @@ UNREAD = "not readable"
 PASSED = "passed with every step"  # the engine keeps no such setting
 KEPT = "kept by the adapter"  # the engine knows no such setting
 NOT_TOLD = (UNREAD, PASSED, KEPT)
+
+
+FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53  # the relative rounding of a number
 
 
 class Unsupported(Exception):
@@ -71,3 +76,26 @@ class Engine(Protocol):
 
     def close(self) -> None:
         """Give everything back."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """How to make an engine and what is known of it.
+
+    Attributes:
+        make: a new engine; imports its library only now.
+        summary: one line for `crosscheck list`.
+        alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t is
+            (alpha - 1/2) a dt t. A property of the order of updates, not an error of the adapter.
+        rounding: the relative rounding of the numbers the engine keeps.
+        leaves_state: what it played before changes what it plays next, so that each cell needs a process of its own;
+            true of none below (a test plays each after others, bit for bit).
+        source: what tells a solver's file that was saved from what it was; "" for an engine of this program.
+    """
+
+    make: Callable[[], Engine]
+    summary: str
+    alpha: float
+    rounding: float
+    leaves_state: bool = False
+    source: str = ""

@@ -2,35 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from adapters.engine import Engine
-
-
-@dataclass(frozen=True)
-class Row:
-    """How to make an engine and what is known of it.
-
-    Attributes:
-        make: a new engine; imports its library only now.
-        summary: one line for `crosscheck list`.
-        alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t is
-            (alpha - 1/2) a dt t. A property of the order of updates, not an error of the adapter.
-        rounding: the relative rounding of the numbers the engine keeps.
-        leaves_state: what it played before changes what it plays next, so that each cell needs a process of its own;
-            true of none below (a test plays each after others, bit for bit).
-        source: what tells a solver's file that was saved from what it was; "" for an engine of this program.
-    """
-
-    make: Callable[[], Engine]
-    summary: str
-    alpha: float
-    rounding: float
-    leaves_state: bool = False
-    source: str = ""
+from adapters.engine import FLOAT32, FLOAT64, Engine, Row
 
 
 def _exercise() -> Engine:
@@ -73,12 +48,10 @@ def _box2d_v3(profile: str) -> Engine:
 
 
 def _event_driven() -> Engine:
-    from adapters.event_driven import EventDriven
+    from adapters.event_driven.engine import EventDriven
 
     return EventDriven()
 
-
-FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
 
 ENGINES: dict[str, Row] = {
     "reference:exercise": Row(
@@ -136,7 +109,7 @@ def row_of(name: str) -> Row:
 
 def read_row(name: str) -> Row:
     """The row of a solver's file, `PATH:own`, as it is now; `row_of` gives it from now on. Raises `NotASolver`."""
-    from adapters.student import engine_file
+    from adapters.own_solver.engine import engine_file
 
     _read[name] = row = engine_file(Path(name.removesuffix(OWN)))
     return row

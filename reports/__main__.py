@@ -2,14 +2,14 @@
 
 import sys
 
-from reports.safe_path import leave_out_current_folder
+from reports.terminal.safe_path import leave_out_current_folder
 
 
 def main() -> None:
     """Do what the command line asks for."""
     leave_out_current_folder()  # before anything else is imported
-    from reports.exits import ends_when_told, refuse
-    from reports.streams import printing
+    from reports.terminal.exits import ends_when_told, refuse
+    from reports.terminal.streams import printing
 
     with ends_when_told(), printing():
         if sys.flags.optimize > 1:

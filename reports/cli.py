@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from reports.exits import refuse
+from reports.terminal.exits import refuse
 
 app = typer.Typer(
     name="crosscheck",
@@ -85,7 +85,7 @@ def run(
     resume: Resume = None,
 ) -> None:
     """Play some scenarios or scene files through some engines, compare, and report."""
-    from reports import run_command
+    from reports.commands import run as run_command
 
     means = run_command.means_of(workers, timeout, memory, scheduler)
     if resume is None:
@@ -98,7 +98,7 @@ def run(
 @app.command()
 def report(out: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")]) -> None:
     """Make the tables and the page of a run again, from its journal."""
-    from reports.commands import report_again
+    from reports.commands.report import report_again
 
     report_again(out)
 
@@ -110,7 +110,7 @@ def replay(
     timeout: Timeout = 60.0,
 ) -> None:
     """Play one cell again, step by step: one that failed from its last good state, any other from the start."""
-    from reports import replay_command
+    from reports.commands import replay as replay_command
 
     replay_command.replay(cell, out, timeout)
 
@@ -121,7 +121,7 @@ def diff(
     after: Annotated[Path, typer.Argument(metavar="OUT_B", help="The folder of a later one.")],
 ) -> None:
     """What changed between two runs: statuses, numbers, timings; exit 1 if something got worse."""
-    from reports import diff_command
+    from reports.commands import diff as diff_command
 
     diff_command.show_difference(before, after)
 
@@ -135,7 +135,7 @@ def truth(
     timeout: Timeout = 60.0,
 ) -> None:
     """Print the exact answer to a scene: its hits, how far it reaches, how precise it is and what ends it."""
-    from reports.truth_command import show_truth
+    from reports.commands.truth import show_truth
 
     show_truth(scene, seed, events, as_json, timeout)
 
@@ -173,9 +173,9 @@ def play(
     opens: Opens = False,
 ) -> None:
     """Fly the exercise's spaceship through several engines at once, in a browser."""
-    from reports.game.command import play_game
+    from reports.commands import serve
 
-    play_game(flight, engine or [], port, opens)
+    serve.play(flight, engine or [], port, opens)
 
 
 @app.command()
@@ -191,9 +191,14 @@ def lesson(
     ] = None,
 ) -> None:
     """Learn why engines differ: short pages with scenes that run and the exact answer beside them."""
-    from reports.lessons.command import open_lesson
+    if export is None:
+        from reports.commands import serve
 
-    open_lesson(name, port, opens, export)
+        serve.lesson(name, port, opens)
+    else:
+        from reports.lessons.command import write_lessons
+
+        write_lessons(name, export)
 
 
 @app.command()
@@ -252,6 +257,6 @@ def tune(
 @app.command(name="list")
 def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
     """Explain every engine, scenario and metric in a line."""
-    from reports.commands import explain
+    from reports.commands.listing import explain
 
     explain(what)

@@ -1,1 +1,1 @@
-"""x"""
+"""The questions and their exact answers."""

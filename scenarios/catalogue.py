@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from scenarios.crowds import CROWDS
-from scenarios.exercise import EXERCISE
-from scenarios.lesson import LESSON
+from scenarios.families.crowds import CROWDS
+from scenarios.families.exercise import EXERCISE
+from scenarios.families.lesson import LESSON
+from scenarios.families.pairs import PAIRS
+from scenarios.families.rows import ROWS
+from scenarios.families.thrusts import THRUSTS
+from scenarios.families.walls import WALLS
 from scenarios.model import Scenario
-from scenarios.pairs import PAIRS
-from scenarios.rows import ROWS
-from scenarios.thrusts import THRUSTS
-from scenarios.walls import WALLS
 
 SCENARIOS: dict[str, Callable[..., Scenario]] = {
     builder().name: builder for builder in (*LESSON, *PAIRS, *WALLS, *ROWS, *THRUSTS, *EXERCISE, *CROWDS)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from reports.comparison import answered, cut
-from reports.delays import jumps_of
-from reports.view import View
+from reports.compare.comparison import answered, cut
+from reports.compare.delays import jumps_of
+from reports.compare.view import View
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Trajectory
 

@@ -14,9 +14,9 @@ from time import perf_counter
 
 import numpy as np
 
-from scenarios.events import EventEngine
+from adapters.event_driven.events import EventEngine
+from scenarios.families.placing import box
 from scenarios.model import Scene
-from scenarios.placing import box
 from tests.gases import gas
 
 REPEATS = 5
@@ -95,7 +95,8 @@ def alone(code: str, **environment: str) -> float:
 def memory() -> float:
     """MB at most, of a process that plays 100 000 disks, Python and numba included."""
     return alone(
-        "from tests.bench_events import peak; from tests.gases import gas; from scenarios.events import EventEngine;"
+        "from tests.bench_events import peak; from tests.gases import gas; "
+        "from adapters.event_driven.events import EventEngine; "
         "engine = EventEngine(*gas(100_000, 0.3)); engine.advance(1.0); print(peak())"
     )
 
@@ -109,8 +110,9 @@ def compile_time() -> float:
     """Processor seconds for all kernels, from an empty cache."""
     with tempfile.TemporaryDirectory() as empty:
         return alone(
-            "from tests.gases import gas; from scenarios.events import EventEngine; from time import process_time;"
-            "start = process_time(); engine = EventEngine(*gas(100, 0.3)); engine.advance(1.0); engine.look(1.0);"
+            "from tests.gases import gas; from time import process_time;"
+            "from adapters.event_driven.events import EventEngine; start = process_time();"
+            "engine = EventEngine(*gas(100, 0.3)); engine.advance(1.0); engine.look(1.0);"
             "engine.pull(0, 1.0, (0.0, 0.0)); engine.advance(2.0); print(process_time() - start)",
             NUMBA_CACHE_DIR=empty,
         )

@@ -6,9 +6,10 @@ import sys
 
 import numpy as np
 
+from reports.commands.serve import application
 from reports.game.command import FIRST
 from reports.game.flight import FRAME
-from reports.game.server import Game, application
+from reports.game.server import Game
 from tests.browsing import chromium, opened, served
 
 # What the page itself does, timed: a picture every animation frame, an answer for every question.

@@ -16,10 +16,10 @@ import numpy as np
 
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario
-from scenarios.numbers import digits
-from scenarios.oracle import accuracy_of, computed, difference
-from scenarios.oracle_events import trace
-from scenarios.oracle_record import TruthRecord
+from scenarios.truth.exact import accuracy_of, computed, difference
+from scenarios.truth.oracle.events import trace
+from scenarios.truth.oracle.numbers import digits
+from scenarios.truth.record import TruthRecord
 from tests.exercise_box import boxed, lasting
 
 FIGURES = Path(__file__).parent / "oracle_figures.csv"

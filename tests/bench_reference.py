@@ -28,7 +28,7 @@ from adapters.box2d_v3 import Box2DV3
 from adapters.pymunk import Pymunk
 from adapters.reference import Reference
 from reference_impl import crowd, ordered
-from reports.machine import about, busy_cores
+from reports.run.machine import about, busy_cores
 from scenarios.model import Scene
 from tests.gases import boxed_asteroids, boxed_gas
 from tests.test_ordered import CASES, off

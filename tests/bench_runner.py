@@ -16,18 +16,18 @@ from typing import NamedTuple
 import numpy as np
 
 from adapters.engines import ENGINES
-from reports.archive import Archive
-from reports.cells import Cell, scene_hash
-from reports.journal import Journal
-from reports.playing import play_here
-from reports.runner import run_all
-from reports.suite import Means, Plan, begin, carry_out, keep_cell
-from reports.tables import make_tables
-from reports.terminal import Progress
+from reports.run.archive import Archive
+from reports.run.cells import Cell, scene_hash
+from reports.run.journal import Journal
+from reports.run.playing import play_here
+from reports.run.runner import run_all
+from reports.run.suite import Means, Plan, begin, carry_out, keep_cell
+from reports.run.tables import make_tables
+from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
-from scenarios.files import write_scene_file
+from scenarios.families.placing import box
+from scenarios.files.scene_file import write_scene_file
 from scenarios.model import Scenario
-from scenarios.placing import box
 from tests.gases import gas
 
 ROUNDS = 3

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from adapters.engine import Engine, Hit, Unsupported
-from adapters.engines import ENGINES, Row
+from adapters.engine import Engine, Hit, Row, Unsupported
+from adapters.engines import ENGINES
 from adapters.reference import Reference
 from reference_impl import exercise, ordered
 from scenarios.model import State

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.engines import Row
+from adapters.engine import Row
 from scenarios.model import State
 
 FATAL = 100  # the step

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from gases import gas
 
+from adapters.event_driven.events import EventEngine
 from reports.stability.hard_disks import compressibility
-from scenarios.events import EventEngine
 
 TABLE = Path(__file__).parent / "event_figures.csv"
 PACKINGS = (0.1, 0.2, 0.3, 0.4, 0.5)

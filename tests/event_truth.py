@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from scenarios.closed_forms import Motion, answer, world_pushes
-from scenarios.events import EventEngine
+from adapters.event_driven.events import EventEngine
 from scenarios.model import Array, Scenario, Scene, Trajectory, frozen
 from scenarios.no_truth import NoTruth
+from scenarios.truth.closed_forms import Motion, answer, world_pushes
 
 ERROR_BOUND = 1e-9  # m
 SAFETY = 10.0  # a perturbed run may stray so many times less than the bound, since the run itself is as far off

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
+from scenarios.families.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
+from scenarios.families.placing import box, lay_out, scatter
 from scenarios.model import Scenario, Scene
-from scenarios.placing import box, lay_out, scatter
 
 COUNT = 20
 

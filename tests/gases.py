@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.events import EventEngine
-from scenarios.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
+from adapters.event_driven.events import EventEngine
+from scenarios.families.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
+from scenarios.families.placing import box, scatter
 from scenarios.model import Scene
-from scenarios.placing import box, scatter
 
 
 def gas(n: int, packing: float, seed: int = 0) -> tuple[Scene, np.ndarray]:

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from scenarios.families.placing import box
 from scenarios.model import Array, Scenario, Scene, Thrust
-from scenarios.placing import box
 
 Draw = np.random.Generator
 

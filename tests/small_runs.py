@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from adapters.conformance import Finding
+from adapters.conformance.conform import Finding
 from adapters.engines import ENGINES
-from reports.cells import Cell, scene_hash
-from reports.folders import RUN, open_new, part_of, replace_folder
-from reports.known_answers import KNOWN_ANSWERS
-from reports.playing import play_here
-from reports.suite import Means, Plan, begin, keep_answer, keep_cell, tasks_of
+from reports.run.cells import Cell, scene_hash
+from reports.run.folders import RUN, open_new, part_of, replace_folder
+from reports.run.known_answers import KNOWN_ANSWERS
+from reports.run.playing import play_here
+from reports.run.suite import Means, Plan, begin, keep_answer, keep_cell, tasks_of
 
 PLAYERS = ("pymunk:shipped", "pymunk:matched")
 

@@ -12,7 +12,7 @@ from math import inf, nan
 from pathlib import Path
 from typing import NamedTuple
 
-from reports import style
+from reports.page import style
 from reports.stability.cases import CASES
 from reports.stability.limits import ONLY_BEYOND, Limit, players_of
 

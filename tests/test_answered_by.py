@@ -6,9 +6,9 @@ from time import perf_counter
 
 import pytest
 
-from scenarios import oracle
 from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.oracle import CLOSED_FORM, HIT_BY_HIT, NOTHING, answered_by, computed
+from scenarios.truth import exact as oracle
+from scenarios.truth.exact import CLOSED_FORM, HIT_BY_HIT, NOTHING, answered_by, computed
 
 MODELS = {name: answered_by(scenario(name)) for name in SCENARIOS}
 

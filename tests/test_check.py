@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.solver_file import read_solver
-from adapters.solver_js import GL_MATRIX
-from adapters.solver_process import SolverProcess
+from adapters.own_solver.file import read_solver
+from adapters.own_solver.javascript import GL_MATRIX
+from adapters.own_solver.process import SolverProcess
 from reports.check.questions import QUESTIONS, Ball, ask
 from reports.check.rows import TASKS
 from reports.check.scenes import bounds, contact_fault, scene_of, scenes, truth_of

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from adapters.own_solver.engine import engine_file
 from adapters.play import play
-from adapters.student import engine_file
 from scenarios.catalogue import scenario
 from tests.command_line import crosscheck
 from tests.solvers.mutants import CORRECT

@@ -8,7 +8,7 @@ from time import monotonic
 
 import pytest
 
-from adapters.solver_file import NotASolver
+from adapters.own_solver.file import NotASolver
 from reports.check.rows import Row
 from reports.check.solver import check_solver
 from reports.check.verdict import FileCheck

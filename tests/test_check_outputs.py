@@ -13,8 +13,8 @@ import jsonschema
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.solver_file import read_solver
-from adapters.solver_process import SolverProcess
+from adapters.own_solver.file import read_solver
+from adapters.own_solver.process import SolverProcess
 from reports.check import command
 from reports.check.machine import SCHEMA
 from reports.check.smallest import Smallest, smallest_scene

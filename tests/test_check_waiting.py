@@ -15,9 +15,9 @@ from unittest import mock
 import pytest
 from py_mini_racer import JSTimeoutException
 
-from adapters.solver_file import NotASolver, read_solver
-from adapters.solver_js import JavaScriptSolver
-from adapters.solver_worker import HERE
+from adapters.own_solver.file import NotASolver, read_solver
+from adapters.own_solver.javascript import JavaScriptSolver
+from adapters.own_solver.worker import HERE
 
 SECONDS = 16.0  # for a process that starts and is stopped late, on a busy machine
 JS = (Path(__file__).parent / "solvers/correct/plain.js").read_text()
@@ -51,7 +51,7 @@ def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Pat
     """V8 stops the loop after its limit; nobody is there to hear it, and no process is left behind."""
     (tmp_path / "Exercise.js").write_text("while (true) {}")
     worker = subprocess.Popen(
-        [sys.executable, "-P", "-m", "adapters.solver_worker"],
+        [sys.executable, "-P", "-m", "adapters.own_solver.worker"],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     assert worker.stdin is not None

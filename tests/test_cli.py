@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 from adapters.engines import ENGINES
-from reports.comparison import COLUMNS
-from reports.metrics import METRICS
-from reports.truth_command import waiting
+from reports.commands.truth import waiting
+from reports.compare.comparison import COLUMNS
+from reports.compare.metrics import METRICS
 from scenarios.catalogue import SCENARIOS
 from tests.command_line import crosscheck, process
 

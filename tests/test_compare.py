@@ -9,14 +9,14 @@ from broken_engines import NanAtStep7
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
-from reports.comparison import COLUMNS, compare, cut
-from reports.delays import jumps_of
-from reports.findings import findings
-from reports.metrics import METRICS
-from reports.view import View
+from reports.compare.comparison import COLUMNS, compare, cut
+from reports.compare.delays import jumps_of
+from reports.compare.metrics import METRICS
+from reports.compare.view import View
+from reports.page.findings import findings
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Scenario, Scene, Thrust
-from scenarios.oracle import with_oracle
+from scenarios.truth.exact import with_oracle
 
 WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
 

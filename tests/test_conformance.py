@@ -11,10 +11,10 @@ import pytest
 from broken_engines import CAUGHT_BY, RaisesInStep, RefusesAll, Sound, row_of
 from tolerances import DEPARTURES
 
-from adapters.conformance import PROBES, conform
+from adapters.conformance.conform import PROBES, conform
+from adapters.conformance.physics import restitution
+from adapters.conformance.probe import head_on, loaded, one_disk
 from adapters.engines import ENGINES
-from adapters.probe import head_on, loaded, one_disk
-from adapters.probes_physics import restitution
 
 
 @cache

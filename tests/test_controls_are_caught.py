@@ -9,9 +9,9 @@ from answers import beside_truth, truth_of
 from broken_engines import DoublesSpeed, Exact, Freezes, GainsEnergy
 
 from adapters.play import play
-from reports.comparison import compare
-from reports.metrics import METRICS
-from reports.scales import top_speed
+from reports.compare.comparison import compare
+from reports.compare.metrics import METRICS
+from reports.compare.scales import top_speed
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Scenario, Trajectory
 

@@ -8,13 +8,13 @@ from answers import beside_truth, truth_of
 
 from adapters.engines import ENGINES
 from adapters.play import play
-from reports import delays, laws, scales, view
-from reports.comparison import compare
-from reports.delays import WINDOW, distance_to_range, jumps_of, nearest, nearest_velocity
-from reports.metrics import METRICS
+from reports.compare import delays, laws, scales, view
+from reports.compare.comparison import compare
+from reports.compare.delays import WINDOW, distance_to_range, jumps_of, nearest, nearest_velocity
+from reports.compare.metrics import METRICS
 from scenarios.catalogue import SCENARIOS
 from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.oracle import with_oracle
+from scenarios.truth.exact import with_oracle
 
 HELD = ("velocity_max", "velocity_rms", "momentum_apart", "energy_apart")
 

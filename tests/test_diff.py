@@ -11,15 +11,15 @@ import pandas as pd
 import pytest
 
 from adapters.engines import ENGINES
-from reports import suite
-from reports.archive import digest
-from reports.diff import Timing, difference, timing
-from reports.diff_command import show_difference
-from reports.journal import JOURNAL, Journal, lines_of
-from reports.report import make_report
-from reports.suite import Means, Plan, carry_out
-from reports.tables import seal_of
-from reports.terminal import Progress
+from reports.commands.diff import show_difference
+from reports.page.report import make_report
+from reports.run import suite
+from reports.run.archive import digest
+from reports.run.diff import Timing, difference, timing
+from reports.run.journal import JOURNAL, Journal, lines_of
+from reports.run.suite import Means, Plan, carry_out
+from reports.run.tables import seal_of
+from reports.terminal.progress import Progress
 
 PLAN = Plan(
     ["slow_hit", "near_miss"], {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")},

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.archive import Archive
+from reports.run.archive import Archive
 from tests.command_line import crosscheck
 from tests.sweeps import SMALL, assert_nothing_lost, lines, undisturbed
 

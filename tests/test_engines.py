@@ -11,14 +11,14 @@ from broken_engines import NanAtStep7, RaisesInStep
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adapters.conformance.probe import first_difference, history, loaded, one_disk, plain
 from adapters.engine import NOT_TOLD
 from adapters.engines import ENGINES
 from adapters.play import STATUSES, play, pushed_steps
-from adapters.probe import first_difference, history, loaded, one_disk, plain
 from adapters.reference import Reference
 from reference_impl import exercise
-from reports.cells import Cell
-from reports.playing import play_cell
+from reports.run.cells import Cell
+from reports.run.playing import play_cell
 from scenarios.catalogue import scenario as from_catalogue
 from scenarios.model import Scenario, Scene, Thrust
 

@@ -10,15 +10,16 @@ import pytest
 from gases import gas
 from test_event_brute_force import plain_kernels
 
-from scenarios import event_loop, events
-from scenarios.closed_forms import bouncing
-from scenarios.event_disks import GOES_ON, LEFT
-from scenarios.events import EventEngine
+from adapters.event_driven import events
+from adapters.event_driven import loop as event_loop
+from adapters.event_driven.disks import GOES_ON, LEFT
+from adapters.event_driven.events import EventEngine
+from scenarios.families.placing import box
+from scenarios.families.rows import counting_pi
 from scenarios.model import Scenario, Scene
 from scenarios.no_truth import NoTruth
-from scenarios.oracle import computed
-from scenarios.placing import box
-from scenarios.rows import counting_pi
+from scenarios.truth.closed_forms import bouncing
+from scenarios.truth.exact import computed
 
 CROSS = [[[-1.0, -1.0], [1.0, 1.0]], [[-1.0, 1.0], [1.0, -1.0]]]
 

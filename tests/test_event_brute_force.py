@@ -12,11 +12,11 @@ from gases import hits_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios import events
-from scenarios.events import EventEngine
+from adapters.event_driven import events
+from adapters.event_driven.events import EventEngine
+from scenarios.families.placing import box, scatter
 from scenarios.model import Scene
 from scenarios.no_truth import NoTruth
-from scenarios.placing import box, scatter
 
 # A second algorithm: all contacts as polynomials, all roots by numpy, nothing kept from one event to the next.
 
@@ -126,7 +126,7 @@ def test_a_brute_force_algorithm_finds_the_same_hits(seed):
     compare(seed)
 
 
-FILES = ("contact_times", "event_queue", "event_disks", "event_search", "event_rest", "event_impacts", "event_loop")
+FILES = ("contact_times", "queue", "disks", "search", "rest", "impacts", "loop")
 BUGS = {
     "stale record kept": ("b.count == a.partner_count", "True"),
     "nearest image": (
@@ -148,7 +148,7 @@ def plain_kernels(right="", wrong=""):
     """The kernels as plain Python, one line of them replaced."""
     folder = Path(events.__file__).parent
     source = "\n".join((folder / f"{name}.py").read_text() for name in FILES)
-    ours = r"from scenarios\.(event|contact|compiled)\w* import (\([^)]*\)|.*)"
+    ours = r"from adapters\.event_driven\.\w+ import (\([^)]*\)|.*)"
     source = re.sub(rf"from __future__.*|@kernel|@inlined|@pasted|{ours}", "", source)
     assert right in source
     names: dict = {"__name__": "plain"}

@@ -8,12 +8,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from test_event_brute_force import plain_kernels
 
-from scenarios import events
-from scenarios.closed_forms import bouncing
-from scenarios.events import EventEngine
+from adapters.event_driven import events
+from adapters.event_driven.events import EventEngine
+from scenarios.families.placing import box, scatter
 from scenarios.model import Scene
 from scenarios.no_truth import NoTruth
-from scenarios.placing import box, scatter
+from scenarios.truth.closed_forms import bouncing
 
 G = 10.0
 FLOOR = [[[-50.0, 0.0], [50.0, 0.0]]]

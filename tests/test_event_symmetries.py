@@ -9,8 +9,8 @@ import pytest
 from event_truth import float64_truth
 from gases import gas, hits_of, state_after
 
+from adapters.event_driven.events import EventEngine
 from scenarios.catalogue import scenario
-from scenarios.events import EventEngine
 
 
 def changed(scene, order=slice(None), x=lambda a: a, v=lambda a: a):

@@ -9,12 +9,12 @@ import pytest
 from event_truth import float64_truth
 from gases import gas, hits_of, state_after
 
-from scenarios import events
+from adapters.event_driven import events
+from adapters.event_driven.events import EventEngine
 from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.events import EventEngine
 from scenarios.model import Scenario, Scene, Thrust
 from scenarios.no_truth import NoTruth
-from scenarios.oracle import OracleTruth
+from scenarios.truth.exact import OracleTruth
 
 REFUSED = {
     "column_of_ten": "accumulate",

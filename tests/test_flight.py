@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES, Row
+from adapters.engine import Row
+from adapters.engines import ENGINES
 from adapters.play import play
 from reports.game.flight import EARTH, FRAME, Flight, field_scenario
 from reports.game.pilot import SHIP
-from scenarios.closed_forms import world_pushes
-from scenarios.exercise import SHIP as START
-from scenarios.files import read_scene_file, scene_text
+from scenarios.families.exercise import SHIP as START
+from scenarios.files.scene_file import read_scene_file, scene_text
+from scenarios.truth.closed_forms import world_pushes
 
 EVENTS = [  # frame, key, down: a turn, a push across it, a renewed push, both keys of a pair
     (8, "a", True), (24, "w", True), (40, "w", True), (56, "a", False), (72, "w", False), (80, "s", True),
@@ -212,7 +213,7 @@ def test_the_marker_names_the_first_hit():
 
 def read_truth(scenario):  # type: ignore[no-untyped-def]
     """The oracle's answer to a flight."""
-    from scenarios.oracle import with_oracle
+    from scenarios.truth.exact import with_oracle
 
     return with_oracle(scenario).truth(scenario.times)
 

@@ -13,13 +13,14 @@ from typing import Any
 
 import pytest
 
-from adapters.solver_file import read_solver
-from adapters.solver_process import SolverProcess
-from reports import safe_path, worker
-from reports.cells import Cell
-from reports.playing import play_here
-from reports.runner import run_all
-from reports.worker_process import Failure
+from adapters.own_solver.file import read_solver
+from adapters.own_solver.process import SolverProcess
+from reports.run import worker
+from reports.run.cells import Cell
+from reports.run.playing import play_here
+from reports.run.runner import run_all
+from reports.run.worker_process import Failure
+from reports.terminal import safe_path
 from scenarios.catalogue import scenario
 from tests.command_line import CROSSCHECK
 from tests.control_engines import Controlled, row

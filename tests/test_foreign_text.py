@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
-from reports.console import Console
-from reports.exits import say
-from reports.foreign_text import encoded, legible, put_bytes
-from reports.terminal import Progress
+from reports.terminal.console import Console
+from reports.terminal.exits import say
+from reports.terminal.foreign_text import encoded, legible, put_bytes
+from reports.terminal.progress import Progress
 from tests.command_line import crosscheck
 
 ROOT = Path(__file__).parent.parent
@@ -70,11 +70,11 @@ def test_the_question_of_a_scene_is_printed_as_it_is(tmp_path: Path, what: str):
 
 
 def test_only_one_console_prints():
-    """No file but reports/console.py makes a console of rich's, or takes text as markup."""
+    """No file but reports/terminal/console.py makes a console of rich's, or takes text as markup."""
     users = {str(path.relative_to(ROOT)) for path in FILES if "rich.console" in path.read_text(encoding="utf-8")}
     markup = {str(path.relative_to(ROOT)) for path in FILES if "rich.markup" in path.read_text(encoding="utf-8")}
 
-    assert (users, markup) == ({"reports/console.py"}, set())
+    assert (users, markup) == ({"reports/terminal/console.py"}, set())
 
 
 def without_encoding(source: str) -> list[int]:

@@ -15,9 +15,10 @@ from playwright.sync_api import Browser, Page
 from websockets.sync.client import connect
 
 from adapters.engines import ENGINES
+from reports.commands.serve import application
 from reports.game import command
 from reports.game.command import PATIENCE, own_rows
-from reports.game.server import Game, application
+from reports.game.server import Game
 from tests.browsing import opened, served
 from tests.command_line import CROSSCHECK, crosscheck
 from tests.test_game_page import fly

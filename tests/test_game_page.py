@@ -14,11 +14,12 @@ from playwright.sync_api import Browser, Page
 
 from adapters.engines import ENGINES
 from adapters.play import play
+from reports.commands.serve import application
 from reports.game.flight import FRAME
 from reports.game.pilot import SHIP
-from reports.game.server import Game, application
-from scenarios.closed_forms import world_pushes
-from scenarios.files import read_scene_file
+from reports.game.server import Game
+from scenarios.files.scene_file import read_scene_file
+from scenarios.truth.closed_forms import world_pushes
 from tests.browsing import opened, overhang, served
 from tests.test_flight import steered_home
 

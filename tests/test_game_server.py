@@ -21,18 +21,10 @@ from websockets.sync.client import ClientConnection, connect
 
 from adapters.box2d_v3 import Box2DV3
 from adapters.engines import ENGINES
-from reports.game.command import play_game
+from reports.commands.serve import application, play
 from reports.game.flight import field_scenario
-from reports.game.server import (
-    MOST_A_SECOND,
-    MOST_FAULTS,
-    MOST_TABS,
-    Game,
-    application,
-    config_of,
-    serve,
-    taken_socket,
-)  # fmt: skip
+from reports.game.server import MOST_A_SECOND, MOST_FAULTS, Game
+from reports.page.server import MOST_TABS, config_of, serve, taken_socket
 from tests.test_flight import bits, flown
 
 FLOWN = ["reference:exercise", "pymunk:shipped"]
@@ -249,7 +241,7 @@ def test_bad_input_is_told_and_nothing_is_served(
     (tmp_path / "bad.toml").write_text(top.format(2.0) + disk.format(0.0))
     (tmp_path / "crowd.toml").write_text(top.format(1.0) + "".join(disk.format(x) for x in range(201)))
     with pytest.raises(SystemExit) as exit:
-        play_game(tmp_path / flight if flight else None, engines, 8000, False)
+        play(tmp_path / flight if flight else None, engines, 8000, False)
 
     assert exit.value.code == 2
     assert said in capsys.readouterr().err

@@ -12,8 +12,8 @@ from reports.game.messages import read_message
 from reports.game.pilot import SHIP
 from reports.game.session import Session
 from scenarios.catalogue import SCENARIOS
+from scenarios.families.placing import lay_out
 from scenarios.model import Scenario
-from scenarios.placing import lay_out
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from reports.collisions import closest_in_order, match
+from reports.compare.collisions import closest_in_order, match
 from scenarios.model import Collisions
 
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from reports.archive import Archive
-from reports.journal import JOURNAL
-from reports.journal_lines import KINDS, kind_of
+from reports.run.archive import Archive
+from reports.run.journal import JOURNAL
+from reports.run.journal_lines import KINDS, kind_of
 from tests.command_line import Done, crosscheck
 from tests.small_runs import make
 

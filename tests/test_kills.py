@@ -76,7 +76,8 @@ def test_a_run_that_is_told_to_stop_keeps_what_was_played_and_says_how_to_go_on(
 
 def children_of(parent: int) -> list[int]:
     """The worker processes of a run."""
-    found = subprocess.run(["pgrep", "-P", str(parent), "-f", "reports.worker_process"], capture_output=True, text=True)
+    workers = ["pgrep", "-P", str(parent), "-f", "reports.run.worker_process"]
+    found = subprocess.run(workers, capture_output=True, text=True)
     return [int(pid) for pid in found.stdout.split()]
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reports.known_answers import KNOWN_ANSWERS, KnownAnswer, mean_squared_error_of
+from reports.run.known_answers import KNOWN_ANSWERS, KnownAnswer, mean_squared_error_of
 
 
 @pytest.mark.parametrize("known", KNOWN_ANSWERS, ids=lambda known: f"{known.column} {known.made_by} {known.dt_s:g}")

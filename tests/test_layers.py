@@ -1,4 +1,4 @@
-"""Imports point down only: reports -> adapters -> scenarios, reference_impl; the judge shares no code with a player."""
+"""Imports point down only, in every folder and the folders inside it; the judge shares no code with an engine."""
 
 import ast
 from pathlib import Path
@@ -12,27 +12,95 @@ MAY_IMPORT = {
     "adapters": {"adapters", "scenarios", "reference_impl"},
     "reports": {"reports", "adapters", "scenarios"},
 }
+# From the bottom up; what stands in one line does not import each other. A folder's own files are its layer "".
+LAYERS = {
+    "scenarios": ["model", "no_truth", "truth", "families", "files", "catalogue"],
+    "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines", "record", "exact"],
+    "adapters": [
+        "engine matched", "float32 play", "reference pymunk box2d box2d_v3 event_driven", "own_solver", "engines",
+        "mechanisms conformance",
+    ],
+    "reports": [
+        "terminal compare", "run", "page", "check speed stability game tune", "lessons", "commands", "cli", "__main__",
+    ],
+}  # fmt: skip
+MAY_ALSO = {("lessons", "stability")}  # a lesson shows a limit; no other application knows another
+APPLICATIONS = {"check", "speed", "stability", "game", "tune", "lessons"}
 FILES = [path for folder in MAY_IMPORT for path in sorted((ROOT / folder).rglob("*.py")) if "out" not in path.parts]
+MODULES = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in FILES}
 
 
 def imports_of(path: Path) -> set[str]:
-    """Top-level packages a file imports, wherever the import stands."""
+    """The modules a file imports, wherever the import stands; a name of a package counts as its module."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
+            found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import"
-            found.add((node.module or "").split(".")[0])
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= names & set(MODULES) or {node.module or ""}
     return found
+
+
+def of_folder(folder: str, names: set[str]) -> set[str]:
+    """What of a folder is named: `scenarios`, scenarios.truth.exact -> truth."""
+    start = folder.replace("/", ".") + "."
+    return {name.removeprefix(start).split(".")[0] for name in names if name.startswith(start)}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_file_imports_only_from_layers_below(path: Path):
-    """A player never sees the judge, the solver never sees the harness."""
-    ours = imports_of(path) & set(MAY_IMPORT)
+    """An engine never sees the judge, the solver never sees the harness."""
+    ours = {name.split(".")[0] for name in imports_of(path)} & set(MAY_IMPORT)
 
     assert ours <= MAY_IMPORT[path.relative_to(ROOT).parts[0]]
+
+
+@pytest.mark.parametrize("folder", LAYERS)
+def test_inside_a_folder_imports_point_down(folder: str):
+    """Between the parts of a folder, files and folders alike."""
+    height = {part: k for k, line in enumerate(LAYERS[folder]) for part in line.split()}
+    upwards = []
+    for name, path in MODULES.items():
+        for mine in of_folder(folder, {name}) - {""}:
+            for other in of_folder(folder, imports_of(path)) - {mine, ""}:
+                if height[other] >= height[mine] and (mine, other) not in MAY_ALSO:
+                    upwards.append(f"{path.relative_to(ROOT)} imports {other}")
+
+    assert upwards == []
+
+
+def test_no_application_imports_another():
+    """But lessons may ask stability for a limit."""
+    both = [
+        f"{path.relative_to(ROOT)} imports {other}"
+        for name, path in MODULES.items()
+        for mine in of_folder("reports", {name}) & APPLICATIONS
+        for other in (of_folder("reports", imports_of(path)) & APPLICATIONS) - {mine}
+        if (mine, other) not in MAY_ALSO
+    ]
+
+    assert both == []
+
+
+def test_no_file_imports_itself_through_others():
+    """No circle anywhere, imports inside functions included."""
+    graph = {name: imports_of(path) & set(MODULES) - {name} for name, path in MODULES.items()}
+    while leaves := [name for name, others in graph.items() if not others]:
+        graph = {name: others - set(leaves) for name, others in graph.items() if name not in leaves}
+
+    assert graph == {}
+
+
+def test_what_compares_opens_no_file_starts_no_process_and_asks_no_clock():
+    """`reports/compare` is pure: trajectories in, tables out."""
+    unclean = {"os", "io", "pathlib", "subprocess", "multiprocessing", "threading", "time", "datetime", "shutil"}
+    for path in (ROOT / "reports" / "compare").rglob("*.py"):
+        assert not unclean & {name.split(".")[0] for name in imports_of(path)}, path
+        called = {node.func.id for node in ast.walk(ast.parse(path.read_text()))
+                  if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}  # fmt: skip
+        assert not called & {"open", "print", "input"}, path
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
@@ -44,7 +112,9 @@ def test_a_file_fits_in_one_head(path: Path):
 def test_only_the_engine_table_names_engines():
     """An engine's library is imported by its own adapter and nowhere else."""
     libraries = {"pymunk", "Box2D", "pyb2d3"}
-    users = {str(path.relative_to(ROOT)): imports_of(path) & libraries for path in FILES}
+    users = {
+        str(path.relative_to(ROOT)): {name.split(".")[0] for name in imports_of(path)} & libraries for path in FILES
+    }
 
     assert {name: used for name, used in users.items() if used} == {
         "adapters/pymunk.py": {"pymunk"},

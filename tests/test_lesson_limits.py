@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.features import changed_box2d
+from adapters.mechanisms.features import changed_box2d
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.limits import HARSHNESS, SEEN, limits_of
+from reports.page.style import TRUTH
 from reports.stability import players
 from reports.stability.cases import CASES
 from reports.stability.players import Player
-from reports.style import TRUTH
 from tests.stability_limits import agrees, kept
 
 LESSON = LESSONS["limits"]

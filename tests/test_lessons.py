@@ -11,17 +11,17 @@ import pytest
 from playwright.sync_api import Browser
 
 from adapters.engines import ENGINES
+from adapters.mechanisms.switched import Switched
 from adapters.play import play
-from adapters.switched import Switched
-from reports.game.server import Game, application
+from reports.commands.serve import application
+from reports.game.server import Game
 from reports.lessons import pages
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson, play_once
 from reports.lessons.mechanisms import SWITCHED
 from reports.lessons.meeting import hit_of_the_reference, two
-from reports.lessons.pages import ROUTES
-from reports.style import TRUTH
+from reports.page.style import TRUTH
 from scenarios.catalogue import scenario
 from tests.browsing import opened, overhang, served
 
@@ -129,7 +129,7 @@ def test_conventions_are_measured():
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
     """Where the lessons are served."""
-    with served(application(Game(["reference:exercise"]), ROUTES)) as url:
+    with served(application(Game(["reference:exercise"]))) as url:
         yield f"{url}/lesson"
 
 

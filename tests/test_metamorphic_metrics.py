@@ -17,15 +17,15 @@ from metamorphic import CHANGES, Change
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
-from reports import collisions, delays, faces, view
-from reports.comparison import compare
-from reports.metrics import METRICS, Metric, _largest_of_disks
-from reports.scales import momentum
-from reports.view import Value, View
-from scenarios.files import read_scene_file
+from reports.compare import collisions, delays, faces, view
+from reports.compare.comparison import compare
+from reports.compare.metrics import METRICS, Metric, _largest_of_disks
+from reports.compare.scales import momentum
+from reports.compare.view import Value, View
+from scenarios.families.placing import box, lay_out
+from scenarios.files.scene_file import read_scene_file
 from scenarios.model import Scenario, Scene, Thrust
-from scenarios.oracle import with_oracle
-from scenarios.placing import box, lay_out
+from scenarios.truth.exact import with_oracle
 
 PLAYERS = ("reference:exercise", "reference:ordered", "pymunk:matched", "box2d:matched", "event_driven:float64")
 ROOM = box([-2.5, -2.5], [2.5, 2.5])

@@ -10,15 +10,15 @@ from answers import beside_truth, truth_of
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
-from reports import overview
-from reports.charts import CHARTS
-from reports.comparison import Comparison, compare, cut
-from reports.delays import WINDOW
-from reports.diff import changed_numbers
-from reports.findings import findings
-from reports.metrics import METRICS
-from reports.shares import read_share
-from reports.view import LEAST_SHARE, NOT_JUDGED, View
+from reports.compare.comparison import Comparison, compare, cut
+from reports.compare.delays import WINDOW
+from reports.compare.metrics import METRICS
+from reports.compare.view import LEAST_SHARE, NOT_JUDGED, View
+from reports.page import overview
+from reports.page.charts import CHARTS
+from reports.page.findings import findings
+from reports.run.diff import changed_numbers
+from reports.run.shares import read_share
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Trajectory
 

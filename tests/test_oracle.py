@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from test_scenarios import smallest_gap
 from test_truth import FLYING, simulate
 
-from scenarios import oracle_events
 from scenarios.catalogue import scenario
+from scenarios.families.placing import box, lay_out, scatter
 from scenarios.model import Scenario, Scene, Thrust
-from scenarios.numbers import balls, decimals, has_balls, mpfr
-from scenarios.oracle import ACCURACY, TruthRecord, computed
-from scenarios.oracle_events import Path, trace
-from scenarios.placing import box, lay_out, scatter
+from scenarios.truth.exact import ACCURACY, TruthRecord, computed
+from scenarios.truth.oracle import events as oracle_events
+from scenarios.truth.oracle.events import Path, trace
+from scenarios.truth.oracle.numbers import balls, decimals, has_balls, mpfr
 
 DRAWN = ("asteroids", "falling_box", "gas_of_100")
 COUNTS = {"asteroids": 20, "falling_box": 980, "gas_of_100": 1974}
@@ -210,8 +210,8 @@ def test_an_edge_of_the_wrap_sets_the_centre_onto_the_other():
 
 def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):
     """With too few bits for the scene the truth ends early, and says so."""
-    monkeypatch.setattr("scenarios.oracle.FEWEST_BITS", 56)
-    monkeypatch.setattr("scenarios.oracle.MOST_BITS", 100)
+    monkeypatch.setattr("scenarios.truth.exact.FEWEST_BITS", 56)
+    monkeypatch.setattr("scenarios.truth.exact.MOST_BITS", 100)
     one = scenario("falling_box")
     record = computed(one)
 

@@ -13,8 +13,8 @@ from bench_oracle import FIGURES, FLOORS, questions, said
 from test_scenarios import smallest_gap
 
 from scenarios.model import Scenario
-from scenarios.numbers import has_balls
-from scenarios.oracle import ACCURACY, computed
+from scenarios.truth.exact import ACCURACY, computed
+from scenarios.truth.oracle.numbers import has_balls
 
 WRITTEN = list(csv.DictReader(FIGURES.open(encoding="utf-8")))
 

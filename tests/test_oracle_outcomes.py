@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from test_oracle import asked, states
 
-from scenarios import oracle_ahead
 from scenarios.catalogue import scenario
+from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario, Scene, Thrust
 from scenarios.no_truth import NoTruth, truth_at
-from scenarios.numbers import mpfr
-from scenarios.oracle import computed, with_oracle
-from scenarios.oracle_record import TruthRecord
-from scenarios.oracle_ties import Contact, Matter, Touch
-from scenarios.placing import box, lay_out
+from scenarios.truth.exact import computed, with_oracle
+from scenarios.truth.oracle import ahead as oracle_ahead
+from scenarios.truth.oracle.numbers import mpfr
+from scenarios.truth.oracle.ties import Contact, Matter, Touch
+from scenarios.truth.record import TruthRecord
 
 ROW = lay_out(position=[[-2, 0], [0, 0], [0.5, 0], [1, 0]], velocity=[[1, 0], [0, 0], [0, 0], [0, 0]],
               radius=[0.25] * 4, mass=[1] * 4, restitution=1.0)  # fmt: skip

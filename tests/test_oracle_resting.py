@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from test_oracle import asked, drawn, states
 from test_scenarios import smallest_gap
 
-from scenarios import oracle_resting
 from scenarios.catalogue import scenario
+from scenarios.families.placing import lay_out
 from scenarios.model import Scene, Thrust
-from scenarios.numbers import has_balls, mpfr
-from scenarios.oracle import ACCURACY, computed
-from scenarios.oracle_record import TruthRecord
-from scenarios.placing import lay_out
+from scenarios.truth.exact import ACCURACY, computed
+from scenarios.truth.oracle import resting as oracle_resting
+from scenarios.truth.oracle.numbers import has_balls, mpfr
+from scenarios.truth.record import TruthRecord
 
 FLOOR = [[[-9, 0], [9, 0]]]
 KINDS = [None, mpfr]

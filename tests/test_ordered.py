@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adapters.event_driven.events import EventEngine
 from adapters.reference import Reference
 from reference_impl import crowd, ordered
-from scenarios.events import EventEngine
+from scenarios.families.placing import box
 from scenarios.model import Scenario, Scene
-from scenarios.oracle import computed
-from scenarios.placing import box
+from scenarios.truth.exact import computed
 from tests.gases import boxed_asteroids
 
 ROUNDING = 2.0**-53

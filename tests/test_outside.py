@@ -18,18 +18,18 @@ from typing import Any
 
 import pytest
 
-from adapters import solver_process
 from adapters.engine import NotStarted
+from adapters.own_solver import process as solver_process
+from adapters.own_solver.engine import engine_file
+from adapters.own_solver.file import read_solver
+from adapters.own_solver.worker import HERE, MEMORY
 from adapters.play import play
-from adapters.solver_file import read_solver
-from adapters.solver_worker import HERE, MEMORY
-from adapters.student import engine_file
-from reports import runner, worker
-from reports.archive import Archive
-from reports.cells import Cell
-from reports.playing import play_here
-from reports.runner import LEAST_MEMORY, affordable, run_all
-from reports.worker_process import Failure
+from reports.run import runner, worker
+from reports.run.archive import Archive
+from reports.run.cells import Cell
+from reports.run.playing import play_here
+from reports.run.runner import LEAST_MEMORY, affordable, run_all
+from reports.run.worker_process import Failure
 from scenarios.catalogue import scenario
 from tests.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
@@ -198,7 +198,7 @@ def little_memory() -> None:
 def test_a_worker_with_little_memory_can_still_start_a_solver():
     """A limit that is lower than the solver's own stays as it is: nobody but root may raise it."""
     with subprocess.Popen(
-        [sys.executable, "-P", "-m", "adapters.solver_worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        [sys.executable, "-P", "-m", "adapters.own_solver.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         preexec_fn=little_memory, start_new_session=True,
     ) as process:  # fmt: skip
         assert process.stdin is not None

@@ -14,9 +14,9 @@ from playwright.sync_api import Browser, Page
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
-from reports.charts import CHARTS
-from reports.comparison import Comparison, compare
-from reports.page import write_page
+from reports.compare.comparison import Comparison, compare
+from reports.page.charts import CHARTS
+from reports.page.page import write_page
 from scenarios.catalogue import scenario
 from tests.browsing import opened, overhang
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.journal import JOURNAL
+from reports.run.journal import JOURNAL
 from tests.command_line import crosscheck
 
 SCENE = (Path(__file__).parent / "scenes" / "two.toml").read_text()

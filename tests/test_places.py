@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.streams import Outlet
+from reports.terminal.streams import Outlet
 from tests.command_line import CROSSCHECK
 
 SCENE = Path(__file__).parent / "scenes" / "two.toml"
@@ -118,5 +118,5 @@ def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
     assert table.engine.nunique() == 2
     assert set(pd.read_csv(out / "runs.csv").status) == {"ok"}
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert (Path(__file__).parent.parent / "reports" / "page.js").read_text(encoding="utf-8") in page
+    assert (Path(__file__).parent.parent / "reports" / "page" / "page.js").read_text(encoding="utf-8") in page
     assert "own" in page

@@ -10,12 +10,12 @@ import pytest
 from random_scenes import LAYOUTS, random_scenario, random_scenarios
 from time_limits import each_within
 
-from adapters.event_driven import EventDriven
+from adapters.event_driven.engine import EventDriven
 from adapters.play import Run, play
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
-from scenarios.oracle import computed
+from scenarios.truth.exact import computed
 
 LIMIT = 2.0  # s of processor time a scene; most take some ms
 FAST, LONG, CHUNKS = 45, 500, 5

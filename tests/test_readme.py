@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from adapters.conformance import PROBES
+from adapters.conformance.conform import PROBES
 from adapters.engines import ENGINES
 from reports.lessons.catalogue import LESSONS
 from scenarios.catalogue import SCENARIOS

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from adapters.engines import ENGINES as EVERY
-from reports.archive import Archive
-from reports.cells import Cell
-from reports.journal import Journal
-from reports.playing import play_cell
-from reports.replay_command import continued, replay
-from reports.suite import Means, Plan, carry_out
-from reports.terminal import Progress
+from reports.commands.replay import continued, replay
+from reports.run.archive import Archive
+from reports.run.cells import Cell
+from reports.run.journal import Journal
+from reports.run.playing import play_cell
+from reports.run.suite import Means, Plan, carry_out
+from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from tests.control_engines import CONTROLS, FATAL, Controlled, row
 

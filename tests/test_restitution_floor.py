@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES, FLOAT32, FLOAT64
+from adapters.engine import FLOAT32, FLOAT64
+from adapters.engines import ENGINES
 from adapters.play import play
-from reports import collisions
-from reports.collisions import FLOOR, effective_restitution
-from reports.metrics import METRICS
-from reports.view import NOT_JUDGED, Value, View
+from reports.compare import collisions
+from reports.compare.collisions import FLOOR, effective_restitution
+from reports.compare.metrics import METRICS
+from reports.compare.view import NOT_JUDGED, Value, View
 from scenarios.catalogue import scenario
 from scenarios.model import Collisions, Scene, Trajectory
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.archive import Archive
-from reports.journal import Journal
+from reports.run.archive import Archive
+from reports.run.journal import Journal
 from tests.command_line import crosscheck
 from tests.sweeps import SMALL, assert_nothing_lost, broken_off, lines, undisturbed
 

@@ -8,13 +8,14 @@ from typing import Any
 
 import pytest
 
-from adapters.engines import ENGINES, Row
-from reports import playing
-from reports.archive import from_trail, load_trajectory, packed
-from reports.cells import Cell
-from reports.playing import Played, play_cell, play_here
-from reports.runner import NoScheduler, cluster, run_all
-from reports.worker_process import Failure
+from adapters.engine import Row
+from adapters.engines import ENGINES
+from reports.run import playing
+from reports.run.archive import from_trail, load_trajectory, packed
+from reports.run.cells import Cell
+from reports.run.playing import Played, play_cell, play_here
+from reports.run.runner import NoScheduler, cluster, run_all
+from reports.run.worker_process import Failure
 from scenarios.catalogue import scenario
 from tests.control_engines import (
     CONTROLS,

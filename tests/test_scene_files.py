@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scene_faults import DISK, FAULTS, SCENES, THRUST, TWO
 
-from scenarios.files import SceneFileError, read_scene_file, write_scene_file
+from scenarios.files.scene_file import SceneFileError, read_scene_file, write_scene_file
 from scenarios.model import Scenario, Scene, Thrust
 
 

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_faults import TWO
 
-from reports.scenes import with_steps
-from scenarios.files import SceneFileError, read_scene_file
+from reports.run.scenes import with_steps
+from scenarios.files.scene_file import SceneFileError, read_scene_file
 
 # Every number that a scene may hold.
 FULL = """name = "full"

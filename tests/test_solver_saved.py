@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import solver_process
+from adapters.own_solver import process as solver_process
+from adapters.own_solver.engine import engine_file
+from adapters.own_solver.file import LARGEST, NotASolver, read_solver
 from adapters.play import Run, play
-from adapters.solver_file import LARGEST, NotASolver, read_solver
-from adapters.student import engine_file
-from reports import suite
-from reports.archive import Archive, load_trajectory, trajectory_file
 from reports.check.command import make_page
 from reports.check.verdict import check_file
+from reports.run import suite
+from reports.run.archive import Archive, load_trajectory, trajectory_file
 from scenarios.catalogue import scenario
 from tests.command_line import crosscheck
 from tests.solvers.mutants import CORRECT

@@ -9,10 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES, Row
-from adapters.habits import DIGITS, FLIGHT, HABITS, LATE, PUSH_OUT, RESTITUTION, Habit
-from adapters.switched import Switched
-from reports import scales
+from adapters.engine import Row
+from adapters.engines import ENGINES
+from adapters.mechanisms.habits import DIGITS, FLIGHT, HABITS, LATE, PUSH_OUT, RESTITUTION, Habit
+from adapters.mechanisms.switched import Switched
+from reports.compare import scales
 from reports.speed import budget, budget_tables
 from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED, Budget, Offset, budget_of, followed
 from scenarios.model import Array, State

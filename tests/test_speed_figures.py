@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.habits import HABITS
+from adapters.mechanisms.habits import HABITS
 from reports.speed import budget, explained, figures, ladder, tables
 from reports.speed.budget import budget_of
 from reports.speed.effort import FULL, QUICK

@@ -10,16 +10,16 @@ import pandas as pd
 import pytest
 
 from adapters.engines import read_row
-from reports import terminal
-from reports.exits import FolderTaken
-from reports.journal import Journal
+from reports.run.journal import Journal
 from reports.speed import ladder, measure
 from reports.speed.command import kept_of
 from reports.speed.effort import QUICK
 from reports.speed.kept import Kept
 from reports.speed.measure import done
 from reports.speed.plan import Plan
-from reports.terminal import Progress
+from reports.terminal import progress as terminal
+from reports.terminal.exits import FolderTaken
+from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from tests.command_line import crosscheck
 

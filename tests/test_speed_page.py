@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.features import FEATURES
-from adapters.habits import HABITS
+from adapters.mechanisms.features import FEATURES
+from adapters.mechanisms.habits import HABITS
 from adapters.play import play
-from reports.machine import about
+from reports.run.machine import about
 from reports.speed import charts, figures
 from reports.speed.budget import budget_of
 from reports.speed.effort import QUICK
@@ -25,9 +25,9 @@ from reports.speed.pareto import FAILED, UNREACHABLE
 from reports.speed.plan import Plan
 from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
-from reports.terminal import Progress
+from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
-from scenarios.oracle import CLOSED_FORM, HIT_BY_HIT
+from scenarios.truth.exact import CLOSED_FORM, HIT_BY_HIT
 from tests.browsing import opened, overhang
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
@@ -77,7 +77,7 @@ def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
 def test_errors_are_those_of_the_comparison(results: Results):
     """The same number as `position_max_radii` of the report, from the same play."""
     from adapters.engines import ENGINES
-    from reports.comparison import compare
+    from reports.compare.comparison import compare
 
     row = results.points[(results.points.scenario == SCENES[0]) & (results.points.engine == "reference")].iloc[1]
     scene = scenario(SCENES[0])

@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from reports import cli
-from reports.journal import JOURNAL
+from reports.run.journal import JOURNAL
 from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
 from reports.stability.cases import CASES
 from reports.stability.command import write_files

@@ -8,10 +8,10 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from adapters.features import changed_pymunk
+from adapters.mechanisms.features import changed_pymunk
 from adapters.play import play
 from adapters.pymunk import Pymunk
-from reports import laws
+from reports.compare import laws
 from reports.stability.cases import CASES
 from reports.stability.cases_gas import RADIUS, gas, wrapped_run
 from reports.stability.hard_disks import compressibility, gas_in_box

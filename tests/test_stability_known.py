@@ -9,7 +9,7 @@ from math import atan, pi, sqrt
 import numpy as np
 import pytest
 
-from adapters.features import changed_box2d, changed_box2d_v3
+from adapters.mechanisms.features import changed_box2d, changed_box2d_v3
 from reports.stability.cases import CASES
 from reports.stability.cases_alone import ball, far, on_spring, oscillator
 from reports.stability.limits import QUICK, Limit

@@ -19,8 +19,8 @@ from reports.stability.players import PLAYERS, play_as
 from reports.stability.reasons import reason_of
 from reports.stability.search import Search
 from reports.stability.vary import VARIES, case_of_file, varied
-from scenarios.files import read_scene_file
-from scenarios.oracle import with_oracle
+from scenarios.files.scene_file import read_scene_file
+from scenarios.truth.exact import with_oracle
 
 SCENES = Path(__file__).parent / "scenes"
 

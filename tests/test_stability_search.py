@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 from adapters.play import Run
-from reports.journal import plain
-from reports.replay import pack_layers
-from reports.runner import run_all
+from reports.page.replay import pack_layers
+from reports.run.journal import plain
+from reports.run.runner import run_all
+from reports.run.worker_process import Failure
 from reports.stability.atlas import Task, failed, limit_from, row_of
 from reports.stability.cases import CASES
 from reports.stability.cases_gas import gas
@@ -29,9 +30,8 @@ from reports.stability.limits import FULL, QUICK, Case, Limit, Trial
 from reports.stability.players import Player, play_as
 from reports.stability.predicates import Predicate, Reading, judge
 from reports.stability.search import Search
-from reports.worker_process import Failure
+from scenarios.families.placing import lay_out
 from scenarios.model import Scenario, Trajectory
-from scenarios.placing import lay_out
 
 
 def abort() -> None:

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from adapters.features import changed_pymunk
-from adapters.habits import FLIGHT, FRICTION, HABITS, PUSH_OUT, RESTITUTION, habits_of
+from adapters.mechanisms.features import changed_pymunk
+from adapters.mechanisms.habits import FLIGHT, FRICTION, HABITS, PUSH_OUT, RESTITUTION, habits_of
 from reports.stability.cases import CASES
 from reports.stability.explain import explained
 from reports.stability.limits import QUICK, Limit, Trial

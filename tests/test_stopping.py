@@ -14,10 +14,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.exits import STATUS, Stopped, broken_off, stoppable
-from reports.folders import RUN, begun, replace_folder
-from reports.made import Made, put_made
-from reports.run_command import what_is_kept
+from reports.commands.run import what_is_kept
+from reports.run.folders import RUN, begun, replace_folder
+from reports.run.made import Made, put_made
+from reports.terminal.exits import STATUS, Stopped, broken_off, stoppable
 from tests.command_line import crosscheck, wait_for
 from tests.stopping import AT_MOST, Command, assert_ended, busyness
 from tests.sweeps import ended_in
@@ -26,7 +26,7 @@ from tests.test_kills import alive
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for what is left in /proc")
 
 SOLVERS = Path(__file__).parent / "solvers" / "correct"
-TRUTH, ANSWER = "scenarios.oracle:OracleTruth.record", "scenarios.oracle:computed"
+TRUTH, ANSWER = "scenarios.truth.exact:OracleTruth.record", "scenarios.truth.exact:computed"
 BOTH = [signal.SIGTERM, signal.SIGINT]
 FILE = """
 name = "two"
@@ -53,9 +53,9 @@ SOCKET = (  # RFC 6455, 1.2: a page opens its socket
 # The stages of every command, each with what never returns there.
 STALLED = {
     "the answer in run": (TWO, TRUTH),
-    "the comparison in run": (TWO, "reports.comparison:_measure"),
+    "the comparison in run": (TWO, "reports.compare.comparison:_measure"),
     "the answer in report": (["report", "done"], TRUTH),
-    "the comparison in report": (["report", "done"], "reports.comparison:_measure"),
+    "the comparison in report": (["report", "done"], "reports.compare.comparison:_measure"),
     "the answer in truth": (["truth", "two.toml"], TRUTH),
     "the answer in speed": (["speed", "two.toml", "--engine", "pymunk:shipped", "--out", "out"], TRUTH),
     "a limit in stability": (
@@ -64,7 +64,7 @@ STALLED = {
     "a scene in check": (["check", SOLVERS / "plain.py"], ANSWER),
     "a scene in check of a folder": (["check", SOLVERS], ANSWER),
     "a lesson in lesson --export": (["lesson", "order", "--export", "order.html"], "reports.lessons.lesson:play"),
-    "a cell in replay": (["replay", "", "--out", "done"], "reports.playing:play"),
+    "a cell in replay": (["replay", "", "--out", "done"], "reports.run.playing:play"),
 }  # fmt: skip
 
 
@@ -105,7 +105,7 @@ def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(place: P
 @pytest.mark.parametrize("how", BOTH)
 def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: int):
     """Told to stop while it compares: the sentence counts the cells, and --resume gives the bytes of a whole run."""
-    command = Command(*TWO, cwd=place, stalled="reports.comparison:_measure").stalled()
+    command = Command(*TWO, cwd=place, stalled="reports.compare.comparison:_measure").stalled()
     had = ended_in(place / "out.part")
     ended = command.stop(how)
     resumed = crosscheck("run", "--resume", "out", cwd=place)
@@ -266,8 +266,8 @@ def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: st
     (tmp_path / name).write_text(text)
     question = {"spheres": [[0.0] * 12], "calls": [["integrate", 0, 1e-3]], "world": False}
     asks = (
-        "from pathlib import Path; from adapters.solver_file import read_solver; "
-        "from adapters.solver_process import SolverProcess; "
+        "from pathlib import Path; from adapters.own_solver.file import read_solver; "
+        "from adapters.own_solver.process import SolverProcess; "
         f"SolverProcess(read_solver(Path({str(tmp_path / name)!r}))).do('ask', {question}, 60.0)"
     )
     asking = subprocess.Popen([sys.executable, "-c", asks], stderr=subprocess.DEVNULL)

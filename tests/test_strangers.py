@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from reports import run_command
-from reports.exits import FolderTaken
-from reports.folders import RUN, begun, made_anew, replace_folder
-from reports.foreign_text import put_text, whole
-from reports.made import MADE, Kind, Made, may_overwrite, put_made, read_made, stranger_in, writing
+from reports.commands import run as run_command
+from reports.run.folders import RUN, begun, made_anew, replace_folder
+from reports.run.made import MADE, Kind, Made, may_overwrite, put_made, read_made, stranger_in, writing
+from reports.terminal.exits import FolderTaken
+from reports.terminal.foreign_text import put_text, whole
 from tests.command_line import CROSSCHECK, crosscheck
 
 SCENE = (Path(__file__).parent / "scenes" / "two.toml").read_text()

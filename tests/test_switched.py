@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.habits import FLIGHT, HABITS, IMPULSE, LATE, PUSH_OUT, RESTITUTION, habits_of, with_habits
+from adapters.mechanisms.habits import FLIGHT, HABITS, IMPULSE, LATE, PUSH_OUT, RESTITUTION, habits_of, with_habits
+from adapters.mechanisms.switched import BOX2D, BOX2D_V3, PYMUNK, Switched
 from adapters.play import Run, play
 from adapters.reference import Reference
-from adapters.switched import BOX2D, BOX2D_V3, PYMUNK, Switched
 from reference_impl import exercise
 from scenarios.catalogue import scenario
+from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario
-from scenarios.placing import lay_out
 
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
 ORDERS = {"pymunk": PYMUNK, "box2d": BOX2D, "box2d_v3": BOX2D_V3}
@@ -177,8 +177,8 @@ def test_every_player_with_habits_is_known_and_flies_as_its_row_says():
 
 PLAIN = """
 import sys, numpy as np
-from adapters.switched import BOX2D, BOX2D_V3, EXERCISE, PYMUNK, Switched
-from scenarios.placing import box, lay_out
+from adapters.mechanisms.switched import BOX2D, BOX2D_V3, EXERCISE, PYMUNK, Switched
+from scenarios.families.placing import box, lay_out
 grid = np.stack(np.meshgrid(np.arange(3), np.arange(3)), -1).reshape(-1, 2) * 1.0
 n = np.arange(9)
 velocity = np.where(n == 4, 0, 1)[:, None] * np.stack([np.sin(1.0 + n), np.cos(2.0 * n)], -1)

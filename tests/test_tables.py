@@ -13,14 +13,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import reports
 from adapters.engines import ENGINES
-from reports import shares, tables
-from reports.answers import answer_of, no_answer, put_answer, read_answer
-from reports.archive import Archive
-from reports.cells import Cell
-from reports.journal import JOURNAL, Journal
-from reports.shares import (
+from reports.run import cells, shares, tables
+from reports.run.answers import answer_of, no_answer, put_answer, read_answer
+from reports.run.archive import Archive
+from reports.run.cells import ROOT, Cell
+from reports.run.journal import JOURNAL, Journal
+from reports.run.shares import (
     ANSWER,
     JUDGES,
     Gathering,
@@ -31,11 +30,12 @@ from reports.shares import (
     name_of,
     share_of,
 )  # fmt: skip
-from reports.suite import Means, Plan, carry_out
-from reports.tables import comparisons_of, make_tables
-from reports.terminal import Progress
-from reports.worker_process import Failure
+from reports.run.suite import Means, Plan, carry_out
+from reports.run.tables import comparisons_of, make_tables
+from reports.run.worker_process import Failure
+from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
+from scenarios.truth import cache
 
 
 @pytest.fixture(scope="module")
@@ -234,16 +234,46 @@ def test_a_file_that_is_gone_is_found_though_the_table_was_kept(folder: Path, tm
     assert "is missing" in (copy / "deviations.csv").read_text()
 
 
-def test_every_file_that_judges_is_in_the_hash():
-    """All of reports/ that the comparison imports, so that a changed metric is measured again."""
-    root = Path(reports.__file__).parent
-    found, waiting = set(), {"comparison"}
-    while waiting:
-        name = waiting.pop()
-        found.add(name)
-        for node in ast.walk(ast.parse((root / f"{name}.py").read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "reports":
-                parts = {alias.name for alias in node.names} if node.module == "reports" else {node.module[8:]}
-                waiting |= parts - found
+def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_hashed():
+    """So that a changed metric is measured again."""
+    folder = ROOT / "reports" / "compare"
+    imported = {
+        node.module or ""
+        for path in folder.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom)
+    }
 
-    assert found == set(JUDGES)
+    assert JUDGES[0].startswith("reports/compare/")
+    assert {name for name in imported if name.startswith("reports")} <= {
+        "reports.compare", *(f"reports.compare.{path.stem}" for path in folder.rglob("*.py"))
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("file", "hashed"),
+    [
+        ("adapters/pymunk.py", cells.source_hash),
+        ("adapters/own_solver/driver.js", cells.source_hash),
+        ("reference_impl/ordered.py", cells.source_hash),
+        ("reports/compare/metrics.py", shares.judge),
+        ("scenarios/truth/oracle/events.py", shares.judge),
+        ("scenarios/truth/oracle/events.py", lambda root: cache.source_hash(root / "scenarios" / "truth")),
+        ("scenarios/truth/horizon.py", lambda root: cache.source_hash(root / "scenarios" / "truth")),
+    ],
+)
+def test_a_file_that_is_moved_into_a_folder_of_its_own_stays_in_the_hash(file, hashed, tmp_path: Path):
+    """Else a change of it would be served by results that it did not make."""
+    where, moved = tmp_path / "before" / file, tmp_path / "after" / Path(file).parent / "deeper" / Path(file).name
+    for root in ("before", "after"):
+        for top in ("adapters", "reference_impl", "scenarios", "reports"):
+            shutil.copytree(ROOT / top, tmp_path / root / top, ignore=shutil.ignore_patterns("out", "__pycache__"))
+    moved.parent.mkdir()
+    (tmp_path / "after" / file).rename(moved)
+    at_first = hashed(tmp_path / "before"), hashed(tmp_path / "after")
+    for path in (where, moved):
+        path.write_text(path.read_text() + "\n")
+    getattr(hashed, "cache_clear", cache.source_hash.cache_clear)()
+
+    assert hashed(tmp_path / "before") != at_first[0]
+    assert hashed(tmp_path / "after") != at_first[1]

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reports.archive import Archive, trajectory_file
-from reports.journal import JOURNAL
+from reports.run.archive import Archive, trajectory_file
+from reports.run.journal import JOURNAL
 from tests.command_line import crosscheck
 from tests.small_runs import make
 
@@ -149,7 +149,7 @@ def test_a_file_that_diff_cannot_read_is_named(whole: Path, torn: Path, monkeypa
     def refused(*_: object) -> None:
         raise PermissionError(13, "Permission denied", str(torn / JOURNAL))
 
-    monkeypatch.setattr("reports.diff_command.difference", refused)
+    monkeypatch.setattr("reports.commands.diff.difference", refused)
     done = crosscheck("diff", whole, torn, cwd=torn.parent)
 
     assert (done.returncode, done.stderr) == (2, f"{torn / JOURNAL}: Permission denied\n")

@@ -9,7 +9,7 @@ import pytest
 
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Scene
-from scenarios.oracle import OracleTruth
+from scenarios.truth.exact import OracleTruth
 
 ANSWERED = [name for name in SCENARIOS if (truth := scenario(name).truth) and not isinstance(truth, OracleTruth)]
 PUSHED = [name for name in ANSWERED if scenario(name).thrusts]

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reports.answers import Answer, put_answer, read_answer
-from scenarios import oracle, truth_cache
+from reports.run.answers import Answer, put_answer, read_answer
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario
-from scenarios.oracle import OracleTruth, TruthRecord
+from scenarios.truth import cache as truth_cache
+from scenarios.truth import exact as oracle
+from scenarios.truth.exact import OracleTruth, TruthRecord
 
 
 @pytest.fixture

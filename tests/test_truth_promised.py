@@ -9,14 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from metamorphic import Change
 
-from reports.answers import record_of
-from scenarios import oracle, oracle_record
-from scenarios.horizon import ASTRAY
+from reports.run.answers import record_of
+from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario, Thrust
 from scenarios.no_truth import NoTruth
-from scenarios.oracle import computed, with_oracle
-from scenarios.oracle_record import TruthRecord
-from scenarios.placing import box, lay_out
+from scenarios.truth import exact as oracle
+from scenarios.truth import record as oracle_record
+from scenarios.truth.exact import computed, with_oracle
+from scenarios.truth.horizon import ASTRAY
+from scenarios.truth.record import TruthRecord
 
 
 def pushed(force: float, away: float = 0.0, duration: float = 2.0) -> Scenario:
@@ -114,10 +115,10 @@ def test_the_horizon_and_the_end_of_an_answer_are_the_same_in_other_units(units:
 def test_a_horizon_by_metres_is_caught(monkeypatch: pytest.MonkeyPatch):
     """The control: astray by a nanometre, whatever the radius."""
     change, one = UNITS["lengths x 1000"], with_oracle(lasting(boxed(1), 12.0))
-    monkeypatch.setattr("scenarios.horizon.ASTRAY", 1e-9 / one.scene.radius.max())
+    monkeypatch.setattr("scenarios.truth.horizon.ASTRAY", 1e-9 / one.scene.radius.max())
     before = computed(one)
     monkeypatch.setattr(
-        "scenarios.horizon.ASTRAY", 1e-12 / one.scene.radius.max()
+        "scenarios.truth.horizon.ASTRAY", 1e-12 / one.scene.radius.max()
     )  # of radii a thousand times as large
     after = computed(with_oracle(change.scenario(replace(one, truth=None))))
     assert after.followed_until < 0.99 * before.followed_until

@@ -7,15 +7,15 @@ from functools import partial
 import numpy as np
 import pytest
 
-from adapters.features import changed_box2d_v3, changed_pymunk
 from adapters.matched import chosen, searched
+from adapters.mechanisms.features import changed_box2d_v3, changed_pymunk
 from adapters.pymunk import MATCHED as PYMUNK
 from reports.tune.grid import GRID, MAKES, NOT_SEARCHED, PAIRS, matched_of, settings_of
 from reports.tune.score import FLOOR, Played, against, at_cost, faults_of, measured, posed
 from reports.tune.search import BETTER, CHOSEN, COLUMNS, NO_SEARCH, Search, shown
 from scenarios.catalogue import SCENARIOS, scenario
+from scenarios.families.tuning import FAMILIES, LADDER, LEAST_GAP, one_of, tuning
 from scenarios.model import Array, Scenario
-from scenarios.tuning import FAMILIES, LADDER, LEAST_GAP, one_of, tuning
 
 
 def start(one: Scenario) -> Array:

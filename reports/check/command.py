@@ -12,16 +12,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adapters.solver_file import KINDS, SolverFailed, SolverText, dangling
-from adapters.solver_process import SolverProcess
+from adapters.own_solver.file import KINDS, SolverFailed, SolverText, dangling
+from adapters.own_solver.process import SolverProcess
 from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
 from reports.check.verdict import NONE, FileCheck, check_file
-from reports.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
-from reports.foreign_text import put_text
-from reports.made import may_overwrite
-from reports.runner import run_all
-from reports.worker_process import Failure
+from reports.run.made import may_overwrite
+from reports.run.runner import run_all
+from reports.run.worker_process import Failure
+from reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
+from reports.terminal.foreign_text import put_text
 
 if TYPE_CHECKING:
     from reports.check.smallest import Smallest

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.solver_file import SolverFailed
-from adapters.solver_process import SolverProcess
+from adapters.own_solver.file import SolverFailed
+from adapters.own_solver.process import SolverProcess
 from reports.check.questions import Answer, Ball, Question, ask
 from reports.check.rows import FOLLOWS, Row, judged, near, not_asked, shown
 

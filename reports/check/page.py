@@ -6,18 +6,18 @@ from importlib.metadata import version
 from pathlib import Path
 
 from adapters.play import Run
-from reports import style
 from reports.check.rows import TASKS, shown
 from reports.check.smallest import DT, Smallest
 from reports.check.verdict import FileCheck
-from reports.documents import looks_as_json, render
-from reports.foreign_text import put_text
-from reports.replay import pack_layers, ratio_of
+from reports.page import style
+from reports.page.documents import looks_as_json, render
+from reports.page.replay import pack_layers, ratio_of
+from reports.terminal.foreign_text import put_text
 from scenarios.model import Scenario, Trajectory
 
 GENERATOR = "crosscheck check"
 YOURS = style.Look("#a3123a", "#ff7a93", (), "diamond", True)  # apart from the truth in any light, by style.py
-SCRIPTS = ("player.js", "player_canvas.js", "check/check.js")
+SCRIPTS = ("page/player.js", "page/player_canvas.js", "check/check.js")
 
 
 def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:

@@ -29,7 +29,7 @@ class SolverFile(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """A test a row."""
-        from adapters.solver_file import NotASolver
+        from adapters.own_solver.file import NotASolver
         from reports.check.solver import check_solver
 
         try:

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.solver_file import SolverFailed
-from adapters.solver_process import SolverProcess
+from adapters.own_solver.file import SolverFailed
+from adapters.own_solver.process import SolverProcess
 from scenarios.model import Array
 
 LIMIT = 1.0  # s a question may take: it needs a few microseconds

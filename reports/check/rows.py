@@ -31,7 +31,7 @@ READ = {
     "2c": "the exercise, task 2 (c); reference_impl/exercise.py, collide (c)",
     "2d": "the exercise, task 2 (d); reference_impl/exercise.py, collide (d)",
     "loop": "performSimStep and projectObjects as the exercise hands them out",
-    "scenes": "scenarios/closed_forms.py, scenarios/oracle.py",
+    "scenes": "scenarios/truth/closed_forms.py, scenarios/truth/exact.py",
 }
 
 

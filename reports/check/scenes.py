@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.solver_file import SolverFailed
-from adapters.solver_process import SolverProcess
-from adapters.student import spheres_of
+from adapters.own_solver.engine import spheres_of
+from adapters.own_solver.file import SolverFailed
+from adapters.own_solver.process import SolverProcess
 from reports.check.rows import FOLLOWS, TOLERANCE, Row, judged, near, not_asked, shown
-from scenarios.closed_forms import world_pushes
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
-from scenarios.oracle import TruthRecord, computed
+from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.exact import TruthRecord, computed
 
 DT = 1e-3  # s, the exercise's
 INTERVAL = 0.02  # s

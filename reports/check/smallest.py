@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from hypothesis.configuration import set_hypothesis_home_dir
 from hypothesis.errors import Flaky, NoSuchExample
 
-from adapters.solver_file import SolverFailed
-from adapters.solver_process import SolverProcess
+from adapters.own_solver.file import SolverFailed
+from adapters.own_solver.process import SolverProcess
 from reports.check.rows import TOLERANCE, near, shown
 from reports.check.scenes import Played, first_wrong, play_scene, scene_of, truth_of
 from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
 from scenarios.no_truth import NoTruth
-from scenarios.oracle import computed
+from scenarios.truth.exact import computed
 
 DT = 1e-2  # s, coarse: a scene is played in milliseconds, and a hit found late is judged by the state it is found in
 SECONDS = 1.5  # for drawing and shrinking together

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.solver_file import SolverFailed, SolverText, read_solver
-from adapters.solver_process import SolverProcess
+from adapters.own_solver.file import SolverFailed, SolverText, read_solver
+from adapters.own_solver.process import SolverProcess
 from reports.check.detection import detection_rows
 from reports.check.functions import implemented
 from reports.check.impacts import APPROACH, BACKWARDS, explain

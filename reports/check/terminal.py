@@ -9,11 +9,11 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from adapters.solver_file import printable
+from adapters.own_solver.file import printable
 from reports.check.rows import TASKS
 from reports.check.verdict import FileCheck
-from reports.console import Console
-from reports.foreign_text import legible
+from reports.terminal.console import Console
+from reports.terminal.foreign_text import legible
 
 STYLE = {"right": "green", "fault": "bold red", "note": "yellow", "not asked": "dim"}
 SHORT = {"right": "ok", "note": "ok", "fault": "FAULT", "not asked": "-"}

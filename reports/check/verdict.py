@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from adapters.solver_file import NotASolver, SolverText, read_solver
+from adapters.own_solver.file import NotASolver, SolverText, read_solver
 from reports.check.rows import FOLLOWS, TASKS, Row, Verdict, worst
 from reports.check.solver import examine
 

@@ -1,4 +1,4 @@
-"""What `crosscheck play` does: checks what is asked for, and serves."""
+"""What `crosscheck play` is asked for, checked: a flight, engines, solvers' files."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 
-from adapters.engines import ENGINES, OWN, Row
+from adapters.engine import Row
+from adapters.engines import ENGINES, OWN
+from adapters.own_solver.engine import engine_file
+from adapters.own_solver.file import KINDS
 from adapters.play import fault_of
-from adapters.solver_file import KINDS
-from adapters.student import engine_file
-from reports.commands import checked_engines
-from reports.exits import refuse
 from reports.game.flight import FRAME, field_scenario
 from reports.game.messages import MOST_ENGINES
-from reports.game.server import Game, application, serve
-from reports.lessons.pages import ROUTES
-from scenarios.files import SceneFileError, read_scene_file
+from reports.game.server import Game
+from reports.run.arguments import checked_engines
+from reports.terminal.exits import refuse
+from scenarios.files.scene_file import SceneFileError, read_scene_file
 from scenarios.model import Scenario
 
 MOST_DISKS = 200  # of a scene file: more are no longer drawn sixty times a second
@@ -25,16 +25,15 @@ PATIENCE = 2.0  # s that a solver's file may take for a frame, while the others 
 FIRST = ("reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:float64")
 
 
-def play_game(flight: Path | None, engines: Sequence[str], port: int, opens: bool) -> None:
-    """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is none."""
+def game_of(flight: Path | None, engines: Sequence[str]) -> Game:
+    """The game, or a saved flight, through these engines; exits 2 if the file or an engine is none."""
     chosen = checked_engines(engines) if engines else list(FIRST)
     if len(chosen) > MOST_ENGINES:
         refuse([f"--engine: {len(chosen)} engines; at most {MOST_ENGINES} fly at once: name fewer"])
     file = read_flight(flight) if flight else None
     # A solver's file is a row like any other while it flies; one that cannot fly at all is told before.
     ENGINES.update(own_rows([name for name in chosen if name.endswith(OWN)]))
-    game = Game(chosen, file)
-    serve(application(game, ROUTES), port, "/", opens)
+    return Game(chosen, file)
 
 
 def own_rows(names: Sequence[str]) -> dict[str, Row]:

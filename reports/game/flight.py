@@ -13,7 +13,7 @@ from adapters.engines import ENGINES
 from adapters.play import RUNAWAY, advance, fault_of, first_hits, reach, weight_impulse
 from reports.game.parting import Parting, Touches, parting
 from reports.game.pilot import SHIP, Pilot
-from scenarios.exercise import HIGH, LOW, SOURCE, asteroid_field
+from scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
 from scenarios.model import Array, Scenario, State
 
 FRAME = 1 / 64  # s; a power of two, so that every instant of a saved flight is a whole number of steps without rounding

@@ -9,8 +9,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, 
 from adapters.engines import ENGINES
 from reports.game.flight import SUBSTEPS
 from reports.game.pilot import KEYS
+from reports.page.server import MOST_BYTES
 
-MOST_BYTES = 4096  # of a message
 MOST_FRAMES = 4  # that one message may ask for
 MOST_ENGINES = 16  # in a flight
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from adapters.engines import ENGINES
-from reports.documents import looks_as_json, render
 from reports.game.flight import FRAME, SUBSTEPS
 from reports.game.parting import APART
-from reports.style import look
+from reports.page.documents import looks_as_json, render
+from reports.page.style import look
 from scenarios.model import Scenario
 
 

@@ -13,7 +13,7 @@ from adapters.play import turned
 from reports.game.flight import EARTH, EARTH_SIZE, Flight, Flyer, field_scenario
 from reports.game.messages import Fly, Frames, Key, Message, read_message
 from reports.game.pilot import SHIP
-from scenarios.files import scene_text
+from scenarios.files.scene_file import scene_text
 from scenarios.model import Array, Scenario
 
 

@@ -1,4 +1,4 @@
-"""What `crosscheck lesson` does: serves the lessons, or writes one as a file, or all into a folder."""
+"""`crosscheck lesson --export`: writes one lesson as a file, or all into a folder."""
 
 from __future__ import annotations
 
@@ -11,20 +11,18 @@ from tempfile import TemporaryFile
 from typing import Any
 
 from adapters.engines import ENGINES
-from reports.commands import unknown
-from reports.exits import FAILED, FolderTaken, refuse, say
-from reports.folders import made_anew, place_of
-from reports.foreign_text import legible, put_text
-from reports.game.command import FIRST
-from reports.game.server import Game, application, serve
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson
-from reports.lessons.pages import ALONE, FILES, ROUTES, Links, index_page, offline, told
-from reports.made import Kind, may_overwrite, writing
-from reports.runner import run_all
-from reports.terminal import Progress
-from reports.worker_process import Failure
+from reports.lessons.pages import ALONE, FILES, Links, index_page, offline, told
+from reports.run.arguments import unknown
+from reports.run.folders import made_anew, place_of
+from reports.run.made import Kind, may_overwrite, writing
+from reports.run.runner import run_all
+from reports.run.worker_process import Failure
+from reports.terminal.exits import FAILED, FolderTaken, refuse, say
+from reports.terminal.foreign_text import legible, put_text
+from reports.terminal.progress import Progress
 
 # What a page of ours begins with, and nothing else does: it may be written over.
 MARK = b'<meta name="generator" content="crosscheck lesson">'
@@ -34,14 +32,19 @@ SHOWING = 300.0  # s that one setting of the sliders may take: the slowest needs
 INDEX, CONVENTIONS = "index.html", "the conventions of the engines"
 
 
-def open_lesson(name: str, port: int, opens: bool, export: Path | None) -> None:
-    """Serve the lessons, opened at `name` or their list, or write them to `export`; exits 2 on bad input."""
+def checked_lesson(name: str) -> str:
+    """The name; exits 2 if there is no such lesson."""
     if name and name not in LESSONS:
         refuse([unknown("lesson", name, LESSONS).replace("see: crosscheck list", f"there are {', '.join(LESSONS)}")])
-    if export is not None:
-        write_one(name, export) if name else write_all(export)
-        return
-    serve(application(Game(list(FIRST)), ROUTES), port, f"/lesson/{name}".rstrip("/"), opens)
+    return name
+
+
+def write_lessons(name: str, place: Path) -> None:
+    """Write the lesson of that name to a file, or with "" all of them to a folder; exits 2 if that cannot be."""
+    if checked_lesson(name):
+        write_one(name, place)
+    else:
+        write_all(place)
 
 
 def write_one(name: str, path: Path) -> None:

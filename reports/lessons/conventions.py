@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from adapters.conformance import PROBES, Finding, conform
-from adapters.engines import Row
-from reports.style import number
+from adapters.conformance.conform import PROBES, Finding, conform
+from adapters.engine import Row
+from reports.page.style import number
 
 ASKED = (
     "free_flight", "restitution_0.1", "restitution_2", "restitution_wall", "friction", "slow_flight", "fast_flight",

@@ -10,11 +10,11 @@ from adapters.engines import ENGINES
 from adapters.play import play
 from adapters.reference import every_pair
 from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider
-from reports.style import TRUTH, number
-from scenarios.exercise import asteroid_field
+from reports.page.style import TRUTH, number
+from scenarios.families.exercise import asteroid_field
+from scenarios.families.placing import box, lay_out, scatter
 from scenarios.model import Scenario, Trajectory
-from scenarios.oracle import MOST_DISKS, with_oracle
-from scenarios.placing import box, lay_out, scatter
+from scenarios.truth.exact import MOST_DISKS, with_oracle
 
 EVERY_PAIR = "reference:every_pair"
 COST_NAMES = (EVERY_PAIR, "reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64")

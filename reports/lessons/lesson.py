@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
-from reports.comparison import Comparison, answered, cut
-from reports.laws import deviation
-from reports.replay import pack_layers, played, ratio_of
-from reports.style import TRUTH, number
+from reports.compare.comparison import Comparison, answered, cut
+from reports.compare.laws import deviation
+from reports.page.replay import pack_layers, played, ratio_of
+from reports.page.style import TRUTH, number
 from scenarios.model import Array, Scenario, Trajectory
 
 POINTS = 400  # of a curve, at most: more than a chart has pixels for

@@ -11,15 +11,15 @@ import pandas as pd
 
 from adapters.engines import ENGINES
 from adapters.play import Run
-from reports.comparison import Comparison
+from reports.compare.comparison import Comparison
 from reports.lessons.lesson import Chart, Curve, Lesson, Settings, Shown, Slider
+from reports.page.style import TRUTH, number
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
 from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, players_of
 from reports.stability.overview import bracket, why
 from reports.stability.players import PLAYERS
 from reports.stability.search import Search
-from reports.style import TRUTH, number
 from scenarios.model import Array, Scenario, Trajectory
 
 HARSHNESS = tuple(range(9))  # places from the gentlest value of a case to its harshest

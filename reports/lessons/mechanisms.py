@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from adapters.features import changed_box2d
+from adapters.mechanisms.features import changed_box2d
+from adapters.mechanisms.switched import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, Switched
 from adapters.play import Run, play
-from adapters.switched import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, Switched
-from reports.comparison import answered
+from reports.compare.comparison import answered
 from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
-from reports.style import TRUTH, number
-from scenarios.lesson import free_fall
+from reports.page.style import TRUTH, number
+from scenarios.families.lesson import free_fall
+from scenarios.families.placing import lay_out
+from scenarios.families.walls import bouncing_ball_e1
 from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.oracle import with_oracle
-from scenarios.placing import lay_out
-from scenarios.walls import bouncing_ball_e1
+from scenarios.truth.exact import with_oracle
 
 SWITCHED, PLAIN, NO_CCD = "reference:switched", "reference:exercise", "box2d:matched+no_ccd"
 PRECISION = {53: np.float64, 24: np.float32}

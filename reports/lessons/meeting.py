@@ -6,10 +6,10 @@ import numpy as np
 
 from adapters.engines import ENGINES
 from reports.lessons.lesson import Chart, Lesson, Played, Settings, Shown, Slider
-from reports.style import TRUTH, number
+from reports.page.style import TRUTH, number
+from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, State
-from scenarios.oracle import with_oracle
-from scenarios.placing import lay_out
+from scenarios.truth.exact import with_oracle
 
 NAMES = ("reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64")
 INTERVAL = 1 / 64

@@ -8,12 +8,12 @@ import numpy as np
 
 from adapters.engines import ENGINES
 from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
-from reports.style import TRUTH, number
-from scenarios.closed_forms import world_pushes
-from scenarios.exercise import ship_thrust
-from scenarios.lesson import falling_box, ping_pong
+from reports.page.style import TRUTH, number
+from scenarios.families.exercise import ship_thrust
+from scenarios.families.lesson import falling_box, ping_pong
 from scenarios.model import Scenario, Thrust, Trajectory
-from scenarios.oracle import with_oracle
+from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.exact import with_oracle
 
 LADDER = (1, 2, 4, 8, 16, 32)
 

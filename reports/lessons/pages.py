@@ -17,15 +17,15 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import BaseRoute, Route
 
 from adapters.engines import ENGINES
-from reports.cells import versions
-from reports.documents import looks_as_json, render
-from reports.game.server import in_thread
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
 from reports.lessons.crowd import EVERY_PAIR
 from reports.lessons.lesson import Lesson
 from reports.lessons.mechanisms import SWITCHED
-from reports.style import Look, look
+from reports.page.documents import looks_as_json, render
+from reports.page.server import in_thread
+from reports.page.style import Look, look
+from reports.run.cells import versions
 
 STYLES = ["lessons/lesson.css"]
 GROUPS = {"A solver, piece by piece": "12345", "How engines differ": "6", "What can be compared, and how far": "78"}
@@ -69,7 +69,7 @@ def lesson_page(lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, g
     around = [LESSONS[names[each]] if 0 <= each < len(names) else None for each in (k - 1, k + 1)]
     return render(
         "lessons/lesson.html.j2",
-        ["player.js", "player_canvas.js", "lessons/chart.js", "lessons/lesson.js"], STYLES, connects=not grid,
+        ["page/player.js", "page/player_canvas.js", "lessons/chart.js", "lessons/lesson.js"], STYLES, connects=not grid,
         lesson=lesson, text=[Markup(paragraph) for paragraph in lesson.text], looks=looks_of(lesson),
         looks_json=looks_as_json(looks_of(lesson)), grid=grid, around=around, links=links, about=about(),
         first=first,

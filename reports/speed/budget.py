@@ -13,13 +13,13 @@ import numpy as np
 
 from adapters.engine import Engine
 from adapters.engines import row_of
-from adapters.habits import FLIGHT, Habit, habits_of, with_habits
+from adapters.mechanisms.habits import FLIGHT, Habit, habits_of, with_habits
 from adapters.play import Run, play
-from reports import laws, scales
-from reports.comparison import cut
-from reports.scenes import open_scene
+from reports.compare import laws, scales
+from reports.compare.comparison import cut
+from reports.compare.view import View
+from reports.run.scenes import open_scene
 from reports.speed.ladder import held
-from reports.view import View
 from scenarios.model import Array, Scenario, Trajectory
 
 TIME, INTERPLAY, SUM, ALL, TOTAL, UNEXPLAINED = (

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.habits import NAMES
+from adapters.mechanisms.habits import NAMES
 from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED
 from reports.speed.explained import LEAST, TO
 

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from reports import style
-from reports.charts import ZERO, decades, shortened
+from reports.page import style
+from reports.page.charts import ZERO, decades, shortened
 from reports.speed.models import KINDS
 from reports.speed.pareto import ACCURACIES, FAILED, front
 from scenarios.model import Array

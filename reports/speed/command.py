@@ -14,15 +14,12 @@ from typing import Any, NoReturn
 from rich.table import Table
 
 from adapters.engines import OWN, row_of
-from reports import style
-from reports.commands import checked_engines, checked_scenes, opening
-from reports.console import Console
-from reports.exits import DONE, FAILED, broken_off, say
-from reports.folders import discard, given_back, open_part, place_of, replace_folder
-from reports.foreign_text import put_text
-from reports.journal import Journal
-from reports.machine import about
-from reports.made import Kind, digest_of, writing
+from reports.page import style
+from reports.run.arguments import checked_engines, checked_scenes, opening
+from reports.run.folders import discard, given_back, open_part, place_of, replace_folder
+from reports.run.journal import Journal
+from reports.run.machine import about
+from reports.run.made import Kind, digest_of, writing
 from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
 from reports.speed.explained import sentence
@@ -33,7 +30,10 @@ from reports.speed.pareto import ACCURACIES
 from reports.speed.plan import Plan
 from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
-from reports.terminal import Progress
+from reports.terminal.console import Console
+from reports.terminal.exits import DONE, FAILED, broken_off, say
+from reports.terminal.foreign_text import put_text
+from reports.terminal.progress import Progress
 
 MACHINE, FIGURES, PAGE = "machine.json", "speed_figures.csv", "speed.html"
 SPEED = Kind("crosscheck speed", r"journal\.jsonl")

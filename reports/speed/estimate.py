@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import ceil
 
 from adapters.engines import ENGINES
-from adapters.habits import HABITS
+from adapters.mechanisms.habits import HABITS
 from reports.speed import ladder
 from reports.speed.effort import Effort
 from reports.speed.plan import SCENE, Plan, Player, Reach

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reports.foreign_text import put_text
 from reports.speed.results import Results
+from reports.terminal.foreign_text import put_text
 
 KEPT = Path(__file__).parent / "figures.csv"
 ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")  # of the same run: errors alone

@@ -6,8 +6,8 @@ import json
 import os
 from typing import Any
 
-from reports.folders import may_go_on
-from reports.journal import Journal, lines_of, numbers, plain
+from reports.run.folders import may_go_on
+from reports.run.journal import Journal, lines_of, numbers, plain
 
 
 class Kept:

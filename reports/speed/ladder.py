@@ -11,8 +11,8 @@ import numpy as np
 
 from adapters.engine import Engine
 from adapters.play import advance, play
-from reports import laws
-from reports.scenes import open_scene
+from reports.compare import laws
+from reports.run.scenes import open_scene
 from reports.speed.timing import Sample, Spent, Timed, interleaved
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import NoTruth

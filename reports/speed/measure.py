@@ -11,16 +11,16 @@ from typing import Any
 import pandas as pd
 
 from adapters.engines import row_of
-from adapters.habits import HABITS
-from reports.machine import busy_cores
-from reports.runner import run_all
+from adapters.mechanisms.habits import HABITS
+from reports.run.machine import busy_cores
+from reports.run.runner import run_all
+from reports.run.worker_process import Failure
 from reports.speed import budget, ladder, models, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept
 from reports.speed.plan import PLAIN, SCENE, Plan, Player, Reach, middle
 from reports.speed.timing import Sample
-from reports.terminal import Progress
-from reports.worker_process import Failure
+from reports.terminal.progress import Progress
 
 HANGS, ALL_ROUNDS = 600.0, 3600.0  # s a ladder and a timing may take: against what hangs, no limit of what is measured
 SIZE, IDLE, TRUTH = "size", "idle", "truth"

@@ -10,7 +10,7 @@ import pandas as pd
 
 from reports.speed.ladder import held
 from reports.speed.order import FINEST
-from scenarios.oracle import CLOSED_FORM, answered_by
+from scenarios.truth.exact import CLOSED_FORM, answered_by
 
 KINDS = {"event_driven": "hit to hit, float64"}
 STEPS = "step by step"

@@ -12,10 +12,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from reports import style
-from reports.charts import Drawing
-from reports.foreign_text import put_text
-from reports.page import SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
+from reports.page import style
+from reports.page.charts import Drawing
+from reports.page.page import REPORTS, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
 from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import TOTALS, UNEXPLAINED
 from reports.speed.order import ELSEWHERE, UNSTEADY
@@ -23,8 +22,8 @@ from reports.speed.pareto import ACCURACIES
 from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.speed.versus import OWN
+from reports.terminal.foreign_text import put_text
 
-HERE = Path(__file__).parent
 FLAGGED = (ELSEWHERE, UNSTEADY)
 
 
@@ -42,9 +41,13 @@ class Section(NamedTuple):
 
 def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     """Write the page of `results`; `about` holds command, seed, machine, versions, started, seconds, load."""
-    plotly, scripts = get_plotlyjs(), [(HERE.parent / script).read_text(encoding="utf-8") for script in SCRIPTS]
+    plotly, scripts = get_plotlyjs(), [(REPORTS / script).read_text(encoding="utf-8") for script in SCRIPTS]
     environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
+        loader=FileSystemLoader(REPORTS / "speed"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
     )
     environment.filters["number"] = style.number
     names = (*results.names, *(dial.name for dial in results.plan.dials), style.TRUTH)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from adapters.engine import Engine
 from adapters.engines import row_of
-from adapters.features import DIALS, FEATURES, Dial, Feature
+from adapters.mechanisms.features import DIALS, FEATURES, Dial, Feature
 from reports.speed import ladder
 from reports.speed.effort import Effort
 

@@ -11,8 +11,8 @@ import numpy as np
 from adapters.engine import Engine, Unsupported
 from reports.speed.order import line_interval
 from reports.speed.timing import Sample, Spent, Timed, interleaved
+from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scene
-from scenarios.placing import box, lay_out
 
 Make = Callable[[], Engine]
 DT, RADIUS, COVERED = 1 / 240, 0.5, 0.3

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.engines import ENGINES
-from adapters.features import DIALS
+from adapters.mechanisms.features import DIALS
 from reports.speed.ladder import open_scene
 from reports.speed.measure import IDLE, SIZE, Measured
 from reports.speed.order import FINEST, NEARER, Order, median_interval, order_of

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from adapters.habits import HABITS
+from adapters.mechanisms.habits import HABITS
 from reports.speed.plan import PLAIN
 
 OWN = "reference:exercise"

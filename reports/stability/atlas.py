@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.foreign_text import put_text
-from reports.journal import JOURNAL, Journal, lines_of, numbers, plain
-from reports.machine import about
-from reports.made import digest_of, writing
-from reports.runner import run_all
+from reports.run.journal import JOURNAL, Journal, lines_of, numbers, plain
+from reports.run.machine import about
+from reports.run.made import digest_of, writing
+from reports.run.runner import run_all
+from reports.run.worker_process import Failure
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
 from reports.stability.failures import keep_failure
@@ -28,8 +28,8 @@ from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.search import Search
 from reports.stability.touching import TOUCHING, LawOf, law_of
 from reports.stability.vary import case_of_file
-from reports.terminal import Progress
-from reports.worker_process import Failure
+from reports.terminal.foreign_text import put_text
+from reports.terminal.progress import Progress
 
 COLUMNS = (
     "engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "seeds", "reason",

@@ -12,9 +12,9 @@ from reports.stability.limits import Case
 from reports.stability.phases import EDGE, drawn, phase
 from reports.stability.players import Player
 from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_APART, SPRING_GROWS, STRAYS
-from scenarios.closed_forms import Hit, answer, bouncing, flight, pair
+from scenarios.families.placing import lay_out
 from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
-from scenarios.placing import lay_out
+from scenarios.truth.closed_forms import Hit, answer, bouncing, flight, pair
 
 FAMILY = "One disk, or two"
 RADIUS, G = 0.25, 10.0

@@ -11,8 +11,8 @@ from adapters.play import Run
 from reports.stability.limits import RARELY, Case
 from reports.stability.players import Player, played
 from reports.stability.predicates_gas import ENERGY_DRIFTS, GAS_PARTS, MOMENTUM_DRIFTS, TEMPERATURES_PART, WRONG_GAS
+from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
-from scenarios.placing import box, lay_out
 
 FAMILY = "A gas at e = 1"
 SOURCE = "the hard-disk gas (Alder & Wainwright, J. Chem. Phys. 31, 459, 1959)"

@@ -10,9 +10,9 @@ import numpy as np
 from reports.stability.limits import Case
 from reports.stability.phases import phase
 from reports.stability.predicates import HITS_INVENTED, HITS_MISSED, RESTITUTION_OFF, VELOCITY_OFF
-from scenarios.closed_forms import answer, flight, pair
+from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.placing import lay_out
+from scenarios.truth.closed_forms import answer, flight, pair
 
 FAMILY = "One hit"
 RADIUS, DT = 0.25, 1 / 64

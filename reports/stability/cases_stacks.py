@@ -10,9 +10,9 @@ from numpy.random import default_rng
 from reports.stability.limits import RARELY, Case
 from reports.stability.phases import phase
 from reports.stability.predicates_crowds import BURSTS, EJECTED, NOT_APART, NOT_AT_REST, STANDS
-from scenarios.closed_forms import at_rest
+from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario
-from scenarios.placing import box, lay_out
+from scenarios.truth.closed_forms import at_rest
 
 FAMILY = "Stacks, piles and overlaps"
 RADIUS, G, DT = 0.25, 10.0, 1 / 64

@@ -13,14 +13,12 @@ import pandas as pd
 from rich.table import Table
 
 from adapters.engines import ENGINES, OWN
-from reports.commands import checked_engines, opening, unknown
-from reports.console import Console
-from reports.exits import DONE, FAILED, broken_off, refuse, say
-from reports.folders import given_back, may_go_on, open_part, place_of, replace_folder
-from reports.foreign_text import put_text
-from reports.journal import Journal
-from reports.made import Kind, writing
-from reports.runner import affordable
+from reports.page.style import number
+from reports.run.arguments import checked_engines, opening, unknown
+from reports.run.folders import given_back, may_go_on, open_part, place_of, replace_folder
+from reports.run.journal import Journal
+from reports.run.made import Kind, writing
+from reports.run.runner import affordable
 from reports.stability.atlas import Atlas, Plan, Task, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
@@ -28,9 +26,11 @@ from reports.stability.maps import MAPS
 from reports.stability.page import write_page
 from reports.stability.touching import TOUCHING, AtGap
 from reports.stability.vary import VARIES, cannot_vary
-from reports.style import number
-from reports.terminal import Progress
-from scenarios.files import SceneFileError, read_scene_file
+from reports.terminal.console import Console
+from reports.terminal.exits import DONE, FAILED, broken_off, refuse, say
+from reports.terminal.foreign_text import put_text
+from reports.terminal.progress import Progress
+from scenarios.files.scene_file import SceneFileError, read_scene_file
 
 SEE = "limits.csv and stability.html have the names of all, or tests/stability_limits.csv; for --vary see --help"
 LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")

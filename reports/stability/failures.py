@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.archive import STATE, load_trajectory, packed
-from reports.replay import HITS
+from reports.page.replay import HITS
+from reports.run.archive import STATE, load_trajectory, packed
 from reports.stability.limits import Limit, Trial
 from reports.stability.search import Search
 from scenarios.model import Collisions, Scenario, Trajectory, frozen
 from scenarios.no_truth import NoTruth
-from scenarios.truth_cache import UNREADABLE
+from scenarios.truth.cache import UNREADABLE
 
 BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 

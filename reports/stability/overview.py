@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isnan
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from adapters.engines import ENGINES
-from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Limit
+from reports.page.style import number
+from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Limit
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import AT_ONCE, PAIRS, AtGap
-from reports.style import number
-
-if TYPE_CHECKING:
-    from reports.stability.page import Section
 
 
 class Cell(NamedTuple):
@@ -41,17 +38,8 @@ class MapTable(NamedTuple):
     rows: list[tuple[float, list[Cell]]]
 
 
-def families(sections: Sequence[Section]) -> dict[str, list[Section]]:
-    """The sections under their headings, both in the order of appearance."""
-    found: dict[str, list[Section]] = {}
-    for section in sections:
-        found.setdefault(section.case.family, []).append(section)
-    return found
-
-
-def cell_of(section: Section, player: str) -> Cell:
+def cell_of(case: Case, limit: Limit | None) -> Cell:
     """A limit in the overview: the deeper its colour, the earlier on the way from gentle to harsh it fails."""
-    limit = next((limit for limit in section.limits if limit.player == player), None)
     if limit is None:
         return Cell("")
     remark = f"{limit.verdict}. {why(limit)}"
@@ -59,7 +47,7 @@ def cell_of(section: Section, player: str) -> Cell:
         return Cell(limit.word, f"does not fail up to {number(limit.works_at)}", 0)
     if limit.word:
         return Cell(limit.word, remark, -1, True)
-    values = list(section.case.values)
+    values = list(case.values)
     harsher = 1 if values[-1] > values[0] else -1
     passed = sum(harsher * value < harsher * limit.fails_at for value in values) / len(values)
     text = limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")

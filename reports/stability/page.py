@@ -13,17 +13,17 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from adapters.play import Run
-from reports import style
-from reports.charts import Drawing, Line, figure_of, shortened
-from reports.foreign_text import put_text
-from reports.page import HERE, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
-from reports.replay import pack_layers, ratio_of
+from reports.page import style
+from reports.page.charts import Drawing, Line, figure_of, shortened
+from reports.page.page import REPORTS, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
+from reports.page.replay import pack_layers, ratio_of
 from reports.stability import overview
 from reports.stability.atlas import Atlas, case_named
 from reports.stability.failures import kept_failure, near
 from reports.stability.limits import EXACT, FORMS, Case, Limit, Trial
 from reports.stability.maps import MAPS
 from reports.stability.touching import GAPS, TOUCHING
+from reports.terminal.foreign_text import put_text
 from scenarios.model import Scenario, Trajectory
 
 SECONDS = 5.0  # a replay lasts
@@ -55,6 +55,10 @@ class Section:
         """Its name as a fragment of a URL."""
         return "".join(c if c.isalnum() or c in "_-" else "-" for c in self.case.name)
 
+    def cell(self, player: str) -> overview.Cell:
+        """Its limit in the overview; empty where it was not asked."""
+        return overview.cell_of(self.case, next((limit for limit in self.limits if limit.player == player), None))
+
     def replay(self, player: str) -> Replay | None:
         """The replay of a player's failure, if there is one."""
         return next((replay for replay in self.replays if replay.player == player), None)
@@ -70,17 +74,17 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
     names = [limit.player for limit in limits] + [one.player for one in maps] + [one.player for one in laws]
     names = list(dict.fromkeys(names))
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
-    plotly, scripts = get_plotlyjs(), [(HERE / script).read_text(encoding="utf-8") for script in SCRIPTS]
-    scripts.append((HERE / "stability" / "stability.js").read_text(encoding="utf-8"))
-    sheet = (HERE / "stability" / "stability.css").read_text(encoding="utf-8")
+    plotly, scripts = get_plotlyjs(), [(REPORTS / script).read_text(encoding="utf-8") for script in SCRIPTS]
+    scripts.append((REPORTS / "stability" / "stability.js").read_text(encoding="utf-8"))
+    sheet = (REPORTS / "stability" / "stability.css").read_text(encoding="utf-8")
     environment = Environment(
-        loader=FileSystemLoader(HERE / "stability"), autoescape=True, trim_blocks=True, lstrip_blocks=True,
+        loader=FileSystemLoader(REPORTS / "stability"), autoescape=True, trim_blocks=True, lstrip_blocks=True,
         undefined=StrictUndefined,
     )  # fmt: skip
     environment.filters["number"] = style.number
     html = environment.get_template("stability.html.j2").render(
-        sections=sections, families=overview.families(sections), findings=overview.findings(limits), about=atlas.header,
-        players=[name for name in names if "+" not in name], looks=looks, cell_of=overview.cell_of,
+        sections=sections, families=families_of(sections), findings=overview.findings(limits), about=atlas.header,
+        players=[name for name in names if "+" not in name], looks=looks,
         maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, gaps=GAPS,
         words=overview, exact=EXACT,
         form=FORMS[atlas.header["form"]], css=Markup(css() + sheet),
@@ -88,6 +92,14 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
     )  # fmt: skip
     put_text(path, html)
+
+
+def families_of(sections: Sequence[Section]) -> dict[str, list[Section]]:
+    """The sections under their headings, both in the order of appearance."""
+    found: dict[str, list[Section]] = {}
+    for section in sections:
+        found.setdefault(section.case.family, []).append(section)
+    return found
 
 
 def section_of(case: Case, limits: list[Limit], folder: Path) -> Section:

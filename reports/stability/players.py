@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from adapters.engine import Engine
 from adapters.engines import ENGINES
-from adapters.features import changed_box2d, changed_box2d_v3, changed_pymunk
+from adapters.mechanisms.features import changed_box2d, changed_box2d_v3, changed_pymunk
 from adapters.play import Run, play
 from scenarios.model import Scenario, Scene
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports import laws
+from reports.compare import laws
 from reports.stability.predicates import Predicate, Reading, first_above
 from scenarios.model import Scenario, Trajectory
 

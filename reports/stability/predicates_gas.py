@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from reports import laws
+from reports.compare import laws
 from reports.stability.hard_disks import Gas, gas_in_box
 from reports.stability.predicates import Predicate, Reading, first_above, truth_of
 from scenarios.model import Array, Scenario, Trajectory

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports import laws, scales
-from reports.collisions import match, pair_keys, who
-from reports.comparison import answered, cut
+from reports.compare import laws, scales
+from reports.compare.collisions import match, pair_keys, who
+from reports.compare.comparison import answered, cut
 from reports.stability.predicates import Predicate, Reading, first_above
 from scenarios.model import Collisions, Scenario, Trajectory
 

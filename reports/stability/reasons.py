@@ -6,7 +6,7 @@ from fnmatch import fnmatch
 from math import atan, pi, sqrt
 from typing import NamedTuple
 
-from adapters.habits import DIGITS, FLIGHT, IMPULSE, PUSH_OUT, RESTITUTION
+from adapters.mechanisms.habits import DIGITS, FLIGHT, IMPULSE, PUSH_OUT, RESTITUTION
 from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, Limit
 from reports.stability.twins import B2_SETTINGS, B2_TYPES, LATE, OF_PYMUNK, PRODUCT, THRESHOLD, THRESHOLDS
@@ -21,7 +21,7 @@ class Reason(NamedTuple):
         source: where it is written down.
         predicts: the limit that follows from it.
         switch: a player that differs in this thing only, or in little else, and must get farther.
-        habit: of `adapters.habits`, or `LATE`: what it speaks of, and a twin that has the limit must do.
+        habit: of `adapters.mechanisms.habits`, or `LATE`: what it speaks of, and a twin that has the limit must do.
     """
 
     cases: str
@@ -151,7 +151,7 @@ REASONS = (
     ),
     # What every exact method refuses.
     Reason("*", "event_driven:*", "it refuses what has no single continuation: overlaps, and hits that accumulate",
-           "scenarios/events.py"),
+           "adapters/event_driven/events.py"),
     # Stacks.
     *(
         Reason(case, "reference:ordered", "the hits of a step are bounded, and what is left shows as overlap",

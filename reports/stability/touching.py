@@ -14,9 +14,9 @@ import numpy as np
 
 from reports.stability.cases_hits import LEAD, RADIUS
 from reports.stability.players import play_as
+from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario
-from scenarios.oracle import with_oracle
-from scenarios.placing import lay_out
+from scenarios.truth.exact import with_oracle
 
 NEAR = 0.02  # of the incoming speed: a player whose velocities are farther from every law follows none of them
 SPEED, DT = 8.0, 1 / 1024  # a radius in 32 steps: where a hit is found late, its normal is off; above any threshold

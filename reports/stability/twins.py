@@ -1,7 +1,8 @@
 """Which habits of a player suffice for its limit: the reference with these alone works and fails where the player does.
 
-What an engine does otherwise than exact flight with late hits is a table of habits (`adapters.habits`), each of them a
-switch of `reference_impl.switched`. A twin is the reference with some; one that has the player's limit shows the cause.
+What an engine does otherwise than exact flight with late hits is a table of habits (`adapters.mechanisms.habits`),
+each of them a switch of `adapters.mechanisms.ablated_reference`.
+A twin is the reference with some; one that has the player's limit shows the cause.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from fnmatch import fnmatch
 from functools import partial
 from math import isnan
 
-from adapters.habits import (
+from adapters.mechanisms.habits import (
     DIGITS,
     FLIGHT,
     FRICTION,
@@ -42,7 +43,7 @@ THRESHOLDS = {"box2d": B2_SETTINGS + "b2_velocityThreshold", "box2d_v3": B2_TYPE
 PRODUCT = "the elasticities of the two shapes are multiplied: e on every shape gives e²"
 OF_PYMUNK = "Munk2D src/cpArbiter.c, cpArbiterUpdate"
 TOGETHER = "the contacts of a step get their impulses together, in the engine's own order of stages"
-OWN_ORDER = "adapters/switched.py, from the engine's own step"
+OWN_ORDER = "adapters/mechanisms/switched.py, from the engine's own step"
 AT_ONCE = "an overlap is undone at once, so that disks move that have hit nothing yet"
 SENTENCES = (
     (LATE, "*", HITS_WAIT, "contacts are looked for once a step"),

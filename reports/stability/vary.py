@@ -12,9 +12,9 @@ import numpy as np
 from reports.stability.cases_suite import dense_ladder, in_steps, ladder
 from reports.stability.limits import Case
 from reports.stability.predicates_usable import USABLE
-from scenarios.files import read_scene_file
+from scenarios.files.scene_file import read_scene_file
 from scenarios.model import Array, Collisions, Scenario, Scene, Thrust, Trajectory, frozen
-from scenarios.oracle import with_oracle
+from scenarios.truth.exact import with_oracle
 
 FAMILY = "A scene of your own"
 

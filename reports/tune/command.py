@@ -11,13 +11,13 @@ from typing import NoReturn
 import pandas as pd
 from rich.table import Table
 
-from reports.commands import opening, unknown
-from reports.console import Console
-from reports.exits import DONE, broken_off, refuse
-from reports.folders import made_anew, place_of
-from reports.foreign_text import put_text
-from reports.made import Kind, may_replace, writing
-from reports.terminal import Progress
+from reports.run.arguments import opening, unknown
+from reports.run.folders import made_anew, place_of
+from reports.run.made import Kind, may_replace, writing
+from reports.terminal.console import Console
+from reports.terminal.exits import DONE, broken_off, refuse
+from reports.terminal.foreign_text import put_text
+from reports.terminal.progress import Progress
 from reports.tune.grid import MAKES
 from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, Search
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from adapters.engine import Engine
-from adapters.features import changed_box2d, changed_box2d_v3, changed_pymunk
+from adapters.mechanisms.features import changed_box2d, changed_box2d_v3, changed_pymunk
 
 
 @dataclass(frozen=True)

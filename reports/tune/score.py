@@ -11,10 +11,10 @@ import numpy as np
 
 from adapters.engine import Engine
 from adapters.play import advance, play
-from reports import laws, scales
-from reports.collisions import match
+from reports.compare import laws, scales
+from reports.compare.collisions import match
+from scenarios.families.tuning import FAMILIES, LADDER, one_of
 from scenarios.model import Array, Scenario, Trajectory
-from scenarios.tuning import FAMILIES, LADDER, one_of
 
 FLOOR = 1e-6  # radii: below the finest accuracy that any page asks for, an error is as good as none
 MORE_ENERGY, SOME_ENERGY = 1.1, 0.01  # times as much energy as before, and so much of that at hand, may be wrong

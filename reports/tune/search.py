@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.conformance import conform
-from adapters.engines import ENGINES, Row
+from adapters.conformance.conform import conform
+from adapters.engine import Row
+from adapters.engines import ENGINES
 from reports.tune.grid import MAKES, NOT_SEARCHED, PAIRS, matched_of, settings_of
 from reports.tune.score import Against, Make, Played, against, cost_of, measured, posed
-from scenarios.tuning import FAMILIES
+from scenarios.families.tuning import FAMILIES
 
 SEEDS, OTHER_SEEDS = (0, 1), (2, 3)  # what is chosen on, and what has to bear it out
 LEAST = 0.9  # times the error: what gains less is kept as it is, as other seeds may read as much more

@@ -30,8 +30,9 @@ BY_CODE = {0: DONE, 1: FINDINGS, 2: SENTENCE, 130: STOPPED, 143: STOPPED}
 SECONDS = 90.0  # that an input may take on a busy machine; what is bounded by its own --timeout takes a fraction of it
 LINES = 101  # of a refusal: one sentence a fault, as many as the reader of scenes lists, and one that there are more
 GRACE = 3.0  # s in which a process that has been told to end is gone
-LOADED = ["reports.cli", "reports.commands", "reports.run_command", "reports.truth_command", "reports.diff_command",
-          "reports.replay_command", "reports.check.command", "reports.speed.command", "reports.stability.command",
+LOADED = ["reports.cli", "reports.run.arguments", "reports.commands.run", "reports.commands.truth", 
+          "reports.commands.diff",
+          "reports.commands.replay", "reports.check.command", "reports.speed.command", "reports.stability.command",
           "reports.lessons.command", "reports.tune.command"]  # fmt: skip
 CROSSCHECK = Path(sys.executable).parent / "crosscheck"
 WIDE = {"COLUMNS": "400"}  # so that no sentence is broken where a line ends

@@ -11,8 +11,8 @@ import pytest
 
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
-from scenarios.oracle import computed
-from scenarios.oracle_record import TruthRecord
+from scenarios.truth.exact import computed
+from scenarios.truth.record import TruthRecord
 from tests.independent.exact_motion import Motion
 from tests.independent.random_scenes import RESTITUTIONS, SURROUNDINGS, random_scene
 

@@ -23,7 +23,7 @@ from gmpy2 import mpc
 
 from scenarios import catalogue
 from scenarios.model import Scenario, Scene
-from scenarios.oracle import computed
+from scenarios.truth.exact import computed
 from tests.independent.exact_motion import Motion, Vector
 from tests.independent.random_scenes import box, placed, scenario
 

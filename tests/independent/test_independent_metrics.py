@@ -16,7 +16,7 @@ import pytest
 
 from adapters.engines import ENGINES
 from adapters.play import play
-from reports.comparison import compare
+from reports.compare.comparison import compare
 from scenarios import catalogue
 from scenarios.model import Scenario, Trajectory
 

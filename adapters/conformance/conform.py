@@ -1,0 +1,73 @@
+"""The conformance suite: what is asked of every engine before a number of it is shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adapters.conformance.contract import CONTRACT
+from adapters.conformance.physics import PHYSICS
+from adapters.conformance.probe import Probe, Reading
+from adapters.engine import Row, Unsupported
+
+PROBES: dict[str, Probe] = CONTRACT | PHYSICS
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one probe found in one engine.
+
+    Attributes:
+        engine, profile: the row of `ENGINES`, `engine:profile`.
+        probe: a key of `PROBES`, or "make" for an engine that cannot be made.
+        asked: the question, one plain sentence.
+        got: the answer, a number in the unit of the question, or words.
+        expected: the answer of an engine that keeps to protocol and scene.
+        bound: how far a number may be from it.
+        verdict: "keeps"; "departs": plays by the protocol, but other physics than the scene states;
+            "breaks": no number of this engine may be trusted.
+        note: what was raised or refused, or what limits the reading.
+    """
+
+    engine: str
+    profile: str
+    probe: str
+    asked: str
+    got: float | str
+    expected: float | str
+    bound: float
+    verdict: str
+    note: str = ""
+
+
+def conform(name: str, row: Row) -> list[Finding]:
+    """One finding a probe, in the order of `PROBES`; only the finding "make" if the engine cannot be made.
+
+    Whatever an engine raises becomes a finding: a refusal (`Unsupported`) departs, all else breaks.
+    """
+    engine, profile = name.split(":")
+    try:
+        row.make().close()
+    except Exception as error:  # a missing library, or one that fails as it starts
+        return [no_answer(name, type(error).__name__, str(error))]
+    return [ask(engine, profile, probe, row) for probe in PROBES]
+
+
+def no_answer(name: str, what: str, why: str) -> Finding:
+    """The one finding of an engine that could not be made, or did not survive its probes."""
+    engine, profile = name.split(":")
+    return Finding(engine, profile, "make", "Does the engine answer?", "no", "yes", 0.0, "breaks", f"{what}: {why}")
+
+
+def ask(engine: str, profile: str, name: str, row: Row) -> Finding:
+    """The finding of one probe."""
+    probe = PROBES[name]
+    try:
+        reading = probe.read(row)
+        verdict = "keeps" if reading.kept else probe.failure
+    except Unsupported as refusal:
+        reading, verdict = Reading("refused", "an answer", note=str(refusal)), "departs"
+    except Exception as error:  # an engine may raise anything; the finding says what
+        reading, verdict = Reading("raised", "an answer", note=f"{type(error).__name__}: {error}"), "breaks"
+    return Finding(
+        engine, profile, name, probe.asked, reading.got, reading.expected, reading.bound, verdict, reading.note
+    )

@@ -1,0 +1,120 @@
+"""What a conformance probe is: a question on a tiny scene, asked of a fresh engine, and a reading with its bound."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from adapters.engine import Engine, Row
+from adapters.play import first_hits
+from scenarios.model import Array, Scene, frozen
+
+DT = 1 / 256  # s; a power of two, so that a whole number of steps is a time without rounding
+
+
+class Reading(NamedTuple):
+    """What a probe read: a number that must lie within `bound` of `expected`, or words that must equal it."""
+
+    got: float | str
+    expected: float | str
+    bound: float = 0.0
+    note: str = ""
+
+    @property
+    def kept(self) -> bool:
+        """Whether it is as expected; NaN never is."""
+        if isinstance(self.got, str) or isinstance(self.expected, str):
+            return self.got == self.expected
+        return abs(self.got - self.expected) <= self.bound
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One question to every engine.
+
+    Attributes:
+        asked: the question, one plain sentence.
+        read: makes fresh engines from a row of `ENGINES` and closes them again.
+        failure: "breaks" if a miss means that the adapter breaks the protocol, so that no number of the engine
+            may be trusted; "departs" if it means other physics than the scene states.
+    """
+
+    asked: str
+    read: Callable[[Row], Reading]
+    failure: Literal["breaks", "departs"]
+
+
+@contextmanager
+def loaded(row: Row, scene: Scene, dt: float = DT) -> Iterator[Engine]:
+    """A fresh engine with `scene` in it, closed at the end whatever happens."""
+    engine = row.make()
+    try:
+        engine.load(scene, dt)
+        yield engine
+    finally:
+        engine.close()
+
+
+def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:
+    """A scene from plain lists, by the names of its fields."""
+    return Scene(restitution=restitution, **{name: frozen(values) for name, values in arrays.items()})
+
+
+def one_disk(velocity: tuple[float, float] = (0.0, 0.0), spin: float = 0.0, gravity: float = 0.0) -> Scene:
+    """A disk alone, whose mass and inertia are those of no density and no solid disk."""
+    return scene_of(
+        position=[[0.25, -0.5]], velocity=[velocity], radius=[0.5], mass=[7.3], inertia=[0.9],
+        angular_velocity=[spin], gravity=[0.0, -gravity],
+    )  # fmt: skip
+
+
+def head_on(closing: float, spin: float = 0.0, lead: float = 4.5) -> Scene:
+    """A disk far off, and two equal ones that meet along x at `closing` m/s after `lead` steps; e = 0.5."""
+    gap = closing * DT * lead
+    return scene_of(
+        position=[[0.0, 9.0], [-0.5 - gap / 2, 0.0], [0.5 + gap / 2, 0.0]],
+        velocity=[[0.0, 0.0], [closing / 2, 0.0], [-closing / 2, 0.0]],
+        angular_velocity=[0.0, spin, spin],
+        radius=[0.5, 0.5, 0.5], mass=[1.0, 1.0, 1.0],
+    )  # fmt: skip
+
+
+def plain() -> Scene:
+    """Two disks that hit each other obliquely after 2 steps, fall, spin, and bounce off a floor."""
+    return scene_of(
+        position=[[-0.42, 0.1], [0.0, 0.4]], velocity=[[2.0, 0.0], [-1.0, 0.5]], radius=[0.25, 0.25], mass=[1.0, 3.0],
+        angle=[0.1, -0.2], angular_velocity=[1.0, -2.0], gravity=[0.0, -9.8],
+        walls=[[[-4.0, -0.2], [4.0, -0.2]]],
+    )  # fmt: skip
+
+
+def told(engine: Engine, dt: float = DT) -> str:
+    """The collisions an engine tells, as "disk 0 and disk 1, disk 0 and wall 2"."""
+    hits = first_hits(engine.hits(), dt)
+    names = [(f"disk {i}", f"disk {j}" if j >= 0 else f"wall {-1 - j}") for i, j in zip(hits.i, hits.j)]
+    return ", ".join(" and ".join(pair) for pair in names) or "none"
+
+
+def history(engine: Engine, steps: int = 60) -> list[tuple[str, bytes]]:
+    """What an engine does from now on: (what and when, its bytes) for every array at every 10th step, then the hits."""
+    seen: list[tuple[str, bytes]] = []
+    for k in range(0, steps + 1, 10):
+        if k:
+            engine.step(10)
+        seen += [(f"{name} after {k} steps", array.tobytes()) for name, array in vars(engine.read()).items()]
+    return [*seen, ("hits", repr([hit[:3] for hit in engine.hits()]).encode())]
+
+
+def first_difference(seen: list[tuple[str, bytes]], wanted: list[tuple[str, bytes]]) -> str:
+    """Where two histories part, or "nowhere"."""
+    return next((what for (what, a), (_, b) in zip(seen, wanted) if a != b), "nowhere")
+
+
+def largest(array: Array) -> float:
+    """Largest magnitude in an array."""
+    return float(np.abs(array).max())

@@ -1,0 +1,1 @@
+"""The event-driven engine: no steps, from collision to collision, in float64."""

@@ -1,0 +1,205 @@
+"""The event engine's searches: what a disk meets next by itself, and which other disk.
+
+The search among disks does not branch where the processor could only guess: it copies all candidates of the cells
+around into one list, and works out the contact time of every one, met or not.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any
+
+import numpy as np
+
+from adapters.event_driven.compiled import inlined, kernel, pasted
+from adapters.event_driven.contact_times import curved_time, disk_time, line_time
+from adapters.event_driven.disks import EDGE, END, NONE, WALL, WRAP, Arena, Disks, Grid, Links, Scenery, Walls
+
+ROUNDING = 1e-14  # relative, of a contact just resolved: squared gap and closing speed are sums of a few roundings
+ALL = -1  # which of the cells around a disk to search: all, or only those beyond the edge it has just crossed
+
+
+@pasted
+def find_own(arena: Arena, scenery: Scenery, a: Any) -> None:
+    """The next thing a disk, which is at its own time, meets by itself."""
+    if len(scenery):
+        best, code = next_own(arena.grid, arena.walls, arena.rules.wrapped, a)
+    else:
+        best, code = next_edge(arena.grid, a)
+    a.own_time, a.own_code = a.t + best, code
+
+
+@inlined
+def next_edge(g: Grid, a: Any) -> tuple[float, int]:
+    """When a disk that flies straight leaves its cell, s from its own time, and over which edge."""
+    right, top = a.vx > 0.0, a.vy > 0.0
+    x = inf if a.vx == 0.0 else max((a.ox + (a.cx + right) * g.side[0] - a.x) / a.vx, 0.0)
+    y = inf if a.vy == 0.0 else max((a.oy + (a.cy + top) * g.side[1] - a.y) / a.vy, 0.0)
+    return min(x, y), (int(right) if x < y else 2 + int(top))
+
+
+@kernel
+def next_own(g: Grid, walls: Walls, wrapped: bool, a: Any) -> tuple[float, int]:
+    """As `next_edge` on a parabola: also the wrap box, the walls near its cell, the end of the one it lies on."""
+    best, code = inf, EDGE
+    for axis in range(2):
+        x, v, pull = (a.x, a.vx, a.ax) if axis == 0 else (a.y, a.vy, a.ay)
+        low = a.ox + a.cx * g.side[0] if axis == 0 else a.oy + a.cy * g.side[1]
+        for high in range(2):
+            sign = 1.0 - 2.0 * high
+            t = line_time(sign * (x - low - high * g.side[axis]), sign * v, sign * pull)
+            if t < best:
+                best, code = t, EDGE + 2 * axis + high
+            if wrapped:
+                t = line_time(sign * (x - walls.wrap[high, axis]), sign * v, sign * pull)
+                if t < best:
+                    best, code = t, WRAP + 2 * axis + high
+    c = a.cx * g.shape[1] + a.cy
+    for k in range(walls.first[c], walls.first[c + 1]):
+        w = walls.of[k]
+        for part in range(3):
+            # Its own wall it does not meet; the face of one that it slid off it can only fall away from.
+            t = inf if a.wall == w or (a.wall == -2 - w and part == 0) else wall_time(walls, a, w, part, best)
+            if t < best:
+                best, code = t, WALL + 3 * w + part
+    if a.wall >= 0:
+        t = end_time(walls, a)
+        if t < best:
+            best, code = t, END
+    return best, code
+
+
+@kernel
+def wall_time(walls: Walls, a: Any, w: int, part: int, until: float) -> float:
+    """When a disk meets a wall: part 0 is either face, 1 its start, 2 its end."""
+    ux, uy, length = walls.segment[w, 2], walls.segment[w, 3], walls.segment[w, 4]
+    dx, dy = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
+    noise = a.noise if a.last == -1 - w else 0.0
+    if part > 0:
+        if part == 2:
+            dx, dy = dx - length * ux, dy - length * uy
+        return meeting(dx, dy, a.vx, a.vy, a.ax, a.ay, a.radius, noise, until)
+    first = inf
+    height, speed, pull = dy * ux - dx * uy, a.vy * ux - a.vx * uy, a.ay * ux - a.ax * uy
+    for side in (1.0, -1.0):
+        gap, v, p = side * height - a.radius, side * speed, side * pull
+        if noise > 0.0 and side * height > 0.0:
+            if abs(gap) < ROUNDING * (abs(dx) + abs(dy) + a.radius):  # beside a wall's end it may be far below
+                gap = 0.0
+            if abs(v) < noise:
+                v = 0.0
+        t = line_time(gap, v, p)
+        along = (dx + (a.vx + a.ax * t / 2) * t) * ux + (dy + (a.vy + a.ay * t / 2) * t) * uy if t < first else -1.0
+        # At the contact the disk must be beside the wall, and on the side from which it was looked for.
+        if 0.0 <= along <= length and side * height + (v + p * t / 2) * t > 0.0:
+            first = t
+    return first
+
+
+@kernel
+def end_time(walls: Walls, a: Any) -> float:
+    """When a disk that slides along a wall reaches its end."""
+    ux, uy = walls.segment[a.wall, 2], walls.segment[a.wall, 3]
+    along = (a.x - walls.segment[a.wall, 0]) * ux + (a.y - walls.segment[a.wall, 1]) * uy
+    speed, pull = a.vx * ux + a.vy * uy, a.ax * ux + a.ay * uy
+    return min(line_time(along, speed, pull), line_time(walls.segment[a.wall, 4] - along, -speed, -pull))
+
+
+@kernel
+def meeting(
+    dx: float, dy: float, ux: float, uy: float, ax: float, ay: float, reach: float, noise: float, until: float
+) -> float:
+    """When two disks meet, from position, velocity and acceleration of one relative to the other.
+
+    noise: what rounding may have left of their closing speed if these two hit each other last, else 0.
+    """
+    gap, closing, speed2 = dx * dx + dy * dy - reach * reach, dx * ux + dy * uy, ux * ux + uy * uy
+    if noise > 0.0:
+        if abs(gap) < ROUNDING * reach * reach:
+            gap = min(gap, 0.0)
+        if abs(closing) < reach * noise:
+            closing = 0.0
+    if ax == 0.0 and ay == 0.0:
+        return disk_time(gap, closing, speed2)
+    return curved_time(dx, dy, ux, uy, ax, ay, gap, closing, until)
+
+
+@inlined
+def three(head: Links, near: Links, m: int, first: int, second: int, third: int) -> int:
+    """Append the first disks of three cells to the m in `near`; how many there are now."""
+    near[m] = head[first]
+    m += near[m] != NONE
+    near[m] = head[second]
+    m += near[m] != NONE
+    near[m] = head[third]
+    return m + (near[m] != NONE)
+
+
+@inlined
+def neighbours(disks: Disks, head: Links, near: Links, g: Grid, a: Any, beyond: int) -> int:
+    """List the disks of the cells around that of disk `a`, or only of the three beyond an edge; how many there are."""
+    here, row, ny = a.cy, a.cx * g.shape[1], g.shape[1]
+    left = row - ny if a.cx > 0 else row + (g.shape[0] - 1) * ny
+    right = row + ny if a.cx < g.shape[0] - 1 else 0
+    bottom = here - 1 if here > 0 else ny - 1
+    top = here + 1 if here < ny - 1 else 0
+    if beyond == ALL:
+        m = three(head, near, 0, left + bottom, left + here, left + top)
+        m = three(head, near, m, row + bottom, row + here, row + top)
+        m = three(head, near, m, right + bottom, right + here, right + top)
+    elif beyond < 2:
+        row = right if beyond == 1 else left
+        m = three(head, near, 0, row + bottom, row + here, row + top)
+    else:
+        here = top if beyond == 3 else bottom
+        m = three(head, near, 0, left + here, row + here, right + here)
+    k = 0
+    while k < m:  # each may head a chain, whose next goes to the end of the list
+        near[m] = disks[near[k]].next
+        m += near[m] != NONE
+        k += 1
+    return m
+
+
+@inlined
+def image(apart: int, shift: float) -> float:
+    """What to add to a coordinate for the image next door, m: by how far apart the cells are, not by nearness."""
+    return -shift if apart > 1 else (shift if apart < -1 else 0.0)
+
+
+@pasted
+def find_pair(arena: Arena, scenery: Scenery, i: int, beyond: int) -> None:
+    """Look for an earlier contact of disk `i`, which is at its own time, with those in the cells around its own."""
+    disks, near, g = arena.disks, arena.near, arena.grid
+    a = disks[i]
+    x, y, vx, vy, now, radius, cx, cy = a.x, a.y, a.vx, a.vy, a.t, a.radius, a.cx, a.cy
+    last, noise = np.int64(a.last), a.noise
+    best, who = a.pair_time - now, np.int64(-1)
+    for k in range(neighbours(disks, arena.head, near, g, a, beyond)):
+        j = near[k]
+        b = disks[j]
+        t = now - b.t
+        dx, dy = b.x - x + image(b.cx - cx, g.shift[0]), b.y - y + image(b.cy - cy, g.shift[1])
+        ux, uy = b.vx, b.vy
+        if len(scenery):
+            dx, dy = dx + (ux + b.ax * t / 2) * t, dy + (uy + b.ay * t / 2) * t
+            ux, uy = ux + b.ax * t - vx, uy + b.ay * t - vy
+        else:
+            dx, dy = dx + ux * t, dy + uy * t
+            ux, uy = ux - vx, uy - vy
+        reach = radius + b.radius
+        if len(scenery) and arena.rules.mixed and (b.ax != a.ax or b.ay != a.ay):
+            just_hit = noise if last == j and b.last == i else 0.0
+            until = min(best, a.own_time - now)
+            t = meeting(dx, dy, ux, uy, b.ax - a.ax, b.ay - a.ay, reach, just_hit, until)
+            if t < best:
+                best, who = t, np.int64(j)
+        else:
+            gap, closing = dx * dx + dy * dy - reach * reach, dx * ux + dy * uy
+            disc = closing * closing - (ux * ux + uy * uy) * gap
+            t = max(gap, 0.0) / (sqrt(max(disc, 0.0)) - closing)
+            # Of a hit just resolved, rounding may have left a little closing speed.
+            if (closing < (-reach * noise if last == j else 0.0)) & (disc > 0.0) & (t < best):
+                best, who = t, np.int64(j)
+    if who >= 0:
+        a.pair_time, a.partner, a.partner_count = now + best, who, disks[who].count

@@ -1,0 +1,1 @@
+"""What each engine does otherwise than exact flight with end-of-step collisions, and the solver that can ablate it."""

@@ -1,0 +1,79 @@
+"""The hand-written solver with switches, as a player: the exercise's, or what an engine does instead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Hit
+from adapters.mechanisms import ablated_reference as switched
+from adapters.mechanisms.ablated_reference import STAGES, Switches
+from adapters.mechanisms.contacts import no_contacts
+from adapters.reference import Reference
+from scenarios.model import Scene
+
+EXERCISE = ("accelerate", "move", "pairs", "walls")
+POSITION_FIRST = ("move", "pairs", "walls", "accelerate")
+# Collide where they are, then aim at a velocity after gravity, then move (Box2D 2.3, b2Island::Solve).
+BOX2D = ("detect", "by_island", "accelerate", "aim", "warm_start", "bounce", "cap", "move", "push_out")
+# Move, collide there, aim at a velocity before gravity; the push-out moves in the next step (Munk2D, cpSpaceStep).
+PYMUNK = ("move", "detect", "aim", "accelerate", "warm_start", "bounce", "nudge")
+# Collide and aim once, then soft substeps, then one sweep for restitution (Box2D 3.1, b2SolverStage).
+BOX2D_V3 = ("detect", "by_colour", "aim", *("accelerate", "warm_start", "soften", "move", "relax") * 4, "restitute")
+
+MIXING: dict[str, Callable[[float, float], float]] = {
+    "as stated": lambda a, _: a,
+    "the larger": max,
+    "the smaller": min,
+    "the mean": lambda a, b: (a + b) / 2,
+    "the product": lambda a, b: a * b,
+}
+
+
+class Switched(Reference):
+    """`adapters.mechanisms.ablated_reference` with these switches; without any the exercise's solver, to the bit.
+
+    order: the stages of a step; substeps: how often it is gone through in a dt, whose share falls to every move.
+    alpha: free flight advances by v dt + alpha a dt2 a step, whatever the order; None: as the order has it.
+    mixing: how the restitutions of two disks make that of the pair, a key of `MIXING`. `switches`: fields of
+    `adapters.mechanisms.ablated_reference.Switches`.
+    """
+
+    def __init__(
+        self, order: Sequence[str] = EXERCISE, *, substeps: int = 1, alpha: float | None = None,
+        mixing: str = "as stated", precision: type = np.float64, **switches: Any,
+    ) -> None:  # fmt: skip
+        super().__init__(switched, precision=precision)
+        self.order, self.substeps, self.alpha, self.mixing = tuple(order), substeps, alpha, mixing
+        self.moves = substeps * self.order.count("move")
+        kinds = Switches._field_defaults  # the solver is compiled once: an int in place of a float would be another
+        numbers = {name: type(kinds[name])(value) for name, value in switches.items()}
+        self.on = Switches(np.array([STAGES.index(stage) for stage in self.order]), self._drift(), **numbers)
+
+    def _drift(self) -> float:
+        """What each of the moves of a step has to add to v h, in a h2, for the whole step to have alpha."""
+        if self.alpha is None:
+            return 0.0
+        after = self.order.index("accelerate") < self.order.index("move")
+        return self.moves * self.alpha - (self.moves - 1) / 2 - after
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Copy the scene into the solver's arrays; what stands still does not turn either."""
+        self.kept = no_contacts(scene.n, len(scene.walls), self.precision)
+        super().load(scene, dt)
+        self.disks.inertia[scene.static] = np.inf
+        self.world = self.world._replace(restitution=float(MIXING[self.mixing](scene.restitution, scene.restitution)))
+
+    def _advance(self, count: int) -> None:
+        h = self.precision(self.dt / self.moves)
+        hits = switched.advance(self.disks, self.world, self.on, self.kept, h, count * self.substeps)
+        if self.listening:
+            self.log += [Hit(self.steps + k // self.substeps, i, j, impulse) for k, i, j, impulse in hits]
+        self.steps += count
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """What is switched on."""
+        told = {"mixing": self.mixing, "substeps": self.substeps, "alpha": self.alpha} | self.on._asdict()
+        return {name: (value, value) for name, value in (told | {"order": ", ".join(self.order)}).items()}

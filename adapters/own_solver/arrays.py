@@ -1,0 +1,99 @@
+"""Makes a module with `advance(disks, world, dt, count)`, as in reference_impl, answer as the exercise's functions do.
+
+A step of 0 s moves nothing, so that it shows what happens to a pair; a step of one disk alone is its integration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from adapters.own_solver.spheres import sphere_of
+from adapters.reference import Reference
+from reference_impl.state import Disks, World, make_disks
+from scenarios.model import Scene
+
+LOW, HIGH = np.array([-5.0, -3.0]), np.array([5.0, 3.0])  # m, the exercise's box
+
+
+def as_functions(module: ModuleType, restitution: float = 0.9) -> dict[str, Callable]:
+    """`integrate`, `collide`, `step` and `wrap` on spheres, by `module.advance`."""
+    world = World(restitution=restitution)
+    boxed = world._replace(low=LOW, high=HIGH)
+
+    def act(spheres: list[Any], where: World, dt: float) -> None:
+        disks = disks_of(spheres)
+        module.advance(disks, where, dt, 1)
+        write_back(disks, spheres)
+
+    def everybody() -> list[Any]:
+        return [module.ufo, *module.asteroids]
+
+    return {
+        "integrate": lambda sphere, dt: act([sphere], world, dt),
+        "collide": lambda a, b: act([a, b], world, 0.0),
+        "step": lambda dt: act(everybody(), boxed, dt),
+        "wrap": lambda: act(everybody(), boxed, 0.0),
+        "begin": lambda: begin(module),
+    }
+
+
+class Whole:
+    """Plays scenes by the module's own `advance`, as the reference solver is played; it takes any restitution."""
+
+    def __init__(self, module: ModuleType) -> None:
+        self.engine = Reference(module)
+
+    def whole_load(self, argument: dict[str, Any]) -> None:
+        """Begin a scene, given by the fields of `Scene`."""
+        walls = np.reshape(argument["scene"]["walls"], (-1, 2, 2))  # JSON has no empty array of that shape
+        self.engine.load(Scene(**argument["scene"] | {"walls": walls}), argument["dt"])
+
+    def whole_step(self, argument: dict[str, Any]) -> None:
+        """`count` steps; pushes act in the first."""
+        for disk, (x, y, torque) in enumerate(argument["pushes"] or ()):
+            if x or y or torque:
+                self.engine.push(disk, np.array([x, y]), torque)
+        self.engine.step(argument["count"])
+
+    def whole_read(self, _argument: Any) -> list[list[float]]:
+        """Position, velocity, angle and angular velocity of every disk."""
+        state = self.engine.read()
+        return np.column_stack([state.position, state.velocity, state.angle, state.angular_velocity]).tolist()
+
+    def whole_hits(self, _argument: Any) -> list[list[float]]:
+        """(step, i, j, impulse), as `advance` told them."""
+        return [[int(step), int(i), int(j), float(impulse)] for step, i, j, impulse in self.engine.hits()]
+
+
+def begin(module: ModuleType) -> None:
+    """Give the module a ufo and 20 asteroids in a grid, as the exercise's file has them."""
+    places = [(-4.0 + 2.0 * (k % 5), -2.2 + 1.2 * (k // 5)) for k in range(20)]
+    parked = [sphere_of([x, y, *[0.0] * 7, 1.0, 1.0, 0.1]) for x, y in places]
+    module.ufo, module.asteroids = sphere_of([-3.5, 0.0, *[0.0] * 7, 1.0, 1.0, 0.3]), parked  # type: ignore[attr-defined]
+
+
+def disks_of(spheres: list[Any]) -> Disks:
+    """Arrays from sphere objects."""
+    disks = make_disks(
+        [(s.position.x, s.position.y) for s in spheres], [(s.velocity.x, s.velocity.y) for s in spheres],
+        [s.size for s in spheres], [s.mass for s in spheres], [s.MoI for s in spheres],
+        [s.alpha for s in spheres], [s.angularVelocity for s in spheres],
+    )  # fmt: skip
+    disks.force[:] = [(s.force.x, s.force.y) for s in spheres]
+    disks.torque[:] = [s.torque for s in spheres]
+    return disks
+
+
+def write_back(disks: Disks, spheres: list[Any]) -> None:
+    """All numbers of the arrays into the sphere objects."""
+    for k, s in enumerate(spheres):
+        s.position.x, s.position.y = map(float, disks.position[k])
+        s.velocity.x, s.velocity.y = map(float, disks.velocity[k])
+        s.force.x, s.force.y = map(float, disks.force[k])
+        s.alpha, s.angularVelocity = float(disks.angle[k]), float(disks.angular_velocity[k])
+        s.torque, s.size = float(disks.torque[k]), float(disks.radius[k])
+        s.mass, s.MoI = float(disks.mass[k]), float(disks.inertia[k])

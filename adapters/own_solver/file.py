@@ -1,0 +1,147 @@
+"""Reads the file of somebody's solver as text, and says in a sentence why it cannot be one.
+
+It is read once: what is played, checked and hashed is the text that was read, whatever is saved meanwhile.
+"""
+
+from __future__ import annotations
+
+import codecs
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from adapters.own_solver.beside import modules_beside
+
+LARGEST = 2**20  # bytes; the exercise's file has about five thousand
+PATIENCE = 3  # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
+LONGEST = 300  # characters of a message
+KINDS = {".js": "javascript", ".py": "python"}
+
+
+class NotASolver(ValueError):
+    """A path that is no JavaScript or Python text; the message names it and says what to do."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(printable(what))
+
+
+class SolverFailed(Exception):
+    """A solver that cannot be loaded or did not come back from a call.
+
+    Attributes:
+        kind: "error" (threw), "timeout", "memory" or "crashed".
+        what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is escaped, and what
+            goes on for more than `LONGEST` characters is cut.
+        line, column: where in the solver's file, from 1; 0 where nobody can tell.
+    """
+
+    def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
+        what = printable(what)
+        what = what if len(what) <= LONGEST else what[:LONGEST] + " ..."
+        super().__init__(what)
+        self.kind, self.what, self.line, self.column = kind, what, line, column
+
+    @property
+    def status(self) -> str:
+        """Of a run that it ends, one of `STATUSES` of play.py."""
+        return self.kind if self.kind in ("timeout", "crashed") else "error"
+
+    def __str__(self) -> str:
+        return f"{self.what} (line {self.line}, column {self.column})" if self.line else self.what
+
+
+def printable(text: str) -> str:
+    """Somebody's text on one line, its control characters as they are written in code: they would act on a terminal."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+@dataclass(frozen=True)
+class SolverText:
+    """A solver's file as it was when it was read, with all that it takes to play it on any machine.
+
+    Attributes:
+        path: where it was.
+        kind: "javascript" or "python".
+        text: with \\n at the end of lines.
+        digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
+        beside: the modules that it imports from its own folder: file, relative to the folder, -> text.
+    """
+
+    path: Path
+    kind: str
+    text: str
+    digest: str
+    beside: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def source(self) -> str:
+        """16 hex digits over every text that decides what it does."""
+        return hashlib.sha256(repr((self.digest, self.beside)).encode()).hexdigest()[:16]
+
+
+def read_solver(path: Path) -> SolverText:
+    """The text of `path`, and of what it imports from beside it; raises `NotASolver` with one sentence."""
+    kind = KINDS.get(path.suffix.lower())
+    if kind is None:
+        raise NotASolver(f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file")
+    data = read_bytes(path, "name an Exercise.js or a solver.py")
+    text = decoded(path, data)
+    if not text.strip():
+        raise NotASolver(f"{path}: is empty; save your solver into it")
+    beside = read_beside(path, text) if kind == "python" else {}
+    return SolverText(path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(beside.items())))
+
+
+def read_beside(path: Path, text: str) -> dict[str, str]:
+    """The texts of the modules that a solver of that `text` imports from its own folder; raises `NotASolver`."""
+    itself, beside = path.resolve(), dict[str, str]()
+    for file, module in modules_beside(itself.parent, text, lambda one: text if one == itself else read_module(one)):
+        beside[file] = module
+        if sum(map(len, beside.values())) > LARGEST:
+            raise NotASolver(f"{path}: imports more than 1 MB from beside it; a solver has a few kilobytes")
+    return beside
+
+
+def read_module(path: Path) -> str:
+    """The text of a module beside a solver; raises `NotASolver`."""
+    return decoded(path, read_bytes(path, "a module that a solver imports is a file"))
+
+
+def read_bytes(path: Path, wanted: str) -> bytes:
+    """All of a small file; raises `NotASolver`, with what is `wanted` in the place of something that is no file."""
+    try:
+        if path.exists() and not path.is_file():
+            raise NotASolver(f"{path}: is no file; {wanted}")  # a pipe would be waited for
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise NotASolver(f"{path}: has {size / 1e6:.1f} MB; a solver has a few kilobytes, at most 1 MB is read")
+        return path.read_bytes()
+    except OSError as fault:
+        if dangling(path):
+            raise NotASolver(f"{path}: is a link to {path.readlink()}, which is not there") from None
+        raise NotASolver(f"{path}: {fault.strerror or fault}; name a file that can be read") from None
+
+
+def dangling(path: Path) -> bool:
+    """Whether it is a link to nothing."""
+    return path.is_symlink() and not path.exists()
+
+
+def decoded(path: Path, data: bytes) -> str:
+    """Text from UTF-8, from UTF-16 or UTF-32 with its mark, or from Windows' Latin letters; \\n ends its lines."""
+    return letters(path, data).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def letters(path: Path, data: bytes) -> str:
+    """The text of `decoded` with its own line ends."""
+    if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
+        return data.decode("utf-32", errors="replace")
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", errors="replace")
+    odd = next((k for k, byte in enumerate(data) if byte < 32 and byte not in b"\t\n\r\f\v"), None)
+    if odd is not None:
+        raise NotASolver(f"{path}: is not text (byte {data[odd]} at offset {odd}); save it as UTF-8 text")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")

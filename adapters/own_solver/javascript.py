@@ -1,0 +1,125 @@
+"""Runs an Exercise.js in V8: no file, no network, no clock; bounded in time and memory."""
+
+from __future__ import annotations
+
+import json
+import re
+from importlib.metadata import version
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+from py_mini_racer import JSEvalException, JSOOMException, JSParseException, JSTimeoutException, MiniRacer
+
+from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
+
+HEAP = 64 * 2**20  # bytes; a solver needs a hundredth of it
+LOAD_LIMIT = 2.0  # s
+NAME = "solver-file"  # how the solver's text is called in stack traces
+DRIVER = (Path(__file__).parent / "driver.js").read_text(encoding="utf-8")
+# What the exercise's page loads beside the file; from version 3 on vec2, vec3, mat4 ... are no globals any more.
+GL_MATRIX = Path(__file__).parent / "gl-matrix-2.8.1.min.js"
+CALLS_GL_MATRIX = re.compile(r"\b(?:vec[234]|mat[234]|mat2d|quat2?|glMatrix)\b")
+# Evaluated after the file, where its `let` and `const` can be seen too; a name that it lacks fails when it is used.
+BIND = """__crosscheck("bind", {
+  integrate: typeof integrate === "undefined" ? null : integrate,
+  collide: typeof sphereSphereCollisionHandling === "undefined" ? null : sphereSphereCollisionHandling,
+  step: typeof performSimStep === "undefined" ? null : performSimStep,
+  wrap: typeof projectObjects === "undefined" ? null : projectObjects,
+  begin: typeof initScene === "undefined" ? null : initScene,
+  ufo: () => ufo, asteroids: () => asteroids,
+})"""
+
+
+class JavaScriptSolver:
+    """The file in a fresh V8. Raises `SolverFailed` if it cannot be loaded."""
+
+    surface = "exercise"
+
+    def __init__(self, solver: SolverText) -> None:
+        self.engine = MiniRacer()
+        self.engine.set_hard_memory_limit(HEAP)
+        self.engine.eval(DRIVER)
+        if CALLS_GL_MATRIX.search(solver.text):
+            self.engine.eval(GL_MATRIX.read_text(encoding="utf-8"))
+        try:
+            self.engine.eval(f"{solver.text}\n//# sourceURL={NAME}", timeout_sec=LOAD_LIMIT)
+            self.functions = json.loads(str(self.engine.eval(BIND, timeout_sec=LOAD_LIMIT)))
+        except JSEvalException as error:
+            raise self.failure(error, LOAD_LIMIT, "while it is loaded") from None
+
+    def run(self, command: str, argument: Any, limit: float) -> Any:
+        """What the driver answers to a command; raises `SolverFailed` after `limit` s, or if the file threw."""
+        code = f'__crosscheck("{command}", {json.dumps(json.dumps(argument))})'
+        try:
+            answer = json.loads(str(self.evaluated(code, limit, may_repeat=command == "ask")))
+        except JSEvalException as error:
+            raise self.failure(error, limit, "in one call") from None
+        if "error" in answer:
+            raise thrown(answer["error"])
+        if isinstance(answer["done"], dict) and answer["done"].get("error"):
+            answer["done"]["error"] = vars(thrown(answer["done"]["error"]))
+        return answer["done"]
+
+    def evaluated(self, code: str, limit: float, may_repeat: bool) -> object:
+        """What V8 makes of `code`; what was stopped without having run for `limit` s is asked again if `may_repeat`.
+
+        V8 is stopped by the clock, on a busy machine before it has had its time.
+        """
+        began = process_time()
+        try:
+            return self.engine.eval(code, timeout_sec=limit)
+        except JSTimeoutException:
+            if not may_repeat or process_time() - began > limit / 2:
+                raise
+            return self.engine.eval(code, timeout_sec=(PATIENCE - 1) * limit)
+
+    def versions(self) -> dict[str, str]:
+        """What decides the numbers."""
+        return {"mini-racer": version("mini-racer"), "V8": self.engine.v8_version}
+
+    def failure(self, error: JSEvalException, limit: float, when: str) -> SolverFailed:
+        """What V8 says, in a sentence, with line and column where it tells."""
+        if isinstance(error, JSTimeoutException):
+            return SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
+        if isinstance(error, JSOOMException):
+            return SolverFailed("memory", f"wants more than {HEAP // 2**20} MB of memory {when}")
+        first, _, rest = str(error).partition("\n")
+        place = re.match(r"[^\n]*?:(\d+): (.*)", first)
+        if not place:
+            return SolverFailed("error", plainly(first))
+        caret = next((line for line in rest.splitlines() if line.strip() and set(line.strip()) == {"^"}), "")
+        stack = re.search(rf"{NAME}:(\d+):(\d+)", str(error))
+        line, column = int(place[1]), caret.find("^") + 1
+        if stack and not isinstance(error, JSParseException):
+            line, column = int(stack[1]), int(stack[2])
+        return SolverFailed("error", plainly(place[2]), line, column)
+
+
+def thrown(error: dict[str, str]) -> SolverFailed:
+    """What a function threw, and where in the solver's file."""
+    place = re.search(rf"{NAME}:(\d+):(\d+)", error["stack"])
+    line, column = (int(place[1]), int(place[2])) if place else (0, 0)
+    return SolverFailed("error", plainly(error["what"]), line, column)
+
+
+OUTSIDE = ("Date", "performance", "setTimeout", "setInterval", "requestAnimationFrame", "document", "window", "alert",
+           "fetch", "localStorage")  # fmt: skip
+SCRIPT = "the exercise's page loads the file as a plain script, which has no modules; leave it out"
+
+
+def plainly(what: str) -> str:
+    """V8's words, with a hint where they alone do not help."""
+    what = what.removeprefix("Uncaught ")
+    if "Maximum call stack" in what:
+        return "calls itself without end (maximum call stack size exceeded)"
+    if "Array buffer allocation failed" in what or "Invalid array length" in what:
+        return f"wants more memory than it is given ({what})"
+    missing = re.match(r"ReferenceError: (\w+) is not defined", what)
+    if missing and missing[1] in OUTSIDE:
+        return f"{what}: a solver is run without page, network and clock"
+    if missing and missing[1] in ("module", "exports", "require"):
+        return f"{what}: {SCRIPT}"
+    if re.match(r"SyntaxError: (?:Unexpected token 'export'|Cannot use import statement)", what):
+        return f"{what}: {SCRIPT}"
+    return what

@@ -1,0 +1,194 @@
+"""Talks to a solver's file in its own process, and outlives whatever that does."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+from typing import Any
+
+from adapters.engine import NotStarted
+from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
+from adapters.own_solver.worker import HERE
+from scenarios.truth.cache import folder
+
+STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
+INTRUDED = "wrote into the channel that its answers come by"
+GRACE = 4.0  # s beyond what the calls of a request may take
+Request = tuple[str, Any, float]
+"""A command of the worker, its argument, and how long it may take, s."""
+
+
+class SolverProcess:
+    """A solver's text, loaded in a process of its own; use it in a `with`, or close it.
+
+    Attributes:
+        functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it replaced.
+        kind: "javascript" or "python".
+        surface: "exercise" (functions on spheres) or "advance" (arrays, as in reference_impl).
+        versions: library -> version.
+
+    Raises:
+        SolverFailed: it cannot be loaded.
+        NotStarted: its process cannot be had.
+    """
+
+    def __init__(self, solver: SolverText, compiled: bool = False) -> None:
+        self.kind = solver.kind
+        kept = folder()
+        copies = kept_copies(solver, kept) if compiled and kept and self.kind == "python" else None
+        # Plain Python gives the same bits as numba, and starts 20 s sooner.
+        settings = {"PYTHONDONTWRITEBYTECODE": "1"} | ({} if copies else {"NUMBA_DISABLE_JIT": "1"})
+        settings["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # as here, without the current folder
+        if kept is not None:
+            settings["NUMBA_CACHE_DIR"] = str(kept / "numba")
+        hello = self.start(pickle.dumps((solver, copies)).hex(), settings)
+        if not isinstance(hello, dict) or not {"failed", "functions"} & hello.keys():
+            self.close()
+            raise SolverFailed("crashed", INTRUDED)
+        if "failed" in hello:
+            self.close()
+            raise SolverFailed(**hello["failed"])
+        self.functions: dict[str, Any] = hello["functions"]
+        self.surface: str = hello["surface"]
+        self.versions: dict[str, str] = hello["versions"]
+
+    def start(self, solver: str, settings: dict[str, str]) -> Any:
+        """Start the process and give it the solver; what it says then.
+
+        It stops a file that does not load by itself. A process that says nothing at all is started once more before
+        the file is blamed: a start of V8 has been seen to hang, so rarely that none of 1259 that were counted did.
+        """
+        for last in (False, True):
+            try:
+                self.begin(settings)
+                return self.exchange(solver, STARTING)
+            except BaseException as error:
+                self.close()
+                if last or not (isinstance(error, SolverFailed) and error.kind == "timeout"):
+                    raise
+        raise AssertionError("the second start returns or raises")
+
+    def begin(self, settings: dict[str, str]) -> None:
+        """Start the process and hear that it is there, with nothing of the solver in it; raises `NotStarted`."""
+        self.process: subprocess.Popen[bytes] | None = None
+        try:
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "adapters.own_solver.worker"],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | settings,
+                start_new_session=True, bufsize=0,
+            )  # fmt: skip
+            if self.receive(STARTING) == HERE:
+                return
+            why = "it said something else than that it is there"
+        except (OSError, SolverFailed) as fault:
+            why = str(fault)
+        raise NotStarted(f"the process for a solver's file could not be started: {why}")
+
+    def __enter__(self) -> SolverProcess:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
+        self.close()
+
+    def request(self, requests: Sequence[Request], total: float = float("inf")) -> list[Any | SolverFailed]:
+        """The answer to each, or how it failed, within `total` s; raises `SolverFailed` if the process is lost."""
+        # After one call that does not come back the worker puts no other like it, so a few limits are enough.
+        most = PATIENCE * max((limit for _, _, limit in requests), default=0.0)
+        answers = self.exchange(requests, min(most + GRACE, total))
+        if not isinstance(answers, list) or len(answers) != len(requests):
+            self.close()
+            raise SolverFailed("crashed", INTRUDED)
+        return [SolverFailed(**a["failed"]) if "failed" in a else a["done"] for a in answers]
+
+    def do(self, command: str, argument: Any = None, limit: float = 5.0) -> Any:
+        """One request; raises `SolverFailed` if it failed."""
+        (answer,) = self.request([(command, argument, limit)])
+        if isinstance(answer, SolverFailed):
+            raise answer
+        return answer
+
+    def exchange(self, what: Any, limit: float) -> Any:
+        """One line there and one back."""
+        assert self.process is not None
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(json.dumps(what).encode() + b"\n")
+        except BrokenPipeError:
+            raise self.lost() from None
+        return self.receive(limit)
+
+    def receive(self, limit: float) -> Any:
+        """One line from the process."""
+        assert self.process is not None
+        assert self.process.stdout is not None
+        received, deadline = b"", monotonic() + limit
+        while not received.endswith(b"\n"):
+            ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, deadline - monotonic()))
+            if not ready:
+                self.close()
+                raise SolverFailed("timeout", f"does not come back within {limit:g} s and had to be stopped")
+            chunk = os.read(self.process.stdout.fileno(), 1 << 20)
+            if not chunk:
+                raise self.lost()
+            received += chunk
+        try:
+            return json.loads(received)
+        except ValueError:
+            raise SolverFailed("crashed", INTRUDED) from None
+
+    def lost(self) -> SolverFailed:
+        """Why the process is gone."""
+        assert self.process is not None
+        code = self.process.wait(timeout=GRACE)
+        ends_v8 = self.kind == "javascript" and -code in (signal.SIGTRAP, signal.SIGABRT)  # V8's word for a full heap
+        if ends_v8:
+            return SolverFailed("memory", "wants more memory than it is given, and its process was ended")
+        if -code == signal.SIGKILL:
+            return SolverFailed("crashed", "its process was ended by SIGKILL, as a system does that runs out of memory")
+        if -code == signal.SIGABRT:
+            return SolverFailed("crashed", "its process was ended by SIGABRT")
+        name = signal.Signals(-code).name if code < 0 else f"exit status {code}"
+        return SolverFailed("crashed", f"ended its own process ({name})")
+
+    def close(self) -> None:
+        """End the process and all it has started."""
+        if self.process is not None:
+            if self.process.poll() is None:
+                os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.wait()
+            for stream in (self.process.stdin, self.process.stdout):
+                if stream is not None:
+                    stream.close()
+            self.process = None
+
+
+def kept_copies(solver: SolverText, kept: Path) -> Path | None:
+    """A folder below `kept` with the texts of a Python solver, named by what they are; None if it cannot be written.
+
+    numba keeps what it compiled from a file under that file's place and content of the moment. The file itself may have
+    been saved since it was read, and what it imports is compiled into it: both would be taken for what they were not.
+    """
+    copies = kept / "solvers" / solver.source
+    try:
+        for file, text in {**dict(solver.beside), solver.path.resolve().name: solver.text}.items():
+            copy = copies / file
+            if copy.is_file() and copy.read_bytes() == text.encode():
+                continue
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            handle, temporary = tempfile.mkstemp(dir=copy.parent)
+            with os.fdopen(handle, "wb") as written:
+                written.write(text.encode())
+            os.replace(temporary, copy)
+    except OSError:
+        return None
+    return copies

@@ -1,0 +1,235 @@
+"""Runs a solver.py: the exercise's functions on sphere objects, or `advance` on arrays as in reference_impl."""
+
+from __future__ import annotations
+
+import random
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType, ModuleType
+from typing import Any
+
+from adapters.own_solver.beside import Neighbours
+from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
+from adapters.own_solver.spheres import NAMES, Fields, sphere_of
+
+LOAD_LIMIT = 3.0  # s; importing numba takes one
+LOGGED = 400  # contacts that are kept for the judge
+
+
+def row_of(s: Any) -> list[float]:
+    """The 12 numbers of a sphere; NaN where it holds none."""
+    try:
+        vectors = (s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y)
+    except AttributeError:
+        raise AttributeError("a sphere is left with a position, velocity or force that has no x and y") from None
+    return [number(x) for x in (*vectors, s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size)]
+
+
+def number(x: Any) -> float:
+    """`x` as a float, NaN if it is none."""
+    try:
+        return float(x)
+    except (TypeError, ValueError):
+        return float("nan")
+
+
+class PythonSolver:
+    """The file as a module of this process. Raises `SolverFailed` if it cannot be loaded."""
+
+    def __init__(self, solver: SolverText, copies: Path | None = None) -> None:
+        """`copies`: where the texts lie as they were read, for numba: it keeps what it compiled by file and content."""
+        here = solver.path.resolve()
+        self.name = str(solver.path if copies is None else copies / here.name)
+        sys.meta_path.insert(0, Neighbours(here.parent, dict(solver.beside), copies or here.parent))
+        random.seed(1)
+        self.module = module = ModuleType("solver")
+        module.__file__ = str(here)
+        sys.modules["solver"] = module  # numba and dataclasses look a function's module up
+        with self.guarded(LOAD_LIMIT, "while it is loaded"):
+            exec(compile(solver.text, self.name, "exec"), module.__dict__)
+        self.surface = "advance" if callable(getattr(module, "advance", None)) else "exercise"
+        named = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling", "step": "performSimStep",
+                 "wrap": "projectObjects", "begin": "initScene"}  # fmt: skip
+        self.file: dict[str, Callable] = {k: vars(module)[f] for k, f in named.items() if callable(vars(module).get(f))}
+        self.whole: Any = None  # plays whole scenes by `advance`, where the file has it
+        if self.surface == "advance":
+            from adapters.own_solver.arrays import Whole, as_functions
+
+            self.file, self.whole = as_functions(module), Whole(module)
+        self.functions: dict[str, Any] = {k: k in self.file for k in named} | {"replaced": []}
+
+    def run(self, command: str, argument: Any, limit: float) -> Any:
+        """The answer to a command; raises `SolverFailed` after `limit` s, or if the file threw."""
+        with self.guarded(limit, "in one call"):
+            return getattr(self.whole if command.startswith("whole") else self, command)(argument)
+
+    def versions(self) -> dict[str, str]:
+        """What decides the numbers."""
+        return {"python": ".".join(map(str, sys.version_info[:3]))}
+
+    @contextmanager
+    def guarded(self, limit: float, when: str) -> Iterator[None]:
+        """Turns whatever the file does into `SolverFailed`, and stops it after `limit` s of processor time."""
+
+        def stop(_signal: int, _frame: FrameType | None) -> None:
+            raise SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
+
+        timers = {signal.ITIMER_PROF: (signal.SIGPROF, limit), signal.ITIMER_REAL: (signal.SIGALRM, PATIENCE * limit)}
+        for timer, (number, after) in timers.items():  # the clock stops what only waits
+            signal.signal(number, stop)
+            signal.setitimer(timer, after)
+        try:
+            yield
+        except SolverFailed:
+            raise
+        except BaseException as error:  # SystemExit too: a solver may not end the process
+            raise self.failure(error, when) from None
+        finally:
+            for timer in timers:
+                signal.setitimer(timer, 0)
+
+    def failure(self, error: BaseException, when: str) -> SolverFailed:
+        """What was raised, in a sentence, with its place in the solver's file."""
+        if isinstance(error, RecursionError):
+            what = "calls itself without end (maximum recursion depth exceeded)"
+        elif isinstance(error, MemoryError):
+            return SolverFailed("memory", f"wants more memory than it is given {when}")
+        elif isinstance(error, SystemExit):
+            what = f"ends the process (SystemExit: {error})"
+        else:
+            what = f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}"
+        if "for ^" in what:
+            what += "; a power is written **"
+        elif isinstance(error, EOFError):
+            what += "; nobody is there to answer input()"
+        if isinstance(error, SyntaxError) and error.filename == self.name:
+            return SolverFailed("error", what, error.lineno or 0, error.offset or 0)
+        mine = [f for f in traceback.TracebackException.from_exception(error).stack if f.filename == self.name]
+        line, column = (mine[-1].lineno or 0, (mine[-1].colno or 0) + 1) if mine else (0, 0)
+        return SolverFailed("error", what, line, column)
+
+    def begin(self, _argument: Any = None) -> None:
+        """Let the file make its scene."""
+        if "begin" in self.file:
+            self.file["begin"]()
+
+    def everybody(self) -> list[Any]:
+        """The file's ufo and asteroids."""
+        return [self.module.ufo, *self.module.asteroids]
+
+    def globals(self, _argument: Any = None) -> list[list[float]] | None:
+        """The numbers of the file's own spheres, None if it has none."""
+        try:
+            return [row_of(s) for s in self.everybody()]
+        except (AttributeError, TypeError):
+            return None
+
+    def ask(self, question: dict[str, Any]) -> dict[str, Any]:
+        """The spheres after each call of a question, and whether anything was returned, strayed or failed."""
+        states: list[list[list[float]]] = []
+        returned, error = False, None
+        spheres = self.placed(question)
+        known = None if question["world"] else self.globals()
+        try:
+            for name, *arguments in question["calls"]:
+                on = {"integrate": 1, "collide": 2}.get(name, 0)
+                result = self.file[name](*(spheres[i] for i in arguments[:on]), *arguments[on:])
+                if hasattr(result, "send"):
+                    raise TypeError(f"a call of {name} runs nothing: it is an async def, or has a yield")
+                returned = returned or isinstance(result, (Fields, dict, list, tuple)) or hasattr(result, "position")
+                spheres = self.everybody() if question["world"] else spheres
+                states.append([row_of(s) for s in spheres])
+        except SolverFailed:
+            raise
+        except BaseException as raised:
+            error = vars(self.failure(raised, "in one call"))
+        strange = sorted({name for s in spheres if isinstance(s, Fields) for name in vars(s)} - NAMES)
+        strayed = not question["world"] and not same(self.globals(), known)
+        return {"states": states, "returned": returned, "strayed": strayed, "strange": strange, "error": error}
+
+    def placed(self, question: dict[str, Any]) -> list[Any]:
+        """The question's spheres, new ones or the file's own."""
+        made = [sphere_of(r) for r in question["spheres"]]
+        if not question["world"]:
+            return made
+        spheres = self.everybody()
+        for mine, wanted in zip(spheres, made):
+            for name, value in vars(wanted).items():
+                if isinstance(value, Fields):
+                    vector = getattr(mine, name)
+                    vector.x, vector.y = value.x, value.y
+                else:
+                    setattr(mine, name, value)
+        return spheres
+
+    def load(self, scene: dict[str, Any]) -> None:
+        """Begin a scene."""
+        self.scene, self.steps = scene, 0
+        self.log: list[list[float]] = []
+        self.hit_rows: list[list[float]] = []
+        self.spheres: list[Any] = [sphere_of(r) for r in scene["spheres"]]
+
+    def step(self, argument: dict[str, Any]) -> None:
+        """Integrate all, collide every pair i < j, wrap; `count` times; pushes act in the first, or in all if held."""
+        gx, gy = self.scene["gravity"]
+        pushes, held = argument["pushes"], argument.get("held", False)
+        for k in range(argument["count"]):
+            for i, s in enumerate(self.spheres):
+                px, py, turn = pushes[i] if pushes and (held or k == 0) else (0.0, 0.0, 0.0)
+                s.force.x, s.force.y, s.torque = s.mass * gx + px, s.mass * gy + py, turn
+                self.file["integrate"](s, self.scene["dt"])
+            for i in range(len(self.spheres)):
+                for j in range(i + 1, len(self.spheres)):
+                    self.pair(i, j)
+            if self.scene["wrap"]:
+                for s in self.spheres:
+                    wrap(s.position, self.scene["wrap"])
+            self.steps += 1
+
+    def pair(self, i: int, j: int) -> None:
+        """Collide two, and log them if they overlapped or anything changed."""
+        a, b = self.spheres[i], self.spheres[j]
+        x, y = a.position.x - b.position.x, a.position.y - b.position.y
+        before = (*motion(a), *motion(b))
+        self.file["collide"](a, b)
+        after = (*motion(a), *motion(b))
+        reach = a.size + b.size
+        if before[2:4] != after[2:4] or before[6:] != after[6:]:
+            du, dv = after[2] - before[2], after[3] - before[3]
+            sign = -1.0 if du * x + dv * y < 0 else 1.0
+            self.hit_rows.append([self.steps, i, j, number(sign * a.mass * (du * du + dv * dv) ** 0.5)])
+        if (before != after or x * x + y * y < reach * reach) and len(self.log) < LOGGED:
+            self.log.append([self.steps, i, j, *map(number, before), *map(number, after)])
+
+    def read(self, _argument: Any = None) -> list[list[float]]:
+        """The scene's spheres as they are."""
+        return [row_of(s) for s in self.spheres]
+
+    def hits(self, _argument: Any = None) -> list[list[float]]:
+        """(step, i, j, impulse) of every pair whose velocities a call changed."""
+        return self.hit_rows
+
+    def contacts(self, _argument: Any = None) -> list[list[float]]:
+        """What `pair` logged."""
+        return self.log
+
+
+def motion(s: Any) -> tuple[float, float, float, float]:
+    """Position and velocity of a sphere."""
+    return s.position.x, s.position.y, s.velocity.x, s.velocity.y
+
+
+def wrap(p: Any, box: list[float]) -> None:
+    """As projectObjects: beyond an edge of the box, onto the opposite one."""
+    left, bottom, right, top = box
+    p.x = right if p.x < left else left if p.x > right else p.x
+    p.y = top if p.y < bottom else bottom if p.y > top else p.y
+
+
+def same(one: Any, other: Any) -> bool:
+    """Equal, NaN being equal to itself."""
+    return repr(one) == repr(other)

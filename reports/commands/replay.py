@@ -1,0 +1,139 @@
+"""`crosscheck replay CELL`: one cell again, step by step from its last good state, with all that its engine prints."""
+
+from __future__ import annotations
+
+import difflib
+import io
+import os
+import pickle
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NoReturn
+
+from adapters.engine import Row
+from adapters.engines import ENGINES, OWN, read_row, row_of
+from reports.run.archive import STATE, Archive, from_trail, load_trajectory, stored_trajectory
+from reports.run.arguments import go_where_files_are
+from reports.run.cells import Cell
+from reports.run.folders import found
+from reports.run.playing import play_here
+from reports.run.scenes import played_scenario
+from reports.run.worker import Worker
+from reports.run.worker_process import Failure
+from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse, say
+from reports.terminal.foreign_text import legible
+from scenarios.model import Scenario, Trajectory
+
+REMEMBERED = ", the last good state (what the engine remembers beside it begins anew)"
+
+
+def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = ENGINES) -> NoReturn:
+    """Play the cell of the run in `out` whose key begins with `name`; exits 0, 1 (it failed again) or 2."""
+    try:
+        archive = Archive.read(found(Path(os.path.abspath(out))))
+        record = record_of(archive, name)
+        scenario = played_scenario(archive.folder, record)
+        player = f"{record['engine']}:{record['profile']}"
+        go_where_files_are(archive.header, [player])
+        row = engines.get(player) or (read_row if player.endswith(OWN) else row_of)(player)
+        before = recorded(archive, record)
+    except FolderTaken as fault:
+        refuse([str(fault)])
+    except KeyError as gone:
+        refuse([f"{gone.args[0]} was played, but is not known to this version"])
+    except (OSError, ValueError) as fault:
+        refuse([str(fault)])
+    cell = Cell(record["scene"], record["seed"], player, record["substeps"])
+    if row.source and record["cell"] != cell.key(record["scene_hash"], row.source):
+        say(f"{player.removesuffix(OWN)} or a version has changed since: what is played is what is there now")
+    k = len(before) - 1 if before is not None and record["status"] != "ok" else 0
+    substeps = record["substeps"]
+    show(f"{record['scenario']}  {record['engine']}:{record['profile']}  dt {record['dt_s']:.4g} s")
+    show(f"was:    {ending(record['status'], record['reason'])}")
+    show(f"from:   step {k * substeps}, {scenario.times[k]:g} s{REMEMBERED if k else ', the start'}")
+    status, reason, after = again(record, row, continued(scenario, substeps, before, k), timeout)
+    step = k * substeps + (len(after) - 1 if after is not None else 0)
+    show(f"now:    {ending(status, reason)}")
+    show(f"as far: step {step} of {scenario.samples * substeps}, {step * record['dt_s']:g} s")
+    if record["status"] == status == "ok":
+        show(f"bits:   {'as' if same(before, after, substeps) else 'other than'} recorded")
+    sys.exit(DONE if status == "ok" else FAILED)
+
+
+def show(line: str) -> None:
+    """One line on standard output, at once: what the engine prints comes after it."""
+    print(legible(line), flush=True)
+
+
+def ending(status: str, reason: str) -> str:
+    """How a cell ended."""
+    return f"{status}: {reason}" if reason else status
+
+
+def record_of(archive: Archive, name: str) -> dict[str, Any]:
+    """The line of the one cell whose key begins with `name`; raises `ValueError` naming what is near."""
+    keys = {record["cell"]: record for record in archive.records}
+    matching = [key for key in keys if key.startswith(name)]
+    if len(matching) == 1:
+        return keys[matching[0]]
+    failed = [key for key, record in keys.items() if record["status"] not in ("ok", "unsupported")]
+    near = matching or difflib.get_close_matches(name, keys, n=3, cutoff=0.5) or failed
+    named = ", ".join(f"{key} ({keys[key]['scenario']} {keys[key]['engine']})" for key in near[:3])
+    why = "is no cell" if not matching else f"begins {len(matching)} cells"
+    hint = f"did you mean {named}?" if near else f"see the column cell of {archive.folder / 'runs.csv'}"
+    raise ValueError(f"{name!r} {why} of {archive.folder}; {hint}")
+
+
+def continued(scenario: Scenario, substeps: int, before: Trajectory | None, k: int) -> Scenario:
+    """The rest of a scenario from its sample `k` on, sampled at every step."""
+    start, dt = float(scenario.times[k]), scenario.dt(substeps)
+    scene = scenario.scene
+    if before is not None and k:
+        scene = replace(scene, **{name: getattr(before, name)[k] for name in STATE})
+    return replace(
+        scenario,
+        scene=scene,
+        sample_interval=dt,
+        duration=max(1, scenario.samples - k) * substeps * dt,
+        substeps=(1,),
+        thrusts=[
+            replace(thrust, start=max(0.0, thrust.start - start), stop=thrust.stop - start)
+            for thrust in scenario.thrusts
+            if thrust.stop > start
+        ],
+        truth=None,
+    )
+
+
+def again(record: dict[str, Any], row: Row, scenario: Scenario, timeout: float) -> tuple[str, str, Trajectory | None]:
+    """Status, reason and trajectory, from a process of its own that prints where the user sees it."""
+    cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", 1)
+    worker = Worker(memory=0, show=True)
+    try:
+        outcome = worker.do(partial(play_here, cell, row, scenario), timeout)
+    finally:
+        worker.close()
+    if outcome is None:
+        return "crashed", "its process ended as if from outside", from_trail(worker.left(), scenario)
+    if isinstance(outcome, bytes):
+        outcome = pickle.loads(outcome)
+    if isinstance(outcome, Failure):
+        return outcome.status, outcome.reason, from_trail(outcome.trail, scenario)
+    return outcome.run.status, outcome.run.reason, load_trajectory(io.BytesIO(outcome.file)) if outcome.file else None
+
+
+def recorded(archive: Archive, record: dict[str, Any]) -> Trajectory | None:
+    """The samples that the run has of a cell; None if it has none."""
+    if record["damage"]:
+        say(f"{archive.folder / 'trajectories'}: {record['damage']}, so the cell is played from the start")
+    return stored_trajectory(archive.folder, record)
+
+
+def same(before: Trajectory | None, after: Trajectory | None, substeps: int) -> bool:
+    """Whether a cell that was sampled at every step has the bits of its record."""
+    if before is None or after is None:
+        return before is after
+    return all(getattr(before, name).tobytes() == getattr(after, name)[::substeps].tobytes() for name in STATE)

@@ -1,0 +1,139 @@
+"""`crosscheck run`: play, compare, report; or go on with a run that was broken off."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NoReturn
+
+from adapters.engines import row_of
+from reports.commands.report import finish
+from reports.lessons.catalogue import LESSONS
+from reports.page.report import make_report
+from reports.run.archive import Archive, stored_scene
+from reports.run.arguments import checked_engines, checked_scenes, go_where_files_are, opening, refusing
+from reports.run.folders import RUN, given_back, open_again, open_new, part_of, place_of, reopened, replace_folder
+from reports.run.journal import JOURNAL, Journal
+from reports.run.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
+from reports.run.suite import Means, OtherVersions, Plan, carry_out
+from reports.terminal.exits import FAILED, broken_off, refuse, say
+from reports.terminal.progress import Progress
+from scenarios.catalogue import SCENARIOS
+
+
+def run_plan(
+    scenes: Sequence[str],
+    engines: Sequence[str],
+    dts: Sequence[float],
+    full: bool,
+    seed: int,
+    timings: int,
+    out: Path,
+    means: Means,
+    command: str,
+) -> NoReturn:
+    """Play, compare, report into `out`; exits 0, 1 (an engine or a scene could not be compared), 2, 130 or 143."""
+    with opening(out):
+        out, folder = place_of(out), os.getcwd()
+    plan = Plan(
+        scenes=checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
+        engines={name: row_of(name) for name in checked_engines(engines)},
+        seed=seed,
+        dts=dts,
+        full=full,
+        timings=timings,
+        command=command,
+        folder=folder,
+    )
+    with opening(out):
+        journal = open_new(out)
+    carry_on(plan, means, journal, out)
+
+
+def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means:
+    """The means that are asked for; exits 2 if no worker could start, or no scheduler answers.
+
+    `workers` 0: one a core; `memory` in MB, 0: the share of a worker.
+    """
+    workers = affordable(workers or os.cpu_count() or 1)
+    if 0 < memory < LEAST_MEMORY:
+        refuse([f"--memory {memory}: a worker takes {LEAST_MEMORY} MB before it has played anything; allowed is more"])
+    if scheduler:
+        try:
+            cluster(scheduler).close()
+        except NoScheduler as fault:
+            refuse([str(fault)])
+    share = 0 if scheduler else os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // workers
+    return Means(workers, timeout, memory * 1_000_000 or share, scheduler)
+
+
+def resume(out: Path, means: Means, alone: bool) -> NoReturn:
+    """Play what is missing or changed in the run of `out`, compare, report; exits as `run_plan`.
+
+    `alone`: nothing is asked for but to resume, and with which means.
+    """
+    if not alone:
+        refuse(["--resume goes on with a run as it was asked for: it takes no scenarios, --engine, --dt, --full, "
+                "--seed, --timings and --out"])  # fmt: skip
+    with refusing(f"--resume {out}"):
+        out = place_of(out, "--resume")
+        journal = open_again(out)
+        with given_back(journal):
+            plan = plan_of(journal.path.parent, part_of(out))
+            reopened(journal, out)
+    carry_on(plan, means, journal, out)
+
+
+def plan_of(folder: Path, part: Path) -> Plan:
+    """What was asked for, as the journal has it, wherever one is now; of a scene file that is gone the copy is played.
+
+    `part`: where `folder` will be when that is carried out. Exits 2 where a scene file, or a solver's, is at fault.
+    """
+    header = {"folder": os.getcwd()} | Archive.read(folder).header
+    files = {scene: file_of(scene, folder, header) for scene in header["scenes"] if scene.endswith(".toml")}
+    scenes = checked_scenes(header["scenes"], header["dts"], header["full"], header["seed"], files)
+    go_where_files_are(header, header["engines"])
+    engines = {name: row_of(name) for name in checked_engines(header["engines"])}
+    moved = {
+        scene: part / path.relative_to(folder) if path.is_relative_to(folder) else path for scene, path in files.items()
+    }
+    names = ("seed", "dts", "full", "timings", "command", "folder")
+    return Plan(scenes=scenes, engines=engines, files=moved, **{name: header[name] for name in names})
+
+
+def file_of(scene: str, folder: Path, header: Mapping[str, Any]) -> Path:
+    """The file of a scene, from where the run was begun, or where that is gone the copy in the run's folder."""
+    path = Path(header["folder"], scene)
+    copy = stored_scene(folder, header["names"].get(scene, ""))
+    return copy if not path.exists() and copy.exists() else path
+
+
+def carry_on(plan: Plan, means: Means, journal: Journal, out: Path) -> NoReturn:
+    """Carry out the plan, report, and put it all in its place; what was played is kept, whatever happens."""
+    part = journal.path.parent
+    try:
+        with broken_off(part, partial(what_is_kept, out)), journal, Progress() as progress:
+            carry_out(plan, means, journal, progress)
+            report = make_report(part, progress.say, LESSONS)
+            replace_folder(part, out, RUN)
+    except (NoScheduler, OtherVersions) as fault:
+        say(f"{fault}. {what_is_kept(out)}")
+        sys.exit(FAILED)
+    finish(report, out)
+
+
+def what_is_kept(out: Path) -> str:
+    """A sentence on what a run that was broken off has left, and how to go on."""
+    part = part_of(out)
+    if not part.exists() and (out / JOURNAL).exists():
+        return f"All is done: {out}"
+    ended = len(Archive.read(part).records) if (part / JOURNAL).exists() else 0
+    if not ended:
+        return "Nothing was played yet."
+    return (
+        f"The {ended} cells that were played are kept.\n"
+        f"To go on:  crosscheck run --resume {out}\nTo look:   crosscheck report {part}"
+    )

@@ -1,0 +1,30 @@
+"""`crosscheck play` and `crosscheck lesson`: one web application, the game at / and the lessons below /lesson."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from starlette.applications import Starlette
+
+from reports.game.command import FIRST, game_of
+from reports.game.server import Game, routes
+from reports.lessons.command import checked_lesson
+from reports.lessons.pages import ROUTES
+from reports.page import server
+
+
+def application(game: Game) -> Starlette:
+    """The game and the lessons."""
+    return server.application([*routes(game), *ROUTES])
+
+
+def play(flight: Path | None, engines: Sequence[str], port: int, opens: bool) -> None:
+    """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is none."""
+    server.serve(application(game_of(flight, engines)), port, "/", opens)
+
+
+def lesson(name: str, port: int, opens: bool) -> None:
+    """Serve the lessons, opened at `name` or their list, until Ctrl-C; exits 2 if there is no such lesson."""
+    path = f"/lesson/{checked_lesson(name)}".rstrip("/")
+    server.serve(application(Game(list(FIRST))), port, path, opens)

@@ -1,0 +1,156 @@
+"""`crosscheck truth`: the exact answer to one scene, its hits, how far it reaches and what ends it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from functools import partial
+from typing import NoReturn
+
+import numpy as np
+from rich.table import Table
+
+from reports.page.style import number
+from reports.run.answers import no_answer, record_here
+from reports.run.arguments import checked_scenes
+from reports.run.journal import plain
+from reports.run.runner import run_all
+from reports.run.scenes import open_scene
+from reports.run.worker_process import Failure
+from reports.terminal.console import Console
+from reports.terminal.exits import DONE, FAILED, say
+from reports.terminal.progress import Progress
+from scenarios.model import Scenario
+from scenarios.truth.record import TruthRecord
+
+SHOWN = 10  # hits at the start and at the end
+HEADINGS = ("t, s", "disk", "other", "impulse, N s", "cos of impact angle")
+
+
+def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float) -> NoReturn:
+    """Print the exact answer to a scene; exits 1 where there is none within `timeout` s, 2 on what is no scene."""
+    (checked,) = checked_scenes([scene], [], False, seed)
+    scenario = open_scene(checked, seed)
+    # In a worker, which can be stopped whatever it is doing.
+    task = partial(record_here, checked, seed)
+    with waiting(f"the exact answer to {scenario.name}"), closing(run_all({checked: task}, 1, timeout)) as results:
+        [(_, record)] = results
+    if isinstance(record, Failure | str):
+        why = f"no exact answer: {record}" if isinstance(record, str) else no_answer(record, timeout).reason
+        say(f"{scenario.name}: {why}")
+        sys.exit(FAILED)
+    if as_json:
+        print(json.dumps(as_plain(scenario, record), indent=2, allow_nan=False))
+    else:
+        print_truth(scenario, record, every)
+    sys.exit(DONE)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Say on a terminal what is being computed, and for how long by now."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    with Progress() as progress:
+        progress.say(what)
+        yield
+
+
+def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
+    """The record for programs; numbers that are not finite are text or null, as JSON has none."""
+    hits = [
+        {
+            "t_s": t,
+            "i": int(i),
+            "j": int(j),
+            "impulse_Ns": impulse,
+            "cosine": cosine if impulse and cosine > 0 else None,
+        }
+        for t, i, j, impulse, cosine in record.events.tolist()
+    ]
+    return plain(
+        {
+            "scenario": scenario.name, "method": record.method, "bits": record.bits, "duration_s": scenario.duration,
+            "valid_until_s": min(record.valid_until, scenario.duration),
+            "followed_until_s": min(record.followed_until, scenario.duration), "reason": record.reason,
+            "error_bound_m": record.error_bound, "hits": hits, "outcomes": outcomes(record),
+            "still_known": list(record.remains),
+        }
+    )  # fmt: skip
+
+
+def outcomes(record: TruthRecord) -> list[dict]:
+    """How a simultaneous hit may end: the velocity (m/s) of each disk, and the hits in one order that leads there."""
+    return [
+        {
+            "velocities_m_s": {str(int(i)): [vx, vy] for _, i, vx, vy in record.outcomes[record.outcomes[:, 0] == k]},
+            "order": [[int(i), int(j)] for _, i, j in record.orders[record.orders[:, 0] == k]],
+        }
+        for k in sorted({*record.outcomes[:, 0]})
+    ]
+
+
+def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
+    """The record for people."""
+    console = Console()
+    ends = f"{number(min(record.valid_until, scenario.duration), 6)} s of {number(scenario.duration, 6)} s"
+    lines = {
+        "scenario": f"{scenario.name}: {scenario.asks}",
+        "method": record.method,
+        "precision": precision(record),
+        "horizon": ends,
+        "ends because": record.reason or "it is asked for no longer" * (record.valid_until >= scenario.duration),
+        "players held to it": f"up to {number(min(record.followed_until, record.valid_until, scenario.duration), 6)} s",
+        "error bound": f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64",
+        "still known": "\n".join(record.remains),
+        "hits": str(int((record.events[:, 3] != 0).sum())),
+    }
+    grid = Table.grid(padding=(0, 2))
+    for name, text in lines.items():
+        if text:
+            grid.add_row(name, text)
+    console.print(grid)
+    if len(record.events):
+        console.print(table_of_hits(record, every))
+    if len(record.outcomes):
+        console.print(table_of_outcomes(record))
+
+
+def precision(record: TruthRecord) -> str:
+    """What the record was computed with."""
+    if record.bits == 53:
+        return "float64"
+    return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (record.method == "two-precision")
+
+
+def table_of_hits(record: TruthRecord, every: bool) -> Table:
+    """The hits, or the first and the last ten."""
+    table, rows = Table(*HEADINGS), record.events.tolist()
+    skipped = 0 if every else max(0, len(rows) - 2 * SHOWN)
+    for k, (t, i, j, impulse, cosine) in enumerate(rows):
+        if skipped and k == SHOWN:
+            table.add_row("...", "", "", f"{skipped} more: --events", "")
+        if skipped and SHOWN <= k < len(rows) - SHOWN:
+            continue
+        other, angle = name(j), "" if np.isnan(cosine) else f"{cosine:.6g}"
+        kick, angle = (f"{impulse:.6g}", angle) if impulse else ("comes to rest", "")
+        table.add_row(f"{t:.12g}", str(int(i)), other, kick, angle)
+    return table
+
+
+def table_of_outcomes(record: TruthRecord) -> Table:
+    """All ends a simultaneous contact may have; none of them is the truth."""
+    found = outcomes(record)
+    table = Table("outcome", "velocities, m/s", "one order of hits", title=f"{len(found)} outcomes; none is the truth")
+    for k, end in enumerate(found, 1):
+        velocities = (f"{disk}: ({vx:.6g}, {vy:.6g})" for disk, (vx, vy) in end["velocities_m_s"].items())
+        table.add_row(str(k), "\n".join(velocities), ", ".join(f"{i} on {name(j)}" for i, j in end["order"]))
+    return table
+
+
+def name(j: float) -> str:
+    """The other side of a hit."""
+    return f"disk {int(j)}" if j >= 0 else f"wall {-1 - int(j)}"

@@ -1,0 +1,1 @@
+"""Trajectories to tables: metrics, laws, collisions. No files, no processes, no clock."""

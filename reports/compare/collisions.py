@@ -1,0 +1,268 @@
+"""Which hits of the truth a player found, which it missed, which it invented, and how late it was."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from reports.compare import laws
+from reports.compare.delays import WINDOW
+from reports.compare.faces import SAME, interval, on_faces
+from scenarios.model import Array, Collisions, Scene, Trajectory
+
+# Hits and steps lie on one grid, and so do halves of the time between hits. No bound is one of it, where rounding would
+# decide: all are roots of numbers that have none.
+CROWDED = 5**0.5  # dt; true hits of a pair that are closer cannot be told apart by any step
+FAR = 401**0.5  # dt; so late, or early, a match may always be
+ROUNDING = 1e-12  # of a sum of thousands of times
+HALF = 0.26**0.5  # of the time to the nearest other true hit: so late it may be too
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """Hits of a player set against hits of the truth.
+
+    Attributes:
+        delay: (m,) s, played time less true time of each hit found.
+        missed: (time s, i, j) of true hits not found.
+        invented: (time s, i, j) of played hits that are not true.
+    """
+
+    delay: Array
+    missed: list[tuple[float, int, int]]
+    invented: list[tuple[float, int, int]]
+
+    @property
+    def first_wrong(self) -> tuple[float, str] | None:
+        """Time and description of the first missed or invented hit, or None."""
+        wrong = [(t, f"missed {who(i, j)}") for t, i, j in self.missed]
+        wrong += [(t, f"invented {who(i, j)}") for t, i, j in self.invented]
+        return min(wrong) if wrong else None
+
+
+def who(i: int, j: int) -> str:
+    """ "3-7" for two disks, "3-wall 0" for a wall."""
+    return f"{i}-{j}" if j >= 0 else f"{i}-wall {-1 - j}"
+
+
+def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matched:
+    """Match hits pair by pair, in order, up to `end` s, for a player with steps of `dt` s.
+
+    Where a pair has hit more often on one side, those hits are left over whose absence brings the others closest in
+    time; the earlier if two are as close. A match is no match if it is further off than `HALF` the time to the nearest
+    other true hit of the pair (or to the start), and than `FAR` dt: then one hit is missed and one invented.
+
+    Three kinds of hits are not judged: of a pair at rest against each other from the start (a true hit without
+    impulse), as what a player reports there is weight; true hits of a pair closer together than `CROWDED` dt, as no
+    step can tell them apart, with all that a player makes of them; and hits within `WINDOW` dt of `end`, which may be
+    cut off.
+    """
+    resting = pair_keys(true)[true.impulse == 0]
+    mine, its = (by_pair(hits, resting, end - SAME * dt) for hits in (played, true))
+    pairs = np.union1d(mine.key, its.key)
+    limits = [np.append(np.searchsorted(side.key, pairs), len(side.key)) for side in (mine, its)]
+    partner, lost, extra = judge(mine.t, limits[0], its.t, limits[1], dt, end)
+    found = partner >= 0
+    return Matched(
+        delay=mine.t[found] - its.t[partner[found]],
+        missed=[(float(its.t[k]), int(its.i[k]), int(its.j[k])) for k in np.flatnonzero(lost)],
+        invented=[(float(mine.t[k]), int(mine.i[k]), int(mine.j[k])) for k in np.flatnonzero(extra)],
+    )
+
+
+class ByPair(NamedTuple):
+    """Hits sorted by pair and then by time: one number that stands for the pair, the time in s, the pair."""
+
+    key: np.ndarray
+    t: Array
+    i: np.ndarray
+    j: np.ndarray
+
+
+def pair_keys(hits: Collisions) -> np.ndarray:
+    """(h,) a number for the pair of each hit."""
+    return (hits.i << 32) + hits.j
+
+
+def by_pair(hits: Collisions, resting: np.ndarray, end: float) -> ByPair:
+    """The hits before `end` s of pairs that are not `resting`."""
+    key = pair_keys(hits)
+    order = np.argsort(key, kind="stable")
+    order = order[hits.t[order] < end]
+    if len(resting):
+        order = order[~np.isin(key[order], resting)]
+    return ByPair(key[order], hits.t[order], hits.i[order], hits.j[order])
+
+
+@njit(cache=True)
+def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no-untyped-def]
+    """Pair by pair: (partner of each played hit or -1, true hits that are missed, played hits that are invented)."""
+    partner = np.full(len(played), -1)
+    lost, extra = np.zeros(len(true), dtype=np.bool_), np.zeros(len(played), dtype=np.bool_)
+    for k in range(len(played_limits) - 1):
+        p, q = played_limits[k], played_limits[k + 1]
+        a, b = true_limits[k], true_limits[k + 1]
+        mine, its = played[p:q], true[a:b]
+        gap = gap_to_nearest(its)
+        if q - p <= b - a:
+            chosen = closest_in_order(mine, its, SAME * dt)
+            for m in range(q - p):
+                partner[p + m] = a + chosen[m]
+        else:
+            chosen = closest_in_order(its, mine, SAME * dt)
+            for m in range(b - a):
+                partner[p + chosen[m]] = a + m
+        lost[a:b] = (gap >= CROWDED * dt) & (its < end - WINDOW * dt)
+        for m in range(p, q):
+            t, other = played[m], partner[m]
+            if other >= 0 and abs(t - true[other]) > max(HALF * gap[other - a], FAR * dt):
+                partner[m] = other = -1
+            if other >= 0:
+                lost[other] = False
+            else:
+                extra[m] = t < end - WINDOW * dt and not among_crowded(t, its, gap, dt)
+    return partner, lost, extra
+
+
+@njit(cache=True)
+def gap_to_nearest(t):  # type: ignore[no-untyped-def]
+    """(h,) s from each of the sorted times to the nearest other, or to the start."""
+    gap = np.empty(len(t))
+    for k in range(len(t)):
+        gap[k] = t[k] - (t[k - 1] if k > 0 else 0.0)
+        if k + 1 < len(t):
+            gap[k] = min(gap[k], t[k + 1] - t[k])
+    return gap
+
+
+@njit(cache=True)
+def among_crowded(t, times, gap, dt):  # type: ignore[no-untyped-def]
+    """Whether `t` is within `WINDOW` dt of one of `times` that no step of dt can tell from its neighbour."""
+    for k in range(len(times)):
+        if gap[k] < CROWDED * dt and abs(times[k] - t) <= WINDOW * dt:
+            return True
+    return False
+
+
+@njit(cache=True)
+def closest_in_order(few, many, same):  # type: ignore[no-untyped-def]
+    """(len(few),) indices into `many`, increasing, with the least sum of |few - many[index]|; both sorted, in s.
+
+    Of sums that differ by less than `same` s the one that skips later, as a hit between two true ones on one grid may
+    be as far from both. Dynamic programming over how many of `many` have been skipped so far, one row per element of
+    `few`.
+    """
+    spare = len(many) - len(few)
+    cost = np.zeros(spare + 1)
+    skipped = np.zeros((len(few), spare + 1), dtype=np.int64)
+    for k in range(len(few)):
+        best = 0
+        lowest = cost[0]
+        for s in range(spare + 1):
+            if cost[s] < lowest - same - ROUNDING * lowest:
+                best, lowest = s, cost[s]
+            skipped[k, s] = best
+            cost[s] = lowest + abs(few[k] - many[k + s])
+    chosen = np.zeros(len(few), dtype=np.int64)
+    skips = np.argmax(cost <= cost.min() * (1 + ROUNDING) + same)
+    for k in range(len(few) - 1, -1, -1):
+        chosen[k] = k + skips
+        skips = skipped[k, skips]
+    return chosen
+
+
+class Restitutions(NamedTuple):
+    """What was read off samples: e and time of each collision, (m,) and (m,) s, and how many were below the floor."""
+
+    values: Array
+    times: Array
+    below: int
+
+
+CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold hit far more
+FLOOR = 100  # times the rounding of the velocities that a change must have: e is then read to a hundredth or so
+
+
+def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, rounding: float) -> Restitutions:
+    """Restitution of each collision that can be read off the samples.
+
+    One can be read if neither disk has another in the same sample interval or the next, and none of them
+    changes its spin (friction): then the change of velocity points along the normal n, and e = -(dv'.n) / (dv.n).
+    Two disks must also change their momenta by as much, and a disk at a wall along the wall's normal: else
+    something was hit of which the player did not tell. Those closing slower than `slowest` m/s are left out.
+
+    Those that change the velocities by no more than `FLOOR` times their rounding, which is relative, are below the
+    floor: their normal, and with it e, would be noise. What gravity adds before and after is taken out with the
+    velocities, and rounded as they are. Engines tell such collisions of a contact that lasts: Box2D 3.1 of a disk
+    that slides along a wall whenever it comes nearer at any speed at all.
+    """
+    t, spin, collisions = trajectory.t, trajectory.angular_velocity, on_faces(trajectory, scene)
+    # A hit at the instant of a sample, at the end of its step, belongs to the interval that ends there.
+    before = np.searchsorted(t, collisions.t - SAME * interval(trajectory), side="left") - 1
+    busy: dict[tuple[int, int], int] = {}
+    for k, i, j in zip(before, collisions.i, collisions.j):
+        for disk in (i, j):
+            busy[k, disk] = busy.get((k, disk), 0) + 1
+    values, times, below = [], [], 0
+    for k, i, j, when in zip(before, collisions.i, collisions.j, collisions.t):
+        disks = (i, j) if j >= 0 else (i,)
+        alone = all(busy[k, disk] == 1 and (k + 1, disk) not in busy for disk in disks)
+        if alone and 0 <= k < len(t) - 1 and not scene.static[i]:
+            earlier, later = around(trajectory, scene, k, when)
+            moving = [disk for disk in disks if not scene.static[disk]]
+            if is_rounding(earlier, later, moving, rounding):
+                below += 1
+                continue
+            turned = np.abs(spin[k + 1] - spin[k]) * scene.radius
+            closing, parting = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
+            if closing > max(slowest, 0.0):
+                values.append(parting / closing)
+                times.append(when)
+    return Restitutions(np.array(values), np.array(times), below)
+
+
+def around(trajectory: Trajectory, scene: Scene, k: int, when: float) -> tuple[Array, Array]:
+    """(n, 2) m/s just before and just after `when` s, from the samples k and k + 1 around it and gravity."""
+    t, velocity = trajectory.t, trajectory.velocity
+    falling = np.where(scene.static[:, None], 0.0, scene.gravity)
+    return velocity[k] + falling * (when - t[k]), velocity[k + 1] - falling * (t[k + 1] - when)
+
+
+def is_rounding(earlier: Array, later: Array, moving: list[int], rounding: float) -> bool:
+    """Whether the change of a disk that moves, or that of both to each other, is below the floor."""
+    change = later[moving] - earlier[moving]
+    speed = laws.lengths(earlier[moving]) + laws.lengths(later[moving])
+    between = change[0] - change[-1] if len(moving) > 1 else change[0]
+    floor = FLOOR * rounding
+    return bool((laws.lengths(change) <= floor * speed).any() or laws.lengths(between) <= floor * speed.sum())
+
+
+def speeds_along_normal(
+    earlier: Array, later: Array, scene: Scene, i: int, j: int, turned: Array
+) -> tuple[float, float]:
+    """m/s at which disk i and disk or wall j close before and part after a collision; `turned` (n,) m/s by friction.
+
+    The normal is that of the change of their velocity to each other, whichever of the two is named first.
+    (nan, nan) if the change is not that of one frictionless collision.
+    """
+    change = later - earlier
+    one, two = (change[i], change[j]) if j >= 0 else (change[i], np.zeros(2))
+    between = one - two
+    normal = between / (np.linalg.norm(between) or 1.0)
+    if j >= 0 and not scene.static[j]:
+        kicks = scene.mass[i] * one, scene.mass[j] * two
+        untold = np.linalg.norm(kicks[0] + kicks[1]) > CLEAN * max(map(np.linalg.norm, kicks))
+        slid = (turned[[i, j]] > CLEAN * laws.lengths(change[[i, j]])).any()
+    elif j < 0:
+        start, end = scene.walls[-1 - j]
+        untold = abs(one @ (end - start)) > CLEAN * np.linalg.norm(end - start) * np.linalg.norm(one)
+        slid = turned[i] > CLEAN * np.linalg.norm(one)
+    else:
+        untold, slid = False, turned[i] > CLEAN * np.linalg.norm(one)
+    if untold or slid:
+        return np.nan, np.nan
+    before, after = (earlier[i] - earlier[j], later[i] - later[j]) if j >= 0 else (earlier[i], later[i])
+    return float(-before @ normal), float(after @ normal)

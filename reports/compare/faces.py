@@ -1,0 +1,50 @@
+"""Collisions by what a disk can tell apart: walls along one line are one, however many segments they are made of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from reports.compare import laws
+from scenarios.model import Array, Collisions, Scene, Trajectory, frozen
+
+ALONG = 1e-12
+"""Of the largest coordinate: an end of a wall that is no further from the line of another lies on it. A few thousand
+roundings: a wall that is cut in two at any point of it stays on its line."""
+SAME = 1e-9
+"""Of a sample interval, or a step: what is closer in time is at one instant, but for rounding of the grid of samples
+and steps."""
+
+
+def first_on_line(walls: Array, one: int) -> int:
+    """The first of the walls (w, 2, 2) that lie on the line of wall `one`."""
+    start, span = walls[one, 0], walls[one, 1] - walls[one, 0]
+    off = np.abs(laws.cross(walls - start, span)) / np.hypot(*span)
+    return int(np.argmax((off <= ALONG * np.abs(walls).max()).all(axis=1)))
+
+
+@laws.once
+def on_faces(trajectory: Trajectory, scene: Scene) -> Collisions:
+    """The collisions of a trajectory, each wall named by the first on its line; of those of a pair at one instant one.
+
+    So a floor of one segment, of two end to end, or of two on top of each other gives the same pairs.
+    """
+    hits, walls = trajectory.collisions, np.unique(trajectory.collisions.j)
+    firsts = np.array([-1 - first_on_line(scene.walls, -1 - j) if j < 0 else j for j in walls], np.int64)
+    if np.array_equal(firsts, walls):
+        return hits
+    j = firsts[np.searchsorted(walls, hits.j)]
+    order = np.lexsort((hits.t, j, hits.i))
+    near = np.diff(hits.t[order]) <= SAME * interval(trajectory)
+    again = (np.diff(hits.i[order]) == 0) & (np.diff(j[order]) == 0) & near
+    kept = np.ones(len(hits), bool)
+    kept[order[1:][again]] = False
+    columns = {"t": hits.t[kept], "impulse": hits.impulse[kept]}
+    whole = {"i": frozen(hits.i[kept], np.int64), "j": frozen(j[kept], np.int64)}
+    return replace(hits, **{name: frozen(column) for name, column in columns.items()}, **whole)
+
+
+def interval(trajectory: Trajectory) -> float:
+    """s between two samples."""
+    return float(trajectory.t[1] - trajectory.t[0]) if len(trajectory) > 1 else 0.0

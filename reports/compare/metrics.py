@@ -1,0 +1,294 @@
+"""Every number of the report: a function, what it means, its unit, and what it is measured against.
+
+To add one: write `def name(view) -> Value | None` and its row in `METRICS`. None: it does not apply here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+
+import numpy as np
+
+from reports.compare import laws, scales, violations
+from reports.compare.collisions import by_pair, pair_keys
+from reports.compare.faces import SAME
+from reports.compare.view import LEAST_SHARE, Value, View, not_judged
+from scenarios.model import Array
+
+Measure = Callable[[View], Value | None]
+
+
+def over_judged(measure: Measure) -> Measure:
+    """The metric, that says how many samples carry it, and nothing where they are too few (view.py: LEAST_SHARE)."""
+
+    @wraps(measure)
+    def carried(view: View) -> Value | None:
+        found = measure(view)
+        if found is None or view.other is None:
+            return found
+        if view.share < LEAST_SHARE:
+            return not_judged(f"only {view.carried}")
+        return found._replace(note=", ".join(filter(None, (view.carried, found.note))))
+
+    return carried
+
+
+def momentum_error(view: View) -> Value | None:
+    """Largest |P(t) - P(0) - impulse from outside|, where that is known, over all m|v| that flight can bring."""
+    return _largest(violations.momentum(view), view)
+
+
+def angular_momentum_error(view: View) -> Value | None:
+    """Largest |L(t) - L(0) - outer angular impulse|, about the scene's centre of mass, over all m|x||v| + I|w|."""
+    return _largest(violations.angular_momentum(view), view)
+
+
+@over_judged
+def energy_error(view: View) -> Value | None:
+    """Largest |E(t) - E(0)| at e = 1, else distance from the truth's range within three steps; over that at hand."""
+    return _largest(violations.energy(view), view)
+
+
+def energy_created(view: View) -> Value | None:
+    """Largest rise of the energy above an earlier sample, over the energy at hand; no hit can give any."""
+    return _largest(violations.energy_rise(view), view)
+
+
+@over_judged
+def energy_apart(view: View) -> Value | None:
+    """Root mean square distance of the energy from the truth's range within three steps, over the energy at hand.
+
+    Beside an engine: difference of the energies of all disks that are away from their collisions in both (view.py).
+    """
+    return Value(_rms(view.energy_apart[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0))
+
+
+@over_judged
+def momentum_apart(view: View) -> Value | None:
+    """Root mean square distance of the momentum from the truth's range within three steps, over the sum of m|v|.
+
+    Beside an engine: distance of the momenta of all disks that are away from their collisions in both (view.py).
+    """
+    return Value(_rms(view.momentum_apart[view.judged.any(axis=1)]) / (scales.momentum(view.scenario) or 1.0))
+
+
+@over_judged
+def energy_loss_error(view: View) -> Value | None:
+    """Energy lost by the last judged sample, less what the truth loses by three steps around it; over that at hand."""
+    scenario = view.scenario
+    if violations.keeps_energy(scenario) or scenario.thrusts or violations.lifts(scenario):
+        return None
+    if view.other is None or view.jumps is None:
+        return None
+    if not view.judged.any():
+        return Value(np.nan)
+    last, scale = int(np.flatnonzero(view.judged.any(axis=1))[-1]), scales.energy(scenario, view.other) or 1.0
+    low, high = view.energy_range
+    start = laws.energy(view.played, scenario.scene)[0] - laws.energy(view.other, scenario.scene)[0]
+    excess, width = float(start - view.energy_apart[last]) / scale, (high[last] - low[last]) / scale
+    return Value(excess, at=float(view.played.t[last]), note=f"the delay explains {width:.2g}" if width else "")
+
+
+def restitution(view: View) -> Value | None:
+    """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the samples."""
+    values, _, below = view.restitutions
+    return _read(float(np.median(values)), len(values), below) if len(values) else _unread(below)
+
+
+def restitution_error(view: View) -> Value | None:
+    """Largest |e - what the scene states| over the collisions that can be read off the samples."""
+    values, times, below = view.restitutions
+    if not len(values):
+        return _unread(below)
+    off = np.abs(values - view.scenario.scene.restitution)
+    worst = int(np.argmax(off))
+    return _read(float(off[worst]), len(values), below)._replace(at=float(times[worst]))
+
+
+def penetration_radii(view: View) -> Value | None:
+    """Largest overlap in any sample, in radii of the smaller disk."""
+    if view.scenario.scene.n + len(view.scenario.scene.walls) < 2:
+        return None
+    return _largest(laws.penetration(view.played, view.scenario.scene), view)
+
+
+def disks_through_walls(view: View) -> Value | None:
+    """Disks whose centre has crossed a wall: they are where no hit can bring them back from."""
+    if not len(view.scenario.scene.walls):
+        return None
+    through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))
+    return Value(len(through), int(through[0]) if len(through) else -1)
+
+
+def position_rms(view: View) -> Value | None:
+    """Root mean square distance over disks and samples."""
+    return Value(_rms(view.apart))
+
+
+def position_rms_radii(view: View) -> Value | None:
+    """Root mean square distance over disks and samples, each in radii of its disk."""
+    return Value(_rms(view.apart / view.scenario.scene.radius))
+
+
+def position_max(view: View) -> Value | None:
+    """Largest distance of any disk in any sample."""
+    return _largest_of_disks(view.apart, view)
+
+
+def position_max_radii(view: View) -> Value | None:
+    """Largest distance of any disk in any sample, in radii of that disk; over an edge of the wrap if that is nearer."""
+    return _largest_of_disks(view.apart / view.scenario.scene.radius, view)
+
+
+@over_judged
+def velocity_rms(view: View) -> Value | None:
+    """Root mean square over disks and samples of what `velocity_max` is the largest of."""
+    return Value(_rms(view.velocity_apart[view.judged]))
+
+
+@over_judged
+def velocity_max(view: View) -> Value | None:
+    """Largest difference of a disk's velocity from the nearest that it has in the truth within three steps.
+
+    Beside an engine: from the other's, where the disk has no collision within three steps in either (view.py).
+    """
+    return _largest_of_disks(np.where(view.judged, view.velocity_apart, 0.0), view)
+
+
+def angle_rms(view: View) -> Value | None:
+    """Root mean square difference of angle over disks and samples."""
+    return Value(_rms(view.angle_apart))
+
+
+def angle_max(view: View) -> Value | None:
+    """Largest difference of angle of any disk in any sample."""
+    return _largest_of_disks(view.angle_apart, view)
+
+
+def time_to_1pct_s(view: View) -> Value | None:
+    """First sample at which some disk is off by more than 1 % of its radius; `inf` if none ever is."""
+    off = view.apart / view.scenario.scene.radius > 0.01
+    if not off.any():
+        return Value(np.inf, note=f"never within {view.played.t[-1]:g} s")
+    k = int(np.argmax(off.any(axis=1)))
+    return Value(float(view.played.t[k]), int(np.argmax(off[k])), float(view.played.t[k]))
+
+
+def collision_count_error(view: View) -> Value | None:
+    """Hits of the player less hits of the other, whenever they come; pairs at rest from the start are not counted."""
+    resting = pair_keys(view.hits[1])[view.hits[1].impulse == 0]
+    counted = (by_pair(hits, resting, view.end - SAME * view.dt) for hits in view.hits)
+    played, true = (len(hits.t) for hits in counted)
+    return Value(played - true, note=f"{played} of {true}")
+
+
+def collisions_missed(view: View) -> Value | None:
+    """Hits of the other, of those that a step can tell apart, that the player does not have at their time."""
+    return Value(len(view.matched.missed), note=f"of {len(view.hits[1])}")
+
+
+def collisions_invented(view: View) -> Value | None:
+    """Hits of the player that the other does not have at their time."""
+    return Value(len(view.matched.invented))
+
+
+def first_wrong_collision_s(view: View) -> Value | None:
+    """When the first hit is missed or invented, and whose; `inf` if none is."""
+    if view.matched.first_wrong is None:
+        return Value(np.inf, note="none")
+    at, what = view.matched.first_wrong
+    return Value(at, at=at, note=what)
+
+
+def hit_delay_dt(view: View) -> Value | None:
+    """Median over the hits of played time less true time, in dt; a hit is dated to the end of its step."""
+    delay = view.matched.delay
+    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+
+
+def hit_delay_max_dt(view: View) -> Value | None:
+    """Largest difference in time of any hit from the true one, in dt."""
+    delay = view.matched.delay
+    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
+
+
+def _read(value: float, read: int, below: int) -> Value:
+    return Value(value, note=f"{read} collisions read" + (f", {below} below the floor" if below else ""))
+
+
+def _unread(below: int) -> Value | None:
+    """None where no collision could be read for other reasons than rounding."""
+    return not_judged(f"no collision read, {below} below the floor") if below else None
+
+
+def _largest(series: Array | None, view: View) -> Value | None:
+    if series is None:
+        return None
+    if np.isnan(series).all():
+        return Value(np.nan, note="too large for float64")
+    k = int(np.nanargmax(series))
+    return Value(float(series[k]), at=float(view.played.t[k]))
+
+
+def _largest_of_disks(values: Array, view: View) -> Value:
+    k, disk = np.unravel_index(int(np.argmax(values)), values.shape)
+    return Value(float(values[k, disk]), int(disk), float(view.played.t[k]))
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A row of `METRICS`.
+
+    Attributes:
+        of: the function.
+        unit: of the value, "1" for a ratio.
+        against: what it is measured against: "itself" (laws of physics and the start), "truth", "engine".
+        better: "lower", "higher", "zero" or "as stated" (the best value).
+    """
+
+    of: Callable[[View], Value | None]
+    unit: str
+    against: tuple[str, ...]
+    better: str = "lower"
+
+    @property
+    def summary(self) -> str:
+        """The first line of the function's docstring."""
+        return (self.of.__doc__ or "").splitlines()[0]
+
+
+TRUTH, ITSELF, ENGINE = "truth", "itself", "engine"
+METRICS: dict[str, Metric] = {
+    "position_max_radii": Metric(position_max_radii, "radii", (TRUTH, ENGINE)),
+    "position_rms_radii": Metric(position_rms_radii, "radii", (TRUTH, ENGINE)),
+    "position_max": Metric(position_max, "m", (TRUTH, ENGINE)),
+    "position_rms": Metric(position_rms, "m", (TRUTH, ENGINE)),
+    "velocity_max": Metric(velocity_max, "m/s", (TRUTH, ENGINE)),
+    "velocity_rms": Metric(velocity_rms, "m/s", (TRUTH, ENGINE)),
+    "angle_max": Metric(angle_max, "rad", (TRUTH, ENGINE)),
+    "angle_rms": Metric(angle_rms, "rad", (TRUTH, ENGINE)),
+    "time_to_1pct_s": Metric(time_to_1pct_s, "s", (TRUTH, ENGINE), "higher"),
+    "momentum_error": Metric(momentum_error, "1", (ITSELF,)),
+    "momentum_apart": Metric(momentum_apart, "1", (TRUTH, ENGINE)),
+    "angular_momentum_error": Metric(angular_momentum_error, "1", (ITSELF,)),
+    "energy_error": Metric(energy_error, "1", (ITSELF, TRUTH)),
+    "energy_apart": Metric(energy_apart, "1", (TRUTH, ENGINE)),
+    "energy_created": Metric(energy_created, "1", (ITSELF,)),
+    "energy_loss_error": Metric(energy_loss_error, "1", (TRUTH,), "zero"),
+    "restitution": Metric(restitution, "1", (ITSELF,), "as stated"),
+    "restitution_error": Metric(restitution_error, "1", (ITSELF,)),
+    "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,)),
+    "disks_through_walls": Metric(disks_through_walls, "disks", (ITSELF,)),
+    "collision_count_error": Metric(collision_count_error, "hits", (TRUTH, ENGINE), "zero"),
+    "collisions_missed": Metric(collisions_missed, "hits", (TRUTH, ENGINE)),
+    "collisions_invented": Metric(collisions_invented, "hits", (TRUTH, ENGINE)),
+    "first_wrong_collision_s": Metric(first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"),
+    "hit_delay_dt": Metric(hit_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
+    "hit_delay_max_dt": Metric(hit_delay_max_dt, "dt", (TRUTH, ENGINE)),
+}

@@ -1,0 +1,58 @@
+"""What errors of momentum and energy are relative to: what a scenario has at hand, before anybody has played it.
+
+Not taken from what was played: an explosion must not make itself look small.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reports.compare import laws
+from scenarios.model import Array, Scenario, Trajectory
+
+
+@laws.once
+def momentum(scenario: Scenario) -> float:
+    """kg m/s: sum of m |v|, each disk as fast as flight under gravity and thrust can make it."""
+    return float(laws.moving_mass(scenario.scene) @ top_speed(scenario))
+
+
+def angular_momentum(scenario: Scenario) -> float:
+    """kg m2/s about the centre of mass: sum of m |x||v| + I |w|, each as far and as fast as flight can bring it."""
+    scene, t = scenario.scene, scenario.duration
+    reach = laws.lengths(scene.position - laws.centre(scene)) + top_speed(scenario) * t
+    spin = np.abs(scene.angular_velocity) @ laws.moving_inertia(scene)
+    return float((laws.moving_mass(scene) * reach) @ top_speed(scenario) + spin)
+
+
+@laws.once
+def energy(scenario: Scenario, truth: Trajectory | None = None) -> float:
+    """J: the energy at hand: kinetic, and what each disk can gain by falling, and by one radius further.
+
+    The largest in the truth where that is given; else what the start has, down to the lowest wall or disk.
+    """
+    scene = scenario.scene
+    g, m = float(np.linalg.norm(scene.gravity)), laws.moving_mass(scene)
+    if truth is not None:
+        height = -(truth.position @ scene.gravity)
+        fall = height.max(axis=0) - height.min(axis=0)
+        return float(laws.kinetic_energy(truth, scene).max() + (fall + scene.radius * g) @ m)
+    speed = np.linalg.norm(scene.velocity, axis=1)
+    kinetic = speed**2 @ m / 2 + scene.angular_velocity**2 @ laws.moving_inertia(scene) / 2
+    if len(scene.walls):
+        points = np.concatenate([scene.position, scene.walls.reshape(-1, 2)])
+        fall = (points @ scene.gravity).max() - scene.position @ scene.gravity
+    else:
+        fall = g * (speed * scenario.duration + g * scenario.duration**2 / 2)
+    return float(kinetic + (fall + scene.radius * g) @ m)
+
+
+@laws.once
+def top_speed(scenario: Scenario) -> Array:
+    """(n,) m/s, of each disk in free flight under gravity and its thrusts, all along one line."""
+    scene = scenario.scene
+    speed = np.linalg.norm(scene.velocity, axis=1) + np.linalg.norm(scene.gravity) * scenario.duration
+    for thrust in scenario.thrusts:
+        burns = min(thrust.stop, scenario.duration) - min(thrust.start, scenario.duration)
+        speed[thrust.disk] += np.linalg.norm(thrust.force) * burns / scene.mass[thrust.disk]
+    return np.where(scene.static, 0.0, speed)

@@ -1,0 +1,188 @@
+"""A played trajectory beside what it is set against: the one argument of every metric."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from adapters.engine import FLOAT64
+from reports.compare import laws
+from reports.compare.collisions import Matched, Restitutions, effective_restitution, match
+from reports.compare.delays import WINDOW, Jumps, collision_free, energy_range, momentum_outside, nearest_velocity
+from reports.compare.faces import on_faces
+from scenarios.model import Array, Collisions, Scenario, Trajectory
+
+SLOWEST = 401**0.5  # sample intervals of falling; irrational, as of a threshold that speeds may be equal to
+LEAST_SHARE = 0.1
+"""Of the samples after the start that must carry a number for it to be judged by. An engine errs in collisions: what is
+left of a run in less than a tenth of its samples is mostly the flight before the first of them, where nobody errs."""
+NOT_JUDGED = "not judged"  # how the note of a number begins that too little carries; its value is NaN
+
+
+class Value(NamedTuple):
+    """A number and where it comes from: the disk (-1: all), the instant in s, a remark."""
+
+    value: float
+    disk: int = -1
+    at: float = np.nan
+    note: str = ""
+
+
+def not_judged(why: str) -> Value:
+    """What a metric says where it applies and too little carries it."""
+    return Value(np.nan, note=f"{NOT_JUDGED}: {why}")
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A played trajectory beside what it is set against, over the samples both have.
+
+    Attributes:
+        scenario: what was played.
+        dt: s, of the player.
+        played: the player's trajectory, cut to the samples the other has.
+        other: the truth, another engine's trajectory, or None: only the laws of physics.
+        jumps: of `other` (delays.py) if it is the truth; None for an engine.
+        rounding: the relative rounding of the numbers that the player keeps.
+    """
+
+    scenario: Scenario
+    dt: float
+    played: Trajectory
+    other: Trajectory | None = None
+    jumps: Jumps | None = None
+    rounding: float = FLOAT64
+
+    @cached_property
+    def apart(self) -> Array:
+        """(k, n) m between the two."""
+        assert self.other is not None
+        return laws.deviation(self.played, self.other, self.scenario.scene)
+
+    @cached_property
+    def judged(self) -> np.ndarray:
+        """(k, n) where the velocity of a disk is compared; never at the start, which is given to all.
+
+        With the truth: everywhere but within `WINDOW` dt of its end, as of a collision after it nobody knows that may
+        come early. With an engine, where nobody knows who is late: where neither has a collision of that disk within
+        `WINDOW` dt.
+        """
+        assert self.other is not None
+        played, moving = self.played, ~self.scenario.scene.static
+        if self.jumps is None:
+            judged = collision_free(played, self.dt) & collision_free(self.other, self.dt) & moving
+        else:
+            judged = (played.t < self.other.t[-1] - WINDOW * self.dt)[:, None] & moving
+        judged[0] = False
+        return judged
+
+    @cached_property
+    def share(self) -> float:
+        """Of the samples after the start, disk by disk, those that are judged."""
+        every = (len(self.played) - 1) * int((~self.scenario.scene.static).sum())
+        return float(self.judged.sum() / every) if every else 0.0
+
+    @cached_property
+    def carried(self) -> str:
+        """How many samples carry what is compared with the other."""
+        samples = len(self.played) - 1
+        if self.jumps is not None:
+            return f"{self.judged.any(axis=1).sum()} of {samples} samples"
+        return f"{self.judged.sum()} of {samples * (~self.scenario.scene.static).sum()} samples of a disk"
+
+    @cached_property
+    def velocity_apart(self) -> Array:
+        """(k, n) m/s between the two, of the truth within the detection delay; nan where it is not judged."""
+        assert self.other is not None
+        expected = self.other.velocity
+        if self.jumps is not None:
+            expected = nearest_velocity(self.played, self.other, self.jumps, self.dt)
+        return np.where(self.judged, laws.lengths(self.played.velocity - expected), np.nan)
+
+    @cached_property
+    def momentum_apart(self) -> Array:
+        """(k,) kg m/s between the momenta of the two, of the truth within the detection delay; nan if not judged.
+
+        Beside an engine only those of the disks that are judged are added up.
+        """
+        assert self.other is not None
+        if self.jumps is not None:
+            off = momentum_outside(self.played, self.other, self.jumps, self.dt, self.scenario.scene)
+            return np.where(self.judged.any(axis=1), off, np.nan)
+        momenta = (laws.momenta(one, self.scenario.scene) for one in (self.played, self.other))
+        return laws.lengths(self._summed(next(momenta) - next(momenta)))
+
+    @cached_property
+    def energy_range(self) -> tuple[Array, Array]:
+        """((k,), (k,)) J, between which the truth's energy is within the detection delay."""
+        assert self.other is not None
+        assert self.jumps is not None
+        return energy_range(self.played, self.other, self.jumps, self.dt, self.scenario.scene)
+
+    @cached_property
+    def energy_apart(self) -> Array:
+        """(k,) J that the player has more than the other, as `momentum_apart`."""
+        assert self.other is not None
+        if self.jumps is not None:
+            energy, (low, high) = laws.energy(self.played, self.scenario.scene), self.energy_range
+            return np.where(self.judged.any(axis=1), energy - np.clip(energy, low, high), np.nan)
+        energies = (laws.energies(one, self.scenario.scene) for one in (self.played, self.other))
+        return self._summed(next(energies) - next(energies))
+
+    def _summed(self, apart: Array) -> Array:
+        """Over the judged disks of (k, n, ...); nan where none is."""
+        judged = self.judged.reshape(*self.judged.shape, *[1] * (apart.ndim - 2))
+        return np.where(judged.any(axis=1), np.where(judged, apart, 0.0).sum(axis=1), np.nan)
+
+    @cached_property
+    def angle_apart(self) -> Array:
+        """(k, n) rad between the two."""
+        assert self.other is not None
+        return np.abs(self.played.angle - self.other.angle)
+
+    @cached_property
+    def calm(self) -> np.ndarray:
+        """(k,) False at samples within `WINDOW` dt of a hit of the other; sample 0 always counts.
+
+        For the error budget, which takes runs from each other: no metric, as in a crowd nothing but the start is left.
+        """
+        calm = np.ones(len(self.played), bool)
+        if self.other is not None and len(hits := self.other.collisions.t):
+            nearest = np.searchsorted(hits, self.played.t)
+            before = self.played.t - hits[np.maximum(nearest - 1, 0)]
+            after = hits[np.minimum(nearest, len(hits) - 1)] - self.played.t
+            calm = np.minimum(np.abs(before), np.abs(after)) > WINDOW * self.dt
+            calm[0] = True
+        return calm
+
+    @cached_property
+    def restitutions(self) -> Restitutions:
+        """What can be read off the samples; nothing under thrust.
+
+        Slow collisions are left out under gravity, which is taken out of the samples to first order only.
+        """
+        if self.scenario.thrusts:
+            return Restitutions(np.zeros(0), np.zeros(0), 0)
+        scene = self.scenario.scene
+        slowest = SLOWEST * float(np.linalg.norm(scene.gravity)) * self.scenario.sample_interval
+        return effective_restitution(self.played, scene, slowest, self.rounding)
+
+    @cached_property
+    def hits(self) -> tuple[Collisions, Collisions]:
+        """Of the player and of the other, by what a disk can tell apart (faces.py)."""
+        assert self.other is not None
+        return on_faces(self.played, self.scenario.scene), on_faces(self.other, self.scenario.scene)
+
+    @property
+    def end(self) -> float:
+        """s, of the samples both have."""
+        assert self.other is not None
+        return float(min(self.played.t[-1], self.other.t[-1]))
+
+    @cached_property
+    def matched(self) -> Matched:
+        """The hits of the two."""
+        return match(*self.hits, self.end, self.dt)

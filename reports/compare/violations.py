@@ -1,0 +1,91 @@
+"""How far a trajectory breaks the laws it should keep, sample by sample, relative to what is at hand.
+
+Each function returns (k,) numbers, or None where the law says nothing. Where the truth is what is compared with, it is
+the truth within the detection delay (delays.py), and samples that are not judged are nan.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reports.compare import laws, scales
+from reports.compare.view import View
+from scenarios.model import Array, Scenario, Thrust
+
+
+def momentum(view: View) -> Array | None:
+    """|P(t) - P(0) - impulse from outside| over the sum of m|v| at hand (scales.py).
+
+    From outside come weight and world-frame thrust. Where walls, static disks or a turning thrust act, nobody
+    knows the impulse without asking the player.
+    """
+    if view.other is not None or not knows_impulses(view.scenario):
+        return None
+    scene, played = view.scenario.scene, view.played
+    actual = laws.momentum(played, scene)
+    expected = actual[0] + np.outer(played.t, laws.moving_mass(scene).sum() * scene.gravity)
+    for thrust in view.scenario.thrusts:
+        expected = expected + np.outer(time_on(thrust, played.t), thrust.force)
+    return laws.lengths(actual - expected) / (scales.momentum(view.scenario) or 1.0)
+
+
+def angular_momentum(view: View) -> Array | None:
+    """|L(t) - L(0) - angular impulse from outside| over the sum of m|x||v| + I|w| at hand, about the centre of mass.
+
+    About that of the start, so that it does not matter where the origin is. The weight of the whole, at the centre of
+    mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts where its disk is, which only the player knows,
+    and a wrap moves disks: there the law says nothing.
+    """
+    scene, played = view.scenario.scene, view.played
+    silent = scene.wrap is not None or view.scenario.thrusts or not knows_impulses(view.scenario)
+    if view.other is not None or silent:
+        return None
+    m, g, t = laws.moving_mass(scene), scene.gravity, played.t
+    lever = np.outer(t**2 / 2, m @ played.velocity[0])
+    actual = laws.angular_momentum(played, scene)
+    expected = actual[0] + lever[:, 0] * g[1] - lever[:, 1] * g[0]
+    return np.abs(actual - expected) / (scales.angular_momentum(view.scenario) or 1.0)
+
+
+def energy(view: View) -> Array | None:
+    """|E(t) - E_expected(t)| over the energy at hand (scales.py).
+
+    At e = 1 without thrust E_expected is E(0); else it is the truth's. Where a scene wraps under gravity the law
+    says nothing: a disk that is set onto the opposite edge has another height.
+    """
+    scenario, conserved = view.scenario, keeps_energy(view.scenario)
+    if conserved == (view.other is not None) or lifts(scenario):
+        return None
+    if view.other is None:
+        actual = laws.energy(view.played, scenario.scene)
+        return np.abs(actual - actual[0]) / (scales.energy(scenario) or 1.0)
+    return np.abs(view.energy_apart) / (scales.energy(scenario, view.other) or 1.0)
+
+
+def energy_rise(view: View) -> Array | None:
+    """E(t) less the smallest E before t, over the energy at hand: no hit can give any, only thrust can."""
+    if view.scenario.thrusts or lifts(view.scenario):
+        return None
+    actual = laws.energy(view.played, view.scenario.scene)
+    return (actual - np.minimum.accumulate(actual)) / (scales.energy(view.scenario) or 1.0)
+
+
+def lifts(scenario: Scenario) -> bool:
+    """Whether the wrap of the scene lifts disks against gravity."""
+    return scenario.scene.wrap is not None and bool(scenario.scene.gravity.any())
+
+
+def knows_impulses(scenario: Scenario) -> bool:
+    """Whether all that acts from outside is weight and world-frame thrust."""
+    fixed = len(scenario.scene.walls) or scenario.scene.static.any()
+    return not fixed and all(thrust.frame == "world" for thrust in scenario.thrusts)
+
+
+def keeps_energy(scenario: Scenario) -> bool:
+    """Whether no hit takes energy and no thrust brings any."""
+    return scenario.scene.restitution == 1 and not scenario.thrusts
+
+
+def time_on(thrust: Thrust, t: Array) -> Array:
+    """(k,) s for which the thrust has been on by `t`."""
+    return np.clip(t - thrust.start, 0.0, thrust.stop - thrust.start)

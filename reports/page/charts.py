@@ -1,0 +1,262 @@
+"""The charts of a comparison: what went off, when, and how it shrinks with the step size. A row in `CHARTS` each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import plotly.graph_objects as go
+
+from adapters.play import Run
+from reports.compare import laws, scales, violations
+from reports.compare.comparison import Comparison, cut
+from reports.compare.delays import jumps_of
+from reports.compare.view import View
+from reports.page import style
+from scenarios.model import Array, Trajectory
+
+ZERO = 1e-17
+"""Where 0, and what is smaller than this, is drawn on a log axis: below the rounding of any number compared."""
+POINTS = 300
+TIME = "time (s)"
+BASELINE = "reference:exercise"  # drawn as the zero line where there is no truth; it is no truth itself
+
+
+class Drawing(NamedTuple):
+    """A heading, how to read it in a sentence or two, and the figure; None where the caption says why."""
+
+    title: str
+    caption: str
+    figure: go.Figure | None
+
+
+class Line(NamedTuple):
+    """One run's numbers: x (k,), y (k,); y may hold nan."""
+
+    run: Run
+    x: Array
+    y: Array
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A row of `CHARTS`: what it shows in a line, and the function that draws it for one comparison."""
+
+    summary: str
+    draw: Callable[[Comparison], Drawing]
+
+
+def views(comparison: Comparison, other: Trajectory | None) -> list[tuple[Run, View]]:
+    """What the middle dt's runs played, each beside `other` and cut to the samples both have."""
+    played, scenario = [], comparison.scenario
+    jumps = jumps_of(other, scenario) if other is not None and other is comparison.truth else None
+    for run in comparison.middle_runs:
+        if run.trajectory is not None and len(run.trajectory) > 1:
+            k = min(len(run.trajectory), len(other) if other is not None else len(run.trajectory))
+            mine = cut(run.trajectory, k)
+            played.append((run, View(scenario, run.dt, mine, cut(other, k) if other else None, jumps)))
+    return played
+
+
+def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None]) -> list[Line]:
+    """A line a run of what `series` gives for it, over time."""
+    return [Line(run, view.played.t, y) for run, view in played if (y := series(view)) is not None]
+
+
+def momentum(comparison: Comparison) -> Drawing:
+    """Momentum that should not be there; where walls take some up, momentum apart from the truth's."""
+    if violations.knows_impulses(comparison.scenario):
+        caption = (
+            "Distance of the momentum from P(0) and what weight and pushes have added since, over the Σ m|v| at hand. "
+            "Lower is better."
+        )
+        lines = over(views(comparison, None), violations.momentum)
+        return Drawing("Momentum error", caption, over_time(comparison, lines, "error / Σ m|v| at hand"))
+    if comparison.truth is None:
+        why = "Walls, static disks or turning pushes take up momentum, and no exact answer says how much."
+        return Drawing("Momentum", why, None)
+    scale, lines = scales.momentum(comparison.scenario) or 1.0, []
+    for run, view in views(comparison, comparison.truth):
+        lines.append(Line(run, view.played.t, view.momentum_apart / scale))
+    caption = (
+        "Walls and static disks take up momentum, so no law is broken here: how far the momentum is from the truth's, "
+        f"over the Σ m|v| at hand{DELAY}."
+    )
+    return Drawing("Momentum apart from the truth's", caption, over_time(comparison, lines, "apart / Σ m|v| at hand"))
+
+
+DELAY = ", where a collision up to three steps late or early costs nothing: that is measured by itself"
+
+
+def energy(comparison: Comparison) -> Drawing:
+    """Energy that should not be there or is missing, relative to the energy at hand."""
+    conserved = violations.keeps_energy(comparison.scenario)
+    if not conserved and comparison.truth is None:
+        return energy_course(comparison)
+    lines = over(views(comparison, None if conserved else comparison.truth), violations.energy)
+    against = "what it was at the start, as no hit takes any (e = 1)," if conserved else "the truth's,"
+    caption = (
+        f"Distance of the energy from {against} over the energy at hand{'' if conserved else DELAY}. Lower is better."
+    )
+    return Drawing("Energy error", caption, over_time(comparison, lines, "error / energy at hand"))
+
+
+def energy_course(comparison: Comparison) -> Drawing:
+    """The energy itself, where nobody knows what it should be."""
+    scene = comparison.scenario.scene
+    lines = []
+    for run, view in views(comparison, None):
+        scale = scales.energy(comparison.scenario) or 1.0
+        lines.append(Line(run, view.played.t, laws.energy(view.played, scene) / scale))
+    caption = (
+        "No exact answer says how much energy the hits should take, so this is no error: the energy over that "
+        "at hand. Without pushes it must never rise."
+    )
+    return Drawing("Energy", caption, over_time(comparison, lines, "energy / energy at hand", log=False))
+
+
+def deviation(comparison: Comparison) -> Drawing:
+    """How far the disk that is farthest off is from where it should be."""
+    scene, truth = comparison.scenario.scene, comparison.truth
+    held: Run | None = None
+    if truth is None:
+        played = [run for run in comparison.middle_runs if run.trajectory is not None]
+        held = next((run for run in played if run.name == BASELINE), played[0] if played else None)
+        if held is None:
+            return Drawing("Trajectories", "No engine played this scene.", None)
+    lines = [
+        Line(run, view.played.t, (view.apart / scene.radius).max(axis=1))
+        for run, view in views(comparison, held.trajectory if held else truth)
+        if run is not held
+    ]
+    if held is None:
+        caption = "Largest distance of any disk from where it truly is, in radii of that disk. Lower is better."
+        return Drawing("Trajectory deviation", caption, over_time(comparison, lines, "off the truth (radii)"))
+    caption = f"No truth to be off from: how far the disks are from those of {held.name}; neither is the right one."
+    apart = f"apart from {held.name}"
+    return Drawing(apart.capitalize(), caption, over_time(comparison, lines, f"{apart} (radii)"))
+
+
+def convergence(comparison: Comparison) -> Drawing:
+    """How the position error shrinks with the step size."""
+    title = "Error against dt"
+    if comparison.truth is None:
+        return Drawing(title, "Without a truth there is no error to set against dt.", None)
+    table = comparison.table
+    rows = table[(table.metric == "position_max_radii") & (table.versus == style.TRUTH)]
+    lines = []
+    for (engine, profile), group in rows.groupby(["engine", "profile"], sort=False):
+        ladder = group.sort_values("dt_s")
+        run = Run(str(engine), str(profile), comparison.scenario.name, 0.0)
+        lines.append(Line(run, ladder.dt_s.to_numpy(float), ladder.value.to_numpy(float)))
+    if not lines:
+        return Drawing(title, "No run has a position error to show.", None)
+    steps = sorted({float(x) for line in lines for x in line.x})
+    marks = [style.number(x, 2) for x in steps]
+    dt_axis = {"title": "dt (s)", "type": "log", "tickvals": steps, "ticktext": marks}
+    guide = first_order(lines, steps)
+    figure = figure_of(lines, dt_axis, "position error (radii)", guide=guide, markers=len(steps))
+    caption = (
+        "Largest position error at every step size. The dotted line falls as dt does (first order): a steeper run "
+        "is of higher order, a flat one has an error that no smaller step removes."
+    )
+    return Drawing(title, caption, figure)
+
+
+def first_order(lines: Iterable[Line], steps: list[float]) -> list[dict[str, Any]]:
+    """A guide with slope 1 through the middle of what is shown; none where there is nothing to guide."""
+    shown = np.concatenate([line.y for line in lines])
+    shown = shown[np.isfinite(shown) & (shown > ZERO)]
+    if not len(shown) or len(steps) < 2:
+        return []
+    y = float(np.median(shown)) / float(np.median(steps)) * np.array(steps)
+    line = {"color": style.look(style.TRUTH).light, "dash": "dot", "width": 1}
+    look = {"mode": "lines", "line": line, "opacity": 0.55, "name": "∝ dt", "hoverinfo": "skip"}
+    return [{"type": "scatter", "x": steps, "y": shortened(y)} | look]
+
+
+def over_time(comparison: Comparison, lines: list[Line], title: str, log: bool = True) -> go.Figure | None:
+    """A figure of lines over time, with a mark where the truth ends; None if there is no line."""
+    if not lines:
+        return None
+    duration, truth = comparison.scenario.duration, comparison.truth
+    marks: dict[str, Any] = {}
+    if truth is not None and truth.valid_until < duration:
+        ink = {"dash": "dot", "width": 1, "color": style.look(style.TRUTH).light}
+        at = {"x": truth.valid_until, "y": 1, "yref": "paper", "showarrow": False, "xanchor": "left", "yanchor": "top"}
+        marks["shapes"] = [{"x0": at["x"], "x1": at["x"], "y0": 0, "y1": 1, "yref": "paper", "line": ink}]
+        marks["annotations"] = [at | {"text": "truth ends"}]
+    if log:  # the start is given to all: its 0 would take up half of the axis and say nothing
+        lines = [Line(run, x[1:], y[1:]) for run, x, y in lines]
+    figure = figure_of([thinned(line) for line in lines], {"title": TIME, "range": [0, duration]}, title, log=log)
+    return figure.update_layout(marks)
+
+
+def figure_of(
+    lines: list[Line],
+    x_axis: dict[str, Any],
+    title: str,
+    log: bool = True,
+    markers: int = 7,
+    guide: Sequence[dict[str, Any]] = (),
+) -> go.Figure:
+    """A figure with a trace a line, each in its engine's look, `markers` marks on each, and `guide` behind them."""
+    traces = list(guide)
+    for line in lines:
+        look = style.look(line.run.engine, line.run.profile)
+        y = np.where(line.y < ZERO, ZERO, line.y) if log else line.y
+        traces.append({
+            "type": "scatter", "x": shortened(line.x, 5), "y": shortened(y, 4 if log else 5), "name": line.run.name,
+            "mode": "lines+markers", "connectgaps": True,
+            "line": {"color": look.light, "dash": look.plotly_dash, "width": 1.7},
+            "marker": {"symbol": look.symbol, "size": 8, "color": look.light, "maxdisplayed": markers},
+            "hovertemplate": "%{y:.3g} at %{x:.4g} s",
+        })  # fmt: skip
+    y_axis = {"title": title} | (decades(np.concatenate([line.y for line in lines])) if log else {})
+    # Built in one go: adding traces one by one copies and checks every number three times.
+    return go.Figure(traces, {"hovermode": "closest", "xaxis": x_axis, "yaxis": y_axis})
+
+
+def decades(values: Array) -> dict[str, object]:
+    """Range and ticks of a log axis for `values` >= 0, with a tick "0" at `ZERO` if any is drawn there."""
+    values = values[np.isfinite(values)]
+    real = values[values >= ZERO]
+    low = int(np.floor(np.log10(real.min()))) if len(real) else -16
+    high = int(np.ceil(np.log10(real.max()))) if len(real) else -15
+    zero = bool((values < ZERO).any())
+    low, high = (-17 if zero else low), max(high, low + 1)
+    every = max(1, -(-(high - low) // 6))
+    ticks = [k for k in range(high, low - 1, -every) if not zero or k > low + every / 2]
+    text = [f"10<sup>{k}</sup>".replace("-", "−") if k not in (0, 1) else str(10**k) for k in ticks]
+    if zero:
+        ticks, text = [*ticks, low], [*text, "0"]
+    return {"type": "log", "range": [low - 0.35, high + 0.25], "tickvals": [10.0**k for k in ticks], "ticktext": text}
+
+
+def thinned(line: Line) -> Line:
+    """At most `POINTS` points of a line: the smallest and the largest of each stretch stay, so no peak is hidden."""
+    k = len(line.y)
+    if k <= POINTS:
+        return line
+    keep = {0, k - 1}
+    for stretch in np.array_split(np.arange(k), POINTS // 2 - 1):
+        known = stretch[np.isfinite(line.y[stretch])]
+        if len(known):
+            keep |= {int(known[np.argmin(line.y[known])]), int(known[np.argmax(line.y[known])])}
+    order = sorted(keep)
+    return Line(line.run, line.x[order], line.y[order])
+
+
+def shortened(values: Iterable[float], digits: int = 4) -> list[float | None]:
+    """Numbers to so many significant digits, which is finer than a pixel; None for nan."""
+    return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in values]
+
+
+CHARTS: dict[str, Chart] = {
+    "momentum": Chart("momentum error over time", momentum),
+    "energy": Chart("energy error over time", energy),
+    "deviation": Chart("distance to the truth over time", deviation),
+    "convergence": Chart("position error against dt", convergence),
+}

@@ -1,0 +1,227 @@
+"""Reads the numbers that the page shows out of the comparisons' tables: the summary, the map, a scenario's table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence, Set
+from typing import NamedTuple
+
+import numpy as np
+
+from reports.compare.comparison import Comparison
+from reports.compare.metrics import METRICS
+from reports.compare.view import NOT_JUDGED
+from reports.page.style import TRUTH, heat, number
+
+OUTCOMES = {
+    "unsupported": "refused", "diverged": "diverged", "error": "error", "crashed": "crashed", "timeout": "time-out",
+}  # fmt: skip
+MAPPED = "position_max_radii"
+
+
+class Cell(NamedTuple):
+    """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none), failed, the best."""
+
+    text: str
+    remark: str = ""
+    heat: int = -1
+    failed: bool = False
+    best: bool = False
+
+
+class Measured(NamedTuple):
+    """A number of the tables: value, a remark on it, and whether enough carries it; else the remark says why not."""
+
+    value: float
+    remark: str
+    judged: bool
+
+    @property
+    def text(self) -> str:
+        """As a table shows it."""
+        return number(self.value) if self.judged else NOT_JUDGED
+
+
+Found = dict[tuple[str, str], Measured]  # (`engine:profile`, metric) -> its number
+
+
+class Column(NamedTuple):
+    """A column of the summary, lower is better: heading, unit, and what it means in a line."""
+
+    title: str
+    unit: str
+    meaning: str
+
+
+class Failure(NamedTuple):
+    """Runs of one engine that did not play a scenario to its end, for one reason."""
+
+    name: str
+    outcome: str
+    reason: str
+    steps: str
+
+
+SUMMARY: dict[str, Column] = {
+    MAPPED: Column("Position", "radii", "largest distance of any disk from where it truly is"),
+    "momentum_error": Column("Momentum", "of Σ m|v|", "largest momentum that came or went unasked"),
+    "energy_error": Column("Energy", "of the energy at hand", "largest energy that came or went unasked"),
+    "restitution_error": Column("Restitution", "no unit", "largest |e measured − e asked for| of any hit"),
+    "wrong_hits": Column("Wrong hits", "hits in all", "hits missed and hits invented, added up"),
+    "failed": Column("Not played", "scenarios", "refused, crashed, diverged or timed out"),
+}  # fmt: skip
+
+
+def names_of(comparisons: Iterable[Comparison]) -> list[str]:
+    """Every `engine:profile` that was to play, in the order of appearance."""
+    return list(dict.fromkeys(run.name for comparison in comparisons for run in comparison.runs))
+
+
+def values(comparison: Comparison) -> Found:
+    """The numbers of a scenario at the middle dt, against the truth or else the laws of physics."""
+    table = comparison.table
+    near = table.dt_s == comparison.middle_dt
+    found: Found = {}
+    for versus in ("itself", TRUTH):  # the truth comes last and wins
+        rows = table[near & (table.versus == versus) & table.metric.isin(list(METRICS))]
+        for row in rows.to_dict("records"):
+            where = f"disk {row['disk']}" if row["disk"] >= 0 and comparison.scenario.scene.n > 1 else ""
+            when = f"at {row['at_s']:.4g} s" if np.isfinite(row["at_s"]) else ""
+            remark = ", ".join(filter(None, (where, when, str(row["note"]))))
+            judged = not str(row["note"]).startswith(NOT_JUDGED)
+            found[f"{row['engine']}:{row['profile']}", str(row["metric"])] = Measured(row["value"], remark, judged)
+    return found
+
+
+def failures(comparison: Comparison) -> list[Failure]:
+    """Every run that is not "ok", those of one engine and reason together."""
+    steps: dict[tuple[str, str, str], list[str]] = {}
+    for run in comparison.runs:
+        if run.status != "ok":
+            key = (run.name, OUTCOMES.get(run.status, run.status), run.reason)
+            steps.setdefault(key, []).append(number(run.dt))
+    return [Failure(*key, ", ".join(dts)) for key, dts in steps.items()]
+
+
+def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
+    """`engine:profile` -> (what happened, reason) of the runs at the middle dt that are not "ok"."""
+    return {
+        run.name: (OUTCOMES.get(run.status, run.status), run.reason)
+        for run in comparison.middle_runs
+        if run.status != "ok"
+    }
+
+
+def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]) -> dict[str, list[Cell]]:
+    """`engine:profile` -> a cell for each of `SUMMARY`: medians over the scenarios, sums where the unit says so.
+
+    Who is `untrusted` broke the protocol of the harness and is not scored; who failed somewhere is never the best.
+    """
+    found = [values(comparison) for comparison in comparisons]
+    failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
+    rows: dict[str, list[Cell]] = {name: [] for name in names}
+    for name in untrusted & set(names):
+        rows[name] = [Cell("breaks", "breaks the protocol: not scored", failed=True)] * (len(SUMMARY) - 1)
+    for metric in SUMMARY:
+        if metric == "failed":
+            for name in names:
+                count = sum(name in each for each in failed)
+                rows[name].append(Cell(f"{count} of {len(comparisons)}", failed=count > 0))
+            continue
+        pooled = {name: pool(metric, name, found) for name in names if name not in untrusted}
+        whole = {name: value for name, (value, _) in pooled.items() if not any(name in each for each in failed)}
+        best = min((value for value in whole.values() if not np.isnan(value)), default=np.nan)
+        for name, (value, remark) in pooled.items():
+            rows[name].append(Cell(number(value), remark, best=whole.get(name) == best))
+    return rows
+
+
+def pool(metric: str, name: str, found: Sequence[Found]) -> tuple[float, str]:
+    """The median, for hits the sum, of a metric over the scenarios in which it is judged; in how many it is, or not."""
+    kinds = ("collisions_missed", "collisions_invented") if metric == "wrong_hits" else (metric,)
+    known = [[each[name, kind] for kind in kinds if (name, kind) in each] for each in found]
+    totals = [sum(one.value for one in each) for each in known if each and all(one.judged for one in each)]
+    left_out = sum(not one.judged for each in known for one in each[:1])
+    remark = f"in {len(totals)} scenarios" + (f", {NOT_JUDGED} in {left_out}" if left_out else "")
+    if not totals:
+        return np.nan, remark
+    return float(np.sum(totals) if metric == "wrong_hits" else np.median(totals)), remark
+
+
+def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[str, list[Cell]]:
+    """scenario -> a cell for each name: the largest position error in radii, or why there is none."""
+    rows = {}
+    for comparison in comparisons:
+        found, failed = values(comparison), outcome_at_middle_dt(comparison)
+        played = {run.name for run in comparison.middle_runs}
+        cells = []
+        for name in names:
+            if name in failed:
+                cells.append(Cell(*failed[name], failed=True))
+            elif (name, MAPPED) in found:
+                value, remark, judged = found[name, MAPPED]
+                cells.append(Cell(number(value, 2), remark, heat(value)) if judged else Cell(NOT_JUDGED, remark))
+            elif name in played:
+                cells.append(Cell("no truth", comparison.scenario.without_truth))
+            else:
+                cells.append(Cell("–", "not asked to play"))
+        rows[comparison.scenario.name] = cells
+    return rows
+
+
+def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[str, str, str, list[Cell]]]:
+    """(metric, unit, which way is better, a cell for each name) of every metric that this scenario has."""
+    found, failed = values(comparison), outcome_at_middle_dt(comparison)
+    rows = []
+    for key, metric in METRICS.items():
+        if not any((name, key) in found for name in names):
+            continue
+        cells = []
+        for name in names:
+            if (name, key) in found:
+                cells.append(Cell(found[name, key].text, found[name, key].remark))
+            else:
+                cells.append(Cell(failed[name][0], failed[name][1], failed=True) if name in failed else Cell("–"))
+        unit = "" if metric.unit == "1" else metric.unit
+        better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[metric.better]
+        rows.append((key, unit, better, cells))
+    return rows
+
+
+def between_engines(comparison: Comparison, names: Sequence[str]) -> dict[str, list[Cell]]:
+    """name -> how far apart its trajectory is from each other name's, at most, in radii; {} if there is no pair."""
+    table = comparison.table
+    near = table.dt_s == comparison.middle_dt
+    apart: dict[frozenset[str], float] = {}
+    for row in table[near & (table.metric == MAPPED) & table.versus.isin(list(names))].to_dict("records"):
+        apart[frozenset((f"{row['engine']}:{row['profile']}", str(row["versus"])))] = float(row["value"])
+    if not apart:
+        return {}
+
+    def cell(one: str, other: str) -> Cell:
+        value = apart.get(frozenset((one, other)))
+        return Cell("–") if value is None else Cell(number(value, 2), "", heat(value))
+
+    return {one: [cell(one, other) for other in names[:k]] for k, one in enumerate(names)}
+
+
+Settings = dict[tuple[str, str], tuple[str, str]]
+
+
+def settings(comparison: Comparison) -> Settings:
+    """(`engine:profile`, setting) -> (asked, used) at the middle dt; asked "–" where it is the engine's own."""
+    return {
+        (run.name, setting): (number(asked, 6), number(used, 6))
+        for run in comparison.middle_runs
+        for setting, (asked, used) in run.settings.items()
+    }
+
+
+def common_settings(comparisons: Sequence[Comparison]) -> Settings:
+    """Those settings that no scenario has otherwise, so that a scenario need only show its own."""
+    common: Settings = {}
+    otherwise: set[tuple[str, str]] = set()
+    for comparison in comparisons:
+        for key, pair in settings(comparison).items():
+            if common.setdefault(key, pair) != pair:
+                otherwise.add(key)
+    return {key: pair for key, pair in common.items() if key not in otherwise}

@@ -1,0 +1,227 @@
+"""Writes report.html: one file that holds everything it shows and asks nothing of anywhere."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from adapters.matched import searched
+from adapters.play import Run
+from reports.compare.comparison import Comparison
+from reports.compare.metrics import METRICS
+from reports.page import overview, style
+from reports.page.charts import CHARTS, POINTS, Drawing
+from reports.page.documents import REPORTS, content_policy, css, looks_as_json
+from reports.page.replay import frames, name_of, pack, played, ratio_of
+from reports.page.trust import how_far_to_trust
+from reports.run.known_answers import MEANING
+from reports.terminal.foreign_text import encoded, put_text
+from scenarios.catalogue import SCENARIOS
+
+SCRIPTS = ("page/player.js", "page/player_canvas.js", "page/page.js")
+VERDICTS = ("keeps", "departs", "breaks")
+FAMILIES = {
+    "scenarios.families.lesson": "The lesson",
+    "scenarios.families.pairs": "Two disks meet",
+    "scenarios.families.walls": "Walls, floors and fixed disks",
+    "scenarios.families.rows": "Disks in a row",
+    "scenarios.families.thrusts": "Pushes and spin",
+    "scenarios.families.exercise": "The exercise",
+    "scenarios.families.crowds": "Crowds",
+}
+OWN = "Scenes of your own"
+
+
+@dataclass(frozen=True)
+class Section:
+    """One scenario as the page shows it."""
+
+    comparison: Comparison
+    family: str
+    dt: float
+    failures: list[overview.Failure]
+    drawings: dict[str, Drawing]
+    charts: str
+    replay: str
+    layers: list[tuple[str, Run | None]]
+    frames: int
+    ratio: float
+    table: list[tuple[str, str, str, list[overview.Cell]]]
+    settings: dict[str, list[tuple[str, str, str]]]
+    pairs: dict[str, list[overview.Cell]]
+
+
+def write_page(
+    path: Path,
+    comparisons: Sequence[Comparison],
+    *,
+    findings: Sequence[str],
+    untrusted: Set[str],
+    conformance: pd.DataFrame,
+    known_answers: pd.DataFrame,
+    about: Mapping[str, Any],
+    lessons: Mapping[str, Any],
+) -> None:
+    """Write the page of `comparisons`, in reading order, to `path`.
+
+    `findings` are the sentences on top; who is in `untrusted` is not scored; `conformance` and `known_answers` are
+    the tables below them; `about` holds command, seed, machine, versions, started and seconds;
+    `lessons` name -> what has its number, title and question.
+    """
+    names = overview.names_of(comparisons)
+    common = overview.common_settings(comparisons)
+    sections = [section_of(comparison, names, common) for comparison in comparisons]
+    plotly, scripts = get_plotlyjs(), [(REPORTS / script).read_text(encoding="utf-8") for script in SCRIPTS]
+    environment = Environment(
+        loader=FileSystemLoader(REPORTS),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.filters["number"] = style.number
+    looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
+    html = environment.get_template("page/page.html.j2").render(
+        names=names, sections=sections, families=by_family(sections), findings=findings, about=about, points=POINTS,
+        engines=versions_of(comparisons), steps=step_range(comparisons), columns=overview.SUMMARY, looks=looks,
+        summary=overview.summary(comparisons, names, untrusted), heat_map=overview.heat_map(comparisons, names),
+        conformance=conformance_matrix(conformance), departures=departures(conformance), probes=records(conformance),
+        known_answers=records(known_answers), known_answers_text=about.get("known_answers_text", MEANING),
+        css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
+        library=deflated(plotly), policy=content_policy([plotly, *scripts]),
+        heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, lessons=lessons, truth_of=truth_of,
+        common=by_name(common), trust=how_far_to_trust(comparisons), searched=by_engine(searched()),
+    )  # fmt: skip
+    put_text(path, html)
+
+
+def section_of(comparison: Comparison, names: Sequence[str], common: overview.Settings) -> Section:
+    """All that the page shows of one scenario; of its settings those that are not `common`."""
+    own = {key: pair for key, pair in overview.settings(comparison).items() if key not in common}
+    drawings = {key: chart.draw(comparison) for key, chart in CHARTS.items()}
+    builder = SCENARIOS.get(comparison.scenario.name)
+    layers = played(comparison)
+    module = getattr(getattr(builder, "func", builder), "__module__", "")
+    return Section(
+        comparison=comparison,
+        family=FAMILIES.get(module, OWN),
+        dt=comparison.middle_dt,
+        failures=overview.failures(comparison),
+        drawings=drawings,
+        charts=packed_charts(drawings),
+        replay=pack(comparison),
+        layers=[(name_of(run), run) for run, _ in layers],
+        frames=len(frames(comparison.scenario, layers)) if layers else 0,
+        ratio=ratio_of(comparison.scenario, layers),
+        table=overview.scenario_table(comparison, names),
+        settings=by_name(own),
+        pairs=overview.between_engines(comparison, names),
+    )
+
+
+def packed_charts(drawings: Mapping[str, Drawing]) -> str:
+    """The figures as JSON, deflated, as base64; what they share with every other figure is left to page.js."""
+    figures = {}
+    for key, drawing in drawings.items():
+        if drawing.figure is not None:
+            figures[key] = drawing.figure.to_dict()
+            figures[key]["layout"].pop("template", None)
+    return deflated(json.dumps(figures, separators=(",", ":"), default=list))
+
+
+def deflated(text: str) -> str:
+    """Text, deflated, as base64: what `unpack` of player.js reads."""
+    return base64.b64encode(zlib.compress(encoded(text), 9)).decode()
+
+
+def by_family(sections: Sequence[Section]) -> dict[str, list[Section]]:
+    """The sections under their headings, both in the order of appearance."""
+    families: dict[str, list[Section]] = {}
+    for section in sections:
+        families.setdefault(section.family, []).append(section)
+    return families
+
+
+def versions_of(comparisons: Sequence[Comparison]) -> dict[str, str]:
+    """engine -> its libraries and their versions, as its runs say."""
+    found: dict[str, dict[str, str]] = {}
+    for comparison in comparisons:
+        for run in comparison.runs:
+            found.setdefault(run.engine, {}).update(run.versions)
+    return {
+        engine: ", ".join(f"{library} {version[:16]}" for library, version in libraries.items())
+        for engine, libraries in found.items()
+    }
+
+
+def step_range(comparisons: Sequence[Comparison]) -> tuple[float, float]:
+    """s, the smallest and the largest step size of all runs."""
+    steps = [run.dt for comparison in comparisons for run in comparison.runs]
+    return (min(steps), max(steps)) if steps else (np.nan, np.nan)
+
+
+def by_engine(rows: Sequence[dict[str, str]]) -> dict[str, list[dict[str, str]]]:
+    """Engine -> its rows of the table of what was searched."""
+    return {
+        engine: [row for row in rows if row["engine"] == engine] for engine in dict.fromkeys(r["engine"] for r in rows)
+    }
+
+
+def by_name(settings: overview.Settings) -> dict[str, list[tuple[str, str, str]]]:
+    """`engine:profile` -> its (setting, asked, used)."""
+    found: dict[str, list[tuple[str, str, str]]] = {}
+    for (name, setting), (asked, used) in settings.items():
+        found.setdefault(name, []).append((setting, asked, used))
+    return found
+
+
+def truth_of(comparison: Comparison) -> str:
+    """What is known of the right answer, in a sentence."""
+    scenario, truth = comparison.scenario, comparison.truth
+    if truth is None:
+        return f"none: {scenario.without_truth or 'the scene comes without an exact answer'}"
+    ends = "at every sample"
+    if truth.valid_until < scenario.duration:
+        ends = f"up to its horizon at {style.number(truth.valid_until)} s, and no further"
+        ends += f": {truth.reason}" if truth.reason else ""
+    return f"exact {ends}" + (f"; off by at most {style.number(truth.error_bound)} m" if truth.error_bound else "")
+
+
+def records(table: pd.DataFrame | None) -> list[dict[str, Any]]:
+    """The rows of a table; [] if there is none."""
+    rows = [] if table is None else table.to_dict("records")
+    return [{str(column): value for column, value in row.items()} for row in rows]
+
+
+def conformance_matrix(table: pd.DataFrame) -> dict[str, dict[str, tuple[str, int]]]:
+    """probe -> `engine:profile` -> (the worst verdict, how many of its questions got it)."""
+    order = VERDICTS
+    matrix: dict[str, dict[str, tuple[str, int]]] = {}
+    for row in records(table):
+        name = f"{row['engine']}:{row['profile']}"
+        worst, count = matrix.setdefault(str(row["probe"]), {}).get(name, ("keeps", 0))
+        verdict = row["verdict"] if row["verdict"] in order else "breaks"
+        if order.index(verdict) > order.index(worst):
+            worst, count = verdict, 0
+        matrix[str(row["probe"])][name] = (worst, count + (verdict == worst))
+    return matrix
+
+
+def departures(table: pd.DataFrame) -> dict[str, list[dict[str, Any]]]:
+    """`engine:profile` -> the rows of what it does not keep."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for row in records(table):
+        if row["verdict"] != "keeps":
+            found.setdefault(f"{row['engine']}:{row['profile']}", []).append(row)
+    return found

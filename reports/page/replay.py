@@ -1,0 +1,168 @@
+"""Packs the trajectories of a comparison into the few kilobytes that the page's player draws from.
+
+A pack is, deflated: uint32 length of a JSON head, the head, then for every layer the numbers the head announces, all
+little-endian uint16: positions on a grid over the layer's bounding box (second differences in time, zigzag, high bytes
+before low bytes: steady motion becomes zeros), angles on a grid over a turn if anything turns, and the hits.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.play import Run
+from reports.page.style import TRUTH
+from scenarios.model import Array, Scenario, Trajectory
+
+if TYPE_CHECKING:
+    from reports.compare.comparison import Comparison
+
+FRAMES = 240
+NUMBERS = 10_000  # positions of disks a layer, so that a crowd of 100 takes no more room than the page has
+HITS = 300  # more marks than this a layer hide the disks
+STEPS = 65535  # of the position grid
+
+
+def pack(comparison: Comparison) -> str:
+    """The middle dt's trajectories and the truth, packed, as base64; "" if nothing was played."""
+    return pack_layers(comparison.scenario, played(comparison))
+
+
+def pack_layers(
+    scenario: Scenario,
+    layers: list[tuple[Run | None, Trajectory]],
+    shown: NDArray[np.int64] | None = None,
+    more: Mapping[str, Any] = MappingProxyType({}),
+) -> str:
+    """The layers at the samples `shown` (all that are worth it), packed, as base64; "" if there are none.
+
+    more: goes into the head: `opens` s, where the player starts; `pace`, seconds in one at speed 1; `event`, what to
+    mark: t s, disk.
+    """
+    if not layers:
+        return ""
+    shown = frames(scenario, layers) if shown is None else shown
+    heads, bodies = zip(*(layer(run, trajectory, shown, scenario) for run, trajectory in layers))
+    head = json.dumps({**head_of(scenario, shown, layers), **more, "layers": heads}, separators=(",", ":")).encode()
+    head += b" " * (-len(head) % 4)
+    whole = len(head).to_bytes(4, "little") + head + b"".join(bodies)
+    return base64.b64encode(zlib.compress(whole, 9)).decode()
+
+
+def played(comparison: Comparison) -> list[tuple[Run | None, Trajectory]]:
+    """What can be drawn: (run, trajectory) at the middle dt, and (None, truth) last, so that it lies on top."""
+    layers: list[tuple[Run | None, Trajectory]] = [
+        (run, run.trajectory) for run in comparison.middle_runs if run.trajectory is not None
+    ]
+    if comparison.truth is not None and len(comparison.truth):
+        layers.append((None, comparison.truth))
+    return layers
+
+
+def name_of(run: Run | None) -> str:
+    """The layer's name: `engine:profile`, or "truth"."""
+    return TRUTH if run is None else run.name
+
+
+def frames(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> NDArray[np.int64]:
+    """The samples that are drawn: spread evenly, and those nearest to the last layer's hits, if these are few."""
+    count = int(min(FRAMES, max(60, NUMBERS // scenario.scene.n), scenario.samples + 1))
+    hits = np.unique(np.rint(layers[-1][1].collisions.t / scenario.sample_interval).astype(int))
+    hits = hits[(hits > 0) & (hits < scenario.samples)]
+    hits = hits if len(hits) < count // 4 else hits[:0]
+    even = np.rint(np.linspace(0, scenario.samples, count - len(hits))).astype(int)
+    return np.unique(np.concatenate([even, hits]))
+
+
+def head_of(
+    scenario: Scenario, shown: NDArray[np.int64], layers: list[tuple[Run | None, Trajectory]]
+) -> dict[str, Any]:
+    """What all layers share: instants in s, disks and walls in m, the part of the plane to show."""
+    scene = scenario.scene
+    return {
+        "duration": scenario.duration,
+        "t": rounded(scenario.times[shown]),
+        "radius": rounded(scene.radius),
+        "static": scene.static.astype(int).tolist(),
+        "walls": rounded(scene.walls.reshape(-1, 4)),
+        "wrap": None if scene.wrap is None else rounded(scene.wrap.ravel()),
+        "view": rounded(view_of(scenario, [trajectory for _, trajectory in layers])),
+    }
+
+
+def view_of(scenario: Scenario, trajectories: list[Trajectory]) -> Array:
+    """(4,) m, left, bottom, right, top: all of the last trajectory, and of the others what is not thrown far away."""
+    scene = scenario.scene
+    r = scene.radius[:, None]
+    boxes = np.array([
+        [(t.position - r).min(axis=(0, 1)), (t.position + r).max(axis=(0, 1))]
+        for t in trajectories if len(t) and np.isfinite(t.position).all()
+    ] or [[[-1.0, -1.0], [1.0, 1.0]]])  # fmt: skip
+    base = boxes[-1] if len(boxes) else boxes[0]
+    room = 0.5 * np.maximum(base[1] - base[0], 2 * scene.radius.max())
+    low, high = np.maximum(boxes[:, 0].min(axis=0), base[0] - room), np.minimum(boxes[:, 1].max(axis=0), base[1] + room)
+    if scene.wrap is not None:
+        low, high = np.minimum(low, scene.wrap[0]), np.maximum(high, scene.wrap[1])
+    if len(scene.walls):
+        ends = scene.walls.reshape(-1, 2)
+        margin = 0.1 * (high - low).max()
+        low = np.minimum(low, np.clip(ends.min(axis=0), low - margin, None))
+        high = np.maximum(high, np.clip(ends.max(axis=0), None, high + margin))
+    return np.concatenate([low, high])
+
+
+def ratio_of(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> float:
+    """Height over width of what is shown, so that the page keeps room for it before it is unpacked."""
+    left, bottom, right, top = view_of(scenario, [trajectory for _, trajectory in layers])
+    return round((top - bottom) / (right - left), 4)
+
+
+def layer(
+    run: Run | None, trajectory: Trajectory, shown: NDArray[np.int64], scenario: Scenario
+) -> tuple[dict[str, Any], bytes]:
+    """The head and the numbers of one layer; it ends where its trajectory ends, of which it may be a part."""
+    first = round(trajectory.t[0] / scenario.sample_interval)
+    mine = shown[shown < first + len(trajectory)] - first
+    position = trajectory.position[mine].reshape(len(mine), -1, 2)
+    finite = np.nan_to_num(position, nan=0.0, posinf=1e9, neginf=-1e9)
+    low, high = finite.min(axis=(0, 1)), finite.max(axis=(0, 1))
+    span = np.where(high > low, high - low, 1.0)
+    grid = np.rint((finite - low) / span * STEPS).astype(np.uint16)
+    body = smoothed(grid.reshape(len(mine), -1))
+    turns = bool(trajectory.angle.any())
+    if turns:
+        turn = np.nan_to_num(trajectory.angle[mine]) / (2 * np.pi)
+        body += smoothed(np.rint((turn % 1.0) * (STEPS + 1)).astype(np.uint32).astype(np.uint16))
+    hits = trajectory.collisions
+    marks = len(hits) if len(hits) <= HITS else 0
+    if marks:
+        instant = np.rint(np.clip(hits.t / scenario.duration, 0, 1) * STEPS)
+        body += np.concatenate([instant, hits.i, np.where(hits.j < 0, STEPS, hits.j)]).astype("<u2").tobytes()
+    ends = "" if len(mine) == len(shown) else f"{trajectory.t[-1]:.4g}"
+    head = {
+        "name": name_of(run), "frames": len(mine), "low": [float(x) for x in low], "span": [float(x) for x in span],
+        "turns": turns, "marks": marks, "hits": len(hits), "ends": ends,
+    }  # fmt: skip
+    return head, body
+
+
+def smoothed(values: NDArray[np.uint16]) -> bytes:
+    """(k, m) numbers as bytes that deflate well; undone by `smooth` in player.js."""
+    twice = np.diff(values, n=1, axis=0, prepend=np.uint16(0))
+    twice = np.diff(twice, n=1, axis=0, prepend=np.uint16(0)).astype(np.int16)
+    zigzag = ((twice << 1) ^ (twice >> 15)).astype(np.uint16)
+    return (zigzag >> 8).astype(np.uint8).tobytes() + (zigzag & 255).astype(np.uint8).tobytes()
+
+
+def rounded(values: Array) -> Any:
+    """Nested lists of numbers to seven significant digits, finer than the position grid."""
+    if np.ndim(values) > 1:
+        return [rounded(row) for row in values]
+    return [float(f"{x:.7g}") for x in np.asarray(values, float)]

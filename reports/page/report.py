@@ -1,0 +1,83 @@
+"""Page and findings of a run, from its tables; nothing is played."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from reports.compare.comparison import Comparison
+from reports.page.findings import findings
+from reports.page.page import write_page
+from reports.run.archive import Archive
+from reports.run.made import writing
+from reports.run.tables import TABLES, comparisons_of, make_tables
+
+PAGE = "report.html"
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What came out of a run.
+
+    Attributes:
+        archive: what it was made from.
+        comparisons: one a scenario, in reading order.
+        runs: runs.csv.
+        findings: the sentences on top.
+        untrusted: the players that broke the protocol: their rows are kept, but nothing is concluded from them.
+        unjudged: name of a scene -> why it is not held to its answer, or not compared at all, though it should be.
+    """
+
+    archive: Archive
+    comparisons: list[Comparison]
+    runs: pd.DataFrame
+    findings: list[str]
+    untrusted: set[str]
+    unjudged: Mapping[str, str]
+
+
+def make_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, Any]) -> Report:
+    """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what is being done.
+
+    `lessons`: name -> a lesson, for the page's list of them.
+
+    Raises:
+        FolderTaken: one of the three is there and is not this program's.
+        ValueError: the journal cannot be used, or a scene is not the one that was played.
+    """
+    with writing(folder, (*TABLES, PAGE)):
+        return made_report(folder, say, lessons)
+
+
+def made_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, Any]) -> Report:
+    """As `make_report`, over whatever is there."""
+    archive = Archive.read(folder)
+    header = archive.header
+    tables = make_tables(archive, say)
+    say("writing the page")
+    comparisons = comparisons_of(archive, tables)
+    began = {run.name for comparison in comparisons for run in comparison.runs}  # an interrupt may come before
+    players = [name for name in header["engines"] if name in began and name in archive.conformance]
+    asked = [archive.conformance[name]["conformance"] for name in players]
+    known = sorted(
+        (line["known_answer"] for line in archive.known_answers),
+        key=lambda row: (row["column"], row["dt_s"], row["made_by"]),
+        reverse=True,
+    )
+    untrusted = {f"{row['engine']}:{row['profile']}" for rows in asked for row in rows if row["verdict"] == "breaks"}
+    sentences = findings(comparisons, untrusted)
+    write_page(
+        folder / PAGE,
+        comparisons,
+        findings=sentences,
+        untrusted=untrusted,
+        conformance=pd.DataFrame([row for rows in asked for row in rows]),
+        known_answers=pd.DataFrame(known),
+        about=header | {"seconds": archive.seconds},
+        lessons=lessons,
+    )
+    return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged)

@@ -1,0 +1,95 @@
+"""Serves pages to browsers on this machine, and to nobody else."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import sys
+import webbrowser
+from asyncio import CancelledError, get_running_loop
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any, TypeVar
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.routing import BaseRoute
+
+from reports.terminal.exits import TERMINATED, Stopped, refuse
+
+T = TypeVar("T")
+HOST, NAMES = "127.0.0.1", ("127.0.0.1", "localhost")
+PORTS = 20  # tried in a row
+MOST_TABS = 16
+MOST_BYTES = 4096  # of a message that a page sends
+THREADS = ThreadPoolExecutor(MOST_TABS + 8)  # one a tab, and some for the pages; not the loop's, for which it waits
+
+
+async def in_thread(do: Callable[..., T], *arguments: Any) -> T:
+    """What `do` gives, in a thread; a server that stops does not wait for it."""
+    return await get_running_loop().run_in_executor(THREADS, partial(do, *arguments))
+
+
+def application(routes: Sequence[BaseRoute]) -> Starlette:
+    """The web application of these routes, for this machine's own names only."""
+    hosts = Middleware(TrustedHostMiddleware, allowed_hosts=list(NAMES), www_redirect=False)
+    return Starlette(routes=list(routes), middleware=[hosts])
+
+
+def taken_socket(port: int) -> socket.socket:
+    """A socket on the loopback address at the first free port from `port` on.
+
+    Raises:
+        OSError: if none of the next few is free, or one may not be had.
+    """
+    for each in range(port, min(port + PORTS, 65536)):
+        try:
+            taken = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+            taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            taken.bind((HOST, each))
+            taken.listen(64)
+            return taken
+        except OSError as fault:
+            taken.close()
+            if isinstance(fault, PermissionError):
+                raise OSError("the system keeps it for administrators, as it does ports below 1024") from None
+    raise OSError(f"none of the ports {port} to {min(port + PORTS, 65536) - 1} is free")
+
+
+def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
+    """Serve until Ctrl-C; say where, and open a browser there if asked; exits 2 if there is no port, 143 on SIGTERM."""
+    try:
+        listening = taken_socket(port)
+    except OSError as fault:
+        refuse([f"--port {port}: {fault}; name another"])
+    found = listening.getsockname()[1]
+    if found != port:
+        print(f"Port {port} is taken: this is on {found}.", file=sys.stderr)
+    url = f"http://localhost:{found}{path}"
+    print(f"{url}  (Ctrl-C stops it)", flush=True)
+    if opens and not webbrowser.open(url):
+        print(f"--open: no browser was found here; open {url} yourself.", file=sys.stderr)
+    server = uvicorn.Server(config_of(app))
+    logging.getLogger("uvicorn.error").addFilter(is_news)
+    try:
+        server.run(sockets=[listening])
+    except KeyboardInterrupt as stopped:  # which the server hands on when it has ended; Ctrl-C is how it ought to end
+        if isinstance(stopped, Stopped) and stopped.status == TERMINATED:
+            raise
+    finally:
+        print("Stopped.")
+
+
+def is_news(record: logging.LogRecord) -> bool:
+    """Whether the server's complaint is about more than work that was cut off because the server stops."""
+    cut_off = record.exc_info and isinstance(record.exc_info[1], CancelledError)
+    return not (cut_off or record.getMessage().startswith("Cancel "))
+
+
+config_of = partial(
+    uvicorn.Config, log_level="warning", ws="websockets-sansio", ws_max_size=MOST_BYTES,
+    ws_ping_interval=10, ws_ping_timeout=10, timeout_graceful_shutdown=1, lifespan="off",
+)  # fmt: skip

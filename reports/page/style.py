@@ -1,0 +1,133 @@
+"""How things look: one colour an engine, one dash and fill a profile, one ramp for size, one way to write a number."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+from zlib import crc32
+
+from reports.terminal.foreign_text import encoded
+
+TRUTH = "truth"
+
+
+class Look(NamedTuple):
+    """How an engine and profile are drawn; the shape tells the engine and the dash the profile without colour.
+
+    Attributes:
+        light, dark: hex colour on a light and on a dark page.
+        dash: lengths of stroke and gap in px, () for a solid line.
+        shape: a key of `PATHS`.
+        filled: whether the shape is.
+    """
+
+    light: str
+    dark: str
+    dash: tuple[int, ...]
+    shape: str
+    filled: bool
+
+    @property
+    def symbol(self) -> str:
+        """The shape as plotly names it."""
+        return self.shape if self.filled else f"{self.shape}-open"
+
+    @property
+    def path(self) -> str:
+        """The shape as an SVG path."""
+        return PATHS[self.shape]
+
+    @property
+    def plotly_dash(self) -> str:
+        """The dash as plotly writes it."""
+        return ",".join(f"{length}px" for length in self.dash) or "solid"
+
+
+# (light, dark, shape). Against page and player each colour has more than 3 : 1, which WCAG 2 asks of graphics, and any
+# two of the four engines are 0.06 or more apart in OKLab, also as seen with protan-, deuteran- and tritanopia (matrices
+# of Machado et al., IEEE TVCG 15, 1291, 2009). Where colour is not seen at all, shape and dash tell them apart.
+ENGINE = {
+    "reference": ("#0a4f9e", "#6cb8ff", "circle"),
+    "pymunk": ("#d1540a", "#ff9a4d", "triangle-up"),
+    "box2d": ("#00876c", "#5be0b5", "square"),
+    "box2d_v3": ("#b84fb0", "#c46bd8", "diamond"),
+    "event_driven": ("#6b5f00", "#d9c84a", "star"),
+    TRUTH: ("#16191d", "#f4f4f2", "circle"),
+}
+# The shapes as SVG paths about the origin, as large as an 8 px mark of plotly.
+PATHS = {
+    "circle": "M4,0A4,4 0 1 1 -4,0A4,4 0 1 1 4,0Z",
+    "triangle-up": "M0,-4.6L4.3,3H-4.3Z",
+    "square": "M-3.7,-3.7H3.7V3.7H-3.7Z",
+    "diamond": "M0,-5L5,0L0,5L-5,0Z",
+    "cross": "M-1.5,-4.4H1.5V-1.5H4.4V1.5H1.5V4.4H-1.5V1.5H-4.4V-1.5H-1.5Z",
+    "triangle-down": "M0,4.6L4.3,-3H-4.3Z",
+    "hexagon": "M-2.3,-4H2.3L4.6,0L2.3,4H-2.3L-4.6,0Z",
+    "pentagon": "M0,-4.6L4.4,-1.4L2.7,3.7H-2.7L-4.4,-1.4Z",
+    "bowtie": "M-4.2,-3.2V3.2L0,0L4.2,3.2V-3.2L0,0Z",
+    "star": "M0,-5L1.3,-1.7L4.8,-1.5L2.1,0.7L2.9,4L0,2.2L-2.9,4L-2.1,0.7L-4.8,-1.5L-1.3,-1.7Z",
+}
+OTHERS = (
+    ("#5b6b7a", "#9fb0c0", "cross"), ("#a3123a", "#ff7a93", "triangle-down"),
+    ("#5a3d9e", "#b7a1ff", "hexagon"), ("#3d6b1f", "#a4d67a", "pentagon"), ("#7a4a21", "#e0a878", "bowtie"),
+)  # fmt: skip
+DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3)}
+SWITCHED = (1, 2)  # a profile with one thing switched, `matched+...`
+
+# Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep to pale on dark.
+HEAT_BOUNDS = (1e-12, 1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+HEAT_LIGHT = (
+    "#f7f9f3", "#eaf3e3", "#d7ebd9", "#bfe0d3", "#9ccfcd", "#74b9c6", "#4c9bbb", "#2f78a8", "#24558c", "#1d3468",
+)  # fmt: skip
+HEAT_DARK = (
+    "#191d22", "#1a252e", "#1a303e", "#1a3d50", "#1b4d64", "#1f6078", "#31778b", "#53939b", "#8ab5a9", "#d3ddb8",
+)  # fmt: skip
+
+
+def look(engine: str, profile: str = "") -> Look:
+    """How `engine:profile` is drawn; an engine without a row gets one of `OTHERS` by its name."""
+    light, dark, shape = ENGINE.get(engine) or OTHERS[crc32(encoded(engine)) % len(OTHERS)]
+    dash = SWITCHED if "+" in profile else DASHED.get(profile, ())
+    return Look(light, dark, dash, shape, not dash)
+
+
+def heat(value: float) -> int:
+    """The step of the ramp, 0 (smallest) to 9."""
+    return sum(value > bound for bound in HEAT_BOUNDS)
+
+
+def readable_on(colour: str) -> str:
+    """Near-black or white, whichever has more contrast on `colour` (relative luminance of WCAG 2)."""
+    channels = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    return "#10151b" if luminance > 0.18 else "#ffffff"
+
+
+def css_variables(dark: bool) -> str:
+    """The ramp as CSS custom properties `--heat-k` and `--on-heat-k`."""
+    ramp = HEAT_DARK if dark else HEAT_LIGHT
+    return "".join(f"--heat-{k}:{c};--on-heat-{k}:{readable_on(c)};" for k, c in enumerate(ramp))
+
+
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number(value: object, digits: int = 3) -> str:
+    """`value` to so many significant digits: 0.0123, 1.23×10⁻⁵, 0, ∞, – for nan; text as it is."""
+    if isinstance(value, bool | str) or value is None:
+        return {True: "yes", False: "no", None: "–", "": "–"}.get(value, str(value))
+    try:
+        x = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return str(value)
+    if not math.isfinite(x):
+        return "–" if math.isnan(x) else ("∞" if x > 0 else "−∞")
+    mantissa, _, exponent = f"{x:.{digits - 1}e}".partition("e")
+    power = int(exponent)
+    if x == 0 or -4 < power < 6:
+        text = f"{float(f'{x:.{digits}g}'):f}".rstrip("0").rstrip(".") if abs(x) < 1e15 else f"{x:g}"
+    else:
+        short = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+        text = ("" if short == "1" else f"{short}×") + f"10{str(power).translate(SUPERSCRIPT)}"
+    return text.replace("-", "−")

@@ -1,0 +1,1 @@
+"""Cells to results: workers, journal, resume, archive, tables, diff."""

@@ -1,0 +1,123 @@
+"""The exact answer to a scene, had in a worker within a time, and kept in a file beside what is compared with it."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import ZipFile
+
+import numpy as np
+
+from reports.compare.comparison import answered
+from reports.run.scenes import open_scene
+from reports.run.worker_process import Failure
+from reports.terminal.foreign_text import put_bytes
+from scenarios.model import Scenario
+from scenarios.no_truth import NoTruth
+from scenarios.truth.cache import UNREADABLE, packed, unpacked
+from scenarios.truth.exact import CLOSED_FORM, OracleTruth, TruthRecord
+
+OK, NONE = "ok", "none"
+SAID = "answer.json"  # in the file of an answer, beside the arrays of its record
+
+
+class Answer(NamedTuple):
+    """What is known of the right answer to a scene.
+
+    Attributes:
+        record: of the oracle; None where a closed form answers, or nothing.
+        status: "ok"; "none", where the scene has no exact answer; "timeout", "crashed" or "error" as of a `Failure`.
+        reason: why there is none, or "".
+        timeout_s: that it had.
+    """
+
+    record: TruthRecord | None
+    status: str
+    reason: str
+    timeout_s: float = 0.0
+
+    @property
+    def lost(self) -> str:
+        """Why a scene that may have an answer is not held to one; "" if that is not so."""
+        return "" if self.status in (OK, NONE) else self.reason
+
+    def may_be_had(self, timeout: float) -> bool:
+        """Whether to try again: it was not had, and had less time than `timeout` s, or failed otherwise."""
+        return bool(self.lost) and (self.status != "timeout" or self.timeout_s < timeout)
+
+    def given_to(self, scenario: Scenario) -> Scenario:
+        """The scenario with this for its answer, so that asking for it computes nothing that takes long."""
+        if self.status != OK:
+            return replace(scenario, truth=None, without_truth=self.reason)
+        return scenario if self.record is None else replace(scenario, truth=OracleTruth(scenario, self.record))
+
+
+def answer_of(scenario: Scenario) -> Answer:
+    """In the worker: compute it."""
+    scenario, truth = answered(scenario)
+    if truth is None:
+        return Answer(None, NONE, scenario.without_truth)
+    return Answer(scenario.truth.record() if isinstance(scenario.truth, OracleTruth) else None, OK, "")
+
+
+def no_answer(failure: Failure, timeout: float) -> Answer:
+    """What a worker leaves that was to have it within `timeout` s and could not."""
+    if failure.status == "timeout":
+        return Answer(None, failure.status, f"the exact answer took longer than {timeout:g} s (--timeout)", timeout)
+    reason = f"the exact answer could not be computed: {failure.status}: {failure.reason}"
+    return Answer(None, failure.status, reason, timeout)
+
+
+def put_answer(path: Path, answer: Answer) -> None:
+    """Write it whole or not at all."""
+    whole = io.BytesIO(b"" if answer.record is None else packed(vars(answer.record)))
+    with ZipFile(whole, "a") as file:
+        file.writestr(SAID, json.dumps(answer[1:]))
+    put_bytes(path, whole.getvalue())
+
+
+def read_answer(path: Path) -> Answer | None:
+    """What `put_answer` wrote; None if it is not there or not that any more, as the sums in the file tell."""
+    try:
+        with ZipFile(path) as file:
+            (status, reason, timeout), whole = json.loads(file.read(SAID)), len(file.namelist()) > 1
+        fields = unpacked(path) if whole else None
+    except UNREADABLE:
+        return None
+    if whole and fields is None:
+        return None
+    return Answer(TruthRecord(**fields) if fields else None, status, reason, timeout)
+
+
+def record_here(scene: str, seed: int) -> TruthRecord | str:
+    """In the worker: the record of a scene by catalogue name or file, or why there is none."""
+    try:
+        return record_of(open_scene(scene, seed))
+    except NoTruth as refusal:
+        return str(refusal)
+
+
+def record_of(scenario: Scenario) -> TruthRecord:
+    """The oracle's record, or a record of what a closed form says. Raises `NoTruth`."""
+    if isinstance(scenario.truth, OracleTruth):
+        record = scenario.truth.record()
+        if record.valid_until < scenario.sample_interval:
+            raise NoTruth(record.reason)
+        return record
+    if scenario.truth is None:
+        raise NoTruth(scenario.without_truth)
+    truth = scenario.truth(scenario.times)
+    hits = truth.collisions
+    angles = np.full(len(hits), np.nan)  # a closed form does not need them
+    return TruthRecord(
+        legs=np.zeros((0, 12)),
+        events=np.stack([hits.t, hits.i, hits.j, hits.impulse, angles], axis=-1),
+        valid_until=truth.valid_until,
+        error_bound=truth.error_bound,
+        bits=53,
+        method=CLOSED_FORM,
+        reason=truth.reason,
+    )

@@ -1,0 +1,221 @@
+"""The files of a run, read back; everything is made from the journal and the trajectories.
+
+journal.jsonl   a header, a line a cell as it ends, a footer; after a run was resumed, another header and footer; what
+                a line holds is said in journal_lines.py
+trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to its last good state;
+                the line of the cell has the file's digest, and what does not match it is as good as none
+scenes/         copies of the scene files
+machine.json    machine, versions, command, seed
+made.json       what of all this was written by whom, so that nothing else is ever replaced
+compared/       the scenarios' exact answers and shares of deviations.csv, so that a report does not measure again
+deviations.csv, runs.csv, report.html
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Hashable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from adapters.play import Run
+from reports.run.journal import JOURNAL, MISSED, lines_of
+from reports.run.journal_lines import kind_of
+from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
+
+ASKED = "without it nobody knows what was asked for: play it again into another --out"
+Numbered = dict[Hashable, tuple[int, dict[str, Any]]]  # what a line is of -> its number, and the line
+STATE = ("position", "velocity", "angle", "angular_velocity")
+HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
+
+
+@dataclass(frozen=True)
+class Archive:
+    """The folder of one run, as its journal has it; of two lines on one thing the later holds.
+
+    Attributes:
+        folder: where it is.
+        header: command, seed, machine, versions, and what was asked for.
+        records: the lines of the cells that ended, `as_found`.
+        conformance: `engine:profile` -> its line.
+        known_answers: the lines of the known answers that were made again.
+        timings: key of a cell -> s, its timings, each taken alone.
+        seconds: that the run took, up to now; NaN if it is not complete.
+        complete: whether everything that was asked for has ended.
+    """
+
+    folder: Path
+    header: dict[str, Any]
+    records: list[dict[str, Any]]
+    conformance: dict[str, dict[str, Any]]
+    known_answers: list[dict[str, Any]]
+    timings: dict[str, list[float]]
+    seconds: float
+    complete: bool
+
+    @staticmethod
+    def read(folder: Path) -> Archive:
+        """Read the journal of a folder, once; raises `ValueError`, naming the line, if it cannot be used."""
+        header: dict[str, Any] = {}
+        last: dict[str, Numbered] = {"cell": {}, "conformance": {}, "known_answer": {}}
+        timings: dict[str, list[float]] = {}
+        seconds, complete = 0.0, False
+        for number, line in enumerate(lines_of(folder), 1):
+            kind = kind_of_line(folder, number, line)
+            complete = kind == "footer"
+            if complete:
+                seconds += line["footer"]["seconds"]
+            elif kind == "header":
+                header = line["header"]
+            elif kind == "timing":
+                timings.setdefault(line["timing"], []).append(line["seconds"])
+            else:
+                last[kind][what_of(line) if kind == "cell" else line["of"]] = number, line
+        if not header:
+            raise ValueError(f"{folder / JOURNAL}: has no header, so nothing was played")
+        for number, record in last["cell"].values():
+            if fault := stranger(record, header):
+                raise ValueError(no_use(folder, number, fault, MISSED))
+        records, conformance, known = ([line for _, line in last[kind].values()] for kind in last)
+        records = [as_found(folder, record) for record in records]
+        by_engine = {line["of"]: line for line in conformance}
+        return Archive(
+            folder, header, records, by_engine, known, timings, seconds if complete else float("nan"), complete
+        )
+
+
+def kind_of_line(folder: Path, number: int, line: Any) -> str:
+    """Which of `KINDS` it is; raises `ValueError`, naming the line and what does not fit."""
+    try:
+        return kind_of(line)
+    except (ValueError, RecursionError) as fault:
+        head = isinstance(line, dict) and "header" in line
+        raise ValueError(no_use(folder, number, str(fault), ASKED if head else MISSED)) from None
+
+
+def no_use(folder: Path, number: int, fault: str, cure: str) -> str:
+    """A sentence on a line that cannot be used, and what to do."""
+    return f"{folder / JOURNAL}: line {number}: {fault}; {cure}"
+
+
+def what_of(record: dict[str, Any]) -> tuple:
+    """What the line of a cell is of."""
+    return tuple(record[name] for name in ("scene", "seed", "engine", "profile", "substeps"))
+
+
+def stranger(record: dict[str, Any], header: dict[str, Any]) -> str:
+    """Why the line of a cell is none of its run; "" if it is."""
+    name = f"{record['engine']}:{record['profile']}"
+    if record["scene"] not in header["scenes"]:
+        return f"scene = {record['scene']!r}: must be one of the scenes of the header"
+    if name not in header["engines"]:
+        return f"engine = {name!r}: must be one of the engines of the header"
+    return "" if record["seed"] == header["seed"] else f"seed = {record['seed']}: must be that of the header"
+
+
+def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
+    """The line of a cell with `damage`, why its trajectory cannot be used, or ""; a played one is then an error.
+
+    A sum over a file is not made again while the file is the same to the system.
+    """
+    path = trajectory_file(folder, record["cell"])
+    why = f"{path.name} was never written" if record["status"] == "ok" else ""
+    if record["file"]:
+        try:
+            found = path.stat()
+            same = digest_of_file(path, found.st_ino, found.st_size, found.st_mtime_ns) == record["file"]
+            why = "" if same else f"{path.name} is not what was written"
+        except OSError as fault:
+            gone = isinstance(fault, FileNotFoundError)
+            why = f"{path.name} {'is missing' if gone else f'cannot be read: {fault.strerror}'}"
+    failed = {"status": "error", "reason": why} if why and record["status"] == "ok" else {}
+    return record | failed | {"damage": why}
+
+
+def digest(data: bytes) -> str:
+    """16 hex digits of a hash over the bytes of a file."""
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+@cache
+def digest_of_file(path: Path, *_: int) -> str:
+    """The same of a file that is there, once for every inode, size and time of change."""
+    return digest(path.read_bytes())
+
+
+def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -> Run:
+    """The run behind a line, its trajectory read back if it has one and it is wanted."""
+    record = as_found(folder, record)
+    trajectory = stored_trajectory(folder, record) if with_trajectory else None
+    return Run(
+        engine=record["engine"],
+        profile=record["profile"],
+        scenario=record["scenario"],
+        dt=record["dt_s"],
+        status=record["status"],
+        reason=record["reason"],
+        trajectory=trajectory,
+        seconds=record["seconds"],
+        settings={name: tuple(pair) for name, pair in record["settings"].items()},
+        versions=record["versions"],
+    )
+
+
+def stored_trajectory(folder: Path, record: dict[str, Any]) -> Trajectory | None:
+    """The samples that the run has of a cell, by its line `as_found`; None if it has none, or not what was written."""
+    whole = record["file"] and not record["damage"]
+    return load_trajectory(trajectory_file(folder, record["cell"])) if whole else None
+
+
+def trajectory_file(folder: Path, key: str) -> Path:
+    """Where the trajectory of the cell of that key is."""
+    return folder / "trajectories" / f"{key}.npz"
+
+
+def stored_scene(folder: Path, name: str) -> Path:
+    """Where the copy of the scene file of that name is."""
+    return folder / "scenes" / f"{name}.toml"
+
+
+def packed(trajectory: Trajectory, small: bool = False) -> bytes:
+    """An .npz with the arrays of `Trajectory`; its hits as collision_t, _i, _j, _impulse. A small one takes longer."""
+    arrays = {name: getattr(trajectory, name) for name in ("t", *STATE)}
+    hits = {key: getattr(trajectory.collisions, name) for name, key in HITS.items()}
+    file = io.BytesIO()
+    (np.savez_compressed if small else np.savez)(file, **arrays, **hits)
+    return file.getvalue()
+
+
+def load_trajectory(file: Path | BinaryIO) -> Trajectory:
+    """What `packed` put into a file."""
+    with np.load(file) as saved:
+        hits = Collisions(**{name: frozen(saved[key], saved[key].dtype) for name, key in HITS.items()})
+        t, position, velocity, angle, angular_velocity = (frozen(saved[name]) for name in ("t", *STATE))
+        return Trajectory(t, position, velocity, angle, angular_velocity, hits)
+
+
+def parts_of(state: State) -> list[np.ndarray]:
+    """The arrays of a state, as a trail holds them."""
+    return [np.ascontiguousarray(getattr(state, name), np.float64) for name in STATE]
+
+
+def from_trail(trail: bytes, scenario: Scenario) -> Trajectory | None:
+    """The samples whose `parts_of` a trail holds, without hits; None if it holds not even the start."""
+    n = scenario.scene.n
+    k = len(trail) // (6 * n * 8)
+    if not k:
+        return None
+    table = np.frombuffer(trail[: k * 6 * n * 8]).reshape(k, 6 * n)
+    position, velocity, angle, angular_velocity = np.split(table, [2 * n, 4 * n, 5 * n], axis=1)
+    return Trajectory(
+        t=scenario.times[:k],
+        position=frozen(position.reshape(k, n, 2)),
+        velocity=frozen(velocity.reshape(k, n, 2)),
+        angle=frozen(angle),
+        angular_velocity=frozen(angular_velocity),
+    )

@@ -1,0 +1,122 @@
+"""What commands are asked for, checked: scenes, engines, folders. Bad input is one clear message and exit 2."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from adapters.engines import ENGINES, OWN, read_row
+from adapters.own_solver.file import KINDS, NotASolver
+from reports.run.scenes import open_scene, with_steps
+from reports.terminal.exits import FolderTaken, refuse
+from scenarios.catalogue import SCENARIOS
+from scenarios.files.scene_file import SceneFileError
+
+
+@contextmanager
+def opening(out: Path) -> Iterator[None]:
+    """What opens the folder that a command makes: exits 2 if it may not, or cannot, be written or gone on with."""
+    try:
+        yield
+    except FolderTaken as fault:
+        refuse([str(fault)])
+    except ValueError as fault:
+        refuse([f"{fault}; name another --out, or delete it"])
+    except OSError as fault:
+        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
+
+
+@contextmanager
+def refusing(named: str) -> Iterator[None]:
+    """What reads the folder of a run: exits 2 with one line that begins with `named` if it cannot be used."""
+    try:
+        yield
+    except FolderTaken as fault:
+        refuse([str(fault)])
+    except OSError as fault:
+        refuse([": ".join(filter(None, [named, fault.filename, fault.strerror or str(fault)]))])
+    except (ValueError, KeyError) as fault:
+        refuse([f"{named}: the journal cannot be used: {fault}"])
+
+
+def checked_scenes(
+    scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int, files: Mapping[str, Path] | None = None
+) -> list[str]:
+    """The scenes asked for, once each; exits 2 with every fault of every scene, one line each.
+
+    `files`: what is read instead of a scene's path.
+    """
+    scenes = list(dict.fromkeys(scenes))
+    faults: list[str] = []
+    names: dict[str, str] = {}
+    for scene in scenes:
+        if not scene.endswith(".toml") and scene not in SCENARIOS:
+            faults.append(unknown("scenario", scene, SCENARIOS) + " (a scene file ends in .toml)")
+            continue
+        try:
+            name = with_steps(open_scene(str((files or {}).get(scene, scene)), seed), dts, full).name
+        except SceneFileError as error:
+            faults += error.faults
+        except ValueError as error:
+            faults.append(str(error))
+        else:
+            if name in names or (scene.endswith(".toml") and name in SCENARIOS):
+                faults.append(f"{scene}: name = {name!r}: taken by {names.get(name, 'a scenario of the catalogue')}")
+            names[name] = scene
+    if faults:
+        refuse(faults)
+    return scenes
+
+
+def checked_engines(asked: Sequence[str]) -> list[str]:
+    """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; if none is asked all."""
+    chosen, own, faults = set(), [], []
+    for name in asked:
+        if (file := Path(name.removesuffix(OWN))).suffix.lower() in KINDS:
+            own += [f"{file}{OWN}"]
+            faults += faults_of_file(file)
+            continue
+        matching = {row for row in ENGINES if name in (row, row.split(":")[0])}
+        if not matching:
+            faults.append(unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)}))
+        chosen |= matching
+    if faults:
+        refuse(faults)
+    return [row for row in ENGINES if row in chosen or not asked] + list(dict.fromkeys(own))
+
+
+def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> None:
+    """Go to the folder where a run was begun, if the file of one of its solvers is meant from there.
+
+    Raises:
+        FolderTaken: that folder is gone: a file of that name elsewhere is another one.
+        OSError: one may not go there.
+    """
+    meant = [name.removesuffix(OWN) for name in engines if name.endswith(OWN)]
+    near = [name for name in meant if not Path(name).is_absolute()]
+    if near and "folder" in header:
+        if not Path(header["folder"]).is_dir():
+            raise FolderTaken(f"{near[0]}: was in {header['folder']}, which is gone; put it there again")
+        os.chdir(header["folder"])
+
+
+def faults_of_file(file: Path) -> list[str]:
+    """Why a file cannot take part as an engine."""
+    if ":" in str(file):
+        return [f"{file}: has a colon in its path, which parts engine and profile; rename it"]
+    try:
+        read_row(f"{file}{OWN}")
+    except NotASolver as refusal:
+        return [str(refusal)]
+    return []
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> str:
+    """A sentence that names what is near."""
+    near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
+    hint = f"did you mean {' or '.join(near)}?" if near else "see: crosscheck list"
+    return f"{kind} {name!r} is not known; {hint}"

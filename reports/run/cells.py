@@ -1,0 +1,86 @@
+"""A cell: one scenario, one engine and profile, one dt, one seed; independent of every other."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Hashable
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.model import Scenario
+
+PLAYERS = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")  # wherever in these folders a file lies
+ROOT = Path(__file__).parents[2]
+DECIDING = ("pymunk", "box2d-py", "pyb2d3", "mini-racer", "numba", "numpy", "crosscheck2d")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What is played.
+
+    Attributes:
+        scene: a name of the catalogue, or the path of a scene file (ends in .toml).
+        seed: what a drawn scene is drawn from.
+        engine: `engine:profile`, or a solver's file as `PATH:own`.
+        substeps: steps in a sample interval.
+    """
+
+    scene: str
+    seed: int
+    engine: str
+    substeps: int
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Engine and profile."""
+        name, profile = self.engine.split(":")
+        return name, profile
+
+    def key(self, scene: str, source: str) -> str:
+        """Its `content_key`: `scene` is the `scene_hash` of what is played, `source` that of the engine's row."""
+        return content_key(scene, self.engine, source, self.substeps)
+
+
+def content_key(*what: Hashable) -> str:
+    """16 hex digits of a hash over what decides a result: `what`, the versions, the players' source.
+
+    No file but of this program is read here: what was read when the command began is in `what`, as `Row.source`.
+    """
+    return hashlib.sha256(repr((*what, versions(), source_hash())).encode()).hexdigest()[:16]
+
+
+def scene_hash(scenario: Scenario) -> str:
+    """16 hex digits of a hash over what is played: the scene, its thrusts, duration and sampling."""
+    digest = hashlib.sha256(repr((scenario.name, scenario.duration, scenario.sample_interval)).encode())
+    scene = scenario.scene
+    arrays = [scene.position, scene.velocity, scene.radius, scene.mass, scene.angle, scene.angular_velocity]
+    arrays += [scene.inertia, scene.walls, scene.gravity, np.array(scene.restitution)]
+    arrays += [scene.wrap] if scene.wrap is not None else []
+    for array in arrays:
+        digest.update(repr(array.shape).encode() + array.tobytes())
+    for t in scenario.thrusts:
+        digest.update(repr((t.disk, t.start, t.stop, t.force.tolist(), t.torque, t.frame)).encode())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Package -> version of all that decides a number; "missing" if it is not installed."""
+    found = {}
+    for package in DECIDING:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "missing"
+    return found
+
+
+@cache
+def source_hash(root: Path = ROOT) -> str:
+    """A hash over the players' source, so that a changed adapter is a changed cell."""
+    files = sorted(path for pattern in PLAYERS for path in root.glob(pattern))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]

@@ -1,0 +1,259 @@
+"""What changed between two runs: how cells ended, what their numbers are, how long they took."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Collection, Hashable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from reports.compare.comparison import COLUMNS
+from reports.compare.metrics import METRICS
+from reports.compare.view import NOT_JUDGED
+from reports.run.archive import Archive
+from reports.run.tables import is_sealed
+from reports.terminal.foreign_text import encoded
+
+# Measured on two cores under a load of 15 to 20 (no idler machine could be had), 3 scenes and --timings 5. 8 runs of
+# one build set against each other, 280 verdicts from 4200 ratios of rounds: "worse" 4 times, as often with a factor of
+# 1.1 as with 1.35; 8 times when the factor was the median of the ratios, for other work lengthens a round, but seldom
+# all of them. Every engine made half as slow again, 240 verdicts: the factor is above 1.25 in 227, but found are 118:
+# what fails under such a load is to be sure, which more rounds and more scenes mend.
+FACTOR = 1.25
+CONFIDENCE = 0.99
+WHOSE = ["scenario", "engine", "profile", "dt_s", "metric", "versus"]
+MACHINE = ("system", "architecture", "processor", "cores")
+
+
+class Change(NamedTuple):
+    """One thing that is not as it was: of which engine, what, before and after, and "better", "worse" or "other"."""
+
+    engine: str
+    what: str
+    before: str
+    after: str
+    verdict: str
+    factor: float = 1.0
+
+
+class Timing(NamedTuple):
+    """How much longer an engine takes.
+
+    Attributes:
+        engine: `engine:profile`.
+        factor: median over the cells of the least time after : before.
+        low, high: where the median of the `n` ratios lies, round by round.
+    """
+
+    engine: str
+    factor: float
+    low: float
+    high: float
+    n: int
+
+    @property
+    def verdict(self) -> str:
+        """ "worse" or "better" if it is both sure (the interval leaves out 1) and large (by `FACTOR`), else "same"."""
+        if self.low > 1 and self.factor > FACTOR:
+            return "worse"
+        return "better" if self.high < 1 and self.factor < 1 / FACTOR else "same"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What came out.
+
+    Attributes:
+        warnings: why the two may differ for other reasons than their engines.
+        statuses, numbers: what changed.
+        same: `engine:profile` -> how many numbers are the same, bit for bit.
+        timings: of the engines that were timed in both, if the machine is the same.
+    """
+
+    warnings: list[str]
+    statuses: list[Change]
+    numbers: list[Change]
+    same: Counter[str]
+    timings: list[Timing]
+
+    @property
+    def worse(self) -> int:
+        """How many things got worse."""
+        verdicts = [one.verdict for one in (*self.statuses, *self.numbers)] + [one.verdict for one in self.timings]
+        return verdicts.count("worse")
+
+
+def difference(before: Path, after: Path) -> Difference:
+    """Set two folders of runs against each other.
+
+    Raises:
+        ValueError: naming the folder that cannot be used, and what to do.
+    """
+    one, other = Archive.read(before), Archive.read(after)
+    warnings, like = warnings_of(one, other)
+    cells = by_name(one), by_name(other)
+    tables = table_of(before), table_of(after)
+    numbers, same = changed_numbers(*tables, equal_keys(*cells) if like else set())
+    statuses = changed_statuses(*cells) + changed_judgement(*tables, cells[0].keys() & cells[1].keys())
+    return Difference(warnings, statuses, numbers, same, timings_of(one, other, *cells) if like else [])
+
+
+def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
+    """What differs of machines, versions and completeness; and whether the machine is the same."""
+    before, after = one.header, other.header
+    said = [f"machine: {key}: {before['machine'][key]} before, {after['machine'][key]} after"
+            for key in MACHINE if before["machine"][key] != after["machine"][key]]  # fmt: skip
+    like = not said
+    for name in sorted({*before["versions"], *after["versions"]}):
+        versions = before["versions"].get(name, "missing"), after["versions"].get(name, "missing")
+        if versions[0] != versions[1]:
+            said.append(f"version: {name}: {versions[0]} before, {versions[1]} after")
+    if before["seed"] != after["seed"]:
+        said.append(f"seed: {before['seed']} before, {after['seed']} after")
+    said += [f"{archive.folder} is not complete" for archive in (one, other) if not archive.complete]
+    for archive in (one, other):
+        if damaged := [record["damage"] for record in archive.records if record["damage"]]:
+            more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+            said.append(f"{archive.folder}: trajectories/{damaged[0]}{more}; "
+                        f"crosscheck run --resume {archive.folder} plays it again")  # fmt: skip
+    return said, like
+
+
+def by_name(archive: Archive) -> dict[tuple, dict[str, Any]]:
+    """(scenario, `engine:profile` as the table has it, dt in s) -> the line of the cell."""
+    return {(r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r for r in archive.records}
+
+
+def equal_keys(before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]) -> set[tuple]:
+    """(scenario, `engine:profile`, dt in s) of the cells whose scene, settings and versions are the same."""
+    return {name for name in before if name in after and before[name]["cell"] == after[name]["cell"]}
+
+
+def changed_statuses(before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]) -> list[Change]:
+    """The cells that ended in another way, or were not played again: that is worse, too."""
+    changes = []
+    for name, record in before.items():
+        scenario, engine, dt = name
+        was, now = record["status"], after[name]["status"] if name in after else "not played"
+        if was != now:
+            verdict = "worse" if was == "ok" or now == "not played" else "better" if now == "ok" else "other"
+            changes.append(Change(engine, f"{scenario}  dt {dt:.4g} s  status", was, now, verdict))
+    return changes
+
+
+def changed_judgement(before: pd.DataFrame, after: pd.DataFrame, both: Collection[tuple]) -> list[Change]:
+    """Which cells, of those that `both` have, are not judged any more, or are now: of that only one has numbers."""
+    was, now = reasons(before), reasons(after)
+    changes = []
+    for cell, versus in sorted(was.keys() ^ now.keys()):
+        if cell in both:
+            scenario, engine, dt = cell
+            what, key = f"{scenario}  dt {dt:.4g} s  against {versus}: status", (cell, versus)
+            verdict = "worse" if key in now else "better"
+            changes.append(Change(engine, what, was.get(key, "judged"), now.get(key, "judged"), verdict))
+    return changes
+
+
+def reasons(table: pd.DataFrame) -> dict[tuple[tuple, str], str]:
+    """((scenario, `engine:profile`, dt in s), against what) -> why it is not judged."""
+    rows = table[(table.metric == "status") & table.note.str.startswith(NOT_JUDGED)].to_dict("records")
+    return {
+        ((r["scenario"], f"{r['engine']}:{r['profile']}", float(r["dt_s"])), str(r["versus"])): str(r["note"])
+        for r in rows
+    }
+
+
+def table_of(folder: Path) -> pd.DataFrame:
+    """deviations.csv as text: what is written the same has the same bits; raises `ValueError` if it is another one."""
+    path = folder / "deviations.csv"
+    try:
+        same, table = is_sealed(folder), pd.read_csv(path, dtype=str, keep_default_na=False)
+    except (OSError, ValueError) as fault:
+        why = getattr(fault, "strerror", None) or str(fault)
+        raise ValueError(f"{path}: {why}; make it: crosscheck report {folder}") from fault
+    columns = list(table.columns) == list(COLUMNS)
+    if not (columns and same):
+        why = "is not what was written" if columns else "its columns are not those of this version"
+        raise ValueError(f"{path}: {why}; make it again: crosscheck report {folder}")
+    return table
+
+
+def changed_numbers(before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]) -> tuple[list[Change], Counter[str]]:
+    """Every number that both tables have and that is not the same, and how many are, by engine.
+
+    The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric says what is better;
+    how far two engines are apart is neither, and so is a number that is judged in one of the two only.
+    """
+    both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
+    both["name"] = both.engine + ":" + both.profile
+    differs = both.value != both.value_after
+    changes = []
+    for row in both[differs].to_dict("records"):
+        was, now = (float(row[key] or "nan") for key in ("value", "value_after"))
+        must = all((row["scenario"], name, float(row["dt_s"])) in equal for name in players_of(row))
+        verdict = "worse" if must else verdict_of(row["metric"], row["versus"], was, now)
+        what = f"{row['scenario']}  dt {float(row['dt_s']):.4g} s  {row['metric']} against {row['versus']}"
+        note = " (same cell, other bits)" if must else ""
+        was_said, now_said = said_of(row["value"], row["note"]), said_of(row["value_after"], row["note_after"])
+        if NOT_JUDGED in (was_said, now_said):
+            verdict, note = "other", ""
+        changes.append(Change(row["name"], what + note, was_said, now_said, verdict, ratio(was, now)))
+    return changes, Counter(both[~differs].name)
+
+
+def said_of(value: str, note: str) -> str:
+    """A number as the table has it, or that too little carries it."""
+    return NOT_JUDGED if note.startswith(NOT_JUDGED) else value
+
+
+def players_of(row: Mapping[Hashable, Any]) -> list[str]:
+    """Who played for a number: an engine, or the two that are set against each other."""
+    return [row["name"]] + ([row["versus"]] if ":" in row["versus"] else [])
+
+
+def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
+    """Whether a number of an engine got better, by the row of the metric."""
+    better = METRICS[metric].better if metric in METRICS else ""
+    if ":" in versus or better in ("", "as stated"):
+        return "other"
+    if math.isnan(was) or math.isnan(now):
+        return "worse" if math.isnan(now) else "better"
+    worse = now < was if better == "higher" else abs(now) > abs(was)
+    return "worse" if worse else "better" if abs(now) != abs(was) else "other"
+
+
+def ratio(was: float, now: float) -> float:
+    """By how much a number grew or shrank, 1 or more; `inf` where there is no saying."""
+    small, large = sorted((abs(was), abs(now)))
+    return large / small if small > 0 and math.isfinite(large) else math.inf
+
+
+def timings_of(
+    one: Archive, other: Archive, before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]
+) -> list[Timing]:
+    """Of every engine the ratio after : before, over the cells that were timed in both, round by round."""
+    ratios: dict[str, list[float]] = {}
+    least: dict[str, list[float]] = {}
+    for name in before.keys() & after.keys():
+        rounds = [*zip(one.timings.get(before[name]["cell"], []), other.timings.get(after[name]["cell"], []))]
+        if rounds and min(min(rounds)) > 0:
+            was, now = (min(times) for times in zip(*rounds))
+            least.setdefault(name[1], []).append(now / was)
+            ratios.setdefault(name[1], []).extend(now / was for was, now in rounds)
+    return [timing(engine, sorted(ratios[engine]), float(np.median(least[engine]))) for engine in sorted(ratios)]
+
+
+def timing(engine: str, ratios: list[float], factor: float) -> Timing:
+    """The distribution-free interval of the median of sorted ratios, from order statistics (the sign test's)."""
+    n = len(ratios)
+    tail, k = 0.5**n, 0
+    while 2 * tail <= 1 - CONFIDENCE:
+        k += 1
+        tail += math.comb(n, k) * 0.5**n
+    low, high = (ratios[k - 1], ratios[n - k]) if k else (0.0, math.inf)
+    return Timing(engine, factor, low, high, n)

@@ -1,0 +1,206 @@
+"""Where a run goes: into OUT.part while it lasts, which takes the place of OUT when all is done."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+
+from reports.run.archive import Archive
+from reports.run.journal import JOURNAL, Busy, Journal
+from reports.run.made import Kind, Made, may_replace, may_write, put_made, read_made, stranger_in
+from reports.terminal.exits import FolderTaken, unbroken
+
+RUN = Kind(
+    "crosscheck run",
+    r"journal\.jsonl|trajectories/[0-9a-f]{16}\.npz|compared/([a-z0-9_-]+-[0-9a-f]{16}\.(npz|csv)|deviations\.digest)",
+    ("trajectories", "scenes", "compared"),
+)
+
+
+def part_of(out: Path) -> Path:
+    """Where a run into `out` is while it lasts."""
+    return out.parent / f"{out.name}.part"
+
+
+def place_of(out: Path, option: str = "--out") -> Path:
+    """The folder that is meant, links followed.
+
+    Raises:
+        FolderTaken: a link to nothing, that is not what an interrupted command has left of one.
+        OSError: there is no current folder any more.
+    """
+    place = Path(os.path.realpath(out))  # of a link to itself `resolve` makes an error of another kind
+    if out.is_symlink() and not out.exists() and not part_of(place).exists():
+        raise FolderTaken(f"{option} {out}: is a link to nothing; name a folder")
+    return place
+
+
+def open_part(out: Path, kind: Kind) -> Journal:
+    """The journal of what will be `out`, where that is while it is made; raises as `may_replace`, or `OSError`."""
+    part = part_of(out)
+    may_replace(out, kind)
+    may_write(part, kind)
+    part.mkdir(parents=True, exist_ok=True)
+    journal = held(part, out)
+    with given_back(journal):
+        begun(part, kind)
+    return journal
+
+
+def begun(part: Path, kind: Kind) -> None:
+    """Record in a folder that it is this program's, and not finished; what it has recorded before stays."""
+    made = read_made(part) or Made(kind.command, False, {})
+    put_made(part, made._replace(finished=False))
+
+
+@contextmanager
+def given_back(journal: Journal) -> Iterator[None]:
+    """Give the journal back as it is if what is first done with it fails."""
+    try:
+        yield
+    except BaseException:
+        journal.__exit__()
+        raise
+
+
+def open_new(out: Path) -> Journal:
+    """The journal of a new run into `out`; raises `FolderTaken`, or `OSError` where nothing can be written."""
+    journal = open_part(out, RUN)
+    part = journal.path.parent
+    with given_back(journal):
+        if had := ended_in(journal):
+            raise FolderTaken(
+                f"{part} holds an interrupted run, in which {had} cells have ended: to go on with it, crosscheck run "
+                f"--resume {out}; to begin anew, name another --out, or delete it"
+            )
+        os.truncate(journal.path, 0)
+    return journal
+
+
+def ended_in(journal: Journal) -> int:
+    """How many cells have ended in an interrupted run; raises `FolderTaken` if it is none, or cannot be read."""
+    part = journal.path.parent
+    try:
+        return len(Archive.read(part).records)
+    except ValueError as fault:
+        if len(journal.path.read_bytes().splitlines()) <= 1:  # nothing, or a header
+            return 0
+        raise FolderTaken(
+            f"{part} holds what is no run that can be gone on with ({fault}); name another --out"
+        ) from None
+
+
+def may_go_on(part: Path, had: int, fits: bool, resume: bool) -> None:
+    """Raise `FolderTaken` where `had` results of an interrupted command would be lost: not asked for, or none fits."""
+    holds = f"{part} holds {had} results of an interrupted run"
+    if had and not resume:
+        raise FolderTaken(
+            f"{holds}: to go on with it, ask again with --resume; to begin anew, name another --out, or delete it"
+        )
+    if had and not fits:
+        raise FolderTaken(
+            f"{holds} of something else: other scenes or cases, a scene file that has changed, with or without --full, "
+            "or other versions; name another --out, or delete it"
+        )
+
+
+def open_again(out: Path) -> Journal:
+    """The journal of a run into `out` that is to be completed, locked where it is; nothing is moved yet.
+
+    Raises:
+        FolderTaken: no run is there, or another process has it, or somebody else's files are there.
+        OSError: it cannot be opened.
+    """
+    part = part_of(out)
+    may_write(part, RUN, "--resume")
+    may_replace(out, RUN, "--resume")
+    if (part / JOURNAL).is_file():
+        return held(part, out)
+    if not (out / JOURNAL).is_file():
+        raise FolderTaken(f"--resume {out}: no run is there, neither finished nor interrupted ({part.name})")
+    return held(out, out)
+
+
+def reopened(journal: Journal, out: Path) -> None:
+    """Move a finished run to where it is while it is written; its journal stays locked meanwhile."""
+    part = part_of(out)
+    if journal.path.parent == out:
+        with unbroken():
+            out.rename(part)
+            journal.path = part / JOURNAL
+    begun(part, RUN)
+
+
+def held(folder: Path, out: Path) -> Journal:
+    """The journal of a folder, locked; raises `FolderTaken` if another process has it."""
+    try:
+        return Journal(folder)
+    except Busy:
+        raise FolderTaken(f"{out} is being written by another crosscheck; wait for it, or name another --out") from None
+
+
+def found(out: Path) -> Path:
+    """The folder of a run into `out`: itself, or where it is while it lasts; raises `FolderTaken` if there is none."""
+    for folder in (out, part_of(out)):
+        if (folder / JOURNAL).is_file():
+            return folder
+    raise FolderTaken(f"{out}: has no {JOURNAL}, so it is not the folder of a run")
+
+
+def replace_folder(made: Path, target: Path, kind: Kind) -> None:
+    """Put the finished folder `made` in the place of `target`, which is moved aside until that is done.
+
+    Raises:
+        FolderTaken: `target` is not what the command made alone, maybe since a moment ago; both stay as they are.
+        OSError: it cannot be moved; `target` is where it was.
+    """
+    may_replace(target, kind)
+    record = read_made(made)
+    assert record is not None
+    with unbroken():
+        put_made(made, record._replace(finished=True))
+        old = next(old for k in count() if not os.path.lexists(old := target.with_name(f"{target.name}.old{k or ''}")))
+        replaced = target.exists()
+        if replaced:
+            target.rename(old)
+        try:
+            made.rename(target)
+        except OSError:
+            if replaced:
+                old.rename(target)
+            raise
+        if replaced:
+            shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
+    """A folder beside `target` to write into: it takes the place of that when all is well, and else is gone.
+
+    Raises:
+        FolderTaken: as `may_replace`, before and after.
+        OSError: it cannot be made.
+    """
+    may_replace(target, kind, option)
+    part = target.with_name(f"{target.name}.part-{os.getpid()}")
+    part.mkdir(parents=True)
+    try:
+        begun(part, kind)
+        yield part
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
+    try:
+        replace_folder(part, target, kind)
+    except FolderTaken as fault:
+        raise FolderTaken(f"{fault}; what was made is in {part}") from None
+
+
+def discard(part: Path, kind: Kind) -> None:
+    """Delete what a command has made of no use, unless somebody has put something there."""
+    if not stranger_in(part, kind):
+        shutil.rmtree(part)

@@ -1,0 +1,190 @@
+"""What this program wrote: the record in a folder of its making, by which nothing that is somebody else's is replaced.
+
+A folder that a command makes holds `made.json`: the command, whether it is finished, and of every file but those
+whose name says enough the SHA-256 of what was written, or null while it is being written. Whatever else is in the
+folder, or in a folder inside it, is a stranger.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import stat
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from reports.run.journal import JOURNAL
+from reports.terminal.exits import FolderTaken
+from reports.terminal.foreign_text import is_part, put_text
+
+MADE = "made.json"
+HEAD = 4096  # bytes at the beginning of a file among which its mark is
+
+
+class Kind(NamedTuple):
+    """What a command makes.
+
+    Attributes:
+        command: that makes it.
+        named: pattern of the paths, from its folder, of files that nobody else would call so: those are not recorded.
+        folders: that are in it.
+    """
+
+    command: str
+    named: str = r"(?!)"
+    folders: tuple[str, ...] = ()
+
+    def names(self, path: str) -> bool:
+        """Whether the name of a file of it is enough to know it by."""
+        return re.fullmatch(self.named, path) is not None
+
+
+class Made(NamedTuple):
+    """made.json: the command, whether all that it makes is there, and path -> SHA-256, None while it is written."""
+
+    command: str
+    finished: bool
+    files: dict[str, str | None]
+
+
+def read_made(folder: Path) -> Made | None:
+    """The record of a folder; None if it has none that can be used."""
+    path = folder / MADE
+    try:
+        if not stat.S_ISREG(path.lstat().st_mode):
+            return None
+        made = Made(**json.loads(path.read_bytes()))
+    except (OSError, ValueError, TypeError):
+        return None
+    return made if isinstance(made.command, str) and isinstance(made.files, dict) else None
+
+
+def put_made(folder: Path, made: Made) -> None:
+    """Write the record of a folder, whole or not at all."""
+    put_text(folder / MADE, json.dumps(made._asdict(), indent=1) + "\n")
+
+
+def stranger_in(folder: Path, kind: Kind) -> str:
+    """What in a folder the command did not make, as the rest of a sentence; "" if there is nothing of the kind.
+
+    Raises:
+        OSError: what cannot be looked into.
+    """
+    made = read_made(folder)
+    if made is None:
+        inside = sorted(path.name for path in folder.iterdir() if not is_begun(path))
+        return f"holds {inside[0]}, and no {MADE} says that {kind.command} made it" if inside else ""
+    if made.command != kind.command:
+        return f"was made by {made.command}, not by {kind.command}"
+    for path in files_below(folder, kind.folders):
+        name = path.relative_to(folder).as_posix()
+        mode = path.lstat().st_mode
+        if not stat.S_ISREG(mode) or not (name == MADE or is_part(path) or kind.names(name) or name in made.files):
+            return f"holds {name}, which {kind.command} did not make"
+        if not as_written(path, made.files.get(name)):
+            return f"holds {name}, which is not as {kind.command} left it"
+    return ""
+
+
+def is_begun(path: Path) -> bool:
+    """Whether it is the journal of which not a line is written yet, all that is there before the record."""
+    about = path.lstat()
+    return path.name == JOURNAL and stat.S_ISREG(about.st_mode) and not about.st_size
+
+
+def files_below(folder: Path, folders: Sequence[str]) -> Iterator[Path]:
+    """All that is in a folder but `folders`, and in those, in order of their names; no link is followed."""
+    for path in sorted(folder.iterdir()):
+        if path.name in folders and stat.S_ISDIR(path.lstat().st_mode):
+            yield from files_below(path, ())
+        else:
+            yield path
+
+
+def as_written(path: Path, digest: str | None) -> bool:
+    """Whether a file has the bytes that were recorded, if any were."""
+    return digest is None or digest == digest_of(path)
+
+
+def digest_of(path: str | Path) -> str:
+    """SHA-256 of a file, 64 hex digits; "" if it cannot be read."""
+    with suppress(OSError), Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+    return ""
+
+
+@contextmanager
+def writing(folder: Path, names: Sequence[str]) -> Iterator[None]:
+    """Within it the files of these names are written: they are this program's, also if that is broken off.
+
+    A folder without a record, made before there was one, gets none.
+
+    Raises:
+        FolderTaken: one of them is there and not as this program left it.
+    """
+    made = read_made(folder)
+    if made is None:
+        yield
+        return
+    for name in names:
+        path = folder / name
+        if os.path.lexists(path) and (path.is_symlink() or name not in made.files):
+            raise FolderTaken(f"{folder}: holds {name}, which {made.command} did not make; {MOVE_IT}")
+        if path.exists() and not as_written(path, made.files[name]):
+            raise FolderTaken(f"{folder}: holds {name}, which is not as {made.command} left it; {MOVE_IT}")
+    put_made(folder, made._replace(files=made.files | dict.fromkeys(names)))
+    try:
+        yield
+    finally:  # also of what was refused, which has written nothing: the record is then what it was
+        written: dict[str, str | None] = {name: digest_of(folder / name) for name in names if (folder / name).exists()}
+        put_made(folder, made._replace(files=made.files | written))
+
+
+MOVE_IT = "move it to another folder, or delete it"
+
+
+def may_write(target: Path, kind: Kind, option: str = "--out") -> None:
+    """Raise `FolderTaken` unless `target`, named by `option`, is absent, empty, or made by the same command alone.
+
+    `OSError` if it cannot be looked into.
+    """
+    if target == Path.cwd() or target in Path.cwd().parents:
+        raise FolderTaken(f"{option} {target}: is where you are, or above it; name another folder, or go elsewhere")
+    if not os.path.lexists(target):
+        return
+    if target.is_symlink():
+        raise FolderTaken(f"{option} {target}: is a link; name a folder")
+    if not target.is_dir():
+        raise FolderTaken(f"{option} {target}: is a file; name a folder that does not exist yet")
+    if os.path.ismount(target):
+        raise FolderTaken(f"{option} {target}: is where a disk is mounted, and stays there; name a folder in it")
+    if stranger := stranger_in(target, kind):
+        raise FolderTaken(f"{option} {target}: {stranger}; name another folder, or move it elsewhere")
+
+
+def may_replace(target: Path, kind: Kind, option: str = "--out") -> None:
+    """Raise as `may_write`, and also if `target` holds what was interrupted: nothing that has ended is lost."""
+    may_write(target, kind, option)
+    made = read_made(target)
+    if made is not None and not made.finished:
+        whose = target.name.removesuffix(".part")
+        hint = f"to go on with it, name {target.with_name(whose)} to --resume" if whose != target.name else "delete it"
+        raise FolderTaken(f"{option} {target}: holds what {kind.command} has not finished; {hint}")
+
+
+def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
+    """Raise `FolderTaken` unless the file `path` is absent, a pipe or a device, or begins with the mark of our own.
+
+    `OSError` if it cannot be looked into, or its folder is not there.
+    """
+    if path.is_symlink() and not path.exists():
+        raise FolderTaken(f"{option} {path}: is a link to nothing; name another file")
+    if path.is_file():
+        with path.open("rb") as file:
+            if mark not in file.read(HEAD):
+                raise FolderTaken(f"{option} {path}: is there and no {what}; name another file")
+    path.parent.stat()

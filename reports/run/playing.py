@@ -1,0 +1,89 @@
+"""What a worker does with a cell. It imports little: a worker that has to be replaced is soon there again.
+
+The clock of a cell (--timeout) starts when its first step is due. Before, the engine is imported, compiled and loaded,
+which on a machine that plays it for the first time, and is busy, takes longer than most cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from typing import NamedTuple
+
+from adapters.conformance.conform import Finding, conform
+from adapters.conformance.probe import DT, plain
+from adapters.engine import Row
+from adapters.play import Run, play, unwatched
+from reports.run.archive import packed, parts_of
+from reports.run.cells import Cell, source_hash, versions
+from reports.run.worker_process import allow, leave
+from scenarios.model import Scenario, State
+
+LOADING = 300.0  # s to import, compile and load an engine: up to 30 idle, all of them the first time
+
+
+class Played(NamedTuple):
+    """What a worker sends back of a cell: the run, its trajectory packed into a file, and by what it was played."""
+
+    run: Run
+    samples: int
+    file: bytes
+    played_by: str
+
+
+def play_cell(cell: Cell, row: Row, scenario: Scenario, watch: Callable[[State], None] = unwatched) -> Run:
+    """Play a cell here and now; the engine is closed again, whatever happens."""
+    try:
+        engine = row.make()
+    except ImportError as missing:
+        reason = f"{missing.name or missing} cannot be imported: {missing}"
+        return Run(*cell.names, scenario.name, scenario.dt(cell.substeps), "unsupported", reason)
+    try:
+        return play(engine, cell.engine, scenario, scenario.dt(cell.substeps), watch)
+    finally:
+        engine.close()
+
+
+class Begun:
+    """What looks on while a cell is played: at the start, when the engine is loaded, the clock of the cell begins."""
+
+    def __init__(self, then: Callable[[State], None] = unwatched) -> None:
+        self.begun, self.then = False, then
+
+    def __call__(self, state: State) -> None:
+        """Start the clock once, then do what is to be done with every state."""
+        if not self.begun:
+            self.begun = True
+            allow()
+        self.then(state)
+
+
+def play_here(cell: Cell, row: Row, scenario: Scenario) -> Played:
+    """In the worker: play, leave every good state behind, and send back the run with its trajectory packed."""
+    allow(LOADING)
+    run = play_cell(cell, row, scenario, Begun(lambda state: leave(parts_of(state))))
+    file, samples = (packed(run.trajectory), len(run.trajectory)) if run.trajectory else (b"", 0)
+    return Played(replace(run, trajectory=None), samples, file, player())
+
+
+def time_here(cell: Cell, row: Row, scenario: Scenario) -> float:
+    """In the worker: s inside the engine's `step`."""
+    allow(LOADING)
+    return play_cell(cell, row, scenario, Begun()).seconds
+
+
+def conform_here(name: str, row: Row) -> list[Finding]:
+    """In the worker: what the probes find; before their clock starts the engine is loaded once, and so compiled."""
+    allow(LOADING)
+    with suppress(Exception):  # which the probes will meet again, and say
+        engine = row.make()
+        engine.load(plain(), DT)
+        engine.close()
+    allow()
+    return conform(name, row)
+
+
+def player() -> str:
+    """By which source and versions this process plays."""
+    return repr((versions(), source_hash()))

@@ -1,0 +1,71 @@
+"""Scenes as they are asked for: by name or as a file, with the steps asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from reports.run.archive import stored_scene
+from reports.run.cells import scene_hash
+from reports.run.journal import JOURNAL
+from reports.terminal.exits import Unusable
+from scenarios.catalogue import SCENARIOS
+from scenarios.catalogue import scenario as from_catalogue
+from scenarios.files.scene_file import read_scene_file
+from scenarios.files.tables import MOST_STEPS
+from scenarios.model import Scenario
+
+
+def open_scene(scene: str, seed: int) -> Scenario:
+    """A scenario by catalogue name or file path; raises `KeyError` or `SceneFileError`."""
+    return read_scene_file(Path(scene)) if scene.endswith(".toml") else from_catalogue(scene, seed)
+
+
+def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
+    """What was played, by the line of a cell in the run of `folder`; raises `Unusable` if it does not fit its scene."""
+    scene = record["scene"] if record["scene"] in SCENARIOS else str(stored_scene(folder, record["scenario"]))
+    scenario = open_scene(scene, record["seed"])
+    if scene_hash(scenario) != record["scene_hash"]:
+        raise Unusable(
+            f"{scenario.name} is not the scene any more that was played; crosscheck run --resume plays it again"
+        )
+    must_fit(folder, scenario, record)
+    return scenario
+
+
+def must_fit(folder: Path, scenario: Scenario, record: dict[str, Any]) -> None:
+    """Raise `Unusable` if the line of a cell is not one of that scenario."""
+    for name, value in {"scenario": scenario.name, "dt_s": scenario.dt(record["substeps"])}.items():
+        if record[name] != value:
+            raise Unusable(
+                f"{folder / JOURNAL}: the line of the cell {record['cell']}: {name} = {record[name]!r}: must be "
+                f"{value!r}, that of {record['scene']} with {record['substeps']} substeps; delete that line"
+            )
+
+
+def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario:
+    """The scenario with the dt ladder asked for: `dts` in s instead of its own, two finer steps if `full`.
+
+    Raises:
+        ValueError: naming the scenario and the dt that does not divide its sample interval, or is too small.
+    """
+    ladder, interval = tuple(scenario.substeps), scenario.sample_interval
+    most = MOST_STEPS // scenario.samples
+    for dt in dts:
+        if dt > 0 and interval / dt > most + 0.5:  # the nearest whole number is more
+            raise ValueError(f"--dt {dt:g} gives {scenario.name} more than {MOST_STEPS} steps: allowed is "
+                             f"{interval / most:.12g} s or more")  # fmt: skip
+        k = round(interval / dt) if dt > 0 else 0
+        if k < 1 or abs(k * dt / interval - 1) > 1e-9:
+            # Twelve digits: fewer may be another step than the one they stand for, and refused as this one is.
+            raise ValueError(
+                f"--dt {dt:.12g} does not fit {scenario.name}: allowed is its sample interval "
+                f"{interval:.12g} s divided by a whole number, e.g. {scenario.dt(ladder[-1]):.12g}"
+            )
+    if dts:
+        ladder = tuple(sorted({round(scenario.sample_interval / dt) for dt in dts}))
+    if full:
+        ladder += (ladder[-1] * 2, ladder[-1] * 4)
+    return replace(scenario, substeps=ladder)

@@ -1,0 +1,300 @@
+"""The main job: play scenarios through engines into a folder, each cell once, and keep every result as it comes."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from adapters.conformance.conform import no_answer
+from adapters.engine import Row
+from adapters.play import Run
+from reports.run.archive import Archive, digest, from_trail, packed, stored_scene, trajectory_file
+from reports.run.cells import Cell, content_key, scene_hash
+from reports.run.folders import RUN
+from reports.run.journal import Journal, plain
+from reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
+from reports.run.machine import about
+from reports.run.made import writing
+from reports.run.playing import Played, conform_here, play_here, player, time_here
+from reports.run.runner import TIMEOUT, run_all
+from reports.run.scenes import open_scene, with_steps
+from reports.run.shares import Gathering
+from reports.run.worker_process import Failure
+from reports.terminal.foreign_text import put_bytes, put_text
+from reports.terminal.progress import Progress
+from scenarios.files.scene_file import scene_text
+from scenarios.model import Scenario
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is asked for: all that decides which numbers come out.
+
+    Attributes:
+        scenes: names of the catalogue or paths of scene files, in reading order.
+        engines: `engine:profile`, or a solver's file as `PATH:own`, -> its row, in reading order.
+        seed: what drawn scenes are drawn from.
+        dts: step sizes in s instead of each scenario's own; empty: its own.
+        full: two finer steps for every scenario.
+        timings: rounds of timings after all is played.
+        command: how to ask for the same again.
+        folder: where it was asked for, from where paths that are not absolute are meant.
+        files: what is read instead of a scene's path, such as the copy of a file that is gone.
+    """
+
+    scenes: Sequence[str]
+    engines: Mapping[str, Row]
+    seed: int
+    dts: Sequence[float]
+    full: bool
+    timings: int
+    command: str
+    folder: str = field(default_factory=os.getcwd)
+    files: Mapping[str, Path] = field(default_factory=dict)
+
+    def scenario(self, scene: str) -> Scenario:
+        """The scenario behind one of `scenes`, with the steps asked for."""
+        return with_steps(open_scene(str(self.files.get(scene, scene)), self.seed), self.dts, self.full)
+
+    def header(self) -> dict[str, Any]:
+        """What the journal begins with, and `Plan` is made from again when a run is resumed."""
+        asked = {name: list(getattr(self, name)) for name in ("scenes", "engines", "dts")}
+        same = {name: getattr(self, name) for name in ("full", "timings", "folder")}
+        return about(self.command, self.seed) | asked | same
+
+
+@dataclass(frozen=True)
+class Means:
+    """With what a plan is carried out; decides no number.
+
+    Attributes:
+        workers: processes that play at once.
+        timeout: s a cell may take, and the exact answer to a scene.
+        memory: bytes a worker may take; 0: no limit.
+        scheduler: address of the dask scheduler whose workers play; "": this machine.
+    """
+
+    workers: int
+    timeout: float = TIMEOUT
+    memory: int = 0
+    scheduler: str = ""
+
+
+class OtherVersions(Exception):
+    """Workers on another machine do not play by the same source and versions."""
+
+
+def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) -> None:
+    """Put the probes to every engine and play every cell that the journal does not have; all goes into its folder."""
+    folder = journal.path.parent
+    scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
+    tasks = tasks_of(plan, scenarios)
+    begin(plan, journal, scenarios, len(tasks))
+    archive = Archive.read(folder)
+    done = had(archive, plan, means, scenarios)
+    missing = {task: work for task, work in tasks.items() if task not in done}
+    cells = [task for task in missing if isinstance(task, Cell)]
+    alone = {cell for cell in cells if plan.engines[cell.engine].leaves_state}
+    gathering = Gathering(archive, cells, means.timeout)
+    comparing: deque[Any] = deque(gathering.whole())
+    progress.start(len(missing), len(tasks))
+    limits = means.timeout, means.memory
+    if gathering.asked and not missing:
+        progress.say(waiting_for(gathering.asked))
+    with closing(run_all(missing, means.workers, *limits, means.scheduler, alone, comparing)) as results:
+        for task, result in results:
+            if isinstance(task, Cell):
+                key = task.key(scene_hash(scenarios[task.scene]), plan.engines[task.engine].source)
+                line = keep_cell(journal, scenarios[task.scene], means, task, key, result)
+                said = f"{line['scenario']}  {task.engine}  dt {line['dt_s']:.4g} s"
+                progress.done(said, line["status"], line["reason"])
+                comparing.extend(gathering.ended(line))
+            elif isinstance(task, Path):
+                comparing.extend(gathering.came(task, result))
+            else:
+                progress.done(*keep_answer(journal, plan, task, result))
+            if gathering.asked and not gathering.playing:
+                progress.say(waiting_for(gathering.asked))
+    archive = Archive.read(folder)
+    take_timings(archive, plan, means, journal, scenarios, progress)
+    sweep(archive)
+    journal.append({"footer": {"tasks": len(tasks), "played": len(missing), "seconds": progress.seconds}})
+
+
+def waiting_for(scenes: Sequence[str]) -> str:
+    """What is still to come when all is played."""
+    more = f" and {len(scenes) - 1} more" if len(scenes) > 1 else ""
+    return f"the exact answer to {Path(scenes[0]).stem}{more}"
+
+
+def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
+    """Make the folders, copy the scene files, write the header to the journal and to machine.json."""
+    folder = journal.path.parent
+    for name in ("trajectories", "scenes", "compared"):
+        (folder / name).mkdir(exist_ok=True)
+    named = {scene: scenarios[scene].name for scene in plan.scenes if scene.endswith(".toml")}
+    copies = {
+        copy: scene_text(scenarios[scene])
+        for scene, name in named.items()
+        if (copy := stored_scene(folder, name)) != plan.files.get(scene)  # else it is what is left of the file
+    }
+    header = plan.header() | {"tasks": tasks, "names": named}
+    about_it = folder / "machine.json"
+    with writing(folder, [path.relative_to(folder).as_posix() for path in (*copies, about_it)]):
+        for path, text in copies.items():
+            put_text(path, text)
+        put_text(about_it, json.dumps(plain(header), indent=2) + "\n")
+    journal.append({"header": header})
+
+
+def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
+    """What is to be done, by what it is: an engine's name (its probes), a `KnownAnswer`, or a `Cell`."""
+    tasks: dict[Any, Callable[[], Any]] = {name: partial(conform_here, name, row) for name, row in plan.engines.items()}
+    if KNOWN_SCENE in plan.scenes:
+        tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
+    for scene, scenario in scenarios.items():
+        question = replace(scenario, truth=None)  # the answer stays with the judge
+        for name, row in plan.engines.items():
+            for cell in (Cell(scene, plan.seed, name, k) for k in scenario.substeps):
+                tasks[cell] = partial(play_here, cell, row, question)
+    return tasks
+
+
+def had(archive: Archive, plan: Plan, means: Means, scenarios: Mapping[str, Scenario]) -> set[Any]:
+    """The tasks of which the journal has the result, by the same scene, settings and versions.
+
+    What was stopped for time is had only if it would be stopped now; not what has lost its trajectory; and what failed
+    for a reason outside the engine is no result.
+    """
+    keys = {line["of"]: line["key"] for line in (*archive.conformance.values(), *archive.known_answers)}
+    asked: tuple[KnownAnswer | str, ...] = (*plan.engines, *KNOWN_ANSWERS)
+    done: set[Any] = {task for task in asked if keys.get(name_of(task)) == answer_key(plan, task)}
+    hashes = {scene: scene_hash(scenario) for scene, scenario in scenarios.items()}
+    for record in archive.records:
+        cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", record["substeps"])
+        if cell.scene not in hashes or cell.engine not in plan.engines:
+            continue
+        stopped = record["status"] == "timeout" and record["timeout_s"] < means.timeout
+        lost = record["damage"]  # its trajectory is gone, or not what was written
+        same = record["cell"] == cell.key(hashes[cell.scene], plan.engines[cell.engine].source)
+        if same and not (stopped or lost or record["outside"]):
+            done.add(cell)
+    return done
+
+
+def name_of(task: KnownAnswer | str) -> str:
+    """How the journal calls the probes of an engine, or a known answer."""
+    return task if isinstance(task, str) else repr(task)
+
+
+def answer_key(plan: Plan, task: KnownAnswer | str) -> str:
+    """The `content_key` of the probes of an engine, or of a known answer."""
+    return content_key(name_of(task), plan.engines[task].source if isinstance(task, str) else "")
+
+
+def keep_answer(journal: Journal, plan: Plan, task: KnownAnswer | str, result: Any) -> tuple[str, str, str]:
+    """Write what a known answer, or the probes of an engine, gave; returns what to say of it, its status, and why."""
+    failure = result if isinstance(result, Failure) else None
+    status, reason = (failure.status, failure.reason) if failure else ("ok", "")
+    if isinstance(task, KnownAnswer):
+        line: dict[str, Any] = {"known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}}
+        said = f"known answer: {task.column} at dt {task.dt_s:g} s"
+    else:
+        findings = [no_answer(task, status, reason)] if failure else result
+        line = {"conformance": [asdict(finding) for finding in findings]}
+        said = f"conformance of {task}"
+    # A key that is nobody's: what failed for a reason outside the engine is asked again.
+    key = "" if failure and failure.outside else answer_key(plan, task)
+    journal.append(line | {"of": name_of(task), "key": key})
+    return said, status, reason
+
+
+def keep_cell(
+    journal: Journal, scenario: Scenario, means: Means, cell: Cell, key: str, result: Played | Failure
+) -> dict[str, Any]:
+    """Write the trajectory of the cell of that `key`, then its line, which is returned."""
+    played = failed(cell, scenario, result) if isinstance(result, Failure) else result
+    run, samples = played.run, played.samples
+    if played.played_by != player():
+        raise OtherVersions("a worker has other versions or other source of the players than this machine")
+    path = trajectory_file(journal.path.parent, key)
+    if played.file:
+        put_bytes(path, played.file)
+    record = {
+        "cell": key,
+        "scene_hash": scene_hash(scenario),
+        "scene": cell.scene,
+        "seed": cell.seed,
+        "substeps": cell.substeps,
+        "scenario": run.scenario,
+        "engine": run.engine,
+        "profile": run.profile,
+        "dt_s": run.dt,
+        "status": run.status,
+        "reason": run.reason,
+        "step": (samples - 1) * cell.substeps if samples else -1,
+        "until_s": float(scenario.times[samples - 1]) if samples else float("nan"),
+        "seconds": run.seconds,
+        "timeout_s": means.timeout,
+        "outside": isinstance(result, Failure) and result.outside,
+        "file": digest(played.file) if played.file else "",
+        "settings": run.settings,
+        "versions": run.versions,
+    }
+    journal.append(record)
+    return record
+
+
+def failed(cell: Cell, scenario: Scenario, failure: Failure) -> Played:
+    """What is left of a cell whose worker died or was stopped: the states up to then."""
+    trajectory = from_trail(failure.trail, scenario)
+    samples = len(trajectory) if trajectory else 0
+    last = (
+        f"; last good state: step {(samples - 1) * cell.substeps}, {scenario.times[samples - 1]:g} s" if samples else ""
+    )
+    run = Run(*cell.names, scenario.name, scenario.dt(cell.substeps), failure.status, failure.reason + last)
+    return Played(run, samples, packed(trajectory) if trajectory else b"", player())
+
+
+def take_timings(
+    archive: Archive,
+    plan: Plan,
+    means: Means,
+    journal: Journal,
+    scenarios: Mapping[str, Scenario],
+    progress: Progress,
+) -> None:
+    """Time the middle step of every scenario on every engine that played it, round by round, nothing beside it."""
+    tasks: dict[Any, Callable[[], Any]] = {}
+    for turn in range(plan.timings):
+        for record in archive.records:
+            scenario = scenarios[record["scene"]]
+            middle = scenario.substeps[len(scenario.substeps) // 2]
+            name = f"{record['engine']}:{record['profile']}"
+            timed = len(archive.timings.get(record["cell"], []))
+            if record["status"] == "ok" and record["substeps"] == middle and turn >= timed:
+                cell = Cell(record["scene"], record["seed"], name, middle)
+                tasks[turn, record["cell"]] = partial(
+                    time_here, cell, plan.engines[name], replace(scenario, truth=None)
+                )
+    progress.start(len(tasks), len(tasks), "taking timings, one after the other")
+    with closing(run_all(tasks, 1, means.timeout, means.memory)) as results:
+        for (turn, key), seconds in results:
+            if not isinstance(seconds, Failure):
+                journal.append({"timing": key, "round": turn, "seconds": seconds})
+            progress.done(f"timings, round {turn + 1} of {plan.timings}")
+
+
+def sweep(archive: Archive) -> None:
+    """Delete the trajectories that no line of the journal speaks of any more."""
+    spoken_of = {record["cell"] for record in archive.records}
+    for path in (archive.folder / "trajectories").iterdir():
+        if path.stem not in spoken_of and RUN.names(f"trajectories/{path.name}"):
+            path.unlink()

@@ -1,0 +1,205 @@
+"""The tables of a run, made from its journal scenario by scenario; what has been compared is not compared again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence, Set
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pandas as pd
+
+from reports.compare.comparison import Comparison, answered
+from reports.run.answers import Answer, read_answer
+from reports.run.archive import Archive, digest, run_of
+from reports.run.folders import RUN
+from reports.run.journal import JOURNAL
+from reports.run.runner import run_all
+from reports.run.shares import (
+    ANSWER,
+    PATHS,
+    Gathering,
+    Records,
+    answer_file,
+    csv_of,
+    in_order,
+    kept_share,
+    name_of,
+    not_judged,
+    read_share,
+    scenario_of,
+    share_file,
+)
+from reports.run.worker_process import Failure
+from reports.terminal.foreign_text import encoded, is_part, put_text, whole
+
+TABLES = ("deviations.csv", "runs.csv")
+
+
+class Tables(NamedTuple):
+    """What was made.
+
+    Attributes:
+        runs: runs.csv.
+        answers: scene -> its exact answer, as it was had or not.
+        shares: scene -> where its share of deviations.csv is.
+        unkept: scene -> its comparison, of which no share is kept: it could not be made, or a file is gone or torn.
+        unjudged: name of a scene -> why it is not held to its answer, or not compared at all, though it should be.
+    """
+
+    runs: pd.DataFrame
+    answers: dict[str, Answer]
+    shares: dict[str, Path]
+    unkept: dict[str, Comparison]
+    unjudged: dict[str, str]
+
+
+def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
+    """Write deviations.csv and runs.csv; what was compared before and has not changed is not compared again.
+
+    Raises:
+        ValueError: no cell has ended, or a scene is not the one that was played.
+    """
+    by_scene, folder = ordered(archive), archive.folder
+    if not by_scene:
+        raise ValueError(f"{folder / JOURNAL}: no cell has ended yet, so there is nothing to report")
+    gathering = compare_missing(archive, by_scene, say)
+    answers = {scene: read_answer(answer_file(folder, records)) for scene, records in by_scene.items()}
+    had = {scene: answer for scene, answer in answers.items() if answer is not None}
+    assert len(had) == len(by_scene)
+    shares = {scene: share_file(folder, records, had[scene]) for scene, records in by_scene.items()}
+    unkept = {scene: unkept_comparison(folder, by_scene[scene], had[scene], share)
+              for scene, share in (gathering.unkept | gathering.failed).items()}  # fmt: skip
+    unjudged = {by_scene[scene][0]["scenario"]: answer.lost for scene, answer in had.items() if answer.lost}
+    unjudged |= {unkept[scene].scenario.name: not_compared(failure) for scene, failure in gathering.failed.items()}
+    say("writing the tables")
+    write_deviations(folder, shares, unkept)
+    had_from = {answer_file(folder, records) for records in by_scene.values()}
+    sweep(folder / "compared", {*shares.values(), *had_from, seal_of(folder)})
+    runs = table_of_runs([record for records in by_scene.values() for record in records], archive, unkept)
+    put_text(folder / "runs.csv", runs.to_csv(index=False))
+    return Tables(runs, had, shares, unkept, unjudged)
+
+
+def compare_missing(archive: Archive, by_scene: Mapping[str, Records], say: Callable[[str], None]) -> Gathering:
+    """Have the answers and make the shares that are not kept, in worker processes, each within its time."""
+    (archive.folder / "compared").mkdir(exist_ok=True)
+    # As much time as the cells had: it is the same option.
+    gathering = Gathering(archive, [], max(record["timeout_s"] for record in archive.records))
+    tasks = deque(gathering.whole())
+    for records in by_scene.values():
+        scenario_of(archive.folder, records)  # a scene that is another one now is found here
+    with closing(run_all({}, os.cpu_count() or 1, gathering.timeout, urgent=tasks)) as results:
+        for path, result in results:
+            name = by_scene[gathering.scenes[path]][0]["scenario"]
+            say(f"{'answered' if path.suffix == ANSWER else 'compared'}: {name}")
+            tasks.extend(gathering.came(path, result))
+    return gathering
+
+
+def not_compared(failure: Failure) -> str:
+    """Why a scene is not compared."""
+    if failure.status == "timeout":
+        return f"the comparison took too long: {failure.reason}"
+    return f"the comparison could not be made: {failure.status}: {failure.reason}"
+
+
+def unkept_comparison(folder: Path, records: Records, answer: Answer, share: bytes | Failure) -> Comparison:
+    """What can be shown of a scene of which no share is kept; what could not be compared is held to no answer."""
+    runs = [run_of(folder, record) for record in records]
+    scenario = scenario_of(folder, records)
+    if isinstance(share, bytes):
+        scenario, truth = answered(answer.given_to(scenario))
+        return Comparison(scenario, truth, runs, read_share(share))
+    why = not_compared(share)
+    scenario = replace(scenario, truth=None, without_truth=why)
+    return Comparison(scenario, None, runs, not_judged(runs, why, "itself"))
+
+
+def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
+    """The comparisons in reading order; only the runs at the middle dt hold their trajectories: no other is drawn."""
+    comparisons = []
+    for scene, records in ordered(archive).items():
+        if scene in tables.unkept:
+            comparisons.append(tables.unkept[scene])
+            continue
+        scenario, truth = answered(tables.answers[scene].given_to(scenario_of(archive.folder, records)))
+        middle = scenario.substeps[len(scenario.substeps) // 2]
+        runs = [run_of(archive.folder, record, with_trajectory=record["substeps"] == middle) for record in records]
+        comparisons.append(Comparison(scenario, truth, runs, read_share(kept_share(tables.shares[scene]))))
+    return comparisons
+
+
+def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
+    """Scene -> the lines of its cells, in the order of scenes and engines that was asked for, coarse dt first."""
+    by_scene: dict[str, list[dict[str, Any]]] = {scene: [] for scene in archive.header["scenes"]}
+    for record in archive.records:
+        by_scene[record["scene"]].append(record)
+    players = archive.header["engines"]
+    return {scene: in_order(records, players) for scene, records in by_scene.items() if records}
+
+
+def write_deviations(folder: Path, shares: Mapping[str, Path], unkept: Mapping[str, Comparison]) -> None:
+    """Put the scenes' shares one after the other into deviations.csv, and its digest beside them."""
+    all_of_it = hashlib.sha256()
+    with whole(folder / "deviations.csv") as file:
+        for number, (scene, share) in enumerate(shares.items()):
+            csv = csv_of(unkept[scene].table) if scene in unkept else kept_share(share)
+            rows = csv.partition(b"\n")[2] if number else csv  # the names of the columns once
+            text = encoded(rows.decode(errors=PATHS))
+            all_of_it.update(text)
+            file.write(text)
+    put_text(seal_of(folder), all_of_it.hexdigest()[:16])
+
+
+def seal_of(folder: Path) -> Path:
+    """Where the digest of deviations.csv is kept: `diff` believes no other table."""
+    return folder / "compared" / "deviations.digest"
+
+
+def is_sealed(folder: Path) -> bool:
+    """Whether deviations.csv is as it was written."""
+    return seal_of(folder).read_bytes() == digest((folder / "deviations.csv").read_bytes()).encode()
+
+
+def sweep(folder: Path, kept: Set[Path]) -> None:
+    """Delete the answers and shares that are of something else, and nothing that is no answer or share."""
+    for other in set(folder.iterdir()) - kept:
+        if is_part(other) or RUN.names(f"{folder.name}/{other.name}"):
+            other.unlink()
+
+
+def settled(name: str, pair: Sequence[Any]) -> str:
+    """A setting, what was asked for, and what the engine then has, as runs.csv has it."""
+    asked, used = pair
+    return f"{name}: asked {'default' if asked is None else asked}, used {used}"
+
+
+def table_of_runs(
+    records: Sequence[dict[str, Any]], archive: Archive, unkept: Mapping[str, Comparison]
+) -> pd.DataFrame:
+    """A row a cell: what was played, how it ended, how long the engine took, with which settings and versions."""
+    found = {
+        (run.scenario, run.name, run.dt): {"status": run.status, "reason": run.reason}
+        for comparison in unkept.values()
+        for run in comparison.runs
+    }
+    columns = [
+        "scenario", "engine", "profile", "dt_s", "seed", "status", "reason", "step", "until_s", "seconds", "cell",
+    ]  # fmt: skip
+    rows = [
+        {name: record[name] for name in columns}
+        | found.get((record["scenario"], name_of(record), record["dt_s"]), {})
+        | {
+            "until_s": float(record["until_s"]),
+            "seconds_alone": min(archive.timings.get(record["cell"], [float("nan")])),
+            "settings": "; ".join(map(settled, record["settings"], record["settings"].values())),
+            "versions": "; ".join(f"{name} {version}" for name, version in record["versions"].items()),
+        }
+        for record in records
+    ]
+    return pd.DataFrame(rows, columns=[*columns, "seconds_alone", "settings", "versions"])

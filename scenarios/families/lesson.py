@@ -1,0 +1,97 @@
+"""The scenes of the lesson "Simple body dynamics": a body, its flight, a boundary, a box of falling disks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenarios.families.placing import box, lay_out, scatter
+from scenarios.model import Array, Scenario, Trajectory
+from scenarios.truth.closed_forms import answer, flight, to_and_fro
+from scenarios.truth.exact import with_oracle
+
+SOURCE = 'the lesson "Simple body dynamics"'
+
+
+def free_fall() -> Scenario:
+    """One spinning disk, thrown."""
+    scene = lay_out(
+        position=[[-4.0, 1.0]],
+        velocity=[[3.0, 7.0]],
+        angle=[0.5],
+        angular_velocity=[2.0],
+        radius=[0.25],
+        mass=[2.0],
+        gravity=[0.0, -9.81],
+        restitution=1.0,
+    )
+
+    def truth(t: Array) -> Trajectory:
+        return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity, scene.gravity))
+
+    return Scenario(
+        name="free_fall",
+        asks="How far off the parabola does a thrown disk fly?",
+        source=f"{SOURCE}, part 3; x + v t + g t2 / 2",
+        scene=scene,
+        duration=1.5,
+        sample_interval=1 / 60,
+        truth=truth,
+    )
+
+
+def ping_pong() -> Scenario:
+    """One disk between y = 1 and y = 11 at speed 1: a period of 20 s."""
+    radius, low, high = 0.25, 1.0, 11.0
+    scene = lay_out(
+        position=[[0.0, 6.3213]],
+        velocity=[[0.0, 1.0]],
+        radius=[radius],
+        mass=[1.0],
+        walls=[[[-5, low - radius], [5, low - radius]], [[-5, high + radius], [5, high + radius]]],
+        restitution=1.0,
+    )
+
+    def truth(t: Array) -> Trajectory:
+        legs = to_and_fro(scene.position[0, 1] - low, 1.0, high - low, 1.0, t[-1])
+        y, speed = legs.at(t)
+        position, velocity = (np.stack([np.zeros_like(y), a], axis=-1)[:, None] for a in (y + low, speed))
+        return answer(scene, t, (position, velocity), legs.wall_hits(0, (1, 0), 1.0, 1.0))
+
+    return Scenario(
+        name="ping_pong",
+        asks="Does a disk that ping-pongs between two walls keep its speed and its period of 20 s?",
+        source=f"{SOURCE}, part 2",
+        scene=scene,
+        duration=40.0,
+        sample_interval=1 / 30,
+        truth=truth,
+    )
+
+
+def falling_box(seed: int = 0) -> Scenario:
+    """Thirty small disks at random places in a unit box, falling."""
+    rng = np.random.default_rng(seed)
+    radius = np.full(30, 0.03)
+    position = scatter(rng, [0.03, 0.03], [0.97, 0.97], radius)
+    scene = lay_out(
+        position=position,
+        velocity=rng.uniform(-1, 1, (30, 2)),
+        radius=radius,
+        mass=np.ones(30),
+        walls=box([0, 0], [1, 1]),
+        gravity=[0.0, -9.81],
+        restitution=0.95,
+    )
+    question = Scenario(
+        name="falling_box",
+        asks="Do thirty disks that fall in a box stay inside it and apart, and lose energy only by hits?",
+        source=f"{SOURCE}, parts 3 and 4, in two dimensions",
+        scene=scene,
+        duration=2.0,
+        sample_interval=1 / 60,
+        seed=seed,
+    )
+    return with_oracle(question)
+
+
+LESSON = (free_fall, ping_pong, falling_box)

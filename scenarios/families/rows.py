@@ -1,0 +1,140 @@
+"""Disks on one line that hit each other in turn: the line gas, Galperin's billiard, the cradle."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from scenarios.families.placing import lay_out
+from scenarios.model import Array, Scenario, Scene, Trajectory
+from scenarios.truth.closed_forms import Motion, answer
+from scenarios.truth.exact import with_oracle
+from scenarios.truth.lines import galperin, galperin_hits, row, row_hits
+
+EPS = float(np.finfo(float).eps)
+
+
+def _on_line(x: Array, v: Array) -> Motion:
+    """(..., 2) m, m/s: what is at x and v (...,) along the line y = 0."""
+    zero = np.zeros_like(x)
+    return np.stack([x, zero], axis=-1), np.stack([v, zero], axis=-1)
+
+
+def line_gas() -> Scenario:
+    """Fifteen equal disks between two walls."""
+    n, radius, length = 15, 0.25, 12.0
+    # As irregular as a random draw, without one; plain multiples i sqrt(2) would make simultaneous hits.
+    squares = np.arange(1, n + 2) ** 2
+    gap = 0.2 + (squares * np.sqrt(5)) % 1
+    v = 4 * ((squares[:n] * np.sqrt(2)) % 1) - 2
+    x = np.cumsum(gap)[:-1] / gap.sum() * (length - 2 * radius * n) + radius + 2 * radius * np.arange(n)
+    position, velocity = _on_line(x, v)
+    scene = lay_out(
+        position=position,
+        velocity=velocity,
+        radius=np.full(n, radius),
+        mass=np.ones(n),
+        walls=[[[0, -1], [0, 1]], [[length, -1], [length, 1]]],
+        restitution=1.0,
+    )
+
+    def truth(t: Array) -> Trajectory:
+        hits = row_hits(x, v, radius, length, 1.0, t[-1])
+        return answer(scene, t, _on_line(*row(x, v, radius, length, t)), hits)
+
+    return Scenario(
+        name="line_gas",
+        asks="How does the error grow over hundreds of hits where there is no chaos?",
+        source="Tonks, Phys. Rev. 50, 955 (1936); Jepsen, J. Math. Phys. 6, 405 (1965)",
+        scene=scene,
+        duration=9.15,  # 278 hits
+        sample_interval=1 / 60,
+        truth=truth,
+    )
+
+
+def counting_pi(hits: int, ratio: float, duration: float, ladder: tuple[int, ...]) -> Scenario:
+    """A wall, a light disk and one 100^k times as heavy, whose hits count out pi."""
+    radius, speed = np.array([0.25, 0.5]), 0.25
+    mass = np.array([1.0, ratio])
+    gap = np.array([1.0, 1.4246])
+    # From the free room back to the centres: the light disk's width lies before the heavy one.
+    shift = np.array([radius[0], 2 * radius[0] + radius[1]])
+    position, velocity = _on_line(gap + shift, np.array([0.0, -speed]))
+    scene = lay_out(
+        position=position,
+        velocity=velocity,
+        radius=radius,
+        mass=mass,
+        walls=[[[0, -2], [0, 2]]],
+        restitution=1.0,
+    )
+
+    def truth(t: Array) -> Trajectory:
+        room, rate = galperin(gap, speed, mass, t)
+        # The unfolding angle, up to pi, is rounded; its lever is the heavy disk's weighted distance.
+        bound = 4 * EPS * float(np.sqrt(mass[1] / mass[0])) * float(np.abs(gap[1] - speed * t).max())
+        return answer(scene, t, _on_line(room + shift, rate), galperin_hits(gap, speed, mass), error_bound=bound)
+
+    return Scenario(
+        name=f"galperin_{hits}",
+        asks=f"Do a wall, a light disk and a heavy one hit each other exactly {hits} times?",
+        source="Galperin, Playing pool with pi, Regul. Chaotic Dyn. 8, 375 (2003)",
+        scene=scene,
+        duration=duration,
+        sample_interval=1 / 60,
+        substeps=ladder,
+        truth=truth,
+    )
+
+
+def _cradle(position: Array) -> Scene:
+    """Five equal disks, e = 1, of which the first two come in."""
+    n = len(position)
+    x, v = _on_line(position, np.array([1.0, 1.0, 0.0, 0.0, 0.0]))
+    return lay_out(position=x, velocity=v, radius=np.full(n, 0.25), mass=np.ones(n), restitution=1.0)
+
+
+def cradle_with_gaps() -> Scenario:
+    """Two disks come in, two go out, one hit after the other."""
+    x = np.array([-2.355, -1.8447, 0.0, 0.5169, 1.0317])
+    scene = _cradle(x)
+
+    def truth(t: Array) -> Trajectory:
+        v = scene.velocity[:, 0]
+        hits = row_hits(x, v, 0.25, np.inf, 1.0, t[-1])
+        return answer(scene, t, _on_line(*row(x, v, 0.25, np.inf, t)), hits)
+
+    return Scenario(
+        name="cradle_with_gaps",
+        asks="Do two disks leave a cradle when two come in, if a centimetre lies between its disks?",
+        source="equal masses swap velocities at e = 1: they stay sorted",
+        scene=scene,
+        duration=4.0,
+        sample_interval=1 / 60,
+        truth=truth,
+    )
+
+
+def cradle_touching() -> Scenario:
+    """The same cradle without gaps: binary fractions, so that its disks touch exactly."""
+    question = Scenario(
+        name="cradle_touching",
+        asks="Do two disks leave a cradle when two come in, if its disks touch?",
+        source="the limit of small gaps, which is the same in whatever order the hits come",
+        scene=_cradle(np.array([-2.2587890625, -1.7587890625, 0.0, 0.5, 1.0])),
+        duration=4.0,
+        sample_interval=1 / 60,
+    )
+    return with_oracle(question)
+
+
+ROWS = (
+    line_gas,
+    partial(counting_pi, 3, 1.0, 12.0, (1, 2, 4, 8)),
+    partial(counting_pi, 31, 1e2, 15.0, (1, 2, 4, 8)),
+    partial(counting_pi, 314, 1e4, 31.0, (1, 4, 16, 64)),  # its hits follow each other by 0.4 ms
+    cradle_with_gaps,
+    cradle_touching,
+)

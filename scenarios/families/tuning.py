@@ -1,0 +1,274 @@
+"""Scenes that settings are chosen on, sampled from a seed; none is of the catalogue, which settings are judged on.
+
+Sizes and speeds differ from scene to scene, so that no setting can be right for one length or one speed alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scenarios.families.placing import box, lay_out
+from scenarios.model import Array, Scenario, Scene, Trajectory
+from scenarios.truth.closed_forms import answer, at_rest, bouncing, flight
+from scenarios.truth.exact import with_oracle
+
+SAMPLE_INTERVAL = 1 / 60  # s
+LADDER = (1, 2, 4)  # steps in it
+RADII, SPEEDS = (0.1, 3.0), (2.0, 20.0)  # m; radii a second, so .03 to .3 radii in the coarsest step
+ELASTIC, INELASTIC = 1.0, (0.3, 0.9)
+LEAST_GAP, MOST_GAP = 0.005, 0.05  # of the touching distance: nearer than that two disks pass as good as touching
+PASSING, FASTER = 8, 3.0  # so many pairs graze or miss in a scene, faster than elsewhere: up to a radius a step
+LANE = 6.0  # touching distances from pair to pair
+FAR = 100.0  # radii, to the end of a floor
+
+Sampled = Callable[[np.random.Generator, float, float], Scenario]
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number of which every power of ten is as likely."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def posed(asks: str, scene: Scene, duration: float) -> Scenario:
+    """The scenario with the oracle for its answer, cut to whole samples; `tuning` gives it its name."""
+    samples = max(round(duration / SAMPLE_INTERVAL), 4)
+    source = "sampled for crosscheck tune"
+    question = Scenario("unnamed", asks, source, scene, samples * SAMPLE_INTERVAL, SAMPLE_INTERVAL, substeps=LADDER)
+    return with_oracle(question)
+
+
+def one_restitution(rng: np.random.Generator) -> float:
+    """1 in half of the scenes, else anything between."""
+    return ELASTIC if rng.random() < 0.5 else float(rng.uniform(*INELASTIC))
+
+
+def flight_alone(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """One disk, thrown."""
+    scene = lay_out(
+        position=[[0.0, 0.0]], velocity=[v * r * rng.normal(size=2)], radius=[r], mass=[1.0], gravity=[0, -v * r],
+        restitution=1.0,
+    )  # fmt: skip
+    return posed("How far from its parabola is a thrown disk?", scene, 1.0)
+
+
+def pairs(rng: np.random.Generator, radius: Array, speed: float, offset: Array, duration: float, asks: str) -> Scenario:
+    """Pairs of disks with these two radii in lanes beside each other; pair k passes at offset[k] touching distances.
+
+    They close at `speed` m/s and come to touch, or pass, after .3 to .4 s: each pair at a phase of the step of its own.
+    """
+    turn, n, touch = rng.uniform(0, 2 * np.pi), len(offset), radius.sum()
+    along, across = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+    ahead = touch * np.sqrt(np.maximum(1 - offset**2, 0)) + rng.uniform(0.3, 0.4, n) * speed
+    apart = np.outer(ahead, along) + np.outer(touch * offset, across)
+    lane = np.outer(LANE * touch * (np.arange(n) - n // 2), across)
+    drift = np.outer(0.1 * speed * rng.normal(size=n), along)
+    scene = lay_out(
+        position=np.stack([lane - apart / 2, lane + apart / 2], axis=1).reshape(-1, 2),
+        velocity=np.stack([drift + speed / 2 * along, drift - speed / 2 * along], axis=1).reshape(-1, 2),
+        radius=np.tile(radius, n), mass=10 ** rng.uniform(-1, 1, 2 * n), restitution=one_restitution(rng),
+    )  # fmt: skip
+    return posed(asks, scene, duration)
+
+
+def head_on(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """Two disks that meet in the line of their centres."""
+    return pairs(rng, unlike(rng, r), v * r, np.zeros(1), 1.0, "How far off are two disks after they collided head-on?")
+
+
+def oblique(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """Two that meet beside it."""
+    offset = rng.uniform(0.2, 0.9, 1)
+    return pairs(rng, unlike(rng, r), v * r, offset, 1.0, "How far off are two disks after an oblique collision?")
+
+
+def grazing(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """Pairs that collide by as little as those of `near_miss` miss."""
+    offset = 1 - near(rng)
+    return pairs(rng, np.array([r, r]), FASTER * v * r, offset, 0.5, "Is a grazing collision seen?")
+
+
+def near_miss(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """Pairs that do not collide."""
+    offset = 1 + near(rng)
+    return pairs(rng, np.array([r, r]), FASTER * v * r, offset, 0.5, "Is a collision of two that miss invented?")
+
+
+def unlike(rng: np.random.Generator, r: float) -> Array:
+    """(2,) m: two radii of about r."""
+    return r * rng.uniform(0.7, 1.5, 2)
+
+
+def near(rng: np.random.Generator) -> Array:
+    """(PASSING,) of the touching distance, between `LEAST_GAP` and `MOST_GAP`."""
+    return np.array([log_uniform(rng, LEAST_GAP, MOST_GAP) for _ in range(PASSING)])
+
+
+def onto_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """One disk at a wall, at an angle."""
+    x = -rng.uniform(0.35, 0.4) * v * r - r
+    scene = lay_out(
+        position=[[x, 0.0]], velocity=[[v * r, v * r * rng.normal()]], radius=[r], mass=[1.0],
+        walls=[[[0, -FAR * r], [0, FAR * r]]], restitution=one_restitution(rng),
+    )  # fmt: skip
+    return posed("How far off is a disk after a wall?", scene, 1.0)
+
+
+def onto_static(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """One disk at a static one that is larger."""
+    y = rng.uniform(0, 2)
+    x = -(rng.uniform(0.35, 0.4) * v + np.sqrt(9 - y * y))
+    scene = lay_out(
+        position=[[x * r, y * r], [0, 0]], velocity=[[v * r, 0], [0, 0]],
+        radius=[r, 2 * r], mass=[1.0, np.inf], restitution=one_restitution(rng),
+    )  # fmt: skip
+    return posed("How far off is a disk after a static one?", scene, 1.0)
+
+
+def wall_to_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """One disk, to and fro some times."""
+    reach = r + 0.2 * v * r
+    scene = lay_out(
+        position=[[rng.uniform(-0.1, 0.1) * v * r, 0]], velocity=[[v * r, 0]], radius=[r], mass=[1.0],
+        walls=[[[-reach, -2 * r], [-reach, 2 * r]], [[reach, -2 * r], [reach, 2 * r]]],
+        restitution=one_restitution(rng),
+    )  # fmt: skip
+    return posed("How far off is a disk between two walls?", scene, 2.0)
+
+
+def dropped(rng: np.random.Generator, r: float, v: float, restitution: float, falls: float) -> Scenario:
+    """A ball that reaches its floor at the speed v, for the time of so many falls of .3 to .5 s."""
+    t = rng.uniform(0.3, 0.5)
+    scene = lay_out(
+        position=[[0, r + v * r * t / 2]], velocity=[[0, 0]], radius=[r], mass=[1.0], gravity=[0, -v * r / t],
+        walls=[[[-FAR * r, 0], [FAR * r, 0]]], restitution=restitution,
+    )  # fmt: skip
+    return posed("How far off is a ball that bounces?", scene, falls * t)
+
+
+def bouncing_elastic(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """A ball that keeps its height."""
+    return dropped(rng, r, v, ELASTIC, 8.0)
+
+
+def bouncing_lossy(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """A ball that loses some, up to before it rests."""
+    return dropped(rng, r, v, rng.uniform(0.6, 0.9), 4.0)
+
+
+def long_bounce(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """The same for forty bounces, of which only conservation of energy is asked."""
+    ball = dropped(rng, r, v, ELASTIC, 80.0)
+    asks = "Does a ball keep its energy over many bounces?"
+    return replace(ball, asks=asks, truth=None, without_truth="after so many bounces a late collision is all there is")
+
+
+def coming_to_rest(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """A ball that bounces ever lower, comes to rest, and stays."""
+    restitution = rng.uniform(0.4, 0.8)
+    asked = dropped(rng, r, v, restitution, 2 + 2 * (1 + restitution) / (1 - restitution))
+    height, g = float(asked.scene.position[0, 1]) - r, -float(asked.scene.gravity[1])
+
+    def truth(t: Array) -> Trajectory:
+        legs = bouncing(height, g, restitution, t[-1])
+        gap, speed = legs.at(t)
+        position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + r, speed))
+        return answer(asked.scene, t, (position, velocity), legs.wall_hits(0, (0,), 1.0, restitution))
+
+    return replace(asked, truth=truth)
+
+
+def landing(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """A ball that stays where it lands."""
+    return dropped(rng, r, v, 0.0, 3.0)
+
+
+def row(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """Five equal disks with small gaps, of which the first comes in."""
+    x = np.cumsum(np.append(0.0, 2 * r + r * np.append(rng.uniform(0.25, 0.3) * v, rng.uniform(0.02, 0.3, 3))))
+    scene = lay_out(
+        position=np.stack([x, 0 * x], axis=-1), velocity=[[v * r, 0], *[[0, 0]] * 4], radius=np.full(5, r),
+        mass=np.ones(5), restitution=one_restitution(rng),
+    )  # fmt: skip
+    return posed("How far off is a row of disks after a collision went through it?", scene, 1.0)
+
+
+def light_between(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """A light disk between a wall and a heavy one that comes in."""
+    scene = lay_out(
+        position=[[rng.uniform(1.5, 3) * r, 0], [rng.uniform(5, 6) * r + 0.2 * v * r, 0]],
+        velocity=[[0, 0], [-v * r / 2, 0]], radius=[r, r], mass=[1.0, log_uniform(rng, 3, 30)],
+        walls=[[[0, -2 * r], [0, 2 * r]]], restitution=1.0,
+    )  # fmt: skip
+    return posed("How far off are a light and a heavy disk after some collisions?", scene, 2.0)
+
+
+def small_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """Nine disks in a box of which they cover a sixth to a half, for some collisions each."""
+    n, pitch = 9, float(np.sqrt(np.pi / rng.uniform(0.15, 0.5))) * r
+    places = pitch * (np.stack(np.meshgrid(np.arange(3), np.arange(3)), axis=-1).reshape(-1, 2) - 1)
+    room, half = pitch / 2 - r, 1.5 * pitch
+    scene = lay_out(
+        position=places + rng.uniform(-0.9 * room, 0.9 * room, (n, 2)), velocity=v * r * rng.normal(size=(n, 2)),
+        radius=np.full(n, r), mass=np.ones(n), walls=box([-half] * 2, [half] * 2), restitution=one_restitution(rng),
+    )  # fmt: skip
+    return posed("How far off is a small gas before chaos has its way?", scene, 6.0 / v)
+
+
+def long_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """The same at e = 1 for some ten times as long, which only conservation of energy is asked of."""
+    gas = small_gas(rng, r, v)
+    scene = replace(gas.scene, restitution=ELASTIC)
+    why = "after so many collisions chaos has its way"
+    longer = replace(gas, scene=scene, duration=10 * gas.duration, truth=None, without_truth=why)
+    return replace(longer, asks="Does a small gas keep its energy?")
+
+
+def column(rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """Three to eight disks that rest on each other; their gravity is that of a fall at speed v in .4 s."""
+    n = int(rng.integers(3, 9))
+    r = 2.0 ** round(np.log2(r))  # so that they touch exactly
+    y = r + 2 * r * np.arange(n)
+    scene = lay_out(
+        position=np.stack([0 * y, y], axis=-1), velocity=np.zeros((n, 2)), radius=np.full(n, r), mass=np.ones(n),
+        gravity=[0, -v * r / 0.4], walls=[[[-FAR * r, 0], [FAR * r, 0]]], restitution=0.0,
+    )  # fmt: skip
+    contacts = [(0.0, 0, -1, 0.0), *((0.0, i, i + 1, 0.0) for i in range(n - 1))]
+    asked = posed("Does a column of disks stay as it is?", scene, 2.0)
+    return replace(asked, truth=lambda t: at_rest(scene, t, contacts))
+
+
+def sliding(_rng: np.random.Generator, r: float, v: float) -> Scenario:
+    """A disk on a smooth 3-4-5 incline."""
+    r, g = 2.0 ** round(np.log2(r)) * 0.625, v * r
+    down = np.array([4.0, -3.0]) / 5
+    scene = lay_out(
+        position=[np.array([0.6, 0.8]) * r], velocity=[[0, 0]], radius=[r], mass=[1.0], gravity=[0, -g],
+        walls=[np.array([-8 * r * down, FAR * r * down])], restitution=0.0,
+    )  # fmt: skip
+
+    def truth(t: Array) -> Trajectory:
+        motion = flight(t[:, None, None], scene.position, scene.velocity, 0.6 * g * down)
+        return answer(scene, t, motion, [(0.0, 0, -1, 0.0)])
+
+    return replace(posed("Does a disk slide down a smooth incline as it should?", scene, 1.0), truth=truth)
+
+
+FAMILIES: tuple[Sampled, ...] = (
+    flight_alone, head_on, oblique, grazing, near_miss, onto_wall, onto_static, wall_to_wall, bouncing_elastic,
+    bouncing_lossy, long_bounce, coming_to_rest, landing, row, light_between, small_gas, long_gas, column, sliding,
+)  # fmt: skip
+
+
+def tuning(seeds: Sequence[int]) -> list[Scenario]:
+    """A scene of every family for every seed, named `family-seed`."""
+    return [one_of(family, seed) for family in FAMILIES for seed in seeds]
+
+
+def one_of(family: Sampled, seed: int) -> Scenario:
+    """The scene of a family sampled from a seed."""
+    rng = np.random.default_rng([seed, *family.__name__.encode()])
+    made = family(rng, log_uniform(rng, *RADII), log_uniform(rng, *SPEEDS))
+    return replace(made, name=f"{family.__name__}-{seed}", seed=seed)

@@ -1,0 +1,1 @@
+"""A scene as a TOML file, in and out."""

@@ -1,0 +1,111 @@
+"""Truth records kept on disk under a hash of what was asked, in the user's cache folder; never needed, only faster."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import tempfile
+import zipfile
+import zlib
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.model import Scenario, frozen
+
+HERE = Path(__file__).parent
+ARRAYS = {"legs": 12, "events": 5, "outcomes": 4, "orders": 3}
+"""The arrays of a record and how many columns each has."""
+NUMBERS = ("valid_until", "error_bound", "bits", "method", "reason", "followed_until", "remains")
+
+
+def folder() -> Path | None:
+    """$CROSSCHECK_CACHE, or crosscheck2d in $XDG_CACHE_HOME or ~/.cache; None where there is no home."""
+    if given := os.environ.get("CROSSCHECK_CACHE"):
+        return Path(given)
+    if base := os.environ.get("XDG_CACHE_HOME"):
+        return Path(base) / "crosscheck2d"
+    try:
+        return Path.home() / ".cache" / "crosscheck2d"
+    except RuntimeError:
+        return None
+
+
+def key_of(scenario: Scenario, certifying: bool) -> str:
+    """A hash over all that decides a record: scene, pushes, duration, the oracle's source and what it can prove."""
+    scene, hashed = scenario.scene, hashlib.sha256()
+    parts = [
+        scene.position, scene.velocity, scene.radius, scene.mass, scene.walls, scene.gravity, scene.restitution,
+        [] if scene.wrap is None else scene.wrap, scenario.duration,
+        *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
+    ]  # fmt: skip
+    hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())
+    for part in parts:
+        hashed.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
+    return hashed.hexdigest()[:32]
+
+
+@cache
+def source_hash(folder: Path = HERE) -> str:
+    """A hash over the source in this folder, so that a changed oracle never answers with what it said before."""
+    files = sorted(folder.rglob("*.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
+
+
+def look_up(key: str) -> dict[str, Any] | None:
+    """The fields of the record kept under `key`; None where there is none that can be read in full."""
+    where = folder()
+    return None if where is None else unpacked(where / f"{key}.npz")
+
+
+# What reading a torn or foreign archive raises: it is as good as none. One bit makes an unknown compression
+# (NotImplementedError), an encrypted file (RuntimeError), or an array larger than any memory.
+UNREADABLE = (OSError, ValueError, LookupError, EOFError, TypeError, RuntimeError, MemoryError, SyntaxError,
+              zipfile.BadZipFile, zlib.error)  # fmt: skip
+
+
+def packed(fields: dict[str, Any]) -> bytes:
+    """The fields of a record as the bytes of an .npz."""
+    file = io.BytesIO()
+    numbers = json.dumps({name: fields[name] for name in NUMBERS})
+    np.savez_compressed(file, **{name: fields[name] for name in ARRAYS}, numbers=np.array(numbers))
+    return file.getvalue()
+
+
+def unpacked(path: Path) -> dict[str, Any] | None:
+    """The fields of the record in a file that holds what `packed` gave; None if it cannot be read in full."""
+    try:
+        with np.load(path, allow_pickle=False) as saved:
+            arrays = {name: frozen(saved[name]) for name in ARRAYS}
+            numbers = json.loads(str(saved["numbers"]))
+        if any(arrays[name].shape[1:] != (width,) for name, width in ARRAYS.items()) or set(numbers) != set(NUMBERS):
+            return None
+    except UNREADABLE:
+        return None
+    return arrays | numbers | {"remains": tuple(numbers["remains"])}
+
+
+def keep(key: str, fields: dict[str, Any]) -> bool:
+    """Write the fields of a record under `key`, whole or not at all; False where the folder cannot be written to."""
+    where = folder()
+    if where is None:
+        return False
+    temporary = None
+    try:
+        where.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=where, suffix=".part")
+        with os.fdopen(handle, "wb") as file:
+            file.write(packed(fields))
+        # Another process may write the same record at the same time: the last rename wins, both are whole.
+        os.replace(temporary, where / f"{key}.npz")
+    except OSError:
+        if temporary:
+            with suppress(OSError):
+                os.unlink(temporary)
+        return False
+    return True

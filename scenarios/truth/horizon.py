@@ -1,0 +1,223 @@
+"""How long a float64 solver can follow an exact motion: a rounding of the start, carried along to first order.
+
+Motions from starts a rounding apart part exponentially; after that a distance to the exact answer says nothing about a
+solver. The horizon is when that happens. It comes from the oracle's own path: every number of the start may be off by
+2^-52 of the largest, each on its own, and what becomes of it is the derivative of flight and of every collision
+(Dellago, Posch & Hoover, Phys. Rev. E 53, 1485, 1996; with falling disks and rest the same for parabolas and for
+motion along a wall). The derivative is wanted to a few per cent, so it is float64 along a path in many digits. A near
+miss by less than a rounding has no derivative and is not seen.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from scenarios.model import Array, Scenario, Scene
+from scenarios.truth.oracle.bodies import Hop, Leg
+from scenarios.truth.oracle.path import Event, Path
+
+EPS = float(np.finfo(float).eps)
+ASTRAY = 1e-9
+"""Of a disk's radius: the standard deviation of its position from which on it is not followed any more."""
+BOUNCES = 64  # of those that die out so many are looked at; what comes later lasts less than float64 can tell
+
+
+def horizon(scenario: Scenario, path: Path) -> float:
+    """s, until when starts a rounding apart stay together along `path`, see `ASTRAY`; inf: as far as the path goes.
+
+    Contacts that touch are kept touching: what lies on a wall, or on another disk, has no freedom across it.
+    """
+    nearby = Nearby(scenario, path)
+    end = min(path.end, scenario.duration)
+    for event in path.events:
+        if float(event.t) >= min(end, nearby.astray):
+            break
+        if float(event.impulse):  # else a contact begins
+            nearby.collide(event)
+    for i in nearby.moving:
+        nearby.carry(i, min(end, nearby.astray))
+    return nearby.astray
+
+
+def roundings(scene: Scene) -> tuple[Array, Array]:
+    """Two (n, d, 2): what 2^-52 of the largest coordinate, or speed, in each of d numbers moves.
+
+    Where all centres lie on one line along an axis and nothing moves across it, nothing is rounded across it either.
+    """
+    lined = (scene.position == scene.position[0]).all(axis=0) & ~scene.velocity.any(axis=0) & (scene.gravity == 0)
+    free = np.argwhere(~scene.static[:, None] & ~lined)
+    dx, dv = np.zeros((2, scene.n, 2 * len(free), 2))
+    for k, (i, axis) in enumerate(free):
+        dx[i, k, axis] = EPS * np.abs(scene.position).max()
+        dv[i, len(free) + k, axis] = EPS * np.abs(scene.velocity).max()
+    return dx, dv
+
+
+class Body(NamedTuple):
+    """One side of a collision: its motion along the path, what it is off by, its acceleration before and after, 1/mass.
+
+    Shapes (2,), m, m/s, m/s2; `dx` and `dv` (d, 2).
+    """
+
+    x: Array
+    v: Array
+    dx: Array
+    dv: Array
+    before: Array
+    after: Array
+    weight: float
+
+
+class Nearby:
+    """All starts a rounding from that of a path, carried along it: one derivative for each number of the start.
+
+    Attributes:
+        moving: the disks that are not static.
+        t: (n,) s, the time that each disk has been carried to; `leg`: (n,) on which of its legs that is.
+        dx, dv: (n, d, 2) m, m/s, how far each disk is off then, for a rounding of each of d numbers.
+        struck, v: (n,) s and (n, 2) m/s, when each disk collided last, and its velocity after that.
+        instant: s, when the latest collision was; `late`: (d,) s, by how much each rounding delays it.
+        astray: s, when the first disk is off by too much; inf: none is so far.
+    """
+
+    def __init__(self, scenario: Scenario, path: Path) -> None:
+        scene = scenario.scene
+        self.scene, self.path, self.moving = scene, path, np.flatnonzero(~scene.static).tolist()
+        self.t, self.leg = np.zeros(scene.n), [0] * scene.n
+        self.dx, self.dv = roundings(scene)
+        self.struck, self.v = np.full(scene.n, -1.0), np.zeros((scene.n, 2))
+        self.instant, self.late = 0.0, np.zeros(self.dx.shape[1])
+        self.switches = {edge for thrust in scenario.thrusts for edge in (thrust.start, thrust.stop)}
+        self.astray = np.inf
+
+    def carry(self, i: int, until: float) -> None:
+        """Bring disk i to `until` s over all of its legs that begin before."""
+        legs = self.path.legs[i]
+        while self.leg[i] + 1 < len(legs) and (t := float(legs[self.leg[i] + 1].t)) < until:
+            self.fly(i, t)
+            self.turn(i, t)
+        self.fly(i, until)
+
+    def fly(self, i: int, until: float) -> None:
+        """Bring disk i to `until` s on its leg, and note when it goes astray."""
+        hop = self.path.legs[i][self.leg[i]].hop
+        if hop is not None:
+            self.bounce(i, hop)
+        here, drift, since, limit = self.dx[i], self.dv[i], until - self.t[i], ASTRAY * self.scene.radius[i]
+        # |dx + dv s|^2 = limit^2, summed over the roundings: they are independent, so that their variances add.
+        room, slope, growth = limit**2 - (here**2).sum(), (here * drift).sum(), (drift**2).sum()
+        if not room > 0:  # or nan, after a graze that no float64 can follow
+            self.astray = min(self.astray, self.t[i])
+        elif growth and (s := room / (slope + np.sqrt(slope**2 + growth * room))) < since:
+            self.astray = min(self.astray, self.t[i] + s)
+        self.dx[i], self.t[i] = here + drift * since, until
+
+    def bounce(self, i: int, hop: Hop) -> None:
+        """Note when disk i goes astray across a wall on which its bounces die out; what is left is along the wall.
+
+        Bounce k begins at u s_k, s_k = (2 / g) (1 - e^k) / (1 - e), with the speed u e^k (`oracle_record.along`): off
+        by dt at the first one and by du, it begins dt + du s_k late and lasts 2 du e^k / g longer.
+        """
+        normal, u, g = np.array([float(hop.nx), float(hop.ny)]), float(hop.speed), float(hop.fall)
+        e, k = self.scene.restitution, np.arange(BOUNCES)[:, None]
+        dt = -self.dx[i] @ normal / u
+        du = self.dv[i] @ normal - g * dt
+        begins = 2 / g * (1 - e**k) / (1 - e)
+        off = u * e**k * np.abs(dt + begins * du) + 2 * u / g * e ** (2 * k) * np.abs(du)
+        if (far := (off**2).sum(axis=1) > (ASTRAY * self.scene.radius[i]) ** 2).any():
+            self.astray = min(self.astray, self.t[i] + u * float(begins[int(far.argmax()), 0]))
+        for part in (self.dx, self.dv):
+            part[i] -= np.outer(part[i] @ normal, normal)
+
+    def turn(self, i: int, t: float) -> None:
+        """Put disk i onto its next leg, which begins at `t` s."""
+        before, leg = self.path.legs[i][self.leg[i] : self.leg[i] + 2]
+        self.leg[i] += 1
+        # A collision has seen to what follows it, and a thrust switches when it switches.
+        if t != self.struck[i] and t not in self.switches:
+            self.dv[i] += np.outer(self.release(i, before, t), acceleration(before) - acceleration(leg))
+        for contact in leg.held:
+            self.hold(i, contact.j if contact.kind == "wall" and len(leg.held) == 1 else None)
+
+    def release(self, i: int, leg: Leg, t: float) -> Array:
+        """(d,) s, how much later disk i leaves what held it: the end of its wall, or a disk that is struck."""
+        spans = [self.scene.walls[c.j, 1] - self.scene.walls[c.j, 0] for c in leg.held if c.kind == "wall"]
+        if len(spans) == 1 and (speed := float(spans[0] @ along(leg, t)[1])):
+            return -self.dx[i] @ spans[0] / speed
+        return self.late if t == self.instant else np.zeros_like(self.late)
+
+    def hold(self, i: int, wall: int | None) -> None:
+        """Leave disk i the freedom along a wall, or none."""
+        way = np.zeros(2)
+        if wall is not None:
+            start, end = self.scene.walls[wall]
+            way = (end - start) / np.hypot(*(end - start))
+        for part in (self.dx, self.dv):
+            part[i] = np.outer(part[i] @ way, way)
+
+    def collide(self, event: Event) -> None:
+        """Carry both sides through a collision; what touched before collides when the instant's new contact does.
+
+        To first order: the gap closes `late` s later, where the normal is tilted and the closing speed another, so
+        that the impulse is; and what has flown on for as long has done so with the old velocity.
+        """
+        t, e, impulse = float(event.t), self.scene.restitution, float(event.impulse)
+        if t > self.instant:
+            self.instant, self.late = t, np.zeros_like(self.late)
+        one = self.body(event.i, t)
+        two, reach = self.other(event, one)
+        way, dv, share = two.x - one.x, two.v - one.v, one.weight + two.weight
+        normal = way / np.hypot(*way)
+        if event.new and t > 0:
+            closing = -impulse * share / (1 + e)  # normal.dv, which would have lost its digits in a graze
+            self.late = -(two.dx - one.dx) @ normal / closing
+        late = self.late[:, None]
+        shift = two.dx - one.dx + dv * late
+        tilt = (shift - np.outer(shift @ normal, normal)) / reach
+        faster = tilt @ dv + (two.dv - one.dv + (two.before - one.before) * late) @ normal
+        kick, change = impulse * normal, impulse * tilt - np.outer((1 + e) / share * faster, normal)
+        for disk, body, side in ((event.i, one, -one.weight), (event.j, two, two.weight)):
+            if side:
+                self.dx[disk] -= side * kick * late
+                self.dv[disk] += side * change + (body.before - body.after) * late
+                self.v[disk], self.struck[disk] = body.v + side * kick, t
+
+    def body(self, i: int, t: float) -> Body:
+        """Disk i at `t` s, as the collisions of that instant have left it so far."""
+        if not self.scene.static[i]:
+            self.carry(i, t)
+        legs, k = self.path.legs[i], self.leg[i]
+        x, v = along(legs[k], t)
+        follows = k + 1 < len(legs) and float(legs[k + 1].t) == t
+        after = acceleration(legs[k + 1] if follows else legs[k])
+        struck = self.struck[i] == t
+        before, v = (after, self.v[i]) if struck else (acceleration(legs[k]), v)
+        weight = 0.0 if self.scene.static[i] else 1 / float(self.scene.mass[i])
+        return Body(x, v, self.dx[i], self.dv[i], before, after, weight)
+
+    def other(self, event: Event, one: Body) -> tuple[Body, float]:
+        """The other side of a collision, and the radius, m, at which its normal turns: none at the face of a wall."""
+        if event.j >= 0:
+            two = self.body(event.j, float(event.t))
+            return two, float(np.hypot(*(two.x - one.x)))
+        start, end = self.scene.walls[-1 - event.j]
+        share = (one.x - start) @ (end - start) / ((end - start) @ (end - start))
+        foot, still = start + np.clip(share, 0, 1) * (end - start), np.zeros(2)
+        nothing = np.zeros_like(one.dx)
+        reach = np.inf if 0 <= share <= 1 else float(np.hypot(*(foot - one.x)))
+        return Body(foot, still, nothing, nothing, still, still, 0.0), reach
+
+
+def along(leg: Leg, t: float) -> tuple[Array, Array]:
+    """Position and velocity (2,) on a leg at `t` s; of bounces only what is along the wall."""
+    since, x, y, vx, vy, ax, ay = t - float(leg.t), *map(float, leg[1:7])
+    v, a = np.array([vx, vy]), np.array([ax, ay])
+    return np.array([x, y]) + (v + a * since / 2) * since, v + a * since
+
+
+def acceleration(leg: Leg) -> Array:
+    """(2,) m/s2 on a leg, with the fall of what bounces on a wall."""
+    a = np.array([float(leg.ax), float(leg.ay)])
+    return a if leg.hop is None else a - float(leg.hop.fall) * np.array([float(leg.hop.nx), float(leg.hop.ny)])

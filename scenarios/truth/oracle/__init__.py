@@ -1,0 +1,1 @@
+"""The oracle: collision by collision, in many digits, certified."""

@@ -1,0 +1,205 @@
+"""What a body touches next and what it touches now, in many digits where float64 bounds leave a doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from scenarios.truth.oracle.bodies import STATIC, Bodies, rational
+from scenarios.truth.oracle.contacts import Pressed, crossing, falling_meeting, meeting
+from scenarios.truth.oracle.filter import soonest, touching
+from scenarios.truth.oracle.numbers import Number
+from scenarios.truth.oracle.ties import Contact, Touch
+
+LATE = 1e-6  # of a limit: what meets at the limit itself must be seen as simultaneous
+
+
+class Ahead:
+    """Contacts of `bodies`, each asked for where it may come next."""
+
+    def __init__(self, bodies: Bodies) -> None:
+        self.bodies, self.k, self.scene = bodies, bodies.k, bodies.scene
+        most = len(bodies.legs) + 2 * len(bodies.walls)
+        self.bounds, self.codes = np.empty(most), np.empty(most, np.int64)
+        # Ends of walls that lie on the line of each wall: what rests on it slides over them, or off them.
+        ends = range(self.scene.n, len(bodies.legs))
+        self.in_line = [{j for j in ends if collinear(wall, bodies.table[j, :2])} for wall in self.scene.walls]
+
+    def contact(self, i: int, code: int) -> Contact:
+        """The contact of disk i of that code, see `soonest`."""
+        wall, right = divmod(code - len(self.bodies.legs), 2)
+        return Contact("wall", i, wall, 1 - 2 * right) if wall >= 0 else Contact("body", i, code)
+
+    def candidates(self, i: int, now: float, left: float) -> Iterator[tuple[float, Contact]]:
+        """What disk i may touch within `left` s, with the s from now before which it cannot, soonest first."""
+        bodies = self.bodies
+        if self.scene.wrap is not None:
+            yield from ((0.0, edge) for edge in self._edges(i))
+        held = bodies.held[i]
+        yield from ((0.0, Contact("end", i, c.j, side)) for c in held if c.kind == "wall" for side in (1, -1))
+        count = soonest(
+            bodies.table, bodies.radii, bodies.asleep, self.scene.walls, i, now, left, self.bounds, self.codes
+        )
+        for bound, code in zip(self.bounds[:count].tolist(), self.codes[:count].tolist()):
+            contact = self.contact(i, code)
+            if not held or not self._holds(contact):
+                yield bound, contact
+
+    def _edges(self, i: int) -> Iterator[Contact]:
+        """The edges of the wrap that disk i may be on its way to."""
+        velocity, pull = self.bodies.table[i, 2:4], self.bodies.table[i, 4:6]
+        for axis in (0, 1):
+            for side in (1, -1):
+                if pull[axis] or side * velocity[axis] >= 0:
+                    yield Contact("edge", i, axis, side)
+
+    def _holds(self, contact: Contact) -> bool:
+        """Whether this contact is what disk i rests on, or an end in its line."""
+        held = self.bodies.held[contact.i]
+        if contact.kind == "body":
+            return contact in held or any(c.kind == "wall" and contact.j in self.in_line[c.j] for c in held)
+        return any(c.kind == "wall" and c.j == contact.j for c in held)
+
+    def time_to(self, contact: Contact, now: Number, limit: float) -> Number | None:
+        """s from `now` to this contact, or None if it does not come within `limit` s. Raises `Pressed`."""
+        if contact.kind == "edge":
+            return self._time_to_edge(contact, now)
+        if contact.kind == "end":
+            return self._time_to_end(contact, now)
+        if contact.kind == "wall":
+            return self._time_to_wall(contact, now)
+        return self._time_to_body(contact, now, limit)
+
+    def _time_to_body(self, contact: Contact, now: Number, limit: float) -> Number | None:
+        bodies, i, j = self.bodies, contact.i, contact.j
+        pair = (min(i, j), max(i, j))
+        parted = bodies.parted.get(pair) == (bodies.count[pair[0]], bodies.count[pair[1]])
+        alike = bodies.pull[i] == bodies.pull[j]
+        if parted and alike:
+            return None
+        (x, y, u, v), (px, py, pu, pv) = bodies.state_at(i, now), bodies.state_at(j, now)
+        dx, dy, du, dv = px - x, py - y, pu - u, pv - v
+        reach = bodies.radius[i] + bodies.radius[j]
+        c, b, a2 = dx * dx + dy * dy - reach * reach, dx * du + dy * dv, du * du + dv * dv
+        if alike:
+            return meeting(self.k, c, b, a2)
+        if parted and (bodies.legs[i].t is now or bodies.legs[j].t is now):
+            c = self.k.exact(0.0)
+        ax, ay = bodies.legs[j].ax - bodies.legs[i].ax, bodies.legs[j].ay - bodies.legs[i].ay
+        gap = [c, 2 * b, a2 + dx * ax + dy * ay, du * ax + dv * ay, (ax * ax + ay * ay) / 4]
+        return falling_meeting(self.k, gap, limit * (1 + LATE))
+
+    def _time_to_wall(self, contact: Contact, now: Number) -> Number | None:
+        bodies, i, leg = self.bodies, contact.i, self.bodies.legs[contact.i]
+        x, y, u, v = bodies.state_at(i, now)
+        fall = self.k.exact(0.0) if bodies.pull[i] == STATIC else bodies.outward(contact, leg.ax, leg.ay)
+        leans = contact in bodies.leaning[i] and leg.t is now
+        gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.radius[i]
+        try:
+            after = crossing(self.k, gap, bodies.outward(contact, u, v), fall)
+        except Pressed:
+            if self._above(contact.j, x, y, u, v):
+                raise
+            return None
+        if after is None:
+            return None
+        x, y = x + (u + leg.ax * after / 2) * after, y + (v + leg.ay * after / 2) * after
+        foot = bodies.foot(contact.j, x, y)
+        beside = self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
+        return None if beside else after
+
+    def _above(self, wall: int, x: Number, y: Number, u: Number, v: Number) -> bool:
+        """Whether a point (x, y) with velocity (u, v) is beside the wall and not about to leave over its ends."""
+        frame, foot = self.bodies.walls[wall], self.bodies.foot(wall, x, y)
+        heading = frame.tx * u + frame.ty * v
+        for left, leaving in ((foot, -heading), (frame.length - foot, heading)):
+            if (side := self.k.sign(left)) < 0 or (side == 0 and self.k.sign(leaving) > 0):
+                return False
+        return True
+
+    def _time_to_end(self, contact: Contact, now: Number) -> Number | None:
+        """s until the point at which a disk rests on a wall comes to the wall's end (side 1) or start."""
+        bodies, leg, wall = self.bodies, self.bodies.legs[contact.i], self.bodies.walls[contact.j]
+        x, y, u, v = bodies.state_at(contact.i, now)
+        foot, speed = bodies.foot(contact.j, x, y), wall.tx * u + wall.ty * v
+        pull = self.k.exact(0.0) if bodies.pull[contact.i] == STATIC else wall.tx * leg.ax + wall.ty * leg.ay
+        left = wall.length - foot if contact.side > 0 else foot
+        return crossing(self.k, left, -contact.side * speed, -contact.side * pull)
+
+    def _time_to_edge(self, contact: Contact, now: Number) -> Number | None:
+        i, axis, side = contact.i, contact.j, contact.side
+        assert self.scene.wrap is not None
+        edge = self.k.exact(float(self.scene.wrap[1 if side > 0 else 0, axis]))
+        state, leg = self.bodies.state_at(i, now), self.bodies.legs[i]
+        pull = self.k.exact(0.0) if self.bodies.pull[i] == STATIC else -side * (leg.ax, leg.ay)[axis]
+        gap, speed = side * (edge - state[axis]), -side * state[2 + axis]
+        # A centre that stands on an edge is not beyond it.
+        if self.k.sign(gap) == 0 and self.k.sign(speed) == 0:
+            return None
+        return crossing(self.k, gap, speed, pull)
+
+    def touch(self, contact: Contact, now: Number) -> Touch:
+        """The contact with its direction, at `now`."""
+        bodies = self.bodies
+        if contact.kind == "body":
+            x, y, _, _ = bodies.state_at(contact.i, now)
+            px, py, _, _ = bodies.state_at(contact.j, now)
+            return Touch(contact, px - x, py - y)
+        wall = bodies.walls[contact.j]
+        return Touch(contact, contact.side * wall.ty, -contact.side * wall.tx)
+
+    def alone(self, contact: Contact, now: float) -> bool:
+        """Whether the disks of a contact surely touch nothing else."""
+        bodies, walls = self.bodies, self.scene.walls
+        for i in contact.disks:
+            count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, now, self.codes)
+            others = {key(self.contact(i, code)) for code in self.codes[:count].tolist()} - {key(contact)}
+            if others or bodies.held[i]:
+                return False
+        return True
+
+    def near(self, i: int, now: Number, sure: Sequence[Contact] = ()) -> list[tuple[Contact, int]]:
+        """What disk i touches (0) or overlaps (-1) now; contacts that surely touch are not asked about."""
+        bodies, found = self.bodies, list[tuple[Contact, int]]()
+        x, y, _, _ = bodies.state_at(i, now)
+        walls, known = self.scene.walls, {key(contact) for contact in sure}
+        count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, float(now), self.codes)
+        for contact in [self.contact(i, code) for code in self.codes[:count].tolist()]:
+            if key(contact) in known:
+                continue
+            if contact.kind == "body":
+                touch, reach = self.touch(contact, now), bodies.radius[i] + bodies.radius[contact.j]
+                gap = self.k.sign(touch.dx * touch.dx + touch.dy * touch.dy - reach * reach)
+                beside = False
+            else:
+                gap, foot = self.k.sign(bodies.height(contact, x, y) - bodies.radius[i]), bodies.foot(contact.j, x, y)
+                beside = self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
+            found += [(contact, gap)] if gap <= 0 and not beside else []
+        return found
+
+    def cluster(self, contacts: Sequence[Contact], now: Number) -> list[Touch]:
+        """All contacts that touch now, of these disks and of all that touch those."""
+        done: set[int] = set()
+        waiting = {contact.i for contact in contacts} | {c.j for c in contacts if c.kind == "body"}
+        found = {key(contact): contact for contact in contacts}
+        resting = {key(c): c for held in self.bodies.held for c in held}
+        while todo := [i for i in waiting - done if i < self.scene.n and not self.scene.static[i]]:
+            i = todo[0]
+            found |= {name: c for name, c in resting.items() if i in c.disks}
+            sure = list(found.values())
+            found |= {key(contact): contact for contact, _ in self.near(i, now, sure)}
+            waiting |= {j for c in found.values() if c.kind == "body" for j in (c.i, c.j)}
+            done.add(i)
+        return [self.touch(contact, now) for contact in found.values()]
+
+
+def key(contact: Contact) -> tuple:
+    """The same for both members of a pair, and for each side of a wall apart."""
+    return ("body", *sorted((contact.i, contact.j))) if contact.kind == "body" else tuple(contact)
+
+
+def collinear(wall: np.ndarray, point: np.ndarray) -> bool:
+    """Whether a point (2,) lies on the line of a wall (2, 2), in rationals."""
+    (px, py), (qx, qy), (x, y) = (rational(each) for each in (*wall, point))
+    return (qx - px) * (y - py) == (qy - py) * (x - px)

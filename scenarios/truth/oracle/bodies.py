@@ -1,0 +1,266 @@
+"""Disks and the ends of walls in many digits: the leg each is on, what holds it, and which contacts touch exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from scenarios.model import Array, Scene, Thrust
+from scenarios.truth.oracle.numbers import Number, Numbers
+from scenarios.truth.oracle.ties import Contact, Matter, Touch, Velocity
+
+STATIC, FALLING = 0, 1
+"""Kinds of acceleration: none, gravity; each pushed disk is a kind of its own, from 2 on; below 0: slides on a wall."""
+
+
+STILL, STRAIGHT, CURVED = range(3)
+"""Shapes of legs."""
+
+
+class Hop(NamedTuple):
+    """Bounces across a wall from the start of a leg on: normal (nx, ny), speed m/s, fall m/s2 towards the wall."""
+
+    nx: Number
+    ny: Number
+    speed: Number
+    fall: Number
+
+
+class Leg(NamedTuple):
+    """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2; with a hop, the part of it along the wall; and on what the
+    disk rests meanwhile."""
+
+    t: Number
+    x: Number
+    y: Number
+    vx: Number
+    vy: Number
+    ax: Number
+    ay: Number
+    hop: Hop | None = None
+    held: tuple[Contact, ...] = ()
+
+    @property
+    def numbers(self) -> list[Number]:
+        """All of them in one list."""
+        return [*self[:7], *(self.hop or ())]
+
+
+class Frame(NamedTuple):
+    """A wall: start (x, y) m, unit direction (x, y), length m."""
+
+    px: Number
+    py: Number
+    tx: Number
+    ty: Number
+    length: Number
+
+
+class Bodies:
+    """n disks and, as static disks of radius 0, the ends of the walls; b of them together.
+
+    Attributes:
+        legs: (b,) the leg each body is on.
+        count: (b,) events each has had.
+        table, radii: (b, 7) and (b,) the legs as float64, see `oracle_filter`, and m.
+        shape: (b,) whether each leg is a point, a straight line or a parabola.
+        asleep: (b,) whose bounces die out untouched, so that nothing need be asked of them.
+        held: (b,) the contacts each rests on: gap 0, no speed and no acceleration across it.
+        parted: pairs that touched, and did not approach, when the two had had so many events.
+        leaning: (b,) the same of walls, at the start of the leg.
+        matter: masses and restitution.
+    """
+
+    def __init__(self, scene: Scene, k: Numbers) -> None:
+        self.k, self.scene, exact = k, scene, k.exact
+        ends = np.unique(scene.walls.reshape(-1, 2), axis=0)
+        # The wall that is blamed for a hit on its end: the first that has it.
+        self.owner = [int(np.argmax((scene.walls == end).all(axis=2).any(axis=1))) for end in ends]
+        nought, still = exact(0.0), ~scene.static
+        positions = np.concatenate([scene.position, ends])
+        velocities = np.concatenate([scene.velocity, np.zeros_like(ends)])
+        pulls = np.concatenate([still[:, None] * scene.gravity, np.zeros_like(ends)])
+        rows = [[nought, *map(exact, row)] for row in np.hstack([positions, velocities, pulls]).tolist()]
+        self.legs = [Leg(*row) for row in rows]
+        self.pull = [FALLING if moves else STATIC for moves in still] + [STATIC] * len(ends)
+        if not scene.gravity.any():
+            self.pull = [STATIC] * len(self.legs)
+        # What accelerates each while nothing holds it.
+        self.free = [(kind, leg.ax, leg.ay) for kind, leg in zip(self.pull, self.legs)]
+        self.count = [0] * len(self.legs)
+        self.radii = np.append(scene.radius, np.zeros(len(ends)))
+        self.radius = [exact(r) for r in self.radii.tolist()]
+        self.table = np.array([[float(x) for x in (*leg[1:7], leg.t)] for leg in self.legs])
+        self.shape = [shape_of(row) for row in self.table.tolist()]
+        self.asleep = np.zeros(len(self.legs), bool)
+        mass = [exact(m) if np.isfinite(m) else None for m in scene.mass.tolist()]
+        inverse = [nought if m is None else exact(1.0) / m for m in mass] + [nought] * len(ends)
+        self.matter = Matter(k, inverse, exact(scene.restitution), scene.restitution == 0)
+        self.walls = [_frame(k, wall) for wall in scene.walls.tolist()]
+        self.parted: dict[tuple[int, int], tuple[int, int]] = {}
+        self.leaning: list[set[Contact]] = [set() for _ in self.legs]
+        self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
+
+    def partner(self, contact: Contact) -> int:
+        """The other disk, or -1 - wall."""
+        if contact.kind != "body":
+            return -1 - contact.j
+        n = self.scene.n
+        return contact.j if contact.j < n else -1 - self.owner[contact.j - n]
+
+    def pair(self, contact: Contact) -> tuple[int, int]:
+        """Both disks, the lower number first; or the disk and -1 - wall."""
+        i, j = contact.i, self.partner(contact)
+        return (i, j) if j < 0 or i < j else (j, i)
+
+    def name(self, contact: Contact) -> str:
+        """The other side of a contact, in words."""
+        j = self.partner(contact)
+        return f"disk {j}" if j >= 0 else f"wall {-1 - j}"
+
+    def state_at(self, i: int, now: Number) -> tuple[Number, Number, Number, Number]:
+        """x, y m and vx, vy m/s of body i: x + v t + a t^2 / 2, v + a t."""
+        leg = self.legs[i]
+        if leg.t is now or self.shape[i] == STILL:
+            return leg.x, leg.y, leg.vx, leg.vy
+        s = now - leg.t
+        if self.shape[i] == STRAIGHT:
+            return leg.x + leg.vx * s, leg.y + leg.vy * s, leg.vx, leg.vy
+        ux, uy = leg.ax * s, leg.ay * s
+        return leg.x + (leg.vx + ux / 2) * s, leg.y + (leg.vy + uy / 2) * s, leg.vx + ux, leg.vy + uy
+
+    def velocity_at(self, i: int, now: Number) -> Velocity:
+        """vx, vy m/s."""
+        return self.state_at(i, now)[2:]
+
+    def fly(self, i: int, now: Number, v: Velocity, beside: Contact | None = None) -> None:
+        """Body i goes on from here with velocity v, held by what holds it; set exactly beside a wall it has hit."""
+        x, y, _, _ = self.state_at(i, now)
+        if beside is not None:
+            x, y = self.beside(beside, x, y)
+        self.begin(i, Leg(now, x, y, *v, *self.acceleration(i)))
+
+    def across(self, edge: Contact, now: Number) -> None:
+        """Set a disk that has reached an edge of the wrap onto the opposite one."""
+        assert self.scene.wrap is not None
+        i, place = edge.i, list(self.state_at(edge.i, now))
+        place[edge.j] = self.k.exact(float(self.scene.wrap[0 if edge.side > 0 else 1, edge.j]))
+        self.held[i] = ()
+        x, y, vx, vy = place
+        self.begin(i, Leg(now, x, y, vx, vy, *self.acceleration(i)))
+
+    def push(self, i: int, now: Number, thrusts: Sequence[Thrust]) -> None:
+        """Body i is pushed by all of `thrusts` from now on."""
+        exact, inverse = self.k.exact, self.matter.inverse_mass[i]
+        a = [exact(g) for g in (self.scene.gravity * (not self.scene.static[i])).tolist()]
+        for thrust in thrusts:
+            a = [each + exact(float(force)) * inverse for each, force in zip(a, thrust.force)]
+        kind = 2 + i if thrusts else (FALLING if self.scene.gravity.any() else STATIC)
+        self.free[i] = kind, a[0], a[1]
+        held = tuple(c for c in self.held[i] if c.kind == "wall" and self.k.sign(self.outward(c, a[0], a[1])) < 0)
+        self.hold(i, now, held, self.velocity_at(i, now))
+        # What held it still touches.
+        self.leaning[i] = {c for c in self.held[i] if c.kind == "wall"}
+
+    def hold(self, i: int, now: Number, contacts: tuple[Contact, ...], v: Velocity) -> None:
+        """Body i goes on with velocity v, resting on these contacts: the end of what it did before."""
+        self.asleep[i] = False
+        self.held[i] = contacts
+        x, y, _, _ = self.state_at(i, now)
+        self.begin(i, Leg(now, x, y, *v, *self.acceleration(i)))
+
+    def begin(self, i: int, leg: Leg) -> None:
+        """Put body i on a new leg."""
+        self.legs[i] = leg = leg._replace(held=self.held[i])
+        row = [float(x) for x in (*leg[1:7], leg.t)]
+        self.table[i], self.shape[i] = row, shape_of(row)
+        self.count[i] += 1
+        self.leaning[i] = set()
+
+    def acceleration(self, i: int) -> tuple[Number, Number]:
+        """ax, ay m/s2 of body i as it is held; sets what kind it is, too."""
+        kind, ax, ay = self.free[i]
+        walls = [c for c in self.held[i] if c.kind == "wall"]
+        if len(self.held[i]) > 1 or len(walls) < len(self.held[i]):
+            kind, ax, ay = STATIC, self.k.exact(0.0), self.k.exact(0.0)
+        elif walls:
+            _, _, tx, ty, _ = self.walls[walls[0].j]
+            along = tx * ax + ty * ay
+            if kind == FALLING:
+                level = square_to(self.scene.walls[walls[0].j], self.scene.gravity)
+                kind, along = (STATIC, self.k.exact(0.0)) if level else (-1 - walls[0].j, along)
+            ax, ay = along * tx, along * ty
+        self.pull[i] = kind
+        return ax, ay
+
+    def remember(self, touches: Sequence[Touch], hit: set[int]) -> None:
+        """After the hits of one instant: these contacts touch, exactly, and do not approach."""
+        for contact, _, _ in touches:
+            if contact.kind == "body":
+                i, j = sorted((contact.i, contact.j))
+                self.parted[i, j] = self.count[i], self.count[j]
+            elif contact.i in hit or not hit:
+                self.leaning[contact.i].add(contact)
+
+    def height(self, contact: Contact, x: Number, y: Number) -> Number:
+        """m from the line of the wall to (x, y), positive on the contact's side of it."""
+        px, py, tx, ty, _ = self.walls[contact.j]
+        return contact.side * (tx * (y - py) - ty * (x - px))
+
+    def foot(self, wall: int, x: Number, y: Number) -> Number:
+        """m along the wall from its start to the point closest to (x, y)."""
+        px, py, tx, ty, _ = self.walls[wall]
+        return tx * (x - px) + ty * (y - py)
+
+    def outward(self, contact: Contact, x: Number, y: Number) -> Number:
+        """The part of a vector (x, y) away from the wall, on the contact's side."""
+        _, _, tx, ty, _ = self.walls[contact.j]
+        return contact.side * (tx * y - ty * x)
+
+    def slide(self, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
+        """The part of a vector (x, y) along the wall."""
+        _, _, tx, ty, _ = self.walls[contact.j]
+        part = tx * x + ty * y
+        return part * tx, part * ty
+
+    def beside(self, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
+        """The place next to (x, y) at which disk contact.i touches the wall exactly."""
+        px, py, tx, ty, _ = self.walls[contact.j]
+        foot, away = self.foot(contact.j, x, y), contact.side * self.radius[contact.i]
+        return px + foot * tx - away * ty, py + foot * ty + away * tx
+
+    def upright(self, one: Contact, other: Contact) -> bool:
+        """Whether two contacts with walls stand at right angles, exactly."""
+        if one.kind != "wall" or other.kind != "wall":
+            return False
+        direction = self.scene.walls[other.j, 1], self.scene.walls[other.j, 0]
+        return square_to(self.scene.walls[one.j], *direction)
+
+
+def shape_of(row: Sequence[float]) -> int:
+    """The shape of a leg given as float64 x, y, vx, vy, ax, ay, t."""
+    if row[4] or row[5]:
+        return CURVED
+    return STRAIGHT if row[2] or row[3] else STILL
+
+
+def rational(vector: Array) -> tuple[Fraction, Fraction]:
+    """The float64 numbers of a vector (2,) as the fractions they are."""
+    return Fraction(float(vector[0])), Fraction(float(vector[1]))
+
+
+def square_to(wall: Array, tip: Array, foot: Array | None = None) -> bool:
+    """Whether a wall stands at right angles to the vector from `foot` (default 0, 0) to `tip`, in rationals."""
+    (px, py), (qx, qy) = rational(wall[0]), rational(wall[1])
+    (x, y), (ox, oy) = rational(tip), rational(np.zeros(2) if foot is None else foot)
+    return (qx - px) * (x - ox) + (qy - py) * (y - oy) == 0
+
+
+def _frame(k: Numbers, wall: list[list[float]]) -> Frame:
+    (px, py), (qx, qy) = [[k.exact(x) for x in end] for end in wall]
+    dx, dy = qx - px, qy - py
+    length = k.sqrt(dx * dx + dy * dy)
+    return Frame(px, py, dx / length, dy / length, length)

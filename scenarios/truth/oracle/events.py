@@ -1,0 +1,299 @@
+"""The event loop: exact flights between hits, in any numbers, from one next event per disk.
+
+Each body keeps its motion since its own last event; each moving disk keeps a record of what it touches first. A
+record is stale when a partner has had an event since; it is then made anew when its turn comes. Every pair is covered
+by whichever of the two was predicted last (Lubachevsky, J. Comput. Phys. 94, 255, 1991).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scenarios.model import Scene, Thrust
+from scenarios.truth.oracle.ahead import Ahead, key
+from scenarios.truth.oracle.bodies import Bodies
+from scenarios.truth.oracle.contacts import Pressed
+from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
+from scenarios.truth.oracle.path import Ends, Event, Path, Recent, Record, ambiguous
+from scenarios.truth.oracle.resting import lie_down, next_in_line, press, settle
+from scenarios.truth.oracle.ties import Blow, Contact, Outcome, Touch
+
+MOST_IDLE = 100  # contacts on end without a hit: their signs contradict each other
+MOST_STEPS = 60_000  # hits, edges crossed, records made anew, orders of simultaneous hits tried
+
+
+class Motion:
+    """A scene on its way to `until` s, in the numbers `k` and `left` steps; arithmetic only within `k.precise()`."""
+
+    def __init__(self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, left: int) -> None:
+        self.k, self.until, self.scene, self.left = k, until, scene, left
+        self.bodies = Bodies(scene, k)
+        self.ahead = Ahead(self.bodies)
+        self.records: list[Record | None] = [None] * scene.n
+        self.due = np.full(scene.n, np.inf)
+        self.now = k.exact(0.0)
+        self.path = Path([[self.bodies.legs[i]] for i in range(scene.n)])
+        self.recent = Recent(scene.n)
+        # From the last to the first, so that the next one can be popped.
+        self.switches = sorted(((t, p.disk) for p in thrusts for t in (p.start, p.stop) if t < until), reverse=True)
+        self.thrusts = thrusts
+        self.idle = 0
+
+    def run(self) -> Path:
+        """Everything up to `until`, or up to where the motion has no answer."""
+        try:
+            self.begin()
+            while self.advance():
+                self.left -= 1
+                if self.left < 0:
+                    raise Ends(float(self.now), f"the work allowed for an answer in {self.k.bits} bits is used up")
+        except Ends as end:
+            self.path.end, self.path.reason = end.t, str(end)
+            self.path.disks, self.path.outcomes = end.disks, end.outcomes
+            self.path.named = [[self.bodies.pair(blow.contact) for blow in one.blows] for one in end.outcomes]
+        except Undecided:
+            raise Undecided(float(self.now)) from None
+        return self.path
+
+    def begin(self) -> None:
+        """Push what is pushed from the start, rest what lies still, predict all."""
+        while self.switches and self.switches[-1][0] == 0:
+            self.push(self.switches.pop()[1])
+        for contact in lie_down(self.ahead):
+            self.rest(contact)
+        self.follow_up(set(np.flatnonzero(~self.scene.static).tolist()))
+
+    def advance(self) -> bool:
+        """Do what comes next; False if nothing does before `until`."""
+        soonest = self.due.min()
+        if self.switches and self.switches[-1][0] <= soonest:
+            t, disk = self.switches.pop()
+            self.now = self.k.exact(t)
+            self.push(disk)
+            self.follow_up({disk})
+            return True
+        if soonest == np.inf:
+            return False
+        i, contacts = self.next_contacts(soonest)
+        if not contacts:
+            self.predict(i)
+        elif len(contacts) == 1 and contacts[0].kind in ("edge", "end", "rest"):
+            {"edge": self.wrap, "end": self.leave, "rest": self.stop}[contacts[0].kind](contacts[0])
+        else:
+            self.collide(contacts)
+        return True
+
+    def next_contacts(self, soonest: float) -> tuple[int, list[Contact]]:
+        """The first disk and the contacts of its event; none if its record is stale and must be made anew.
+
+        float64 clocks only tell which records are worth comparing.
+        """
+        near = [int(i) for i in np.flatnonzero(self.due <= soonest + 1e-9 * max(1.0, soonest))]
+        first = near[0]
+        for i in near[1:]:
+            if self.order(self.record(i), self.record(first)) < 0:
+                first = i
+        record = self.record(first)
+        if self.k.proves or self.k.sign(record.t - self.now):
+            self.now = record.t
+        if self.stale(record):
+            return first, []
+        found = dict.fromkeys(record.contacts)
+        for i in near:
+            other = self.record(i)
+            shares = any(a.disks & b.disks for a in other.contacts for b in found)
+            if i != first and shares and self.order(other, record) == 0:
+                if self.stale(other):
+                    return i, []
+                found |= dict.fromkeys(other.contacts)
+        # Both members of a pair may have recorded it.
+        once = {(c.kind, *sorted((c.i, c.j)), c.side) if c.kind == "body" else c: c for c in found}
+        return first, list(once.values())
+
+    def record(self, i: int) -> Record:
+        """The record of a disk that is due."""
+        record = self.records[i]
+        assert record is not None
+        return record
+
+    def order(self, one: Record, other: Record) -> int:
+        """-1, 0 or 1 as `one` comes before, with or after `other`; balls that overlap are the same time if the same."""
+        try:
+            return self.k.sign(one.t - other.t)
+        except Undecided:
+            mine, theirs = (set().union(*(c.disks for c in record.contacts)) for record in (one, other))
+            if mine == theirs or not mine & theirs:
+                return 0
+            raise
+
+    def stale(self, record: Record) -> bool:
+        """Whether a partner has had an event since the record was made."""
+        counts = self.bodies.count
+        return any(c.kind == "body" and counts[c.j] != then for c, then in zip(record.contacts, record.counts))
+
+    def predict(self, i: int) -> None:
+        """Find what disk i touches first from now on."""
+        k = self.k
+        now = float(self.now)
+        left = self.until - now
+        best: list[tuple[Number, Contact]] = []
+        try:
+            for bound, contact in self.ahead.candidates(i, now, left):
+                limit = float(best[0][0]) if best else left
+                if bound > limit * (1 + 1e-9) + 1e-12:
+                    break
+                if (after := self.ahead.time_to(contact, self.now, limit)) is None:
+                    continue
+                place = k.sign(after - best[0][0]) if best else -1
+                best = [(after, contact)] if place < 0 else [*best, (after, contact)] if place == 0 else best
+        except Pressed:
+            self.press(contact)
+            return
+        self.records[i], self.due[i] = None, np.inf
+        if best and float(best[0][0]) <= left:
+            after, contacts = best[0][0], tuple(contact for _, contact in best)
+            at_once = after.is_zero() if k.proves else not k.sign(after)
+            self.expect(i, self.now if at_once else self.now + after, contacts)
+
+    def expect(self, i: int, t: Number, contacts: tuple[Contact, ...]) -> None:
+        """Put down what disk i does next."""
+        counts = self.bodies.count
+        self.records[i] = Record(t, contacts, tuple(counts[c.j] if c.kind == "body" else 0 for c in contacts))
+        self.due[i] = float(t) if float(t) <= self.until else np.inf
+
+    def press(self, contact: Contact) -> None:
+        """A contact that lasts begins; on a wall the disk rests from now on."""
+        if not press(self.ahead, contact, self.now):
+            on = [self.bodies.name(held) for held in self.bodies.held[contact.i]]
+            where = f" while it rests on {on[0]}" if on else ""
+            others = [contact.j] if contact.kind == "body" and contact.j < self.scene.n else []
+            reason = f"disk {contact.i} is pressed onto {self.bodies.name(contact)}{where}"
+            raise Ends(float(self.now), reason, [contact.i, *others])
+        self.rest(contact)
+        self.follow_up({contact.i})
+
+    def collide(self, contacts: list[Contact]) -> None:
+        """Resolve the contacts of one instant; where their order matters there is no answer."""
+        bodies, now = self.bodies, float(self.now)
+        if odd := [contact for contact in contacts if contact.kind in ("edge", "end")]:
+            where = "the edge of the wrap" if odd[0].kind == "edge" else f"the end of wall {odd[0].j}"
+            raise Ends(now, f"disk {odd[0].i} comes to {where} while it touches another", [odd[0].i])
+        alone = len(contacts) == 1 and self.ahead.alone(contacts[0], now)
+        touches = [self.ahead.touch(c, self.now) for c in contacts] if alone else self.ahead.cluster(contacts, self.now)
+        disks = sorted({i for touch in touches for i in touch.contact.disks})
+        v = {i: bodies.velocity_at(i, self.now) for i in disks}
+        if alone:
+            after, blow = bodies.matter.hit(touches[0], v)
+            outcome = Outcome(after, [blow], frozenset(contacts if bodies.matter.sticks else ()))
+        else:
+            resting = frozenset(c for held in bodies.held for c in held)
+            ends, tried = bodies.matter.outcomes(touches, v, resting, bodies.upright)
+            self.left -= tried
+            if len(ends) != 1 or not ends[0].velocities:
+                names = ", ".join(str(i) for i in disks if i < self.scene.n)
+                raise Ends(now, ambiguous(names, ends), disks, [end for end in ends if end.velocities])
+            outcome = ends[0]
+        arriving = {key(contact) for contact in contacts}
+        for blow in outcome.blows:
+            self.log(blow, key(blow.contact) in arriving)
+            arriving.discard(key(blow.contact))
+        self.idle = 0 if outcome.blows else self.idle + 1
+        if self.idle > MOST_IDLE:
+            raise Ends(now, f"the digits of {self.k.bits} bits are used up")
+        touched = {i for blow in outcome.blows for i in blow.contact.disks} or set(disks)
+        self.go_on(outcome, touches, touched)
+
+    def go_on(self, outcome: Outcome, touches: Sequence[Touch], touched: set[int]) -> None:
+        """New legs after the hits of one instant; a bounce off a wall may be the first of the last ones."""
+        bodies = self.bodies
+        walls = [blow.contact for blow in outcome.blows if blow.contact.kind == "wall"]
+        bounce = walls[0] if len(outcome.blows) == 1 and walls else None
+        for i in sorted(touched):
+            bodies.held[i] = tuple(c for c in bodies.held[i] if c in outcome.still)
+            v = outcome.velocities[i]
+            for still in (c for c in outcome.still if c.kind == "wall" and c.i == i):
+                v = bodies.slide(still, *v)
+            bodies.fly(i, self.now, v, bounce)
+        bodies.remember(touches, touched)
+        # What was carried by a disk that is hit is carried no longer.
+        dropped = {i for i, held in enumerate(bodies.held) if i not in touched and any(c.disks & touched for c in held)}
+        for i in sorted(dropped):
+            bodies.hold(i, self.now, (), bodies.velocity_at(i, self.now))
+        stop = None
+        if bounce is not None and 0 < self.scene.restitution < 1:
+            stop = settle(self.ahead, bounce, self.now, self.thrusts)
+        self.follow_up(touched | dropped)
+        if stop is not None and bounce is not None:
+            self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
+
+    def log(self, blow: Blow, new: bool) -> None:
+        """Write a hit down; refuse where those of a disk pile up."""
+        contact, j = blow.contact, self.bodies.partner(blow.contact)
+        self.path.events.append(Event(self.now, contact.i, j, blow.impulse, float(blow.cosine), new))
+        self.recent.add(contact.i, float(self.now), self.bodies.name(contact))
+        if j >= 0:
+            self.recent.add(j, float(self.now), f"disk {contact.i}")
+
+    def rest(self, contact: Contact) -> None:
+        """Write down that a disk comes to rest: a contact begins, with no impulse."""
+        self.path.events.append(Event(self.now, contact.i, self.bodies.partner(contact), self.k.exact(0.0), 0.0))
+
+    def stop(self, contact: Contact) -> None:
+        """The bounces of a disk on a wall have died out: it rests."""
+        bodies, i = self.bodies, contact.i
+        wall = contact._replace(kind="wall")
+        bodies.hold(i, self.now, (*bodies.held[i], wall), bodies.velocity_at(i, self.now))
+        self.rest(wall)
+        self.follow_up({i})
+
+    def leave(self, contact: Contact) -> None:
+        """A disk slides off the end of the wall it rests on: on to the next in line, or into the air."""
+        bodies, i, k = self.bodies, contact.i, self.k
+        held = [c for c in bodies.held[i] if c.j == contact.j]
+        v, end = bodies.velocity_at(i, self.now), self.scene.walls[contact.j, 1 if contact.side > 0 else 0]
+        following = next_in_line(self.ahead, held[0], contact.side)
+        if following is None:
+            _, ax, ay = bodies.free[i]
+            slow = v[0] * v[0] + v[1] * v[1] + bodies.radius[i] * bodies.outward(held[0], ax, ay)
+            if k.sign(slow) <= 0 or len(bodies.held[i]) > 1:
+                raise Ends(
+                    float(self.now), f"disk {i} turns about the end of wall {contact.j}, off which it slides", [i]
+                )
+            bodies.hold(i, self.now, (), v)
+            corner = next(j for j in range(self.scene.n, len(bodies.legs)) if (bodies.table[j, :2] == end).all())
+            bodies.remember([self.ahead.touch(Contact("body", i, corner), self.now)], set())
+        else:
+            bodies.hold(i, self.now, (following,), v)
+        self.follow_up({i})
+
+    def wrap(self, contact: Contact) -> None:
+        """Set a disk onto the opposite edge; where another stands there, the exercise gives no answer."""
+        i = contact.i
+        self.bodies.across(contact, self.now)
+        for other, gap in self.ahead.near(i, self.now):
+            if gap < 0:
+                reason = f"disk {i} re-enters over the edge of the wrap onto {self.bodies.name(other)}"
+                raise Ends(float(self.now), reason, sorted(other.disks))
+        self.follow_up({i})
+
+    def push(self, disk: int) -> None:
+        """Begin or end a push."""
+        on = [p for p in self.thrusts if p.disk == disk and p.start <= float(self.now) < p.stop]
+        self.bodies.push(disk, self.now, on)
+
+    def follow_up(self, disks: set[int]) -> None:
+        """Write down the new legs and predict the disks anew."""
+        moving = sorted(i for i in disks if i < self.scene.n and not self.scene.static[i])
+        for i in moving:
+            self.path.legs[i].append(self.bodies.legs[i])
+        for i in moving:
+            if not self.bodies.asleep[i]:
+                self.predict(i)
+
+
+def trace(scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, most: int = MOST_STEPS) -> Path:
+    """The motion of `scene` under `thrusts` up to `until` s, in `most` steps at most. Raises what `Bodies` raises."""
+    with k.precise():
+        return Motion(scene, thrusts, until, k, most).run()
