@@ -25,7 +25,7 @@ def make() -> None:
     figures.keep(OUT)
     subprocess.run([sys.executable, Path(__file__).parent / "picture.py", OUT / "speed.html"], check=True)
     kept = ", ".join(str(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED))
-    print(f"kept: {kept}, reports/speed/speed.png; what the documents say of them: python -m tests.speed_figures")
+    print(f"kept: {kept}, reports/speed/speed.png; what README.md says: python -m tests.reports.speed.statements")
 
 
 def check() -> list[str]:

@@ -15,7 +15,7 @@ from labels import MARGIN, named
 from reports.commands.serve import application
 from reports.game.command import FIRST
 from reports.game.server import Game
-from tests.browsing import chromium, served
+from tests.reports.page.browsing import chromium, served
 
 DRAW = """([annotations, right]) => Plotly.relayout(document.querySelector('#pooled .plot'),
   { annotations, 'margin.r': right, 'font.size': 13, autosize: true })"""

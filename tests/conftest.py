@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser
 
-from tests.browsing import chromium
+from tests.reports.page.browsing import chromium
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from adapters.conformance.conform import PROBES
 from adapters.engines import ENGINES
 from reports.lessons.catalogue import LESSONS
 from scenarios.catalogue import SCENARIOS
-from tests.command_line import crosscheck
+from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS
 
 ROOT = Path(__file__).parent.parent
@@ -148,7 +148,7 @@ def test_the_readme_counts_the_solvers_of_the_confusion_table():
 
     assert said is not None
     assert [int(number) for number in said.groups()] == [len(MUTANTS), len(CORRECT)]
-    assert len((ROOT / "tests" / "confusion.csv").read_text().splitlines()) == 1 + len(MUTANTS) + len(CORRECT)
+    assert len((ROOT / "tests" / "data" / "confusion.csv").read_text().splitlines()) == 1 + len(MUTANTS) + len(CORRECT)
 
 
 @pytest.mark.parametrize("document", TEXTS)

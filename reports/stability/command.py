@@ -32,7 +32,7 @@ from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 from scenarios.files.scene_file import SceneFileError, read_scene_file
 
-SEE = "limits.csv and stability.html have the names of all, or tests/stability_limits.csv; for --vary see --help"
+SEE = "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for --vary see --help"
 LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
 PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in ENGINES)
 STABILITY = Kind(

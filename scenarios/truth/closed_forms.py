@@ -1,6 +1,6 @@
 """Closed forms of flights, bounces, single hits and pushes: exact answers without any stepping.
 
-SI units, float64; right to 1e-13 of the lengths and speeds of a scene (tests/test_truth.py).
+SI units, float64; right to 1e-13 of the lengths and speeds of a scene (tests/scenarios/test_closed_forms.py).
 """
 
 from __future__ import annotations

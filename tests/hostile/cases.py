@@ -7,7 +7,7 @@ from pathlib import Path
 from tests.hostile.played import Input
 from tests.hostile.small_run import TWO
 
-SCENES = Path(__file__).parent.parent / "scenes"
+SCENES = Path(__file__).parents[1] / "data" / "scenes"
 FILE = "two.toml"
 TRUTH = ("truth", FILE, "--timeout", "5")
 PLAYED = ("run", FILE, "--engine", "pymunk:shipped", "--out", "out", "--workers", "1", "--timeout", "5")

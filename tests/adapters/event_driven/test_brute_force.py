@@ -1,0 +1,170 @@
+"""The event engine against a second algorithm, and whether that would notice a bug."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from adapters.event_driven import events
+from adapters.event_driven.events import EventEngine
+from scenarios.families.placing import box, scatter
+from scenarios.model import Scene
+from scenarios.no_truth import NoTruth
+from tests.adapters.event_driven.gases import hits_of
+
+# A second algorithm: all contacts as polynomials, all roots by numpy, nothing kept from one event to the next.
+
+
+def first_fall(gap):
+    """First t >= 0 at which a polynomial (highest power first) comes down through 0."""
+    gap = np.trim_zeros(gap, "f")
+    roots = np.roots(gap) if len(gap) > 1 else np.zeros(0)
+    times = roots[np.abs(roots.imag) < 1e-12].real
+    falling = np.polyval(np.polyder(gap), times) < 0
+    return min(times[(times > -1e-12) & falling], default=np.inf)
+
+
+def contacts(scene, x, v, a, images):
+    """All contacts ahead: (time, disk, other or -1 - wall, normal to it at the contact)."""
+    for i in range(scene.n):
+        points = [(scene.radius[i], -1 - w, end, 0, 0) for w, wall in enumerate(scene.walls) for end in wall]
+        others = [
+            (scene.radius[i] + scene.radius[j], j, x[j] + shift, v[j], a[j])
+            for j in range(i + 1, scene.n) for shift in images
+        ]  # fmt: skip
+        for reach, j, place, speed, pull in [*points, *others]:
+            path = np.array([(a[i] - pull) / 2, v[i] - speed, x[i] - place])
+            gap = sum(np.convolve(path[:, axis], path[:, axis]) for axis in range(2)) - [0, 0, 0, 0, reach**2]
+            if (t := first_fall(gap)) < np.inf:
+                yield t, i, j, np.array([np.polyval(path[:, axis], t) for axis in range(2)])
+        for w, (start, end) in enumerate(scene.walls):
+            along = (end - start) / np.hypot(*(end - start))
+            for normal in (np.array([-along[1], along[0]]), np.array([along[1], -along[0]])):
+                t = first_fall([a[i] @ normal / 2, v[i] @ normal, (x[i] - start) @ normal - scene.radius[i]])
+                if t < np.inf and 0 < (x[i] + v[i] * t + a[i] * t * t / 2 - start) @ along < np.hypot(*(end - start)):
+                    yield t, i, -1 - w, normal
+
+
+def brute_force(scene, side, count):
+    """Up to `count` hits as (t, i, j) within 5 s, and when it stopped and where; side: of the torus, or 0."""
+    x, v, w = scene.position.copy(), scene.velocity.copy(), 1 / scene.mass
+    a = np.where(scene.static[:, None], 0.0, scene.gravity)
+    images = [np.array([k, m]) * side for k in (-1, 0, 1) for m in (-1, 0, 1)] if side else [np.zeros(2)]
+    now, hits = 0.0, []
+    while len(hits) < count:
+        if side:
+            x = np.mod(x, side)
+        t, i, j, normal = min(contacts(scene, x, v, a, images), key=lambda c: c[0], default=(np.inf, 0, 0, None))
+        t = min(t, 0.2 if side else 10.0)  # in 0.2 s nobody passes the next image
+        if now + t > 5:
+            break
+        x, v, now = x + v * t + a * t * t / 2, v + a * t, now + t
+        if t in (0.2, 10.0):
+            continue
+        normal = normal / np.hypot(*normal)
+        speed, weight = (v[i] - v[j], w[i] + w[j]) if j >= 0 else (v[i], w[i])
+        kick = (1 + scene.restitution) * (speed @ normal) / weight * normal
+        v[i] -= w[i] * kick
+        if j >= 0:
+            v[j] += w[j] * kick
+        hits.append((now, i, j))
+    return hits, now, x
+
+
+def random_scene(seed):
+    """A box, a torus, or an open place with loose walls; any radii and masses, some static, gravity or none."""
+    draw = np.random.default_rng(seed)
+    n, kind = int(draw.integers(2, 7)), ("box", "torus", "open")[seed % 3]
+    radius = draw.uniform(0.05, 0.3, n)
+    walls = {"box": box([-1.6, -1.3], [1.7, 1.5]), "torus": np.zeros((0, 2, 2))}.get(kind)
+    if walls is None:
+        walls = draw.uniform(-1, 1, (2, 2, 2)) + [[[0, -2.4]], [[0, 2.4]]]
+    position = scatter(draw, [0.01, 0.01], [1.79, 1.79], radius) if kind == "torus" else scatter(
+        draw, [-1.2, -0.9], [1.3, 1.1], radius
+    )  # fmt: skip
+    mass = np.where(draw.random(n) < 0.2, np.inf, draw.uniform(0.3, 5, n))
+    return Scene(
+        position=position, velocity=np.where(np.isinf(mass)[:, None], 0.0, draw.normal(size=(n, 2))),
+        radius=radius, mass=mass, walls=walls, restitution=float(draw.choice([0.6, 0.9, 1.0])),
+        gravity=draw.normal(size=2) * (draw.random() < 0.6),
+    ), 1.8 if kind == "torus" else 0.0  # fmt: skip
+
+
+def compare(seed):
+    """A random scene by the engine and by brute force: the first eight hits, and the positions after them."""
+    scene, side = random_scene(seed)
+    try:
+        engine = EventEngine(scene, [[0, 0], [side, side]] if side else None)
+    except NoTruth:  # a disk lies across the edge of the torus, or on a wall, and on another disk
+        return
+    hits, now, x = brute_force(scene, side, 8)
+    engine.advance(now + 1e-9)
+    found = hits_of(engine)[: len(hits)]
+    # Eight hits of disks a tenth as large as their paths: each may take a digit from the sixteen there are.
+    np.testing.assert_allclose(np.array(found).reshape(-1, 3), np.array(hits).reshape(-1, 3), rtol=0, atol=1e-7)
+    apart = engine.look(now)[0] - x
+    apart -= side * np.round(apart / side) if side else 0
+    assert np.abs(apart).max() < 1e-7
+
+
+def compare_all(seeds):
+    """Compare one random scene after the other."""
+    for seed in seeds:
+        compare(seed)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1))
+def test_a_brute_force_algorithm_finds_the_same_hits(seed):
+    """All pairs, all images, all walls and their ends; all roots at once."""
+    compare(seed)
+
+
+FILES = ("contact_times", "queue", "disks", "search", "rest", "impacts", "loop")
+BUGS = {
+    "stale record kept": ("b.count == a.partner_count", "True"),
+    "nearest image": (
+        "dx, dy = b.x - x + image(b.cx - cx, g.shift[0]), b.y - y + image(b.cy - cy, g.shift[1])",
+        "dx = b.x - x\n        dx -= g.span[0] * np.round(dx / g.span[0]) * g.torus\n        dy = b.y - y\n"
+        "        dy -= g.span[1] * np.round(dy / g.span[1]) * g.torus",
+    ),
+    "contact found late": (
+        "t = max(gap, 0.0) / (sqrt(max(disc, 0.0)) - closing)",
+        "t = (sqrt(max(disc, 0.0)) - closing) / (ux * ux + uy * uy)",
+    ),
+    "wall end forgotten": ("for part in range(3)", "for part in range(1)"),
+    "static disk falls along": ("arena.rules.mixed and (b.ax", "False and (b.ax"),
+    "new cells not searched": ("if beyond == ALL:", "if beyond != ALL: return 0\n    if beyond == ALL:"),
+}
+
+
+def plain_kernels(right="", wrong=""):
+    """The kernels as plain Python, one line of them replaced."""
+    folder = Path(events.__file__).parent
+    source = "\n".join((folder / f"{name}.py").read_text() for name in FILES)
+    ours = r"from adapters\.event_driven\.\w+ import (\([^)]*\)|.*)"
+    source = re.sub(rf"from __future__.*|@kernel|@inlined|@pasted|{ours}", "", source)
+    assert right in source
+    names: dict = {"__name__": "plain"}
+    exec(source.replace(right, wrong) if right else source, names)
+    return SimpleNamespace(**names)
+
+
+def test_the_kernels_as_plain_python_find_the_same(monkeypatch):
+    """So what the next test catches is the bug, and not the way it was planted."""
+    monkeypatch.setattr(events, "event_loop", plain_kernels())
+    compare_all(range(12))
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_a_planted_bug_is_caught_by_brute_force(bug, monkeypatch):
+    """Each by a wrong list of hits in one of forty scenes."""
+    monkeypatch.setattr(events, "event_loop", plain_kernels(*BUGS[bug]))
+    with pytest.raises((AssertionError, NoTruth)):
+        compare_all(range(40))

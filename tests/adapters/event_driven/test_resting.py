@@ -1,0 +1,242 @@
+"""Rest in the event engine: bounces that come to their end, what lies on a wall, and what takes it off again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from adapters.event_driven import events
+from adapters.event_driven.events import EventEngine
+from scenarios.families.placing import box, scatter
+from scenarios.model import Scene
+from scenarios.no_truth import NoTruth
+from scenarios.truth.closed_forms import bouncing
+from tests.adapters.event_driven.test_brute_force import plain_kernels
+
+G = 10.0
+FLOOR = [[[-50.0, 0.0], [50.0, 0.0]]]
+
+
+def disks(position, velocity, restitution, **fields):
+    """Disks of radius 0.5 and mass 1 above a floor, unless said otherwise."""
+    n = len(position)
+    arrays = {"radius": np.full(n, 0.5), "mass": np.ones(n), "walls": FLOOR, "gravity": [0.0, -G]}
+    return Scene(position=position, velocity=velocity, restitution=restitution, **(arrays | fields))
+
+
+def after(scene, until):
+    """Position and velocity at `until` s."""
+    engine = EventEngine(scene)
+    engine.advance(until)
+    return engine.look(until)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.1, 0.5, 0.9, 0.99])
+def test_a_bouncing_ball_follows_the_closed_form_into_rest(e):
+    """At any time, also between bounces a microsecond apart, and for ever after sqrt(2 h / g) (1 + e) / (1 - e)."""
+    end = np.sqrt(2 * 2.0 / G) * (1 + e) / (1 - e)
+    engine = EventEngine(disks([[0.0, 2.5]], [[0.25, 0.0]], e))
+    times = end * np.sort(np.concatenate([np.linspace(0, 1.5, 200), 1 - np.geomspace(1e-1, 1e-9, 60)]))
+    height, speed = bouncing(2.0, G, e, times[-1]).at(times) if e > 0 else (np.maximum(2 - G * times**2 / 2, 0), None)
+    for k, at in enumerate(times):
+        engine.advance(at)
+        x, v = engine.look(at)
+        # A time is rounded at every bounce, 3231 of them at e = 0.99, and moves the ball by 6.3 m/s s.
+        assert x[0] == pytest.approx([at / 4, 0.5 + height[k]], abs=2e-11)
+        if at > end * (1 + 1e-11):
+            assert (x[0, 1], *v[0]) == (0.5, 0.25, 0.0)
+        elif speed is not None and abs(height[k]) > 1e-9:
+            assert v[0, 1] == pytest.approx(speed[k], abs=1e-9)
+
+
+def test_bounces_down_an_incline_end_in_a_slide():
+    """On the line of slope -3/4: g cos(alpha) across it, g sin(alpha) along it, all the time."""
+    along, normal = np.array([0.8, -0.6]), np.array([0.6, 0.8])
+    scene = disks([1.5 * normal], [[0.0, 0.0]], 0.5, walls=[[-20 * along, 60 * along]])
+    end = 3 * np.sqrt(2 * 1.0 / (0.8 * G))
+    for at in (0.3, end * 0.9, end * 0.999, end + 1e-9, 3.0):
+        x, v = after(scene, at)
+        assert x[0] @ along == pytest.approx(0.6 * G * at**2 / 2, abs=1e-12)
+        assert v[0] @ along == pytest.approx(0.6 * G * at, abs=1e-12)
+        if at > end:
+            assert x[0] @ normal == pytest.approx(0.5, abs=1e-14)
+            assert v[0] @ normal == pytest.approx(0.0, abs=1e-14)
+
+
+# One of unit speed hits one that lies on the floor: speeds after A-B, B-floor, A-B, ... until nothing closes in.
+ON_A_LYING_DISK = {0.8: (0.638, 0.0144), 0.5: (0.21875, 0.046875)}
+
+
+@pytest.mark.parametrize("e", ON_A_LYING_DISK)
+def test_a_hit_on_a_lying_disk_is_the_limit_of_small_gaps(e):
+    """By hand for equal masses: at e = 0.8, (-1, 0), (-.1, -.9), (-.1, .72), (.638, -.018), (.638, .0144)."""
+    start = np.sqrt(1 - 2 * G * 0.045)
+    engine, at = EventEngine(disks([[0.0, 0.5], [0.0, 1.545]], [[0, 0], [0, -start]], e)), (1 - start) / G
+    engine.advance(at + 1e-9)
+    _, v = engine.look(at + 1e-9)
+    assert v[::-1, 1] == pytest.approx(np.array(ON_A_LYING_DISK[e]) - G * 1e-9, abs=1e-9)
+    assert len(engine.hits) == 5  # and the floor, which bears the lower one from the start
+
+
+@pytest.mark.parametrize(("e", "mass"), [(0.0, 1.0), (0.1, 1.0), (0.5, 10.0)])
+def test_a_hit_on_a_lying_disk_that_does_not_end_is_refused(e, mass):
+    """As many hits at one instant as there are: when and whose."""
+    scene = disks([[0.0, 0.5], [0.0, 2.0]], [[0, 0], [0, -1.0]], e, mass=[1.0, mass])
+    with pytest.raises(NoTruth, match=r"the collisions of disk [01] on disk [01]( and wall 0)? accumulate at 0\.2316"):
+        EventEngine(scene).advance(1.0)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1))
+def test_a_hit_on_a_lying_disk_is_one_on_a_disk_just_above_the_floor(seed):
+    """From any side, of any masses and radii: without gravity and 1e-12 m up, where there is no rest, the same."""
+    draw = np.random.default_rng(seed)
+    radius, mass, angle = draw.uniform(0.3, 1, 2), draw.uniform(0.5, 2, 2), draw.uniform(0.3, np.pi - 0.3)
+    toward = np.array([np.cos(angle), np.sin(angle)])
+    e, start = draw.uniform(0.7, 1), [0.0, radius[0]]
+    assume(start[1] + (radius.sum() + 1e-3) * toward[1] > radius[1])  # else the other starts below the floor
+
+    def played(lift, gravity):
+        position = np.array([start, start + (radius.sum() + 1e-3) * toward]) + [0, lift]
+        velocity = [[0.0, 0.0], -5 * toward]
+        engine = EventEngine(disks(position, velocity, e, radius=radius, mass=mass, gravity=[0.0, -gravity]))
+        engine.advance(3e-4)
+        return engine.look(3e-4)[1]
+
+    # Between two hits the upper one moves 5 m/s times 1e-12 m over the slow speed of the lower one, some mm/s; and
+    # in 3e-4 s gravity changes a speed by 3e-9 m/s.
+    assert played(0.0, 1e-5) == pytest.approx(played(1e-12, 0.0), abs=2e-7)
+
+
+@pytest.mark.parametrize(("speed", "flies"), [(2.3, True), (2.2, False)])
+def test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(speed, flies):
+    """It turns about the end, on a circle, if v2 < g r = 5 m2/s2; else its parabola never touches the end again."""
+    scene = disks([[-1.0, 0.5]], [[speed, 0.0]], 0.5, walls=[[[-5, 0], [0, 0]]])
+    if not flies:
+        with pytest.raises(NoTruth, match=r"disk 0 slides round the end of wall 0 at 0\.4545\d* s: no parabola"):
+            after(scene, 1.0)
+        return
+    x, v = after(scene, 1.0)
+    fall = 1.0 - 1.0 / speed
+    assert x[0] == pytest.approx([speed - 1.0, 0.5 - G * fall**2 / 2], abs=1e-14)
+    assert v[0] == pytest.approx([speed, -G * fall], abs=1e-14)
+
+
+def test_a_push_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
+    """2 m/s2 upward and to the right from 1 s to 2 s; the same twice as strong downward leaves it where it is."""
+    scene = disks([[0.0, 0.5]], [[0.0, 0.0]], 0.5)
+    for upward, height in ((2.0, 1.0), (-4.0, 0.0)):
+        engine = EventEngine(scene)
+        engine.advance(1.0)
+        engine.pull(0, 1.0, np.array([2.0, upward]))
+        engine.advance(2.0)
+        x, v = engine.look(2.0)
+        assert x[0] == pytest.approx([1.0, 0.5 + height], abs=1e-14)
+        assert v[0] == pytest.approx([2.0, max(upward, 0.0)], abs=1e-14)
+
+
+def test_lying_disks_hit_each_other_along_the_floor_and_stay_on_it():
+    """Head-on at e = 0.5, equal masses and radii: the normal is along the floor, to the last bit."""
+    scene = disks([[0.0, 0.5], [3.0, 0.5]], [[1.0, 0.0], [-1.0, 0.0]], 0.5)
+    x, v = after(scene, 3.0)
+    assert x.tolist() == [[0.0, 0.5], [3.0, 0.5]]
+    assert v.tolist() == [[-0.5, 0.0], [0.5, 0.0]]
+
+
+def test_without_mutual_help_nothing_stands_on_a_point_or_on_another_disk():
+    """Bounces on a wall's end, on a static disk, or of one disk on another have no rest: refused."""
+    pin = disks([[0.0, 2.0]], [[0.0, 0.0]], 0.5, walls=[[[0.0, -1.0], [0.0, 0.0]]])
+    pile = disks([[0.0, 0.5], [0.0, 2.0]], [[0.0, 0.0], [0.0, 0.0]], 0.5)
+    post = disks([[0.0, 0.5], [0.0, 2.0]], [[0.0, 0.0], [0.0, 0.0]], 0.5, mass=[np.inf, 1.0])
+    for scene, words in ((pin, "wall 0"), (pile, "disk [01]( and wall 0)?"), (post, "disk 0")):
+        with pytest.raises(NoTruth, match=f"the collisions of disk [01] on {words} accumulate at"):
+            EventEngine(scene).advance(9.0)
+
+
+def rain(seed, restitution, n=21):
+    """Disks falling in a box."""
+    draw = np.random.default_rng(seed)
+    radius = draw.uniform(0.08, 0.3, n)
+    position = scatter(draw, [0.3, 0.3], [9.7, 5.7], radius)
+    return Scene(
+        position=position, velocity=draw.uniform(-0.5, 0.5, (n, 2)), radius=radius, mass=30 * radius**2,
+        restitution=restitution, gravity=[0.0, -G], walls=box([0.0, 0.0], [10.0, 6.0]),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_while_a_box_settles_energy_only_falls_and_nothing_overlaps(seed):
+    """Up to where two disks come to rest on each other, which is refused."""
+    scene = rain(seed, 0.5)
+    engine, energy, at = EventEngine(scene), np.inf, 0.0
+    i, j = np.triu_indices(scene.n, 1)
+    with pytest.raises(NoTruth, match="accumulate"):
+        EventEngine(scene).advance(99.0)
+    while True:
+        at += 0.01
+        try:
+            engine.advance(at)
+        except NoTruth:
+            break
+        x, v = engine.look(at)
+        now = scene.mass @ ((v**2).sum(axis=1) / 2 + G * x[:, 1])
+        assert now <= energy * (1 + 1e-13)  # rounding of a sum
+        energy = now
+        assert (np.hypot(*(x[i] - x[j]).T) - scene.radius[i] - scene.radius[j]).min() > -1e-12
+        assert (x[:, 1] - scene.radius).min() > -1e-12
+    assert (engine.arena.disks.wall >= 0).any()
+
+
+def test_a_settling_row_does_not_depend_on_order_or_handedness():
+    """Disks that drop onto a floor, come to rest and hit each other on it: shuffled, and in a mirror."""
+    draw = np.random.default_rng(5)
+    n = 8
+    x = np.column_stack([np.arange(n) * 1.7, draw.uniform(0.6, 1.2, n)])
+    v = np.column_stack([draw.uniform(-0.3, 0.3, n), np.zeros(n)])
+    scene = disks(x, v, 0.4)
+    end, speed = after(scene, 6.0)
+    assert (np.abs(end[:, 1] - 0.5) < 1e-15).all()
+    order = draw.permutation(n)
+    other, _ = after(disks(x[order], v[order], 0.4), 6.0)
+    assert other == pytest.approx(end[order], abs=1e-11)
+    mirrored, back = after(disks(x * [-1, 1], v * [-1, 1], 0.4), 6.0)
+    assert mirrored * [-1, 1] == pytest.approx(end, abs=1e-11)
+    assert back * [-1, 1] == pytest.approx(speed, abs=1e-11)
+
+
+def test_nothing_comes_to_rest_at_restitution_one():
+    """A ball that bounces for ever is not told to lie down: 2000 bounces, and its energy."""
+    engine = EventEngine(disks([[0.0, 1.5]], [[0.0, 0.0]], 1.0))
+    engine.advance(1790.0)
+    x, v = engine.look(1790.0)
+    assert len(engine.hits) == int((1790.0 / np.sqrt(2 / G) + 1) / 2)
+    assert v[0, 1] ** 2 / 2 + G * (x[0, 1] - 0.5) == pytest.approx(G, rel=1e-12)
+    assert (engine.arena.disks.wall == -1).all()
+
+
+def play_all():
+    """Some of the tests above."""
+    test_bounces_down_an_incline_end_in_a_slide()
+    test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(2.3, True)
+
+
+def test_rest_in_plain_python_is_the_same(monkeypatch):
+    """So what the next test catches is the bug."""
+    monkeypatch.setattr(events, "event_loop", plain_kernels())
+    play_all()
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("speed * uy, pull * ux, pull * uy", "speed * uy, a.pull_x, a.pull_y"),  # what lies still falls
+        ("if a.wall >= 0:\n        t = end_time", "if False:\n        t = end_time"),  # a wall without an end
+    ],
+)
+def test_a_planted_bug_in_rest_is_caught(right, wrong, monkeypatch):
+    """By the slide down an incline, or the flight over the wall's end."""
+    monkeypatch.setattr(events, "event_loop", plain_kernels(right, wrong))
+    with pytest.raises((AssertionError, NoTruth)):
+        play_all()

@@ -1,0 +1,234 @@
+"""The solver with switches: off it is the exercise, on it is an engine, and every switch does what its formula says."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adapters.engines import ENGINES
+from adapters.mechanisms.habits import FLIGHT, HABITS, IMPULSE, LATE, PUSH_OUT, RESTITUTION, habits_of, with_habits
+from adapters.mechanisms.switched import BOX2D, BOX2D_V3, PYMUNK, Switched
+from adapters.play import Run, play
+from adapters.reference import Reference
+from reference_impl import exercise
+from scenarios.catalogue import scenario
+from scenarios.families.placing import lay_out
+from scenarios.model import Array, Scenario
+
+FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
+ORDERS = {"pymunk": PYMUNK, "box2d": BOX2D, "box2d_v3": BOX2D_V3}
+
+
+def positions(engine: Any, scene: Scenario, dt: float) -> Array:
+    """(k, n, 2) m."""
+    run = play(engine, "switched:reference", scene, dt)
+    assert run.trajectory is not None, run.reason
+    return run.trajectory.position
+
+
+@pytest.mark.parametrize(
+    "name", ["oblique_e09", "falling_box", "asteroids", "ship_thrust", "disk_between_static_disks"]
+)
+def test_with_nothing_switched_on_it_is_the_exercise_to_the_bit(name: str):
+    """Pairs, walls, the wrap, pushes, and disks that stand still; positions and hits."""
+    scene = scenario(name)
+    plain, switched = (
+        play(engine, "one:run", scene, scene.dt(scene.substeps[1])).trajectory
+        for engine in (Reference(exercise), Switched())
+    )
+
+    assert plain is not None
+    assert switched is not None
+    assert np.array_equal(plain.position, switched.position)
+    assert np.array_equal(plain.angle, switched.angle)
+    assert np.array_equal(plain.collisions.impulse, switched.collisions.impulse)
+
+
+@pytest.mark.parametrize("order", [LATE["order"], *ORDERS.values()])
+@pytest.mark.parametrize("alpha", [0.0, 0.5, 0.625, 1.0])
+def test_free_flight_is_off_by_its_closed_form_in_any_order(order: tuple[str, ...], alpha: float):
+    """(alpha - 1/2) a dt t, whichever stage comes first and however many moves there are."""
+    scene = scenario("free_fall")
+    dt = scene.dt(2)
+    assert scene.truth is not None
+    off = positions(Switched(order, alpha=alpha), scene, dt)[:, 0] - scene.truth(scene.times).position[:, 0]
+    expected = (alpha - 0.5) * dt * scene.times[:, None] * scene.scene.gravity
+
+    # 720 moves that each round a height of up to 10 m.
+    assert np.abs(off - expected).max() <= 720 * 10 * FLOAT64
+
+
+def test_a_late_hit_is_off_by_the_change_of_velocity_times_its_delay():
+    """Equal disks head-on: each goes on for tau, so that it is (v' - v) tau off for ever after."""
+    scene = scenario("head_on_equal_e1")
+    dt, (a, b) = scene.dt(2), scene.scene.position
+    closing = scene.scene.velocity[0] - scene.scene.velocity[1]
+    at = (np.linalg.norm(b - a) - scene.scene.radius.sum()) / np.linalg.norm(closing)
+    delay = np.ceil(at / dt) * dt - at
+    assert scene.truth is not None
+    off = positions(Switched(**LATE), scene, dt) - scene.truth(scene.times).position
+
+    assert delay > dt / 10
+    assert off[-1, 0] == pytest.approx(closing * delay, abs=1e-13)
+    assert off[-1, 1] == pytest.approx(-closing * delay, abs=1e-13)
+
+
+@pytest.mark.parametrize(("order", "gain"), [(PYMUNK, 0.0), (BOX2D, 1.0)])
+def test_a_ball_gains_speed_times_dt_of_height_where_it_bounces_off_a_velocity_after_gravity(
+    order: tuple[str, ...], gain: float
+):
+    """And nothing where it bounces off that before: per bounce, with the flight of such an engine."""
+    scene = scenario("bouncing_ball_e1")
+    dt, g = scene.dt(4), -scene.scene.gravity[1]
+    fall = scene.scene.position[0, 1] - scene.scene.radius[0]
+    heights = positions(Switched(order), scene, dt)[:, 0, 1]
+    hit = int(np.sqrt(2 * fall / g) / scene.sample_interval)
+    apex = heights[hit + 2 : 3 * hit].max() - heights[: hit // 2].max()
+    speed = np.sqrt(2 * g * fall)
+
+    # The apex is read off samples, and off a step that is up to a whole one away from it.
+    assert apex / (speed * dt) == pytest.approx(gain, abs=0.1)
+
+
+def run_of(name: str, scene: Scenario, dt: float) -> Run:
+    """An engine's own run."""
+    engine = ENGINES[name].make()
+    run = play(engine, name, scene, dt)
+    engine.close()
+    return run
+
+
+@pytest.mark.parametrize(
+    ("name", "scene", "samples", "bound"),
+    [
+        # Bounds of rounding, in m: of float64 where the engine keeps that, else of so many steps of up to some metres.
+        ("reference:exercise", "falling_box", 25, 1e-11),  # 135 hits, or 351, hand on what rounding does
+        # Ten iterations end before the impulses do, so that the order of the contacts decides the last digits.
+        ("pymunk:matched", "gas_of_100", 58, 1e-5),
+        ("pymunk:shipped", "oblique_e09", 240, 1e-12),
+        ("pymunk:matched", "bouncing_ball_e09", 600, 1e-12),
+        ("box2d:shipped", "box_billiard", 1200, 4800 * 4 * FLOAT32),
+        ("box2d:shipped", "rest_on_floor", 300, 1200 * FLOAT32),
+        ("box2d:matched", "bouncing_ball_e1", 600, 2400 * FLOAT32),
+        ("box2d_v3:shipped", "slow_hit", 240, 960 * FLOAT32),
+        ("box2d_v3:matched", "oblique_e09", 240, 960 * FLOAT32),
+        ("box2d_v3:matched", "bouncing_ball_e1", 600, 2400 * FLOAT32),
+    ],
+)
+def test_with_all_its_habits_the_reference_is_the_engine(name: str, scene: str, samples: int, bound: float):
+    """And without them it is far from it."""
+    played = scenario(scene)
+    played = replace(played, duration=samples * played.sample_interval)
+    dt = played.dt(4)
+    run = run_of(name, played, dt)
+    assert run.trajectory is not None
+    habits = habits_of(name, run.settings, played.scene, dt)
+    everything = positions(with_habits(habits), played, dt)
+    k = len(run.trajectory)
+
+    assert np.abs(everything - run.trajectory.position)[:k].max() <= bound
+    plain = positions(with_habits([]), played, dt)
+    assert np.abs(plain - run.trajectory.position)[:k].max() > 50 * bound
+
+
+@pytest.mark.parametrize(
+    ("name", "scene", "habit"),
+    [
+        ("pymunk:shipped", "oblique_e09", RESTITUTION),
+        ("pymunk:matched", "bouncing_ball_e09", PUSH_OUT),
+        ("box2d_v3:shipped", "slow_hit", RESTITUTION),
+        ("box2d:shipped", "box_billiard", "friction"),
+    ],
+)
+def test_what_is_switched_off_in_the_engine_is_what_is_left_out_in_the_reference(name: str, scene: str, habit: str):
+    """The engine without it is the reference with all but it."""
+    played = scenario(scene)
+    dt = played.dt(4)
+    habits = habits_of(name, run_of(name, played, dt).settings, played.scene, dt)
+    left_out = next(each for each in habits if each.name == habit)
+    assert left_out.without is not None
+    engine = left_out.without()
+    without = positions(engine, played, dt)
+    others = positions(with_habits([each for each in habits if each is not left_out]), played, dt)
+    everything = positions(with_habits(habits), played, dt)
+
+    assert np.abs(without - others).max() <= 2000 * 4 * FLOAT32
+    assert np.abs(without - everything).max() > 0.001
+
+
+def test_every_player_with_habits_is_known_and_flies_as_its_row_says():
+    """The table of habits names rows of `ENGINES`; the impulse is what an engine's own order of stages is."""
+    assert set(HABITS) < set(ENGINES)
+    scene = scenario("head_on_equal_e09")
+    for name in HABITS:
+        habits = {
+            each.name: each for each in habits_of(name, run_of(name, scene, 0.1 / 6).settings, scene.scene, 0.1 / 6)
+        }
+        assert habits[FLIGHT].switches == {"alpha": ENGINES[name].alpha}
+        assert name.startswith("reference") or "order" in habits[IMPULSE].switches
+
+
+PLAIN = """
+import sys, numpy as np
+from adapters.mechanisms.switched import BOX2D, BOX2D_V3, EXERCISE, PYMUNK, Switched
+from scenarios.families.placing import box, lay_out
+grid = np.stack(np.meshgrid(np.arange(3), np.arange(3)), -1).reshape(-1, 2) * 1.0
+n = np.arange(9)
+velocity = np.where(n == 4, 0, 1)[:, None] * np.stack([np.sin(1.0 + n), np.cos(2.0 * n)], -1)
+scene = lay_out(
+    position=grid, velocity=velocity, radius=0.3 + 0.1 * np.sin(n), mass=np.where(n == 4, np.inf, 1.0 + n % 3),
+    walls=box([-0.6, -0.6], [2.6, 2.6]), restitution=0.8, gravity=[0.1, -0.7],
+    angular_velocity=np.where(n == 4, 0, 1.0),
+)
+on = {"friction": 0.3, "push_share": 0.1, "slop": 0.01, "push_speed": 3.0, "margin": 0.01}
+for order in (EXERCISE, BOX2D, PYMUNK, BOX2D_V3):
+    engine = Switched(order, **on)
+    engine.load(scene, 0.01)
+    engine.step(300)
+    assert len(engine.hits()) > 20
+    sys.stdout.buffer.write(engine.read().position.tobytes() + engine.read().velocity.tobytes())
+"""
+
+
+def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
+    """A crowd with walls, gravity, friction and a static disk, through every stage."""
+    outputs = [
+        subprocess.run(
+            [sys.executable, "-c", PLAIN], capture_output=True, check=True, cwd=Path(__file__).parents[2],
+            env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
+        ).stdout
+        for disabled in ("0", "1")
+    ]  # fmt: skip
+    assert len(outputs[0]) == 4 * 2 * 9 * 2 * 8
+    assert outputs[0] == outputs[1]
+
+
+ROW = lay_out(
+    position=[[x, 0.5] for x in (0.0, 1.0, 2.0, 5.0, 6.0)], velocity=[[0.0, -1.0]] * 5, radius=[0.5] * 5,
+    mass=[1.0] * 5, walls=[[[-2.0, 0.0], [9.0, 0.0]]], restitution=0.0,
+)  # fmt: skip
+
+
+def found(stage: str) -> list[tuple[int, int]]:
+    """The contacts of `ROW`, three disks and two, all on a floor, as a stage orders them."""
+    engine = Switched(("accelerate", "detect", stage, "move"), touching=True, margin=0.01)
+    engine.load(ROW, 0.001)
+    engine.step(1)
+    return [(int(row.i), int(row.j)) for row in engine.kept.rows[: engine.kept.found[0]]]
+
+
+def test_colours_never_hold_a_moving_disk_twice_and_what_stands_comes_after_the_first():
+    """Pairs 01 and 34, then 12 with the floors of the others, then those of 1 and 2."""
+    assert found("by_colour") == [(0, 1), (3, 4), (1, 2), (0, -1), (3, -1), (4, -1), (1, -1), (2, -1)]
+
+
+def test_islands_come_from_the_last_disk_on_and_the_floor_joins_none():
+    """First all of the last two, then all of the first three, each from its last disk to its first."""
+    assert found("by_island") == [(4, -1), (3, 4), (3, -1), (2, -1), (1, 2), (1, -1), (0, 1), (0, -1)]

@@ -1,0 +1,238 @@
+"""The conformance suite catches what it is there to catch, and finds in the real engines what is known of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import atan, sqrt
+
+import numpy as np
+import pytest
+
+from adapters.conformance.conform import PROBES, conform
+from adapters.conformance.physics import restitution
+from adapters.conformance.probe import head_on, loaded, one_disk
+from adapters.engines import ENGINES
+from tests.adapters.broken_engines import CAUGHT_BY, RaisesInStep, RefusesAll, Sound, row_of
+from tests.tolerances import DEPARTURES
+
+
+@cache
+def findings_of(name):
+    """The findings of a row of ENGINES, by probe."""
+    return {finding.probe: finding for finding in conform(name, ENGINES[name])}
+
+
+def found_in(make):
+    """The findings of an engine that is not in ENGINES, by probe."""
+    return {finding.probe: finding for finding in conform("broken:one", row_of(make))}
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_no_engine_breaks_the_protocol(name):
+    """Every number of every engine may be shown."""
+    assert [finding for finding in findings_of(name).values() if finding.verdict == "breaks"] == []
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_the_departures_of_an_engine_are_exactly_those_in_the_table(name):
+    """Strict both ways: a departure that is gone is news as well."""
+    known = {departure.probe for departure in DEPARTURES if departure.engine == name}
+    assert {probe for probe, finding in findings_of(name).items() if finding.verdict == "departs"} == known
+
+
+@pytest.mark.parametrize("departure", DEPARTURES, ids=lambda d: f"{d.engine}-{d.probe}")
+def test_a_departure_is_as_large_as_its_cause_makes_it(departure):
+    """The cause gives a number, and the bound is rounding alone."""
+    finding = findings_of(departure.engine)[departure.probe]
+    if isinstance(departure.value, str):
+        assert finding.got == departure.value
+        return
+    assert abs(finding.got - departure.value) <= departure.bound
+    assert abs(departure.value - finding.expected) > finding.bound + departure.bound
+
+
+def test_only_shipped_profiles_depart_from_the_impact_law():
+    """The matched profiles and the reference keep e at every speed, momentum, and the tangential velocities."""
+    law = {probe for probe in PROBES if probe.startswith(("restitution", "friction", "pair"))}
+    departing = {name for name in ENGINES for probe in law if findings_of(name)[probe].verdict != "keeps"}
+    assert departing == {"pymunk:shipped", "box2d:shipped", "box2d_v3:shipped"}
+    assert all(finding.verdict == "keeps" for finding in findings_of("reference:exercise").values())
+
+
+# Each cause is turned off alone: the departure must go with it.
+
+
+def give_each_shape_the_root(engine):
+    """The product of two roots is e."""
+    for shape in engine.index:
+        shape.elasticity = sqrt(engine.scene.restitution)
+
+
+def smooth_box2d(engine):
+    """No friction on any fixture."""
+    for body in engine.bodies:
+        for fixture in body.fixtures:
+            fixture.friction = 0.0
+
+
+def smooth_box2d_v3(engine):
+    """No friction on any shape."""
+    for body in engine.bodies:
+        for shape in body.shapes:
+            shape.friction = 0.0
+
+
+def setting(name, value):
+    """A world with one setting changed."""
+    return lambda engine: setattr(engine.world, name, value)
+
+
+NO_THRESHOLD = setting("restitution_threshold", 0.0)
+SWITCHES = {
+    ("pymunk:shipped", "restitution_0.01"): give_each_shape_the_root,
+    ("pymunk:shipped", "restitution_100"): give_each_shape_the_root,
+    ("pymunk:shipped", "restitution_wall"): give_each_shape_the_root,
+    ("box2d:shipped", "slow_flight"): lambda engine: engine.world.SetAllowSleeping(False),
+    ("box2d:shipped", "friction"): smooth_box2d,
+    ("box2d_v3:shipped", "slow_flight"): setting("sleeping_enabled", False),
+    ("box2d_v3:shipped", "friction"): smooth_box2d_v3,
+    ("box2d_v3:shipped", "restitution_0.01"): NO_THRESHOLD,
+    ("box2d_v3:shipped", "restitution_0.5"): NO_THRESHOLD,
+}
+
+
+def tuned(row, tune):
+    """A row whose engines are changed by `tune` after every load."""
+
+    def make():
+        engine = row.make()
+        load = engine.load
+
+        def load_and_tune(scene, dt):
+            load(scene, dt)
+            tune(engine)
+
+        engine.load = load_and_tune
+        return engine
+
+    return replace(row, make=make)
+
+
+@pytest.mark.parametrize(("name", "probe"), SWITCHES)
+def test_a_departure_goes_when_its_cause_is_turned_off(name, probe):
+    """One setting, and the engine keeps."""
+    reading = PROBES[probe].read(tuned(ENGINES[name], SWITCHES[name, probe]))
+    assert reading.kept, reading
+
+
+def test_the_speed_limit_of_box2d_v3_goes_with_its_option():
+    """It is fixed when the world is made, so it is turned off before."""
+
+    def make():
+        engine = ENGINES["box2d_v3:shipped"].make()
+        engine._options = lambda: {"maximum_linear_speed": 1e9}
+        return engine
+
+    assert PROBES["fast_flight"].read(replace(ENGINES["box2d_v3:shipped"], make=make)).kept
+
+
+@pytest.mark.parametrize("name", ["box2d:shipped", "box2d_v3:shipped"])
+def test_the_threshold_of_both_box2ds_is_1_metre_per_second(name):
+    """In Box2D 2.3 it is compiled in, so it is shown from both sides."""
+    assert not restitution(ENGINES[name], 0.999).kept
+    assert restitution(ENGINES[name], 1.001).kept
+
+
+@pytest.mark.parametrize("dt", [1 / 32, 1 / 64, 1 / 128])
+def test_box2d_moves_a_disk_by_at_most_two_metres_a_step(dt):
+    """The cap is on the way, so half the dt doubles the speed; matched has units as long as half of it."""
+    for name, speed in (("box2d:shipped", 2 / dt), ("box2d:matched", 512.0)):
+        with loaded(ENGINES[name], one_disk(velocity=(512.0, 0.0)), dt) as engine:
+            engine.step()
+            # The cut is one float32 ratio and product.
+            assert engine.read().velocity[0, 0] == pytest.approx(speed, rel=4 * 2.0**-24)
+
+
+@pytest.mark.parametrize("substeps_in_1s", [512, 1024, 2048, 4096])
+def test_box2d_v3_turns_by_the_arc_tangent_a_substep(substeps_in_1s):
+    """Normalised Euler: short by (w h)2 / 3 of the angle, so half the dt leaves a quarter."""
+    steps, spin = substeps_in_1s // 4, 20.0
+    with loaded(ENGINES["box2d_v3:matched"], one_disk(spin=spin), 1 / steps) as engine:
+        for _ in range(16):
+            engine.step(steps // 16)
+            angle = engine.read().angle[0]
+    exact = substeps_in_1s * atan(spin / substeps_in_1s)
+    assert abs(angle - exact) <= substeps_in_1s * 2.0**-24  # cos and sin round once a substep
+
+
+@pytest.mark.parametrize("e", [0.0, 0.25, 0.5, 0.9, 1.0])
+def test_the_friction_of_box2d_v3_is_bounded_by_the_impulse_before_restitution(e):
+    """So its effective coefficient is 0.6 / (1 + e), where Box2D 2.3 has 0.2 at every e."""
+    for name, coefficient in (("box2d_v3:shipped", 0.6 / (1 + e)), ("box2d:shipped", 0.2)):
+        with loaded(ENGINES[name], replace(head_on(2.0, spin=40.0), restitution=e)) as engine:
+            before = engine.read().velocity[1]
+            engine.step(24)
+            taken = np.abs(engine.read().velocity[1] - before)
+        # A ratio of two float32 velocities; Box2D 2.3 comes to it by iterations.
+        assert taken[1] / taken[0] == pytest.approx(coefficient, rel=8 * 2.0**-24)
+
+
+@pytest.mark.parametrize("broken", CAUGHT_BY, ids=lambda broken: broken.__name__)
+def test_a_broken_adapter_is_caught_by_the_probe_meant_for_it(broken):
+    """With the verdict that this probe gives, and by what it read: no exception counts as caught."""
+    finding = found_in(broken)[CAUGHT_BY[broken]]
+    assert finding.verdict == PROBES[finding.probe].failure
+    assert finding.got != "raised"
+
+
+def test_every_probe_that_can_find_a_broken_protocol_has_a_broken_adapter():
+    """No probe of the protocol is there without a proof that it works."""
+    assert {name for name, probe in PROBES.items() if probe.failure == "breaks"} <= set(CAUGHT_BY.values())
+
+
+def test_the_untouched_reference_keeps_everything():
+    """So what is caught above is the fault, and not the wrapper around it."""
+    assert {finding.verdict for finding in found_in(Sound).values()} == {"keeps"}
+
+
+def test_an_exception_is_a_finding_with_its_message():
+    """Only the probes that step are touched by it, and none stops the suite."""
+    found = found_in(RaisesInStep)
+    assert list(found) == list(PROBES)
+    assert found["order_and_shapes"].verdict == "keeps"
+    assert found["stays_finite"].verdict == "breaks"
+    assert found["stays_finite"].note == "RuntimeError: island solver ran out of memory"
+
+
+def test_a_refusal_departs_and_says_why():
+    """`Unsupported` is in the protocol, so it does not break it."""
+    found = found_in(RefusesAll).values()
+    assert {(finding.verdict, finding.note) for finding in found} == {("departs", "no disks here")}
+
+
+def test_a_missing_library_is_one_finding_with_its_name():
+    """It is said once, not once a probe."""
+
+    def make():
+        raise ModuleNotFoundError("No module named 'chipmunk5'", name="chipmunk5")
+
+    (finding,) = conform("broken:one", row_of(make))
+    assert (finding.probe, finding.verdict) == ("make", "breaks")
+    assert "chipmunk5" in finding.note
+
+
+def test_every_engine_that_is_made_is_closed():
+    """Box2D v3 has room for 128 worlds in a process."""
+    alive = []
+
+    class Counted(RaisesInStep):
+        def __init__(self):
+            super().__init__()
+            alive.append(self)
+
+        def close(self):
+            alive.remove(self)
+
+    conform("broken:one", row_of(Counted))
+    assert alive == []

@@ -1,0 +1,68 @@
+"""How smoothly the game flies four engines and 21 disks in Chromium: `uv run python -m tests.bench.game [SECONDS]`."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from reports.commands.serve import application
+from reports.game.command import FIRST
+from reports.game.flight import FRAME
+from reports.game.server import Game
+from tests.reports.page.browsing import chromium, opened, served
+
+# What the page itself does, timed: a picture every animation frame, an answer for every question.
+LISTEN = """() => {
+  window.heard = { drawn: [], drawing: [], engines: [], answer: [] };
+  const { draw, arrive } = Game.prototype;
+  game.draw = (now) => {
+    const began = performance.now();
+    draw.call(game, now);
+    heard.drawn.push(now);
+    heard.drawing.push(performance.now() - began);
+  };
+  game.arrive = (frame) => {
+    heard.answer.push(performance.now() - game.asked);
+    heard.engines.push(frame.ms);
+    arrive.call(game, frame);
+  };
+}"""
+TOLD = {
+    "between two pictures": "60 a second are 16.7 ms",
+    "to draw a picture": "of these",
+    "engines, for a frame": f"must stay below {1e3 * FRAME:.1f} ms, which a frame lasts",
+    "from asking to hearing": "engines, server and browser, for one frame or some",
+}
+
+
+def measure(seconds: float) -> tuple[dict[str, np.ndarray], float]:
+    """ms of each kind over so many seconds of a flight under thrust, and the flight's time over the clock's."""
+    with served(application(Game(FIRST))) as url, chromium() as browser:
+        page, heard = opened(browser, url, viewport={"width": 1280, "height": 900})
+        page.wait_for_function("() => game.field && game.now.frame > 64", timeout=120_000)  # compiled by then
+        page.keyboard.down("w")
+        page.evaluate(LISTEN)
+        before = page.evaluate("[game.now.t, performance.now()]")
+        page.wait_for_timeout(1e3 * seconds)
+        after = page.evaluate("[game.now.t, performance.now()]")
+        found = {name: np.array(values) for name, values in page.evaluate("heard").items()}
+        page.context.close()
+    assert heard == [], heard
+    rows = np.diff(found["drawn"]), found["drawing"], found["engines"], found["answer"]
+    return dict(zip(TOLD, rows)), 1e3 * (after[0] - before[0]) / (after[1] - before[1])
+
+
+def main(seconds: float) -> None:
+    """Print them."""
+    rows, pace = measure(seconds)
+    print(f"{len(FIRST)} engines, 21 disks, {seconds:g} s: {', '.join(FIRST)}")
+    print(f"{'ms':24}{'mean':>8}{'95 %':>8}{'most':>8}")
+    for name, ms in rows.items():
+        print(f"{name:24}{ms.mean():8.2f}{np.quantile(ms, 0.95):8.2f}{ms.max():8.2f}  {TOLD[name]}")
+    rate = 1e3 / rows["between two pictures"].mean()
+    print(f"{rate:.1f} pictures a second; the flight goes at {pace:.1%} of the clock's pace")
+
+
+if __name__ == "__main__":
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 20.0)

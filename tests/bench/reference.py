@@ -1,0 +1,230 @@
+"""How fast the reference is beside the engines: `python -m tests.bench.reference` prints and writes its figures.
+
+A gas of equal disks between walls (area fraction 0.3, e = 1, dt 1/240 s, kT = m = diameter = 1), played by every engine
+in turn, round by round in shuffled order: nothing is read and no hit is told while the clock runs, and Python calls the
+engine once a step where it cannot take many. Each engine's own state goes on from round to round. The clock is that of
+the thread, which does not run while others have the processor; they still take its caches: leave the machine alone.
+
+The figures go to tests/data/reference_figures.csv, each with the least or the most that is demanded of it;
+`uv run pytest tests/bench/test_reference_figures.py` holds them to it, and with `-m slow` measures some ratios anew.
+"""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from time import thread_time
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from adapters.box2d import Box2DEngine
+from adapters.box2d_v3 import Box2DV3
+from adapters.pymunk import Pymunk
+from adapters.reference import Reference
+from reference_impl import crowd, ordered
+from reports.run.machine import about, busy_cores
+from scenarios.model import Scene
+from tests.adapters.event_driven.gases import boxed_asteroids, boxed_gas
+from tests.reference_impl.test_ordered import CASES, off
+
+Step = Callable[[int], object]  # advances so many steps
+DT, ROUNDS, LONG = 1 / 240, 15, 0.02  # s, rounds, s that a round of one engine takes at least
+SIZES = (100, 1000, 10_000, 100_000)
+LEAST = {"pymunk": 8.0, "box2d": 25.0, "box2d_v3": 12.0}  # steps of the reference in one of theirs, of 1000 disks
+FIGURES = Path(__file__).parents[2] / "tests" / "data" / "reference_figures.csv"
+
+
+class Figure(NamedTuple):
+    """One number, and the least or the most that is demanded of it."""
+
+    scene: str
+    disks: int
+    what: str
+    value: float
+    iqr: float | None = None
+    unit: str = "1"
+    at_least: float | None = None
+    at_most: float | None = None
+
+
+def reference(variant, scene: Scene, dt: float) -> Step:
+    """The compiled solver, whose hits are counted but not handed to Python."""
+    engine = Reference(variant)
+    engine.load(scene, dt)
+    return lambda count: silent(variant)(engine.disks, engine.world, dt, count)
+
+
+@cache
+def silent(variant):
+    """The variant's `advance`, which returns how many hits there were."""
+    advance = variant.advance
+    return njit(lambda disks, world, dt, count: len(advance(disks, world, dt, count)))
+
+
+def pymunk(profile: str, scene: Scene, dt: float) -> Step:
+    """The space without its collision callback."""
+    engine = Pymunk(profile)
+    engine._record = None  # type: ignore[assignment, method-assign]
+    engine.load(scene, dt)
+    return lambda count: [engine.space.step(dt) for _ in range(count)]
+
+
+def box2d(profile: str, scene: Scene, dt: float) -> Step:
+    """The world without its contact listener."""
+    engine = Box2DEngine(profile)
+    engine.load(scene, dt)
+    engine.world.contactListener = None
+    unit, velocity, position = dt / engine.time, engine.velocity_iterations, engine.position_iterations
+    return lambda count: [engine.world.Step(unit, velocity, position) for _ in range(count)]
+
+
+def box2d_v3(profile: str, scene: Scene, dt: float) -> Step:
+    """The world, whose hit events nobody collects; its unit of length is global, so it is set before each round."""
+    import pyb2d3
+
+    engine = Box2DV3(profile)
+    engine.load(scene, dt)
+
+    def step(count: int) -> None:
+        pyb2d3.set_length_units_per_meter(engine.unit)
+        for _ in range(count):
+            engine.world.step(dt, engine.substeps)
+
+    step.engine = engine  # type: ignore[attr-defined] # the world dies with its engine
+    return step
+
+
+def engines(scene: Scene, dt: float) -> dict[str, Step]:
+    """Everyone who steps, and the reference a second time: what it measures against itself is the noise."""
+    steps = {
+        "reference:exercise": reference(crowd, scene, dt),
+        "reference:exercise again": reference(crowd, scene, dt),
+    }
+    for profile in ("matched", "shipped"):
+        steps[f"pymunk:{profile}"] = pymunk(profile, scene, dt)
+        steps[f"box2d:{profile}"] = box2d(profile, scene, dt)
+        steps[f"box2d_v3:{profile}"] = box2d_v3(profile, scene, dt)
+    return steps
+
+
+def times(steps: dict[str, Step], warm: int) -> dict[str, np.ndarray]:
+    """(ROUNDS,) microseconds a step of each, interleaved in an order shuffled anew each round, after warming up."""
+    rng = np.random.default_rng(0)
+    counts = {}
+    for name, step in steps.items():
+        step(warm)
+        started = thread_time()
+        step(10)
+        counts[name] = max(10, int(10 * LONG / (thread_time() - started)))
+    samples: dict[str, list[float]] = {name: [] for name in steps}
+    for _ in range(ROUNDS):
+        for name in rng.permutation(list(steps)):
+            started = thread_time()
+            steps[name](counts[name])
+            samples[name].append((thread_time() - started) / counts[name] * 1e6)
+    return {name: np.array(values) for name, values in samples.items()}
+
+
+def compared(scene: str, n: int, steps: dict[str, Step], least: dict[str, float]) -> Iterator[Figure]:
+    """What a step of each costs, and how many of the first go into it, within a round, whose noise is shared."""
+    measured = times(steps, 200)
+    base = next(iter(measured))
+    for name, samples in measured.items():
+        low, middle, high = np.quantile(samples, [0.25, 0.5, 0.75])
+        yield Figure(scene, n, f"{name}, step", middle, high - low, "us")
+        if name != base:
+            ratio = float(np.median(samples / measured[base]))
+            yield Figure(scene, n, f"{name} over {base}", ratio, at_least=least.get(name.split(":")[0]))
+
+
+def added(n: int) -> float:
+    """Bytes a disk that playing n disks adds at most to what the process holds; scene and compiled code not counted."""
+    warm = Reference(crowd)
+    warm.load(boxed_gas(1000, 0.3), DT)
+    scene = boxed_gas(n, 0.3)
+    Path("/proc/self/clear_refs").write_text("5")  # forget the peak so far (Linux, proc(5))
+    before = status("VmRSS")
+    engine = Reference(crowd)
+    engine.load(scene, DT)
+    for _ in range(5):
+        crowd.advance(engine.disks, engine.world, DT, 20)
+    return (status("VmHWM") - before) / n
+
+
+def status(key: str) -> float:
+    """Bytes, of a line in /proc/self/status."""
+    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(key))
+    return 1024.0 * float(line.split()[1])
+
+
+def memory(n: int) -> float:
+    """`added` in a process of its own."""
+    code = f"from tests.bench.reference import added; print(added({n}))"
+    return float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
+
+
+def gases() -> Iterator[Figure]:
+    """Everyone in gases of three sizes."""
+    for n in (20, 100, 1000):
+        yield from compared("gas", n, engines(boxed_gas(n, 0.3), DT), LEAST if n == 1000 else {})
+
+
+def sizes() -> Iterator[Figure]:
+    """What a disk costs among many, and what room it takes."""
+    sized = {str(n): reference(crowd, boxed_gas(n, 0.3), DT) for n in SIZES}
+    measured = {n: samples * 1e3 / n for n, samples in zip(SIZES, times(sized, 50).values())}
+    for n, samples in measured.items():
+        low, middle, high = np.quantile(samples, [0.25, 0.5, 0.75])
+        yield Figure("gas", n, "reference:exercise, disk and step", middle, high - low, "ns")
+    ratio = float(np.median(measured[SIZES[-1]] / measured[SIZES[0]]))
+    yield Figure("gas", SIZES[-1], f"disk and step over one of {SIZES[0]}", ratio, at_most=2.0)
+    yield Figure("gas", SIZES[-1], "memory a disk", memory(SIZES[-1]), unit="B", at_most=300.0)
+
+
+def in_order() -> Iterator[Figure]:
+    """`reference:ordered` in the box of the asteroids: its cost, and how far off it is in 20 of them."""
+    asteroids, dt = boxed_asteroids(0), 1 / 60
+    steps = {
+        "reference:ordered": reference(ordered, asteroids, dt),
+        "reference:exercise": reference(crowd, asteroids, dt),
+        "pymunk:matched": pymunk("matched", asteroids, dt),
+        "pymunk:shipped": pymunk("shipped", asteroids, dt),
+    }
+    least = {"reference": 1 / 1.5, "pymunk": 1.0}
+    yield from compared("asteroids in a box", 21, steps, least)
+    for e, gravity, t, rate in CASES:
+        errors = [off(boxed_asteroids(seed, e, gravity), t, rate) for seed in range(20)]
+        scene = f"asteroids in a box, e = {e}, g = {gravity}, {t:g} s at {rate} Hz"
+        most = 1e-9 if gravity == 0.0 else None
+        yield Figure(scene, 21, "median error", float(np.median(errors)), unit="m", at_most=most)
+        yield Figure(scene, 21, "largest error", max(errors), unit="m", at_most=1e-6)
+
+
+def header() -> str:
+    """Machine and versions, as comment lines."""
+    told = about("python -m tests.bench.reference", 0)
+    lines = {"started": told["started"], **told["machine"], **told["versions"], "busy cores": f"{busy_cores():.2f}"}
+    return "".join(f"# {key}: {value}\n" for key, value in lines.items())
+
+
+def main() -> None:
+    """Print the figures as they come, and write them."""
+    with FIGURES.open("w", newline="", encoding="utf-8") as file:
+        file.write(header())
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(Figure._fields)
+        for part in (gases, sizes, in_order):
+            for figure in part():
+                row = ["" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else cell for cell in figure]
+                table.writerow(row)
+                print("  ".join(map(str, row)), flush=True)
+
+
+if __name__ == "__main__":
+    main()

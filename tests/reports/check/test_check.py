@@ -1,0 +1,202 @@
+"""What the check says of right and of wrong solvers: `python -m tests.reports.check.confusion` makes the whole
+table."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters.own_solver.file import read_solver
+from adapters.own_solver.javascript import GL_MATRIX
+from adapters.own_solver.process import SolverProcess
+from reports.check.questions import QUESTIONS, Ball, ask
+from reports.check.rows import TASKS
+from reports.check.scenes import bounds, contact_fault, scene_of, scenes, truth_of
+from reports.check.solver import check_solver
+from reports.check.verdict import FileCheck
+from tests.reports.check.confusion import TABLE, judged, said_first
+from tests.solvers.mutants import CORRECT, MUTANTS
+
+FAST = MUTANTS[::6]
+
+
+def test_the_catalogue_is_large_enough_and_covers_every_task():
+    """At least 20 mutants in each language, one or more for each task; 12 correct solvers."""
+    assert min(Counter(mutant.base[-2:] for mutant in MUTANTS).values()) >= 20
+    assert {mutant.task for mutant in MUTANTS} == set(TASKS) - {"file", "scenes"}
+    assert len(CORRECT) >= 12
+
+
+def test_no_correct_solver_is_faulted():
+    """However it is written: no fault, and every task asked that the file has."""
+    faults = {path.name: one.sentences for path, one in judged(CORRECT).items() if not one.passed}
+
+    assert faults == {}
+
+
+def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
+    """Every sixth of the catalogue; the long test has them all."""
+    checks = judged([mutant.write(tmp_path) for mutant in FAST])
+
+    assert [mutant.name for mutant in FAST if not said_first(mutant, checks[tmp_path / mutant.name])] == []
+
+
+@pytest.mark.slow
+def test_the_committed_table_is_what_comes_out(tmp_path: Path):
+    """All mutants and all correct solvers: found, cause first, as the table says; and 38 of 40 or better."""
+    checks = judged([mutant.write(tmp_path) for mutant in MUTANTS])
+    right = {mutant.name: said_first(mutant, checks[tmp_path / mutant.name]) for mutant in MUTANTS}
+    rows = {row["solver"]: row for row in csv.DictReader(TABLE.read_text().splitlines())}
+
+    assert sum(right.values()) >= 0.95 * len(right)
+    assert {name: rows[name]["first cause is right"] for name in right} == {
+        name: "yes" if is_right else "no" for name, is_right in right.items()
+    }
+
+
+def test_the_same_file_gets_the_same_rows():
+    """Nothing is drawn by chance, and no clock is read."""
+    path = CORRECT[-1]
+
+    assert check_solver(path) == check_solver(str(path))
+
+
+def test_two_mistakes_are_both_told(tmp_path: Path):
+    """One in task 1 and one in 2d: two sentences, in this order, without those that only follow."""
+    text = (CORRECT[0].parent / "plain.py").read_text()
+    text = text.replace(" / sphere.mass * dt", " * dt").replace("sphereB.velocity.x -= J", "sphereB.velocity.x += J")
+    (tmp_path / "solver.py").write_text(text.replace("sphereB.velocity.y -= J", "sphereB.velocity.y += J"))
+    sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences
+
+    assert "the force is not divided by the mass" in sentences[0]
+    assert "B gets the sign of A" in sentences[1]
+
+
+def test_another_restitution_is_a_note_and_is_judged_by_itself():
+    """The file with e = 0.5 has no fault, and its scenes have that e."""
+    rows = {row.name: row for row in check_solver(next(path for path in CORRECT if path.name == "unusual_e.js"))}
+
+    assert rows["restitution"].verdict == "note"
+    assert "e = 0.5 is written into the file" in rows["restitution"].cause
+    assert rows["oblique"].verdict == "right"
+
+
+def test_free_choices_are_notes():
+    """`<=`, a one-sided displacement, an impulse on pairs that part, no guard for equal centres."""
+    rows = {row.name: row for row in check_solver(next(path for path in CORRECT if path.name == "one_sided.js"))}
+
+    notes = [rows[name].cause for name in ("touch", "split", "parting", "same centre")]
+    assert {rows[name].verdict for name in ("touch", "split", "parting", "same centre")} == {"note"}
+    assert "compares with <=" in notes[0]
+    assert "A alone is moved" in notes[1]
+    assert "as the formula is printed" in notes[2]
+
+
+def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):
+    """Numbers that no formula of the table gives are told as numbers."""
+    text = (CORRECT[0].parent / "plain.py").read_text()
+    (tmp_path / "solver.py").write_text(text.replace("J = -(1 + RESTITUTION) * vn", "J = -(1 + RESTITUTION) * vn**3"))
+    sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences
+
+    assert "unknown" in sentences[0]
+    assert "Came:" in sentences[0]
+
+
+def test_the_numbers_beside_an_unknown_mistake_are_those_of_a_pair_that_is_wrong(tmp_path: Path):
+    """Of five pairs the first comes out right: what came is not what was expected."""
+    text = (CORRECT[0].parent / "plain.js").read_text()
+    assert "var vn = (" in text
+    (tmp_path / "solver.js").write_text(text.replace("var vn = (", "var vn = parseInt("))
+    (row,) = (row for row in check_solver(tmp_path / "solver.js") if row.name == "impulse")
+
+    assert row.cause.startswith("unknown: it is right for some pairs")
+    assert row.got.split()[0] != row.expected.split()[0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "task", "cause"),
+    [
+        ("1 / sphereB.mass)", "1 / sphereB.Mass)", "2c", "the impulse is no number (a field that does not exist"),
+        ("if (vn >= 0) return;", "vn /= sphereB.Mass;", "2c", "the impulse is no number (a field that does not"),
+        ("if (vn >= 0) return;", "vn *= vn / vn;", "2c", "the velocities of a pair at relative rest become no numbers"),
+        ("/ (1 / sphereA.mass + 1 / sphereB.mass)", "/ 0", "2c", "the impulse is no number (a field that does not"),
+        ("-= J / sphereB.mass * nx", "-= J / sphereB.mas * nx", "2d", "the velocity of B becomes no number"),
+        ("  var overlap = ", "  var overlap = sphereA.sise - ", "2b", "the positions become no numbers"),
+    ],
+)
+def test_numbers_that_are_none_have_one_cause_and_accuse_nothing_else(
+    tmp_path: Path, old: str, new: str, task: str, cause: str
+):
+    """A misspelt field is NaN in JavaScript, a division by zero infinite: neither is read as another mistake."""
+    text = (CORRECT[0].parent / "plain.js").read_text()
+    assert old in text
+    (tmp_path / "solver.js").write_text(text.replace(old, new))
+    faults = [row for row in check_solver(tmp_path / "solver.js") if row.verdict == "fault" and row.task[0] == "2"]
+
+    assert {row.task for row in faults} == {task}
+    assert len({row.cause for row in faults}) == 1
+    assert faults[0].cause.startswith(cause)
+
+
+def test_the_bound_on_a_scene_lets_a_right_solver_pass_and_a_wrong_restitution_not():
+    """Motions that are exact but for e = 0.85 leave the bound of e = 0.9 wherever there are at most three spheres."""
+    for (scenario, record), (other, other_record) in zip(scenes(0.9)[1:4], scenes(0.85)[1:4]):
+        truth, off = truth_of(scenario, record), truth_of(other, other_record)
+
+        assert np.abs(off.position - truth.position).max() > bounds(scenario, record, truth.t, 1e-3).max()
+
+
+def test_a_contact_is_judged_by_the_formula():
+    """The right outcome passes; a velocity off by 1 % does not, nor a reaction at a distance."""
+    scene = scene_of([[0.0, 0.0, 1.0, 0.0], [0.9, 0.0, -1.0, 0.0]], [0.5, 0.5], [1.0, 1.0], 0.9)
+    before = [[0.0, 0.0, 1.0, 0.0], [0.9, 0.0, -1.0, 0.0]]
+    after = [[-0.05, 0.0, -0.9, 0.0], [0.95, 0.0, 0.9, 0.0]]
+
+    assert contact_fault(np.array([before, after]), scene, 0, 1) == ""
+    after[1][2] = 0.91
+    assert "sphere 1 has (0.91, 0) m/s after it, not (0.9, 0) m/s" in contact_fault(
+        np.array([before, after]), scene, 0, 1
+    )
+    at_touch = np.array([before, after]) + [[[0, 0, 0, 0], [0.1, 0, 0, 0]], [[0.05, 0, 0, 0], [0.05, 0, 0, 0]]]
+    assert "sphere 1 has (0.91, 0) m/s after it" in contact_fault(at_touch, scene, 0, 1), (
+        "who reacts at a touch is judged"
+    )
+    assert contact_fault(at_touch[[0, 0]], scene, 0, 1) == "", "who does not is free"
+    far = np.array([before, after]) + np.array([[0.0] * 4, [0.3, 0.0, 0.0, 0.0]])
+    assert "react at a distance" in contact_fault(far, scene, 0, 1)
+
+
+def test_gl_matrix_is_the_file_of_its_package_with_its_licence():
+    """Version 2.8.1 as npm has it (integrity sha512-0YCjVpE3pS5XWlN3J4X7AiAx65+nqAI54LndtVFnQZB6G/FVLkZH8y8V6R3cIoOQR4p
+    UdfwQGd1iwyoXHJ4Qfw==), dist/gl-matrix-min.js, unchanged."""
+    data = GL_MATRIX.read_bytes()
+
+    assert hashlib.sha256(data).hexdigest() == "fb4f71b2df9dd73212e35780bd10c25ce7f4307f7ddc4e1c4b8d212812098fc4"
+    assert b"Permission is hereby granted, free of charge" in data[:2000]
+
+
+def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path):
+    """A name of its own in the text loads it; a file without one has no such globals."""
+    code = "function integrate(sphere, dt) { sphere.alpha = typeof globalThis['ve' + 'c2'] === 'object' ? 1 : 2; }\n"
+    seen = {}
+    for name, text in {"with.js": code + "// vec2\n", "without.js": code}.items():
+        (tmp_path / name).write_text(text)
+        with SolverProcess(read_solver(tmp_path / name)) as process:
+            seen[name] = ask(process, {"push": QUESTIONS["push"]})["push"].last[0].alpha
+
+    assert seen == {"with.js": 1.0, "without.js": 2.0}
+
+
+def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():
+    """A call that does nothing to a sphere far away leaves its 12 numbers, bit for bit, in both languages."""
+    for name in ("plain.js", "plain.py"):
+        with SolverProcess(read_solver(CORRECT[0].parent / name)) as process:
+            far = QUESTIONS["touch"]._replace(balls=(Ball((0.1, 0.2), (1 / 3, 0.7)), Ball((9.0, 1e-7), m=5e-324)))
+            answer = ask(process, {"far": far})["far"]
+
+        assert answer.last == list(far.balls)

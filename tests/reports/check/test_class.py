@@ -1,0 +1,75 @@
+"""A class of solvers in a terminal: a row a file, whatever the students are called and whatever they handed in."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from reports.check import command
+from reports.check.verdict import check_file
+from tests.reports.terminal.command_line import crosscheck
+from tests.solvers.mutants import CORRECT, MUTANTS
+
+RIGHT = next(path for path in CORRECT if path.name == "plain.js")
+WRONG = next(mutant for mutant in MUTANTS if mutant.name == "mass_sum.js")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A class of four: one right, one wrong, one that does not load, one that is no text."""
+    for name in ("anna", "ben", "cem", "dora"):
+        (tmp_path / name).mkdir()
+    shutil.copy(RIGHT, tmp_path / "anna" / "Exercise.js")
+    WRONG.write(tmp_path / "ben").rename(tmp_path / "ben" / "Exercise.js")
+    (tmp_path / "cem" / "Exercise.js").write_text("function integrate( {\n")
+    (tmp_path / "dora" / "solver.py").write_bytes(b"\x00\x01")
+    return tmp_path
+
+
+def test_the_table_of_a_class_fits_a_terminal(folder: Path):
+    """A line a file, and how many are right of those that were checked; a link to nothing is told, too."""
+    (folder / "eve.js").symlink_to("gone.js")
+    done = crosscheck("check", folder, cwd=folder)
+    refused = check_file(folder / "eve.js").refused
+    (folder / "eve.js").unlink()
+    told = done.stdout.replace("\n", " ")
+
+    assert "1 of 3 files without a fault; 2 not checked." in done.stdout
+    (eve,) = (line for line in done.stdout.splitlines() if line.startswith("eve.js"))
+    assert not {"ok", "FAULT"} & set(eve.split())
+    assert refused == f"{folder}/eve.js: is a link to gone.js, which is not there"
+    assert "eve.js: is a link to gone.js, which is not there" in told
+    assert "ben/Exercise.js: Task 2c impulse, impulse: it divides by (mA + mB)" in re.sub(" +", " ", told)
+    assert max(len(line) for line in done.stdout.splitlines()) <= 80
+    assert "Traceback" not in done.stderr
+
+
+def test_a_student_with_a_long_name_and_one_with_an_empty_folder_have_a_row(tmp_path: Path):
+    """The middle of a name gives way; the table keeps its columns; what was not handed in is told."""
+    for name in ("a" * 70, "b", "with nothing", ".git"):
+        (tmp_path / name).mkdir()
+    shutil.copy(RIGHT, tmp_path / ("a" * 70) / "Exercise.js")
+    (tmp_path / "b" / "solver.py").write_text("")
+    done = crosscheck("check", tmp_path, cwd=tmp_path)
+    header, long, *_ = lines = done.stdout.splitlines()
+
+    assert header.split() == ["solver", "file", "1", "2a", "2b", "2c", "2d", "loop", "scenes"]
+    assert long.startswith("aaaa")
+    assert "a…a" in long
+    assert long.split()[0].endswith("a/Exercise.js")
+    assert long.split()[1:] == ["ok"] * 8
+    assert [line.split()[:3] for line in lines if line.startswith("with")] == [["with", "nothing", "-"]]
+    assert "  with nothing: holds no .js and no .py file" in done.stdout
+    assert "1 of 1 files without a fault; 2 not checked." in done.stdout
+    assert (done.returncode, ".git" in done.stdout) == (1, False)
+
+
+def test_a_folder_beside_the_files_of_a_class_is_nobody(tmp_path: Path):
+    """Where solvers lie side by side, a folder of pictures is no student."""
+    shutil.copy(RIGHT, tmp_path / "anna.js")
+    (tmp_path / "pictures").mkdir()
+
+    assert command.files_of(tmp_path) == [tmp_path / "anna.js"]

@@ -1,0 +1,204 @@
+"""The check as people, graders and projects see it: command, JSON, JUnit, page, pytest, and the file as an engine."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from unittest import mock
+from xml.etree import ElementTree
+
+import jsonschema
+import pytest
+from playwright.sync_api import Browser
+
+from adapters.own_solver.file import read_solver
+from adapters.own_solver.process import SolverProcess
+from reports.check import command
+from reports.check.machine import SCHEMA
+from reports.check.smallest import Smallest, smallest_scene
+from reports.check.verdict import check_file
+from tests.reports.page.browsing import opened
+from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, process
+from tests.solvers.mutants import CORRECT, MUTANTS
+
+RIGHT = next(path for path in CORRECT if path.name == "plain.js")
+WRONG = next(mutant for mutant in MUTANTS if mutant.name == "mass_sum.js")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A class of four: one right, one wrong, one that does not load, one that is no text."""
+    where = tmp_path_factory.mktemp("class")
+    for name in ("anna", "ben", "cem", "dora", ".hidden"):
+        (where / name).mkdir()
+    shutil.copy(RIGHT, where / "anna" / "Exercise.js")
+    WRONG.write(where / "ben").rename(where / "ben" / "Exercise.js")
+    (where / "cem" / "Exercise.js").write_text("function integrate( {\n")
+    (where / "dora" / "solver.py").write_bytes(b"\x00\x01")
+    (where / "anna" / "gl-matrix.js").write_text("handed out, no solver")
+    (where / ".hidden" / "x.js").write_text("none of ours")
+    return where
+
+
+def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(folder: Path):
+    """The first line is the sentence to begin with; the page, and it alone, is where the command was given."""
+    cwd = folder / ".desk"
+    cwd.mkdir()
+    right, wrong = (process("check", folder / who / "Exercise.js", cwd=cwd) for who in ("anna", "ben"))
+
+    assert (right.returncode, wrong.returncode) == (0, 1)
+    assert right.stdout.startswith("No fault found")
+    assert wrong.stdout.replace("\n", " ").startswith("1. Task 2c impulse, impulse: it divides by (mA + mB)")
+    assert [path.name for path in cwd.iterdir()] == ["check.html"]
+
+
+def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
+    """JSON of a folder: four files in order, as the schema says; what is no text is refused with its reason."""
+    done = crosscheck("check", folder, "--json", "--junit", folder / "class.xml", cwd=folder)
+    told = json.loads(done.stdout)
+
+    jsonschema.validate(told, json.loads(SCHEMA.read_text()))
+    assert done.returncode == 1
+    assert [(Path(one["file"]).parent.name, one["passed"]) for one in told["files"]] == [
+        ("anna", True), ("ben", False), ("cem", False), ("dora", False)
+    ]  # fmt: skip
+    assert "SyntaxError" in told["files"][2]["sentences"][0]
+    assert "is not text" in told["files"][3]["refused"]
+    suites = ElementTree.parse(folder / "class.xml").getroot()
+    assert [int(s.get("failures", "")) > 0 for s in suites] == [False, True, True, False]
+    assert [s.get("errors") for s in suites] == ["0", "0", "0", "1"]
+    assert sum(len(list(s)) for s in suites) == sum(int(s.get("tests", "")) for s in suites)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["nobody.js"], "nobody.js: is not there; name an Exercise.js, a solver.py or a folder of them"),
+        ([""], '"": is not there; name a file or a folder'),
+        (["anna/Exercise.js", "--page", ""], '"": is not there; name a file or a folder'),
+        (["class.txt"], "a solver is a .js or a .py file"),
+        (["empty"], "holds no .js and no .py file"),
+        (["anna/Exercise.js", "--junit", "no/such/x.xml"], "--junit no/such/x.xml: No such file or directory"),
+        (["anna/Exercise.js", "--page", "class.txt"], "class.txt: is there and no page of a check; name another file"),
+        ([".", "--page", "p.html"], "--page p.html: shows one file"),
+        (["anna/Exercise.js", "--page", "no/x.html"], "--page no/x.html: No such file or directory; name another file"),
+        (["anna/Exercise.js", "--page", "empty"], "--page empty: Is a directory; name another file"),
+        ([".", "--junit", "class.txt"], "--junit class.txt: is there and no JUnit file of a check; name another file"),
+        (["anna/Exercise.js", "--junit", "anna/Exercise.js"], "Exercise.js: is there and no JUnit file of a check"),
+        (["anna/Exercise.js", "--junit", "./check.html"], "--junit check.html: is where the page goes"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], message: str):
+    """No traceback, whatever is asked for."""
+    (folder / "class.txt").write_text("mine")
+    (folder / "empty").mkdir(exist_ok=True)
+    with mock.patch.object(command, "checked", side_effect=command.checked) as asked:
+        done = crosscheck("check", *words, cwd=folder)
+
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert (folder / "class.txt").read_text() == "mine"
+    assert (folder / "anna" / "Exercise.js").read_text() == RIGHT.read_text()
+    assert not any("anna" in str(call) for call in asked.call_args_list), "nothing is checked before it is refused"
+
+
+def test_a_junit_file_of_an_earlier_check_is_written_over_and_a_page_is_not(folder: Path):
+    """Each kind knows its own; neither takes the other's place."""
+    (folder / "none.py").write_text("x = 1\n")
+    first, again = (crosscheck("check", "none.py", "--json", "--junit", "r.xml", cwd=folder) for _ in range(2))
+    other = crosscheck("check", "none.py", "--json", "--page", "r.xml", cwd=folder)
+    (folder / "none.py").unlink()
+
+    assert (first.returncode, again.returncode, other.returncode) == (1, 1, 2)
+    assert ElementTree.parse(folder / "r.xml").getroot().get("name") == "crosscheck check"
+
+
+@pytest.mark.slow
+def test_pytest_runs_the_rows_as_tests(folder: Path):
+    """In a folder without any project: a right file passes, a wrong one fails with the numbers, junk is refused."""
+    (folder / "own").mkdir(exist_ok=True)
+    right, wrong, junk = (
+        subprocess.run(
+            [CROSSCHECK.parent / "pytest", "-q", "-p", "no:cacheprovider", "--solver", folder / path],
+            cwd=folder / "own",
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        for path in ("anna/Exercise.js", "ben/Exercise.js", "dora/solver.py")
+    )
+
+    assert (right.returncode, wrong.returncode, junk.returncode) == (0, 1, 4)
+    assert "passed" in right.stdout
+    assert "likely:   it divides by (mA + mB) instead of (1/mA + 1/mB)" in wrong.stdout
+    assert "is not text" in junk.stderr + junk.stdout
+
+
+@pytest.fixture(scope="module")
+def smallest(folder: Path) -> Smallest:
+    """The smallest scene that shows the wrong file's fault."""
+    with SolverProcess(read_solver(folder / "ben" / "Exercise.js")) as process:
+        found = smallest_scene(process, 0.9)
+    assert found is not None
+    return found
+
+
+def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smallest):
+    """A fault of the impulse needs two; yours and the exact answer part."""
+    assert smallest.scenario.scene.n == 2
+    assert "m/s after it, not" in smallest.fault
+    assert smallest.truth is not None
+    assert abs(smallest.yours.position[-1] - smallest.truth.position[-1]).max() > 0.005
+
+
+def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """Without any time to draw scenes, a pair that hits is tried."""
+    monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
+    with SolverProcess(read_solver(folder / "ben" / "Exercise.js")) as process:
+        found = smallest_scene(process, 0.9)
+
+    assert found is not None
+    assert found.scenario.scene.n == 2
+
+
+def test_a_right_solver_has_no_failing_scene():
+    """The negative control of the search: nothing is found in what is right."""
+    with SolverProcess(read_solver(RIGHT)) as process:
+        assert smallest_scene(process, 0.9) is None
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
+    browser: Browser, folder: Path, smallest: Smallest, width: int
+):
+    """Opened from the file, at two widths: both layers move, nothing overflows, no error, no request."""
+    from reports.check.page import write_page
+
+    page_path = folder / "page.html"
+    write_page(page_path, check_file(folder / "ben" / "Exercise.js"), smallest)
+    page, heard = opened(browser, page_path.as_uri(), viewport={"width": width, "height": 800})
+    page.wait_for_function("players.smallest")
+    at_end = "name => { players.smallest.seek(1); return players.smallest.positions(name); }"
+    shown = {name: page.evaluate(at_end, name) for name in ("Exercise.js:own", "truth")}
+    fits = page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    title = page.locator("h1").inner_text()
+
+    assert heard == []
+    assert fits
+    assert title == "Exercise.js: what is wrong, and where"
+    assert shown["truth"] is not None
+    assert max(abs(x - y) for x, y in zip(shown["Exercise.js:own"][0], shown["truth"][0])) > 0.004
+
+
+def test_text_of_a_file_is_inert_on_its_page(tmp_path: Path):
+    """A message that holds markup is shown as it is."""
+    from reports.check.page import write_page
+
+    path = tmp_path / "evil.js"
+    path.write_text("throw new Error('<script>alert(1)</script>')")
+    write_page(tmp_path / "check.html", check_file(path), None)
+
+    assert "<script>alert" not in (tmp_path / "check.html").read_text()

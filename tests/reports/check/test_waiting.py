@@ -1,0 +1,75 @@
+"""What a check waits for, what it stops, and that it leaves nothing running behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from time import process_time
+from unittest import mock
+
+import pytest
+from py_mini_racer import JSTimeoutException
+
+from adapters.own_solver.file import NotASolver, read_solver
+from adapters.own_solver.javascript import JavaScriptSolver
+from adapters.own_solver.worker import HERE
+
+SECONDS = 16.0  # for a process that starts and is stopped late, on a busy machine
+JS = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.js").read_text()
+
+
+def busy(spent: float) -> Iterator[str | Exception]:
+    """An engine that is stopped after `spent` s of processor time, then answers."""
+    until = process_time() + spent
+    while process_time() < until:
+        pass
+    yield JSTimeoutException()
+    yield "7"
+
+
+def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endless_one_is_not(tmp_path: Path):
+    """What V8 was stopped in counts only if it has run for its time; a step cannot be asked twice."""
+    (tmp_path / "Exercise.js").write_text(JS)
+    solver = JavaScriptSolver(read_solver(tmp_path / "Exercise.js"))
+
+    for spent, may_repeat, answer in ((0.0, True, "7"), (0.2, True, None), (0.0, False, None)):
+        solver.engine = mock.Mock()
+        solver.engine.eval.side_effect = busy(spent)
+        if answer is None:
+            with pytest.raises(JSTimeoutException):
+                solver.evaluated("code", 0.2, may_repeat)
+        else:
+            assert solver.evaluated("code", 0.2, may_repeat) == answer
+
+
+def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Path):
+    """V8 stops the loop after its limit; nobody is there to hear it, and no process is left behind."""
+    (tmp_path / "Exercise.js").write_text("while (true) {}")
+    worker = subprocess.Popen(
+        [sys.executable, "-P", "-m", "adapters.own_solver.worker"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    assert json.loads(worker.stdout.readline()) == HERE
+    worker.stdout.close()
+    solver = pickle.dumps((read_solver(tmp_path / "Exercise.js"), None)).hex()
+    worker.stdin.write(json.dumps(solver).encode() + b"\n")
+    worker.stdin.close()
+    try:
+        worker.wait(SECONDS)
+    finally:
+        worker.kill()
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path):
+    """Nobody writes into it, so that reading it would never end."""
+    os.mkfifo(tmp_path / "Exercise.js")
+
+    with pytest.raises(NotASolver, match=r"Exercise\.js: is no file; name an Exercise\.js or a solver\.py"):
+        read_solver(tmp_path / "Exercise.js")

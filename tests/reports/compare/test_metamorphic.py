@@ -1,0 +1,292 @@
+"""Every metric changes as its unit says if the same is told otherwise: numbers of disks, axes, origin, units, walls.
+
+Nothing else may change a number, not by more than rounding, and not by the rounding of a grid on which steps, samples
+and collisions lie together.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from adapters.engines import ENGINES
+from adapters.play import Run, play
+from reports.compare import collisions, delays, faces, view
+from reports.compare.comparison import compare
+from reports.compare.metrics import METRICS, Metric, _largest_of_disks
+from reports.compare.scales import momentum
+from reports.compare.view import Value, View
+from scenarios.families.placing import box, lay_out
+from scenarios.files.scene_file import read_scene_file
+from scenarios.model import Scenario, Scene, Thrust
+from scenarios.truth.exact import with_oracle
+from tests.reports.compare.metamorphic import CHANGES, Change
+
+PLAYERS = ("reference:exercise", "reference:ordered", "pymunk:matched", "box2d:matched", "event_driven:float64")
+ROOM = box([-2.5, -2.5], [2.5, 2.5])
+
+
+def asked(name: str, scene: Scene, duration: float, interval: float, thrusts: tuple[Thrust, ...] = ()) -> Scenario:
+    """The scene at two steps, with the oracle for its answer."""
+    return with_oracle(Scenario(name, "?", "", scene, duration, interval, (1, 2), thrusts))
+
+
+def crowd(**more: object) -> Scene:
+    """Five disks of five sizes that meet soon."""
+    return lay_out(
+        position=[[-1.5, 1.7], [-2.2, -0.4], [-0.6, 0.1], [0.5, 1.3], [1.2, -1.1]],
+        velocity=[[2.35, -1.51], [1.17, 0.64], [-0.75, -2.45], [-0.96, -2.59], [-1.76, 1.78]],
+        radius=[0.17, 0.27, 0.25, 0.34, 0.4], mass=[2.6, 2.1, 0.8, 1.6, 2.4],
+        angle=[0.1, 1.2, -2.0, 0.0, 0.3], angular_velocity=[0.4, -1.0, 0.0, 2.0, 0.7], **more,
+    )  # fmt: skip
+
+
+SCENES: dict[str, Callable[[], Scenario]] = {
+    "free": lambda: asked("free", crowd(restitution=0.8), 1.0, 0.02),
+    "elastic": lambda: asked("elastic", crowd(restitution=1.0, walls=ROOM), 1.5, 0.02),
+    "room": lambda: asked("room", crowd(restitution=0.9, walls=ROOM), 1.0, 0.02),
+    "falling": lambda: asked("falling", crowd(restitution=0.5, walls=ROOM, gravity=[0.3, -9.81]), 0.8, 0.02),
+    # Every collision at the end of a step and of a sample interval; the walls in many pieces of decimal lengths.
+    "grid": lambda: asked(
+        "grid", lay_out(
+            position=[[-0.5, 0.0], [0.5, 0.0], [0.0, 1.0], [0.0, -1.0]],
+            velocity=[[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, 0.0]], radius=[0.1] * 4, mass=[1.0, 1.0, 2.0, np.inf],
+            restitution=1.0, walls=box([-1.1, -1.7], [1.1, 1.7]),
+        ), 3.0, 0.1,
+    ),
+    "pushed": lambda: asked(
+        "pushed", crowd(restitution=0.8), 1.0, 0.02,
+        (Thrust(0, 0.1, 0.5, [1.5, -2.0], 0.3), Thrust(3, 0.2, 0.77, [0.0, 4.0])),
+    ),
+    "pushed to the walls": lambda: asked(
+        "steered", crowd(restitution=0.7, walls=ROOM), 0.8, 0.02, (Thrust(1, 0.0, 0.6, [3.0, 0.5], 0.3, "body"),),
+    ),
+    "wrapped": lambda: asked("wrapped", crowd(restitution=0.9, wrap=[[-3.0, -2.0], [3.0, 2.0]]), 1.0, 0.02),
+}  # fmt: skip
+
+# What a change cannot be asked of: a moving frame moves walls, what stands still and gravity's energy; the wrap stands
+# along the axes and is as long as it is.
+WALLED = ("elastic", "room", "falling", "grid", "pushed to the walls", "wrapped")
+LEFT_OUT = {("boosted", name) for name in WALLED} | {
+    (name, "wrapped") for name in ("turned", "turned by a quarter and mirrored")
+}
+# Numbers that belong to a frame: energies and the spin of the whole about a point are others in a moving one.
+OF_A_FRAME = (
+    "energy_error", "energy_apart", "energy_created", "energy_loss_error", "angular_momentum_error",
+)  # fmt: skip
+
+ROUNDING = 1e-9
+"""Of a number, and of the size of what it is the difference of: float64 of some ten roundings, in coordinates of 40 m
+where lengths are of 1 m, spread a hundredfold by restitutions read off small changes of velocity."""
+
+
+@cache
+def played(name: str) -> tuple[Scenario, tuple[Run, ...], pd.DataFrame]:
+    """A scene, every run of it that came to its end, and their table."""
+    one = SCENES[name]()
+    every = [play(ENGINES[who].make(), who, one, one.dt(k)) for who in PLAYERS for k in one.substeps]
+    runs = tuple(run for run in every if run.status == "ok")
+    return one, runs, compare(one, runs).table
+
+
+def wrong(name: str, change: Change) -> list[str]:
+    """The rows that do not change as their unit says."""
+    one, runs, before = played(name)
+    new = change.scenario(one)
+    after = compare(new, [change.run(run, one) for run in runs]).table
+    assert before.metric.tolist() == after.metric.tolist()
+    moved, found = any(change.boost), []
+    frame = momentum(one) / momentum(new)
+    for a, b in zip(before.itertuples(), after.itertuples()):
+        if moved and a.metric in OF_A_FRAME:
+            continue
+        factor = frame if moved and a.metric.startswith("momentum") else change.factor(a.unit)
+        near = ROUNDING * factor * max(abs(a.value), 1.0)
+        same = a.value * factor == b.value or abs(a.value * factor - b.value) <= near
+        same |= bool(np.isnan(a.value) and np.isnan(b.value))
+        if not same:
+            found.append(f"{a.metric} {a.engine} {a.dt_s:g} {a.versus}: {a.value * factor!r} is {b.value!r} {b.note}")
+    return found
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("name", SCENES)
+def test_every_metric_changes_as_its_unit_says(name: str, change: str):
+    """Against the laws, the exact answer and every other engine, at two steps."""
+    if (change, name) in LEFT_OUT:
+        pytest.skip("the scene cannot be told so")
+    assert not wrong(name, CHANGES[change])
+
+
+def test_every_metric_is_under_test():
+    """Each has a number in some of these scenes, that is not zero."""
+    tables = [played(name)[2] for name in SCENES]
+    assert {*pd.concat(tables).metric} == {*METRICS}
+    for metric in METRICS:
+        values = np.concatenate([table[table.metric == metric].value for table in tables])
+        assert (np.isfinite(values) & (values != 0)).any() or metric == "disks_through_walls", metric
+
+
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    length=st.floats(1e-4, 1e4), time=st.floats(1e-4, 1e4), mass=st.floats(1e-4, 1e4), turn=st.floats(0, 7),
+    flip=st.sampled_from([1, -1]), name=st.sampled_from(["free", "falling", "grid", "pushed"]),
+)  # fmt: skip
+def test_any_units_and_any_axes_will_do(length: float, time: float, mass: float, turn: float, flip: int, name: str):
+    """All at once."""
+    assert not wrong(name, Change(length=length, time=time, mass=mass, turn=turn, flip=flip))
+
+
+def three_steps_away(view: View) -> Value:
+    """How many samples are further than 3 dt from each collision: a threshold on the grid."""
+    near = np.abs(view.played.t[:, None] - view.played.collisions.t).min(axis=1, initial=np.inf)
+    return Value(float((near > 3 * view.dt).sum()))
+
+
+def by_a_millimetre(view: View) -> Value:
+    """How many disks are off by more than 1 mm in some sample."""
+    return Value(float((view.apart > 1e-3).any(axis=0).sum()))
+
+
+def of_the_first_disk(view: View) -> Value:
+    """How far the first disk is off."""
+    return _largest_of_disks(view.apart[:, :1], view)
+
+
+def along_x(view: View) -> Value:
+    """How far a disk is off along x."""
+    assert view.other is not None
+    return Value(float(np.abs(view.played.position[..., 0] - view.other.position[..., 0]).max()))
+
+
+def to_the_right(view: View) -> Value:
+    """How far a disk is off to the top, at most."""
+    assert view.other is not None
+    return Value(float((view.played.position[..., 1] - view.other.position[..., 1]).max()))
+
+
+def from_the_origin(view: View) -> Value:
+    """How far away a disk is, at most."""
+    return Value(float(np.hypot(*np.moveaxis(view.played.position, -1, 0)).max()))
+
+
+def per_second(view: View) -> Value:
+    """How many collisions there are in a second."""
+    return Value(len(view.played.collisions) / float(view.played.t[-1]))
+
+
+def of_walls(view: View) -> Value:
+    """How many walls there are."""
+    return Value(float(len(view.scenario.scene.walls)))
+
+
+def heavy(view: View) -> Value:
+    """How many disks are of more than 2 kg."""
+    return Value(float((view.scenario.scene.mass > 2).sum()))
+
+
+def largest(view: View) -> Value:
+    """The largest radius."""
+    return Value(float(view.scenario.scene.radius.max()))
+
+
+def of_thrusts(view: View) -> Value:
+    """How many thrusts there are."""
+    return Value(float(len(view.scenario.thrusts)))
+
+
+def fastest(view: View) -> Value:
+    """Of any disk, at any time."""
+    return Value(float(np.abs(view.played.velocity).max()))
+
+
+WRONG = [
+    (three_steps_away, "1", "grid", "ten times as fast"),
+    (by_a_millimetre, "disks", "room", "in km"),
+    (of_the_first_disk, "m", "room", "permuted"),
+    (of_the_first_disk, "m", "room", "rolled"),
+    (along_x, "m", "room", "turned"),
+    (to_the_right, "m", "room", "mirrored"),
+    (to_the_right, "m", "room", "turned by a quarter and mirrored"),
+    (from_the_origin, "m", "room", "shifted"),
+    (per_second, "1", "room", "a third as fast"),
+    (per_second, "1", "room", "in ms"),
+    (per_second, "1", "room", "in feet, minutes and pounds"),
+    (of_walls, "1", "room", "walls cut in two"),
+    (per_second, "1", "room", "walls doubled"),
+    (heavy, "1", "room", "in g"),
+    (largest, "1", "room", "in mm"),
+    (of_thrusts, "1", "pushed", "thrusts cut in two"),
+    (of_thrusts, "1", "pushed", "thrusts shared by two"),
+    (fastest, "m/s", "free", "boosted"),
+]
+
+
+@pytest.mark.parametrize(("of", "unit", "name", "change"), WRONG, ids=lambda part: getattr(part, "__name__", str(part)))
+def test_a_metric_that_should_not_be_one_is_caught(
+    of: Callable[[View], Value], unit: str, name: str, change: str, monkeypatch: pytest.MonkeyPatch
+):
+    """The control, one for each change: it is there to catch something."""
+    monkeypatch.setitem(METRICS, "wrong", Metric(of, unit, ("truth",)))
+    played.cache_clear()
+    try:
+        found = wrong(name, CHANGES[change])
+    finally:
+        played.cache_clear()
+    assert found
+    assert all(row.startswith("wrong ") for row in found)
+
+
+def test_there_is_a_control_for_every_change():
+    """Else a change might change nothing."""
+    assert {change for *_, change in WRONG} == {*CHANGES}
+
+
+def test_a_bound_on_the_grid_is_caught_in_the_metrics_themselves(monkeypatch: pytest.MonkeyPatch):
+    """With windows of three steps, or times compared without their rounding, the last bit decides."""
+    monkeypatch.setattr(collisions, "judge", collisions.judge.py_func)  # what is compiled keeps its bounds
+    for module in (delays, view, collisions):
+        monkeypatch.setattr(module, "WINDOW", 3.0)
+    assert wrong_again("room", "ten times as fast")
+    monkeypatch.undo()
+    for module in (delays, collisions, faces):
+        monkeypatch.setattr(module, "SAME", 0.0)
+    assert wrong_again("grid", "in ms")
+
+
+def wrong_again(name: str, change: str) -> list[str]:
+    """The rows, with all worked out anew."""
+    played.cache_clear()
+    try:
+        return wrong(name, CHANGES[change])
+    finally:
+        played.cache_clear()
+
+
+CASES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
+
+
+def test_a_scene_ten_times_as_fast_gives_the_same_numbers_in_its_own_file():
+    """Two files that are one scene, played each: here engines are asked as well.
+
+    Those without a unit of time: pymunk takes as much of an overlap away in a second, whatever a second is.
+    """
+    tables = []
+    for name in ("pace_1", "pace_10"):
+        one = read_scene_file(CASES / f"{name}.toml")
+        runs = [
+            play(ENGINES[who].make(), who, one, one.dt(k))
+            for who in ("reference:exercise", "reference:lesson", "reference:ordered", "event_driven:float64")
+            for k in one.substeps
+        ]
+        tables.append(compare(one, runs).table)
+    slow, fast = tables
+    assert slow.metric.tolist() == fast.metric.tolist()
+    factor = slow.unit.map({"m/s": 10.0, "s": 0.1}).fillna(1.0)
+    # Chaos spreads the rounding of the velocities a millionfold by the end, as the horizon of the scene says.
+    np.testing.assert_allclose(fast.value, slow.value * factor, rtol=1e-8, atol=1e-9)

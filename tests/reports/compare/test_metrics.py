@@ -1,0 +1,261 @@
+"""The judge judged: metrics of trajectories whose faults were put in by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adapters.engines import ENGINES
+from adapters.play import Run, play
+from reports.compare.comparison import COLUMNS, compare, cut
+from reports.compare.delays import jumps_of
+from reports.compare.metrics import METRICS
+from reports.compare.view import View
+from reports.page.findings import findings
+from scenarios.catalogue import SCENARIOS, scenario
+from scenarios.model import Scenario, Scene, Thrust
+from scenarios.truth.exact import with_oracle
+from tests.adapters.broken_engines import NanAtStep7
+from tests.reports.compare.answers import beside_truth, truth_of
+
+WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
+
+
+def value(metric: str, view: View) -> float:
+    """The value of a metric that applies."""
+    found = METRICS[metric].of(view)
+    assert found is not None
+    return found.value
+
+
+@pytest.mark.parametrize("name", WITH_TRUTH)
+def test_the_truth_against_itself_is_zero(name: str):
+    """Every error of the truth measured against the truth is 0, it never leaves the 1 % band, it misses no hit."""
+    one, truth = truth_of(name)
+    view = beside_truth(one, one.dt(1), truth, truth)
+
+    for metric, row in METRICS.items():
+        if "truth" in row.against and (found := row.of(view)) is not None:
+            expected = np.inf if row.better == "higher" else 0.0
+            assert found.value == expected, metric
+
+
+@pytest.mark.parametrize("name", WITH_TRUTH)
+def test_the_truth_keeps_the_laws(name: str):
+    """Momentum, energy and non-penetration hold in the truth to the rounding of a sum over its disks."""
+    one, truth = truth_of(name)
+    view = View(one, one.dt(1), truth)
+
+    for metric in ("momentum_error", "angular_momentum_error", "energy_error", "energy_created", "penetration_radii"):
+        if (found := METRICS[metric].of(view)) is not None:
+            # A few hundred roundings of terms of the size of the scale; angular momentum squares the distances.
+            assert found.value < 1e-12, metric
+
+
+@pytest.mark.parametrize("name", ["head_on_equal_e09", "line_gas", "ping_pong"])
+def test_a_disk_moved_by_a_millimetre_reads_a_millimetre(name: str):
+    """One sample of one disk moved by 1 mm: the largest deviation is 1 mm, at that disk and that instant."""
+    one, truth = truth_of(name)
+    position = truth.position.copy()
+    k, disk = len(truth) // 2, one.scene.n - 1
+    position[k, disk] += [0.0006, 0.0008]
+    found = METRICS["position_max"].of(View(one, one.dt(1), replace(truth, position=position), truth))
+
+    assert found is not None
+    assert found.value == pytest.approx(1e-3, rel=1e-9)  # the rounding of x + 0.0008 at |x| < 20, over 1e-3
+    assert (found.disk, found.at) == (disk, truth.t[k])
+
+
+def test_momentum_that_leaks_is_seen():
+    """A velocity off by 1 % on one of two equal disks is a momentum error of half a percent."""
+    one, truth = truth_of("head_on_equal_e1")
+    velocity = truth.velocity.copy()
+    velocity[-1, 0] *= 1.01
+    found = value("momentum_error", View(one, one.dt(1), replace(truth, velocity=velocity)))
+    share = np.linalg.norm(truth.velocity[-1, 0]) / np.linalg.norm(truth.velocity[-1], axis=1).sum()
+
+    assert found == pytest.approx(0.01 * share, rel=1e-6)  # digits of 1.01 v - v
+
+
+def test_energy_that_is_created_is_seen():
+    """A speed that rises by 1 % raises the energy by 2 % of that disk's share."""
+    one, truth = truth_of("box_billiard")
+    spin = (truth.angular_velocity[0] ** 2 @ one.scene.inertia) / 2
+    velocity = truth.velocity.copy()
+    velocity[len(truth) // 2 :] *= 1.01
+    found = value("energy_created", View(one, one.dt(1), replace(truth, velocity=velocity)))
+    kinetic = (truth.velocity[0] ** 2).sum() * one.scene.mass[0] / 2
+
+    # Differences of energies that round in the last of 16 digits, over 2 % of them.
+    assert found == pytest.approx(kinetic * (1.01**2 - 1) / (kinetic + spin), rel=1e-12)
+
+
+def test_weight_and_thrust_are_accounted_for():
+    """Free flight under gravity and a world-frame push has no momentum error."""
+    scene = Scene(position=[[0, 0]], velocity=[[1, 2]], radius=[0.1], mass=[2], restitution=1, gravity=[0, -9.81])
+    one = Scenario(
+        name="pushed", asks="?", source="", scene=scene, duration=1.0, sample_interval=0.1,
+        thrusts=[Thrust(0, 0.25, 0.6, [3.0, 1.0])],
+    )  # fmt: skip
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
+    assert run.trajectory is not None
+
+    assert value("momentum_error", View(one, run.dt, run.trajectory)) < 1e-14  # ten additions of float64
+
+
+def test_deviation_is_measured_across_the_seam():
+    """Where the scene wraps, two disks on both sides of the same edge are close."""
+    one = scenario("asteroids")
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(4))
+    assert run.trajectory is not None
+    moved = replace(run.trajectory, position=run.trajectory.position + [10.0, 0.0])  # the box is 10 m wide
+
+    assert value("position_max", View(one, run.dt, moved, run.trajectory)) < 1e-14  # rounding of x + 10
+
+
+@pytest.mark.parametrize("e", ["e0", "e05", "e09", "e1"])
+def test_restitution_is_read_off_the_velocities(e: str):
+    """The exact answer has the restitution it was made with."""
+    one, truth = truth_of(f"oblique_{e}")
+
+    # Sampled velocities are exact up to rounding; the quotient amplifies it by v / v_n, below 10 here.
+    assert value("restitution_error", View(one, one.dt(1), truth)) < 1e-14
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_reference_has_the_restitution_of_the_scene_in_every_scene(name: str):
+    """Its impulse is exact, so what is read off its samples is e, or the reading is wrong."""
+    one = scenario(name)
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(one.substeps[0]))
+    assert run.trajectory is not None
+    found = METRICS["restitution_error"].of(View(one, run.dt, run.trajectory))
+
+    # Rounding of v, twice over the closing speed: once in the normal, once in e. The slowest graze here is 1e-3 v.
+    assert found is None or found.value < 1e-8
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
+    """Also for one that explodes, one that stands still, one sample, and a disk that does not turn."""
+    scene = replace(scenario("box_billiard").scene, inertia=np.array([np.inf]))
+    one = replace(scenario("box_billiard"), scene=scene)
+    assert one.truth is not None
+    truth = one.truth(one.times)
+    huge = replace(truth, position=truth.position * 1e200, velocity=truth.velocity * 1e200)
+    still = replace(truth, position=truth.position * 0, velocity=truth.velocity * 0)
+    for played in (huge, still, cut(truth, 1)):
+        for other in (None, cut(truth, len(played))):
+            kind = "itself" if other is None else "truth"
+            if kind in METRICS[metric].against:
+                beside = View(one, one.dt(1), played, other, None if other is None else jumps_of(truth, one))
+                with np.errstate(over="ignore", invalid="ignore"):  # as `compare` does
+                    found = METRICS[metric].of(beside)
+                assert found is None or isinstance(found.value, float | int)
+
+
+def test_a_run_that_diverged_earns_a_status_and_no_score():
+    """A player that gives NaN at step 7 was right before it, for a scene that nobody else played so short."""
+    one = scenario("slow_hit")
+    run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
+    good = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", one, one.dt(1))
+    table = compare(one, [run, good]).table
+
+    assert run.trajectory is not None
+    assert table[table.engine == "reference"].metric.tolist() == ["status"]
+    assert table.note.str.contains("of disk 0 is not finite").any()
+    assert "reference:exercise" not in set(table.versus)
+
+
+def test_to_refuse_a_scene_does_not_help_in_the_ranking():
+    """Who has no result in a scene is last in it, and who has none in half of them is not ranked first."""
+    one, two = scenario("slow_hit"), scenario("near_miss")
+    runs = {
+        name: [play(ENGINES[name].make(), name, each, each.dt(4)) for each in (one, two)]
+        for name in ("reference:exercise", "box2d:shipped")
+    }
+    refused = Run("pymunk", "matched", one.name, one.dt(4), "unsupported", "too hard")
+    perfect = replace(runs["reference:exercise"][1], engine="pymunk", profile="matched")
+    tables = [
+        compare(replace(one, substeps=(4,)), [refused, *(each[0] for each in runs.values())]),
+        compare(replace(two, substeps=(4,)), [perfect, *(each[1] for each in runs.values())]),
+    ]
+
+    assert "2 scenes: reference:exercise" in findings(tables, set())[0]
+    assert "pymunk:matched in 1" in findings(tables, set())[2]
+
+
+def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():
+    """The centre crosses the segment; a disk that stays inside has not."""
+    one, truth = truth_of("box_billiard")
+    away = replace(truth, position=truth.position + np.linspace(0, 50, len(truth))[:, None, None])
+
+    assert value("disks_through_walls", View(one, one.dt(1), truth)) == 0
+    assert value("disks_through_walls", View(one, one.dt(1), away)) == 1
+
+
+def test_an_explosion_does_not_make_itself_small():
+    """Speeds a thousand times too high are an energy error of a million, not of one."""
+    one, truth = truth_of("line_gas")
+    velocity = truth.velocity.copy()
+    velocity[len(truth) // 2 :] *= 1000
+
+    assert value("energy_error", View(one, one.dt(1), replace(truth, velocity=velocity))) > 1e5
+
+
+def test_falling_through_a_wrap_is_no_energy_error():
+    """A disk that is set from the bottom to the top has more height; that is the scene's doing."""
+    scene = Scene(
+        position=[[0, 0]], velocity=[[0, 0]], radius=[0.1], mass=[1], restitution=1, gravity=[0, -1],
+        wrap=[[-1, -1], [1, 1]],
+    )  # fmt: skip
+    one = Scenario(name="rain", asks="?", source="", scene=scene, duration=5.0, sample_interval=0.1)
+    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
+    assert run.trajectory is not None
+    view = View(one, run.dt, run.trajectory)
+
+    assert METRICS["energy_error"].of(view) is None
+    assert METRICS["energy_created"].of(view) is None
+
+
+def test_comparison_stops_where_the_other_ends():
+    """Samples and hits beyond the truth's horizon are cut off."""
+    _, truth = truth_of("line_gas")
+    short = cut(truth, 100)
+
+    assert len(short) == 100
+    assert short.collisions.t[-1] <= short.t[-1]
+    assert len(short.collisions) == (truth.collisions.t <= truth.t[99]).sum()
+
+
+def test_the_table_has_failures_too_and_every_pair_once():
+    """A refused run is a row with its reason; engines are compared pairwise at the same dt, in one direction."""
+    one = scenario("head_on_equal_e1")
+    names = ["reference:exercise", "reference:lesson", "pymunk:matched"]
+    runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in (1, 2)]
+    refused = Run("box2d", "matched", one.name, one.dt(1), "unsupported", "mass 1e+300 does not fit into float32")
+    table = compare(one, [*runs, refused]).table
+    status = table[table.metric == "status"]
+    pairs = table[~table.versus.isin(["itself", "truth"]) & (table.metric == "position_rms")]
+
+    assert list(table.columns) == list(COLUMNS)
+    assert status.note.tolist() == ["unsupported: mass 1e+300 does not fit into float32"]
+    assert len(pairs) == 2 * 3  # two dt, three pairs
+    assert not table.duplicated(["scenario", "engine", "profile", "dt_s", "metric", "versus"]).any()
+
+
+def test_without_a_truth_nothing_is_called_an_error_of_position():
+    """Where nobody knows the answer the table has laws and pairs only."""
+    one = replace(scenario("gas_of_100"), duration=0.5, truth=None)
+    runs = [play(ENGINES[name].make(), name, one, one.dt(4)) for name in ("reference:exercise", "pymunk:matched")]
+    table = compare(one, runs).table
+
+    assert set(table.versus) == {"itself", "pymunk:matched"}
+
+
+def test_where_the_oracle_refuses_the_comparison_says_why():
+    """Disks that overlap have no exact answer: no error is claimed, and the reason is at hand."""
+    scene = Scene(position=[[0, 0], [0.3, 0]], velocity=[[0, 0], [0, 0]], radius=[0.2, 0.2], mass=[1, 1], restitution=1)
+    refused = compare(with_oracle(Scenario("two", "?", "", scene, 1.0, 0.1)), [])
+
+    assert refused.truth is None
+    assert "disk 0 and disk 1 overlap by 0.1 m" in refused.scenario.without_truth

@@ -1,0 +1,200 @@
+"""A number that too few samples carry is not judged: shown so, and left out of medians, best marks and verdicts."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from adapters.engines import ENGINES
+from adapters.play import Run, play
+from reports.compare.comparison import Comparison, compare, cut
+from reports.compare.delays import WINDOW
+from reports.compare.metrics import METRICS
+from reports.compare.view import LEAST_SHARE, NOT_JUDGED, View
+from reports.page import overview
+from reports.page.charts import CHARTS
+from reports.page.findings import findings
+from reports.run.diff import changed_numbers
+from reports.run.shares import read_share
+from scenarios.catalogue import scenario
+from scenarios.model import Scenario, Trajectory
+from tests.reports.compare.answers import beside_truth, truth_of
+
+CARRIED = ("velocity_max", "velocity_rms", "momentum_apart", "energy_apart", "energy_error", "energy_loss_error")
+NAMES = ("reference:exercise", "pymunk:matched")
+
+
+def known_until(name: str, samples: int) -> Scenario:
+    """A scenario whose truth is known at so many samples, the start among them."""
+    one = scenario(name)
+    assert one.truth is not None
+    truth, until = one.truth, (samples - 0.5) * one.sample_interval
+
+    def cut_off(t: np.ndarray) -> Trajectory:
+        whole = truth(t)
+        return cut(whole, int((whole.t <= until).sum()))
+
+    return replace(one, truth=cut_off, substeps=(1, 2, 4))
+
+
+def compared(one: Scenario, *, substeps: tuple[int, ...] = (1, 2, 4)) -> Comparison:
+    """By two engines."""
+    runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in NAMES for k in substeps]
+    return compare(one, runs)
+
+
+def against_truth(table: pd.DataFrame, metric: str, dt: float) -> pd.DataFrame:
+    """Its rows at a step size."""
+    return table[(table.metric == metric) & (table.versus == "truth") & (table.dt_s == dt)]
+
+
+@pytest.mark.parametrize("name", ["falling_box", "gas_of_100"])
+@pytest.mark.parametrize("metric", CARRIED)
+def test_a_crowded_scene_is_judged_at_every_step_size(name: str, metric: str):
+    """From nearly all of its samples, and says from how many; a stepping engine has no perfect score."""
+    one = replace(scenario(name), substeps=(1, 2, 4))
+    rows = compared(one).table.query("metric == @metric and versus == 'truth'")
+
+    for row in rows.to_dict("records"):
+        judged, samples = (int(word) for word in row["note"].split(" samples")[0].split(" of "))
+        assert judged >= samples - int(WINDOW) - 1
+        assert np.isfinite(row["value"])
+    if "velocity" in metric:
+        assert (rows.value > 1e-3).all()
+
+
+def test_nothing_is_judged_by_the_start_alone():
+    """A truth that is lost before its second sample leaves only what was given to all."""
+    rows = compared(known_until("wall_to_wall", 1)).table.query("versus == 'truth'")
+
+    assert set(CARRIED) | {"position_max_radii", "collisions_missed"} <= set(rows.metric)
+    assert rows.value.isna().all()
+    assert (rows.note == f"{NOT_JUDGED}: the start alone").all()
+
+
+@pytest.mark.parametrize("metric", ["velocity_max", "velocity_rms", "momentum_apart", "energy_apart", "energy_error"])
+def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
+    """Within three steps of its end a truth does not say which velocity may come early: of 3 samples 2 are left at dt
+    / 4, none at dt."""
+    one = known_until("wall_to_wall", 4)
+    table = compared(one).table
+    fine, coarse = (against_truth(table, metric, one.dt(k)) for k in (4, 1))
+
+    assert np.isfinite(fine.value).all()
+    assert (fine.note == "2 of 3 samples").all()
+    assert coarse.value.isna().all()
+    assert (coarse.note == f"{NOT_JUDGED}: only 0 of 3 samples").all()
+
+
+def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
+    """Of a pair that collides once, all samples but those within three steps of the collision of either engine."""
+    one = scenario("head_on_equal_e05")
+    runs = [play(ENGINES[name].make(), name, one, one.dt(1)).trajectory for name in NAMES]
+    assert runs[0] is not None
+    assert runs[1] is not None
+    view = View(one, one.dt(1), runs[0], runs[1])
+    hits = np.append(runs[0].collisions.t, runs[1].collisions.t)
+    near = np.abs(view.played.t[:, None] - hits).min(axis=1) < WINDOW * one.dt(1)
+
+    assert len(hits) == 2
+    assert (view.judged == (~near & (view.played.t > 0))[:, None]).all()
+    assert view.carried == f"{view.judged.sum()} of {2 * one.samples} samples of a disk"
+
+
+def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisions():
+    """Each tells of a collision every other step: less than a tenth of the samples is left."""
+    one = scenario("slide_on_incline")
+    found = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)).trajectory
+    assert found is not None
+    times = np.arange(0.0, one.duration, 2 * one.dt(1))
+    hits = replace(
+        found.collisions, t=times, i=np.zeros(len(times), int), j=np.full(len(times), -1), impulse=np.ones(len(times))
+    )
+    view = View(one, one.dt(1), replace(found, collisions=hits), found)
+    value = METRICS["velocity_max"].of(view)
+
+    assert view.share < LEAST_SHARE
+    assert value is not None
+    assert np.isnan(value.value)
+    assert value.note.startswith(f"{NOT_JUDGED}: only ")
+
+
+def lost(comparison: Comparison, name: str, metric: str) -> Comparison:
+    """The comparison, with a metric of an engine not judged."""
+    table = comparison.table.copy()
+    engine, profile = name.split(":")
+    rows = (table.metric == metric) & (table.engine == engine) & (table.profile == profile)
+    assert rows.any()
+    table.loc[rows, ["value", "note"]] = np.nan, f"{NOT_JUDGED}: only 3 of 90 samples"
+    return replace(comparison, table=table)
+
+
+def test_what_is_not_judged_is_shown_and_counts_in_no_median_and_for_no_best_mark():
+    """Of two scenes the other one makes the median; where none is left there is none, and nobody is best by it."""
+    good = [compared(scenario(name)) for name in ("wall_to_wall", "head_on_equal_e05")]
+    half = [good[0], lost(good[1], NAMES[0], "energy_error")]
+    none = [lost(one, NAMES[0], "energy_error") for one in good]
+    column = list(overview.SUMMARY).index("energy_error")
+    whole, some, nothing = (overview.summary(each, NAMES, set()) for each in (good, half, none))
+    [row] = [cells for key, _, _, cells in overview.scenario_table(half[1], NAMES) if key == "energy_error"]
+
+    assert whole[NAMES[0]][column].remark == "in 2 scenarios"
+    assert some[NAMES[0]][column].remark == f"in 1 scenarios, {NOT_JUDGED} in 1"
+    assert some[NAMES[0]][column].text == overview.summary(good[:1], NAMES, set())[NAMES[0]][column].text
+    assert (nothing[NAMES[0]][column].text, nothing[NAMES[0]][column].best) == ("–", False)
+    assert nothing[NAMES[1]][column].best
+    assert (row[0].text, row[0].best) == (NOT_JUDGED, False)
+    assert "3 of 90" in row[0].remark
+
+
+def test_a_scene_known_at_its_start_only_beats_nobody():
+    """It is left out of the findings, of the map, and of what is drawn."""
+    nothing = compared(known_until("wall_to_wall", 1))
+    cells = overview.heat_map([nothing], NAMES)["wall_to_wall"]
+
+    assert "No scene here has an exact answer" in findings([nothing], set())[0]
+    assert "median of 1 scenes" in findings([nothing, compared(scenario("head_on_equal_e05"))], set())[0]
+    assert {(cell.text, cell.heat) for cell in cells} == {(NOT_JUDGED, -1)}
+    for chart in CHARTS.values():
+        chart.draw(nothing)
+
+
+def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp_path: Path):
+    """Beside the control: the same with a number is worse."""
+    whole = compared(scenario("wall_to_wall"))
+    tables = []
+    for each in (whole, lost(whole, NAMES[0], "velocity_rms")):
+        each.table.to_csv(tmp_path / "share.csv", index=False)
+        read_share((tmp_path / "share.csv").read_bytes())
+        tables.append(pd.read_csv(tmp_path / "share.csv", dtype=str, keep_default_na=False))
+    changes, _ = changed_numbers(*tables, set())
+    back, _ = changed_numbers(*tables[::-1], set())
+    tables[1].loc[tables[1].note.str.startswith(NOT_JUDGED), ["value", "note"]] = "1e9", ""
+    control, _ = changed_numbers(*tables, set())
+
+    assert {change.verdict for change in (*changes, *back)} == {"other"}
+    assert {change.after for change in changes} == {NOT_JUDGED}
+    assert "worse" in {change.verdict for change in control}
+
+
+def test_a_velocity_that_overflows_is_judged_and_bad():
+    """Too large for a float is not the same as not judged."""
+    one, truth = truth_of("wall_to_wall")
+    huge = replace(truth, velocity=truth.velocity * 1e200)
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = METRICS["energy_apart"].of(beside_truth(one, one.dt(1), huge, truth))
+
+    assert found is not None
+    assert not np.isfinite(found.value)
+    assert NOT_JUDGED not in found.note
+
+
+def test_a_failed_run_is_no_number_that_is_not_judged():
+    """Its row is a status."""
+    one = scenario("wall_to_wall")
+    table = compare(one, [Run("pymunk", "matched", one.name, one.dt(1), "unsupported", "too hard")]).table
+
+    assert table.metric.tolist() == ["status"]
+    assert not table.note.str.startswith(NOT_JUDGED).any()

@@ -1,0 +1,289 @@
+"""The game in a real browser: keys steer, a flight is won, ghosts part, what is saved is what was flown."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page
+
+from adapters.engines import ENGINES
+from adapters.play import play
+from reports.commands.serve import application
+from reports.game.flight import FRAME
+from reports.game.pilot import SHIP
+from reports.game.server import Game
+from scenarios.files.scene_file import read_scene_file
+from scenarios.truth.closed_forms import world_pushes
+from tests.reports.game.test_flight import steered_home
+from tests.reports.page.browsing import opened, overhang, served
+
+FLOWN = ["reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:float64"]
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    """Where the game is served."""
+    with served(application(Game(FLOWN))) as url:
+        yield url
+
+
+@pytest.fixture
+def page(browser: Browser, url: str) -> Iterator[Page]:
+    """The game, paused at its first frame; whatever it complained of fails the test."""
+    page, heard = opened(browser, url, viewport={"width": 1280, "height": 900}, reduced_motion="reduce")
+    page.wait_for_function("() => game.field")
+    yield page
+    page.context.close()
+    assert heard == []
+
+
+def wish(page: Page, **fields: object) -> None:
+    """A new field."""
+    for name, value in fields.items():
+        before = page.evaluate("game.field && (game.field.seen = true)")
+        page.locator(f"#wishes [name={name}]").fill(str(value))
+        page.locator(f"#wishes [name={name}]").blur()
+        page.wait_for_function("() => !game.field.seen")
+        assert before
+
+
+def fly(page: Page, frames: int) -> None:
+    """So many frames on, by the game's own requests, whatever the clock does."""
+    page.evaluate(
+        """async (frames) => {
+          const until = game.now.frame + frames;
+          while (game.now.frame < until) {
+            game.ask(Math.min(4, until - game.now.frame));
+            while (game.waiting) await new Promise((done) => setTimeout(done));
+          }
+        }""",
+        frames,
+    )
+
+
+def saved(page: Page, folder: Path) -> Path:
+    """The file that "Save flight" gives."""
+    with page.expect_download() as download:
+        page.locator("#save").click()
+    path = folder / download.value.suggested_filename
+    download.value.save_as(path)
+    return path
+
+
+def test_keys_held_and_released_move_the_ship(page: Page):
+    """W held for 64 frames, then a turn by A: x = a t2 / 2 + v t, angle = t2 / 2 (0.25 m/s2, 1 rad/s2)."""
+    wish(page, asteroids=0)
+    keys = page.keyboard
+    keys.down("w")
+    fly(page, 64)
+    keys.up("w")
+    keys.down("ArrowLeft")
+    fly(page, 32)
+    keys.up("ArrowLeft")
+    fly(page, 32)
+    x, y, vx, vy, angle, spin = page.evaluate("game.now.ship")
+    dt, t = FRAME / 16, 64 * FRAME
+
+    # Symplectic Euler is a dt T / 2 further on after a push of T s, and rounds.
+    assert x == pytest.approx(-3.5 + 0.25 * t * (t / 2 + 64 * FRAME) + 0.25 * dt * t / 2, abs=1e-12)
+    assert (y, vx, vy) == (0.0, pytest.approx(0.25 * t, abs=1e-14), 0.0)
+    assert spin == pytest.approx(32 * FRAME, abs=1e-14)
+    assert angle == pytest.approx((32 * FRAME) ** 2 * 1.5 + dt * 32 * FRAME / 2, abs=1e-12)
+
+
+def test_a_scripted_flight_wins(page: Page):
+    """With the keys of `steered_home` pressed and released in the page."""
+    wish(page, asteroids=0)
+    banners = []
+    for frame, key, down in steered_home():
+        fly(page, frame - page.evaluate("game.now.frame"))
+        banners.append(page.locator("#banner").inner_text())
+        (page.keyboard.down if down else page.keyboard.up)(key)
+
+    assert "You won" not in banners[:-1]
+    assert page.locator("#banner.won").inner_text() == "You won"
+
+
+def test_ghosts_part_after_the_first_hit_and_the_marker_names_the_pair(page: Page, tmp_path: Path):
+    """pymunk as shipped makes e2 of e: it parts at the first hit, whose pair and instant the exact answer tells."""
+    fly(page, 16)
+    together = [flyer["apart"] for flyer in page.evaluate("game.now.flyers")]
+    page.locator("#stop").check()
+    page.locator("#pause").click()  # fly on, until it stops by itself
+    page.wait_for_function("() => game.paused && game.now.frame > 16", timeout=20_000)
+    scenario = read_scene_file(saved(page, tmp_path))
+    hits = scenario.truth(scenario.times).collisions  # type: ignore[misc]
+    parted = page.evaluate("game.now.flyers[1].parted")
+    story = page.locator("tr[data-engine='pymunk:shipped'] [data-cell=parted]").inner_text()
+    marks = page.evaluate("game.sky.last[3]")
+
+    # A step at the edge: stepping engines set what wraps onto it, and lose what it flew on beyond.
+    assert max(together) < 0.71 * FRAME / 16
+    assert {parted["i"], parted["j"]} == {hits.i[0], hits.j[0]}
+    assert 0 <= parted["t"] - hits.t[0] <= 2 * FRAME
+    assert f"{parted['i']} × {parted['j']}: both hit, and part differently" in story
+    assert marks[0]["name"] == "pymunk:shipped"
+    assert page.evaluate("game.now.flyers[1].apart") > 1e-3
+
+
+def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Path):
+    """Real keys in real time; the file, played by the harness, ends in the very state that the page showed."""
+    wish(page, asteroids=0)
+    page.locator("#pause").click()
+    page.wait_for_function("() => game.now.frame > 5")
+    page.keyboard.down("w")
+    page.keyboard.down("d")
+    page.wait_for_function("() => game.now.frame > 40")
+    page.keyboard.up("d")
+    page.keyboard.up("w")
+    page.wait_for_function("() => game.now.frame > 60")
+    page.keyboard.press("p")
+    page.wait_for_function("() => !game.waiting")
+    shown, solid = page.evaluate("game.now.ship"), FLOWN[0]
+    scenario = read_scene_file(saved(page, tmp_path))
+    end = play(ENGINES[solid].make(), solid, scenario, scenario.dt(scenario.substeps[1])).trajectory.at(-1)  # type: ignore[union-attr]
+    exact = world_pushes(scenario.scene, scenario.thrusts, scenario.times).at(-1)
+
+    assert len(scenario.thrusts) >= 2
+    assert shown == [*end.position[SHIP], *end.velocity[SHIP], end.angle[SHIP], end.angular_velocity[SHIP]]
+    assert np.abs(exact.position[SHIP] - end.position[SHIP]).max() < 0.25 * FRAME / 16 * scenario.duration
+
+
+def test_a_saved_flight_is_shown_again_to_the_same_bits(browser: Browser, page: Page, tmp_path: Path):
+    """By `crosscheck play FLIGHT.toml`: it ends by itself, where the first flight was saved, and takes no keys."""
+    page.keyboard.down("w")
+    fly(page, 50)
+    page.keyboard.up("w")
+    fly(page, 30)
+    first = page.evaluate("game.now.flyers.map((flyer) => [flyer.x, flyer.energy])")
+    scenario = read_scene_file(saved(page, tmp_path))
+    with served(application(Game(FLOWN, scenario))) as url:
+        again, heard = opened(browser, url)
+        again.wait_for_function("() => game.field")
+        again.keyboard.down("s")
+        again.wait_for_function("() => game.now.over", timeout=20_000)
+        last = again.evaluate("game.now.flyers.map((flyer) => [flyer.x, flyer.energy])")
+        banner = again.locator("#banner").inner_text()
+        again.context.close()
+
+    assert last == first
+    assert banner == "The flight ends here"
+    assert heard == []
+
+
+def test_any_scene_file_can_be_flown(browser: Browser):
+    """Walls, static disks and no wrap: drawn and played to its end, with no earth to win."""
+    scenario = read_scene_file(Path(__file__).parents[3] / "tests" / "data" / "scenes" / "bumper.toml")
+    with served(application(Game(["reference:exercise", "event_driven:float64"], scenario))) as url:
+        page, heard = opened(browser, url)
+        page.wait_for_function("() => game.now && game.now.over", timeout=30_000)
+        left, t = page.evaluate("[game.now.flyers.map((flyer) => flyer.left), game.now.t]")
+        page.context.close()
+
+    assert left == ["", ""]
+    assert t == pytest.approx(scenario.duration)
+    assert heard == []
+
+
+def test_a_finger_steers_too(page: Page):
+    """The button pushes as long as it is held."""
+    wish(page, asteroids=0)
+    box = page.locator("[data-key=w]").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    page.mouse.down()
+    fly(page, 20)
+    page.mouse.up()
+    fly(page, 10)
+
+    assert page.evaluate("game.now.ship[2]") == pytest.approx(0.25 * 20 * FRAME, abs=1e-14)
+
+
+def test_a_lost_connection_is_told_and_mended(page: Page):
+    """The page says so, and begins anew when the server is there again."""
+    fly(page, 3)
+    page.evaluate("game.socket.close(); game.field.seen = true")
+    page.wait_for_function("() => document.getElementById('banner').textContent.includes('Trying again')")
+    page.wait_for_function("() => !game.field.seen && game.now.frame === 0", timeout=10_000)
+
+
+def test_another_engine_can_be_solid(page: Page):
+    """Its row is first in the flight; a ghost can be left out."""
+    page.locator("[name=solid][value='pymunk:shipped']").check()
+    page.wait_for_function("() => game.field.engines[0] === 'pymunk:shipped'")
+    page.locator("[name=flies][value='box2d:matched']").uncheck()
+    page.wait_for_function("() => game.field.engines.length === 3")
+
+    assert page.evaluate("game.field.engines") == ["pymunk:shipped", "reference:exercise", "event_driven:float64"]
+
+
+def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
+    """Nothing scrolls sideways but the table; Tab comes to every control, with a visible outline."""
+    page, heard = opened(browser, url, viewport={"width": 400, "height": 800}, color_scheme="dark")
+    page.wait_for_function("() => game.field && game.now.frame > 10", timeout=20_000)
+    too_wide = overhang(page)
+    page.set_viewport_size({"width": 1280, "height": 800})
+    too_wide = max(too_wide, overhang(page))
+    reached = []
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        reached.append(page.evaluate("document.activeElement.id || document.activeElement.name || ''"))
+    outlined = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+    page.context.close()
+
+    assert too_wide <= 0
+    assert {"sky", "pause", "step", "again", "save", "flies", "solid", "asteroids", "restitution", "seed"} <= set(
+        reached
+    )
+    assert outlined != "none"
+    assert heard == []
+
+
+def test_with_reduced_motion_nothing_moves_by_itself(page: Page):
+    """The flight waits for the player."""
+    page.wait_for_timeout(200)
+
+    assert page.evaluate("[game.now.frame, game.paused]") == [0, True]
+    assert "starts the flight" in page.locator("#banner").inner_text()
+
+
+@pytest.mark.slow
+def test_the_frame_time_is_measured_by_a_command():
+    """`python -m tests.bench.game` prints a row for each thing timed, and how fast the flight goes."""
+    words = [sys.executable, "-m", "tests.bench.game", "1"]
+    done = subprocess.run(words, cwd=Path(__file__).parents[3], capture_output=True, text=True, timeout=120)
+    lines = done.stdout.splitlines()
+    numbers = [[float(number) for number in re.findall(r"\d+\.\d\d", line[:50])] for line in lines[2:6]]
+
+    assert done.returncode == 0, done.stderr
+    assert lines[0].startswith("4 engines, 21 disks")
+    assert all(0 < mean <= most and part <= most for mean, part, most in numbers)
+    assert float(lines[-1].split()[0]) > 1.0
+
+
+def test_the_page_tells_its_frame_time(page: Page):
+    """Pictures a second, and what the engines take of a frame."""
+    fly(page, 30)
+
+    assert re.search(r"\d+ pictures a second.* engines take \d+\.\d ms", page.locator("#pace").inner_text())
+
+
+def test_a_page_of_an_earlier_server_is_loaded_anew(browser: Browser):
+    """Started again with other engines on the same port, as after a change of one's solver: the new ones fly."""
+    game = Game(["reference:exercise", "pymunk:shipped"])
+    with served(application(game)) as url:
+        page, heard = opened(browser, url, reduced_motion="reduce")
+        page.wait_for_function("() => game.field")
+        game.engines, game.mark = ["reference:exercise", "box2d:shipped"], "later"
+        page.evaluate("game.socket.close()")
+        page.wait_for_function("() => document.body.dataset.server === 'later' && window.game?.field", timeout=10_000)
+        flown, ticked = page.evaluate("[game.field.engines, game.rows.filter((row) => !row.matches('.off')).length]")
+        page.context.close()
+
+    assert (flown, ticked, heard) == (["reference:exercise", "box2d:shipped"], 2, [])

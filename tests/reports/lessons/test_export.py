@@ -1,0 +1,133 @@
+"""A lesson as a file needs no server, all of them lead to each other, and what cannot be written is told at once."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+
+from reports.lessons import command, pages
+from reports.lessons.catalogue import LESSONS
+from reports.lessons.pages import offline, told
+from tests.reports.page.browsing import opened
+from tests.reports.terminal.command_line import crosscheck
+
+
+def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
+    """It asks nothing of anywhere, its sliders work, and what it holds is what the lesson shows live."""
+    lesson = LESSONS["order"]
+    path = tmp_path / "order.html"
+    path.write_text(offline(lesson, {places: told("order", places) for places in lesson.grid}))
+    page, heard = opened(browser, path.as_uri())
+    page.on("request", lambda request: heard.append(request.url))
+    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    curves = "[...document.querySelectorAll('.curve')].map((curve) => curve.getAttribute('d')).join()"
+    before = page.evaluate(curves)
+    page.locator(".sliders [name=order]").focus()
+    page.keyboard.press("End")
+    page.evaluate("lesson.ready")
+    after = page.evaluate(curves)
+    packed = page.locator("#grid").text_content()
+    page.context.close()
+    held = json.loads(zlib.decompress(base64.b64decode(packed or "")))
+
+    assert before != after
+    assert heard == []
+    assert len(held) == len(lesson.grid)
+    assert held["1,0"]["charts"] == json.loads(json.dumps(lesson.at((1, 0)).told()["charts"]))
+
+
+def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A page each and their list, with the conventions in it; nothing asks for a server. Two of them, for the time."""
+    few = {name: LESSONS[name] for name in ("order", "mixing")}
+    monkeypatch.setattr(command, "LESSONS", few)
+    monkeypatch.setattr(pages, "LESSONS", few)
+    monkeypatch.setattr(command, "ENGINES", {name: command.ENGINES[name] for name in ("pymunk:shipped",)})
+    done = crosscheck("lesson", "--export", tmp_path / "all", cwd=tmp_path)
+    again = crosscheck("lesson", "--export", tmp_path / "all", cwd=tmp_path)
+    page, heard = opened(browser, (tmp_path / "all" / "index.html").as_uri())
+    text = page.locator("#measured").inner_text()
+    links = page.locator("a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
+    lesson, more = opened(browser, (tmp_path / "all" / "order.html").as_uri())
+    lesson.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    around = lesson.locator(".crumbs a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
+    page.context.close()
+    lesson.context.close()
+
+    assert (done.returncode, again.returncode) == (0, 0)
+    assert sorted(path.name for path in (tmp_path / "all").iterdir()) == [
+        "index.html", "made.json", "mixing.html", "order.html",
+    ]  # fmt: skip
+    assert sorted(links) == ["mixing.html", "order.html"]
+    assert around == ["index.html", "mixing.html"]
+    assert "pymunk 7.3.1" in text
+    assert heard == more == []
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["ordr"], "did you mean order?"),
+        (["xyzzy"], "there are particle, thrust"),
+        (["order", "--export", "folder"], "--export folder: is a folder; name a file"),
+        (["order", "--export", "other.html"], "other.html: is there and no page of a lesson"),
+        (["order", "--export", "nowhere/a.html"], "nowhere/a.html: No such file or directory"),
+        (["order", "--export", "/proc/a.html"], "/proc/a.html: No such file or directory"),
+        (["order", "--export", ""], "name a file"),
+        (["--export", "folder"], "holds other.txt, and no made.json says that crosscheck lesson made it"),
+        (["--export", "other.html"], "other.html: is a file"),
+        (["--export", "/proc/all"], "/proc/all: "),
+    ],
+)
+def test_what_cannot_be_written_is_told_before_any_run(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """One line, exit 2, nothing is there that was not, and no engine was asked."""
+    (tmp_path / "folder").mkdir()
+    for path in (tmp_path / "folder" / "other.txt", tmp_path / "other.html"):
+        path.write_text("somebody's own")
+    before = sorted(tmp_path.rglob("*"))
+    monkeypatch.setattr(command, "write_pages", lambda *_: pytest.fail("a run was made"))
+    done = crosscheck("lesson", *words, cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert sorted(tmp_path.rglob("*")) == before
+    assert (tmp_path / "other.html").read_text() == "somebody's own"
+
+
+def test_a_page_that_cannot_be_made_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The new one takes its place only when it is whole."""
+    path = tmp_path / "order.html"
+    crosscheck("lesson", "order", "--export", path, cwd=tmp_path)
+    whole = path.read_text()
+
+    def interrupted(*_: object) -> str:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "offline", interrupted)
+    done = crosscheck("lesson", "order", "--export", path, cwd=tmp_path)
+
+    assert done.returncode == 130
+    assert path.read_text() == whole
+
+
+def test_a_run_that_fails_ends_the_export_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Exit 1 with the lesson, where its sliders were, and what was raised; nothing is left behind."""
+    monkeypatch.setattr(command, "told", fails)
+    done = crosscheck("lesson", "order", "--export", tmp_path / "order.html", cwd=tmp_path)
+
+    assert done.returncode == 1
+    assert f"{LESSONS['order'].title}, sliders at (0, " in done.stderr
+    assert "): error: ZeroDivisionError: of a lesson\n" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def fails(*_: object) -> None:
+    """What a lesson with a fault does."""
+    raise ZeroDivisionError("of a lesson")

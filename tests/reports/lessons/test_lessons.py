@@ -1,0 +1,227 @@
+"""What the lessons claim: off, the switches give the reference; on, the engine; and every number is of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from urllib.error import HTTPError
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+
+from adapters.engines import ENGINES
+from adapters.mechanisms.switched import Switched
+from adapters.play import play
+from reports.commands.serve import application
+from reports.game.server import Game
+from reports.lessons import pages
+from reports.lessons.catalogue import LESSONS
+from reports.lessons.conventions import table
+from reports.lessons.lesson import Lesson, play_once
+from reports.lessons.mechanisms import SWITCHED
+from reports.lessons.meeting import hit_of_the_reference, two
+from reports.page.style import TRUTH
+from scenarios.catalogue import scenario
+from tests.reports.page.browsing import opened, overhang, served
+
+FLOAT32 = 2.0**-24
+QUICK = ("particle", "meeting", "gravity")
+EVERY = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in LESSONS]
+
+
+@pytest.mark.parametrize("name", ["oblique_e09", "bouncing_ball_e1", "free_fall"])
+def test_with_nothing_switched_on_the_switches_give_the_reference(name: str):
+    """To the bit."""
+    scene = scenario(name)
+    plain = play_once("reference:exercise", scene, 2).trajectory
+    switched = play(Switched(), SWITCHED, scene, scene.dt(2)).trajectory
+
+    assert plain is not None
+    assert switched is not None
+    assert np.array_equal(plain.position, switched.position)
+    assert np.array_equal(plain.velocity, switched.velocity)
+
+
+@pytest.mark.parametrize(
+    ("name", "engine", "on", "off", "bound"),
+    [
+        # Float32 rounds e of a hit a few times; at 1 m/s the threshold of Box2D.
+        ("threshold", "box2d:shipped", (3, 1), (2, 1), 8 * FLOAT32),
+        ("mixing", "pymunk:shipped", (4,), (3,), 8 * 2.0**-53),
+        ("order", "pymunk:matched", (1, 0), (0, 0), 1e-12),
+        # 600 steps that each round a height of up to 2 m, and bounces that hand the error on.
+        ("gravity", "box2d:matched", (2, 1), (0, 1), 2400 * FLOAT32),
+        ("gravity", "pymunk:matched", (1, 1), (2, 1), 1e-12),
+        # mm: 24 steps with three push-outs each, of coordinates up to 1 m.
+        ("push-out", "box2d:matched+no_ccd", (2, 2), (2, 1), 1e3 * 72 * FLOAT32),
+        # mm: 360 substeps, of heights up to 4 m.
+        ("substeps", "box2d_v3:matched", (2, 0), (1, 0), 1e3 * 360 * 4 * FLOAT32),
+        ("digits", "box2d:shipped", (1, 2), (0, 2), 0.0),
+        # A length and a ratio rounded at 120 m/s.
+        ("cap", "box2d:shipped", (2, 0), (1, 0), 120 * 4 * FLOAT32),
+        # 8 iterations over 3 contacts, at 5 m/s.
+        ("row", "box2d:matched", (1, 3, 1), (1, 2, 1), 24 * 5 * FLOAT32),
+        ("row", "pymunk:matched", (0, 3, 1), (1, 3, 1), 1e-12),
+    ],
+)  # fmt: skip
+def test_the_switched_reference_lies_on_the_engine(
+    name: str, engine: str, on: tuple[int, ...], off: tuple[int, ...], bound: float
+):
+    """Within the rounding of the engine where the right mechanism is on; far off with another setting."""
+
+    def apart(places: tuple[int, ...]) -> float:
+        curves = {curve.name: np.asarray(curve.y, float) for curve in LESSONS[name].at(places).charts[0].curves}
+        return float(np.nanmax(np.abs(curves[SWITCHED] - curves[engine])))
+
+    assert apart(on) <= bound
+    assert apart(off) > 300 * bound
+
+
+@pytest.mark.parametrize("name", LESSONS)
+def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name: str):
+    """Drawn in the replay and, where a chart can show it, in a chart; all who are drawn are in the legend."""
+    lesson = LESSONS[name]
+    shown = lesson.at(lesson.start)
+    drawn = {curve.name for chart in shown.charts for curve in chart.curves}
+
+    assert shown.film is not None
+    assert any(run.trajectory is not None for run in shown.film.runs)
+    assert (shown.film.truth is None) == (name == "push-out")  # its disks overlap from the start
+    assert (TRUTH in drawn) == (name not in ("push-out", "crowd"))  # nor has a cost in time
+    assert drawn | {run.name for run in shown.film.runs} <= set(lesson.names)
+
+
+def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
+    """Equal disks, e = 1, hit at one end: all orders of the hits give everything to the last disk."""
+    curves = {curve.name: np.asarray(curve.y) for curve in LESSONS["row"].at((0, 3, 2)).charts[0].curves}
+
+    assert curves[TRUTH].tolist() == [0, 0, 0, 0, 0, 5]
+    assert np.abs(curves["reference:exercise"] - curves[TRUTH]).max() <= 1e-12
+    assert np.abs(curves["box2d:matched"] - curves[TRUTH]).max() > 1.0
+
+
+def test_the_numbers_of_a_hit_are_those_of_the_solver():
+    """The impulse that lesson 4 writes out is the one the solver tells, and momentum is kept."""
+    scene = two(0.9, 10.0, 1.0).scene
+    before, after, told = hit_of_the_reference(scene, 1 / 64)
+    steps = dict(LESSONS["meeting"].at((2, 2, 2, 0)).steps)
+    kick = scene.mass[0] * np.hypot(*(after.velocity[0] - before.velocity[0]))
+
+    assert told == pytest.approx(kick, rel=1e-14)
+    assert f"the solver tells {told:.3g} N s" in steps["Impulse"]
+    assert f"= {told:.3g} N s; the solver" in steps["Impulse"]
+    assert "parting over closing speed: 0.9" in steps["Update"]
+
+
+def test_conventions_are_measured():
+    """An engine that is made otherwise is found otherwise: nothing in the table is typed in."""
+    rows = {row.asked: row.got for row in table({name: ENGINES[name] for name in ("pymunk:shipped", "box2d:shipped")})}
+    slow = rows["What is e of a pair that closes at 0.1 m/s, where 0.5 is stated?"]
+    swapped = {row.asked: row.got for row in table({"pymunk:shipped": ENGINES["pymunk:matched"]})}
+
+    assert slow["pymunk:shipped"] == ("0.25", "departs")
+    assert slow["box2d:shipped"][1] == "departs"
+    assert rows["What coefficient of friction acts between two disks?"]["box2d:shipped"] == ("0.2", "departs")
+    assert swapped["What is e of a pair that closes at 0.1 m/s, where 0.5 is stated?"]["pymunk:shipped"][1] == "keeps"
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    """Where the lessons are served."""
+    with served(application(Game(["reference:exercise"]))) as url:
+        yield f"{url}/lesson"
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
+    """Moved by keyboard; no complaint, nothing wider than the window at 400 and 1280 px, nothing moves by itself."""
+    lesson: Lesson = LESSONS[name]
+    page, heard = opened(browser, f"{url}/{name}", viewport={"width": 400, "height": 800}, reduced_motion="reduce")
+    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    drawn = "[...document.querySelectorAll('.curve, .curves .axis')]"
+    curves = f"{drawn}.map((each) => each.getAttribute('d') ?? each.textContent).join()"
+    for slider in lesson.sliders:
+        before = page.evaluate(curves)
+        page.locator(f".sliders [name={slider.key}]").focus()
+        page.keyboard.press("End" if slider.start < len(slider.values) - 1 else "Home")
+        page.evaluate("lesson.ready")
+        assert page.evaluate(curves) != before, slider.key
+        shown = page.locator(f".sliders label:has([name={slider.key}]) output").inner_text()
+        own = slider.shown[-1 if slider.start < len(slider.values) - 1 else 0]
+        assert shown == page.evaluate("lesson.shown.said").get(slider.key, own)
+    narrow = overhang(page)
+    page.set_viewport_size({"width": 1280, "height": 900})
+    wide = overhang(page)
+    playing = page.evaluate("lesson.player ? lesson.player.playing : false")
+    page.context.close()
+
+    assert (narrow <= 0, wide <= 0, playing, heard) == (True, True, False, [])
+
+
+def test_the_list_of_lessons_fits_and_leads_to_each(browser: Browser, url: str, monkeypatch: pytest.MonkeyPatch):
+    """With the table of conventions below it, which says when and with what it was measured."""
+    monkeypatch.setattr(pages, "ENGINES", {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")})
+    page, heard = opened(browser, url, viewport={"width": 400, "height": 800})
+    links = page.locator(".shelf a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
+    waits = page.locator("#measured").inner_text()
+    page.locator("#measured table").wait_for()
+    text = page.locator("#conventions").inner_text()
+    wide = overhang(page)
+    page.context.close()
+
+    assert links == [f"/lesson/{name}" for name in LESSONS]
+    assert waits.startswith("Measuring") or "pymunk" in waits
+    assert "pymunk 7.3.1" in text
+    assert " UTC" in text
+    assert (wide <= 0, heard) == (True, [])
+
+
+@pytest.mark.parametrize(
+    ("path", "status", "said"),
+    [
+        ("/nothing", 404, "there are particle"),
+        ("/order/shown?at=0", 400, "1 places for 2 sliders"),
+        ("/order/shown?at=0,99", 400, "must be from 0 to 2"),
+        ("/order/shown?at=x,y", 400, "invalid literal"),
+        ("/nothing/shown?at=0", 400, "no such lesson"),
+    ],
+)
+def test_what_cannot_be_shown_is_told(url: str, path: str, status: int, said: str):
+    """A status and a sentence, no traceback."""
+    with pytest.raises(HTTPError) as refusal:
+        urlopen(url + path, timeout=10)
+
+    assert refusal.value.code == status
+    assert said in refusal.value.read().decode()
+
+
+def test_a_slider_that_is_dragged_asks_for_where_it_stops(browser: Browser, url: str):
+    """Not for every place it passes: a lesson that takes a second would answer half a minute later."""
+    page, heard = opened(browser, f"{url}/horizon", viewport={"width": 1280, "height": 900})
+    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.locator(".sliders input").first.focus()
+    page.evaluate(
+        """for (let k = 0; k < 12; k++) {
+          lesson.sliders[0].value = k % 3;
+          lesson.sliders[0].dispatchEvent(new Event("input"));
+        }"""
+    )
+    page.evaluate("lesson.ready")
+    at = page.evaluate("lesson.at")
+    page.context.close()
+
+    assert len(asked) == 2  # the first place, and the last
+    assert asked[-1].endswith(f"?at={at}")
+    assert heard == []
+
+
+def test_what_departs_is_seen_to_depart():
+    """As many digits as it takes: 20 beside a stated 20 would be no departure."""
+    rows = table({"box2d_v3:shipped": ENGINES["box2d_v3:shipped"]})
+
+    departing = [(row.expected, *row.got["box2d_v3:shipped"]) for row in rows]
+    assert [verdict for _, _, verdict in departing].count("departs") > 3
+    assert all(expected != got for expected, got, verdict in departing if verdict == "departs")

@@ -1,0 +1,277 @@
+"""The page is one file that asks nothing of anywhere, draws what was computed, and runs no text it was given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from playwright.sync_api import Browser, Page
+
+from adapters.engines import ENGINES
+from adapters.play import Run, play
+from reports.compare.comparison import Comparison, compare
+from reports.page.charts import CHARTS
+from reports.page.page import write_page
+from scenarios.catalogue import scenario
+from tests.reports.page.browsing import opened, overhang
+
+HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>{{ 7 * 7 }}"
+LONG = "a_name_without_a_place_to_break_it_" * 6
+PLAYERS = ("reference:exercise", "pymunk:matched", "box2d:shipped")
+HEAD_ON, ORBIT, ASTEROIDS = "head_on_equal_e09", "disk_between_static_disks", "asteroids"
+
+
+def played(name: str, **changes: Any) -> Comparison:
+    """A real scenario on three real players, with one that crashed and one that refused, both saying hostile things."""
+    scene = replace(scenario(name), **changes)
+    steps = scene.substeps[1:3]
+    scene = replace(scene, substeps=steps)
+    runs = [play(ENGINES[key].make(), key, scene, scene.dt(k)) for key in PLAYERS for k in steps]
+    failed = [("box2d_v3", "shipped", "crashed", HOSTILE), ("box2d_v3", "matched", "unsupported", f"no {LONG}")]
+    runs += [Run(e, p, name, scene.dt(k), status, why) for e, p, status, why in failed for k in steps]
+    return compare(scene, runs)
+
+
+@pytest.fixture(scope="module")
+def comparisons() -> list[Comparison]:
+    """A scene with a truth, one whose truth ends early, one without a truth that wraps and turns."""
+    return [
+        played(HEAD_ON, asks=f"Is this inert? {HOSTILE} {LONG}", source=HOSTILE),
+        played(ORBIT),
+        played(ASTEROIDS, truth=None, without_truth=HOSTILE),
+    ]
+
+
+@pytest.fixture(scope="module")
+def path(comparisons: list[Comparison], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of these three, with hostile text wherever text can come from."""
+    probe = {"engine": "pymunk", "profile": "matched", "probe": HOSTILE, "asked": HOSTILE, "got": 0.81, "expected": 0.9}
+    conformance = pd.DataFrame([probe | {"bound": 1e-6, "verdict": "departs", "note": HOSTILE}])
+    known = {"column": "ODE", "dt_s": 1e-3, "published_J2": 185.027, "ours_J2": 185.027, "source": HOSTILE}
+    about = {"command": f"crosscheck --out '{HOSTILE}'", "seed": 0, "machine": {"system": HOSTILE}, "seconds": 1.0}
+    about |= {"versions": {"pymunk": "7.3.1"}, "started": "2026-01-01T00:00:00+00:00", "known_answers_text": HOSTILE}
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    write_page(
+        path, comparisons, untrusted=set(),
+        findings=["One.", HOSTILE, "Three."], conformance=conformance,
+        known_answers=pd.DataFrame([known]), about=about,
+    )  # fmt: skip
+    return path
+
+
+@pytest.fixture(scope="module")
+def desktop(browser: Browser, path: Path) -> tuple[Page, list[str]]:
+    """The page at 1280 px, opened once: that takes two seconds."""
+    return opened(browser, path.as_uri(), viewport={"width": 1280, "height": 900})
+
+
+@pytest.fixture
+def page(desktop: tuple[Page, list[str]]) -> Iterator[Page]:
+    """The page at 1280 px, on light, at its top; at the end it has asked for nothing and complained of nothing."""
+    page, heard = desktop
+    page.emulate_media(color_scheme="light")
+    page.evaluate("scrollTo({ top: 0, behavior: 'instant' })")
+    yield page
+
+    assert heard == []
+
+
+def with_player(page: Page, name: str) -> None:
+    """Scroll to a scenario and wait until its player is there."""
+    page.evaluate("name => document.getElementById('s-' + name).scrollIntoView()", name)
+    page.wait_for_function("name => players[name]", arg=name)
+
+
+def test_every_chart_is_drawn_once_it_is_in_view(page: Page) -> None:
+    """Each chart holds a drawing with a line a player; all that have a figure are drawn."""
+    plots = page.locator(".plot")
+
+    assert plots.count() == 3 * len(CHARTS) - 1  # without a truth there is no error against dt
+    for k in range(plots.count()):
+        plots.nth(k).scroll_into_view_if_needed()
+        plots.nth(k).locator(".main-svg .scatterlayer .trace").first.wait_for()
+        names = plots.nth(k).evaluate("plot => plot.data.map(trace => trace.name)")
+        assert set(names) <= {*PLAYERS, "∝ dt"}
+        assert len(names) >= len(PLAYERS) - 1
+
+
+def test_nothing_is_drawn_before_it_is_in_view(browser: Browser, path: Path) -> None:
+    """A page just opened has drawn no chart and unpacked no replay of its last scenario."""
+    page, _ = opened(browser, path.as_uri())
+    drawn = page.locator(f"#s-{ASTEROIDS} .main-svg").count(), page.evaluate("name => name in players", ASTEROIDS)
+    page.context.close()
+
+    assert drawn == (0, False)
+
+
+def test_the_player_moves_disks(page: Page) -> None:
+    """Another time is another picture and other positions."""
+    with_player(page, HEAD_ON)
+    picture = "name => document.querySelector('#s-' + name + ' canvas').toDataURL()"
+    before = page.evaluate(picture, HEAD_ON)
+    seek = "name => [0, 1].map(t => { players[name].seek(t); return players[name].positions('pymunk:matched'); })"
+    start, later = page.evaluate(seek, HEAD_ON)
+
+    assert abs(later[0][0] - start[0][0]) > 0.1
+    assert page.evaluate(picture, HEAD_ON) != before
+
+
+@pytest.mark.parametrize("name", [HEAD_ON, ORBIT, ASTEROIDS])
+def test_the_player_shows_the_trajectory(page: Page, comparisons: list[Comparison], name: str) -> None:
+    """At the packed instants positions are those of the run, to half a step of the position grid."""
+    with_player(page, name)
+    comparison = next(each for each in comparisons if each.scenario.name == name)
+    instants = np.array(page.evaluate("name => players[name].pack.t", name))
+    at_all = "([p, layer]) => players[p].pack.t.map(t => { players[p].seek(t); return players[p].positions(layer); })"
+    shown = [page.evaluate(at_all, [name, player]) for player in PLAYERS]
+    rows = np.rint(instants / comparison.scenario.sample_interval).astype(int)
+    for player, positions in zip(PLAYERS, shown):
+        run = next(r for r in comparison.runs if r.name == player and r.dt == comparison.middle_dt)
+        assert run.trajectory is not None
+        expected = run.trajectory.position[rows]
+        half_step = np.ptp(expected, axis=(0, 1)) / 65535 / 2
+        # A static disk's coordinate may span nothing; the float64 sum of low and step then rounds by itself.
+        assert (np.abs(np.array(positions) - expected) <= half_step * (1 + 1e-6) + 1e-12).all()
+
+
+def test_the_truth_is_not_drawn_beyond_its_horizon(page: Page, comparisons: list[Comparison]) -> None:
+    """After the horizon there are no positions of the truth, and the player says when it ended."""
+    with_player(page, ORBIT)
+    truth = comparisons[1].truth
+    assert truth is not None
+    at = "([name, t]) => { players[name].seek(t); return players[name].positions('truth'); }"
+    before, after = (page.evaluate(at, [ORBIT, float(truth.valid_until) + s]) for s in (-0.1, 0.1))
+
+    assert before is not None
+    assert after is None
+    assert "truth ends at" in page.locator(f"#s-{ORBIT} .ended").inner_text()
+
+
+def test_the_player_is_played_with_the_keyboard(page: Page) -> None:
+    """Arrows step by a frame, space plays and stops; nothing plays by itself."""
+    with_player(page, HEAD_ON)
+    player = page.locator(f"#s-{HEAD_ON} .player")
+    player.focus()
+    page.evaluate("name => players[name].seek(0)", HEAD_ON)
+
+    assert page.evaluate("name => players[name].playing", HEAD_ON) is False
+    player.press("ArrowRight")
+    assert page.evaluate("name => players[name].time === players[name].pack.t[1]", HEAD_ON)
+    player.press("ArrowLeft")
+    assert page.evaluate("name => players[name].time", HEAD_ON) == 0
+    player.press(" ")
+    page.wait_for_function("name => players[name].time > 0.05", arg=HEAD_ON)
+    player.press(" ")
+    assert page.evaluate("name => players[name].playing", HEAD_ON) is False
+
+
+def test_the_legend_hides_a_player_everywhere(page: Page) -> None:
+    """A box that is not ticked hides disks and lines; "all" brings them back."""
+    with_player(page, HEAD_ON)
+    plot = page.locator(f"#s-{HEAD_ON} .plot").first
+    plot.scroll_into_view_if_needed()
+    plot.locator(".main-svg .trace").first.wait_for()
+    visible = "plot => plot.data.find(trace => trace.name === 'pymunk:matched').visible"
+    page.locator(f"#s-{HEAD_ON} .legend input[value='pymunk:matched']").uncheck()
+
+    assert page.evaluate("name => players[name].hidden.has('pymunk:matched')", HEAD_ON)
+    assert plot.evaluate(visible) is False
+    page.locator(f"#s-{HEAD_ON} .picks button").first.click()
+    assert plot.evaluate(visible) is True
+
+
+def test_charts_follow_the_dark(page: Page) -> None:
+    """Where the reader turns to dark, the lines that are drawn take the colours of the dark."""
+    with_player(page, HEAD_ON)
+    plot = page.locator(f"#s-{HEAD_ON} .plot").first
+    plot.scroll_into_view_if_needed()
+    plot.locator(".main-svg .trace").first.wait_for()
+    page.emulate_media(color_scheme="dark")
+
+    page.wait_for_function(
+        "plot => plot.data.every(t => t.line.color === Object.values(looks).find(l => l.dark === t.line.color)?.dark)",
+        arg=plot.element_handle(),
+    )
+
+
+def test_the_index_finds_scenarios(page: Page) -> None:
+    """What is typed leaves the scenarios with these words, by name or by question."""
+    page.locator("#index input").fill("unstable line")
+    found = page.locator("#index li[data-find]:visible a").all_inner_texts()
+    page.locator("#index input").fill("")
+
+    assert found == [ORBIT]
+
+
+def test_text_from_files_is_inert(page: Page) -> None:
+    """Hostile questions, reasons, notes and names are shown as they are and run nothing."""
+    page.locator("footer").scroll_into_view_if_needed()
+
+    assert page.evaluate("window.hacked") is None
+    assert HOSTILE in page.locator(f"#s-{HEAD_ON} .asks").inner_text()
+    assert HOSTILE in page.locator(f"#s-{HEAD_ON} .failures").inner_text()
+    assert page.locator("main img").count() == 0
+
+
+def test_failed_and_refused_runs_are_in_sight(page: Page) -> None:
+    """The map and the scenario's list both name what crashed and what was refused."""
+    cells = page.locator("#map td.failed").all_inner_texts()
+    listed = page.locator(f"#s-{ORBIT} .failures li").all_inner_texts()
+
+    assert cells == ["crashed", "refused"] * 3
+    assert ["crashed" in listed[0], "refused" in listed[1]] == [True, True]
+
+
+@pytest.mark.parametrize("width", [400, 1280])
+def test_the_page_never_scrolls_sideways(browser: Browser, path: Path, width: int) -> None:
+    """All fits the width, however long a word is; wide tables scroll by themselves."""
+    page, heard = opened(browser, path.as_uri(), viewport={"width": width, "height": 800}, reduced_motion="reduce")
+    for name in (HEAD_ON, ORBIT, ASTEROIDS):
+        with_player(page, name)
+    page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
+    wide = overhang(page)
+    page.context.close()
+
+    assert wide <= 0
+    assert heard == []
+
+
+def test_the_page_fits_in_eight_megabytes(path: Path) -> None:
+    """Plotly is there once, deflated; what a scenario adds leaves room for forty in 8 MB."""
+    html = path.read_text()
+    library = html.split('id="library">')[1].split("</script>")[0]
+
+    assert html.count(library[:1000]) == 1
+    assert len(library) < 2.5e6
+    assert (len(html) - len(library)) / 3 < (8e6 - 2.5e6) / 40
+    assert "http://" not in html.split("<script>")[0]
+
+
+def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:
+    """Without scenarios, probes and known answers there is still a page, with the command that makes it."""
+    about = {"command": "crosscheck run nothing", "seed": 1, "machine": {}, "versions": {}, "started": "", "seconds": 0}
+    nothing = pd.DataFrame()
+    write_page(
+        tmp_path / "r.html", [], findings=[], untrusted=set(), conformance=nothing, known_answers=nothing, about=about
+    )
+
+    assert "crosscheck run nothing" in (tmp_path / "r.html").read_text()
+
+
+def test_the_browser_of_these_tests_hears_what_a_page_asks_for(browser: Browser, tmp_path: Path) -> None:
+    """A page that asks for another file, for another machine, and complains: all three are heard, data is not."""
+    path = tmp_path / "asks.html"
+    own = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAAC"
+    images = f"<img src=other.png><img src=http://elsewhere.invalid/a.png><img src={own}>"
+    path.write_text(f"<!doctype html>{images}<script>console.error('ouch')</script>")
+    page, heard = opened(browser, path.as_uri())
+    page.wait_for_load_state("networkidle")
+    page.context.close()
+
+    assert {"ouch", (tmp_path / "other.png").as_uri(), "http://elsewhere.invalid/a.png"} <= set(heard)
+    assert not any(each.startswith("data:") for each in heard)

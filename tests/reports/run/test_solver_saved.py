@@ -1,0 +1,218 @@
+"""A solver's file that is saved, or gone, while it is played: what was read is played, and kept as what it was."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters.own_solver import process as solver_process
+from adapters.own_solver.engine import engine_file
+from adapters.own_solver.file import LARGEST, NotASolver, read_solver
+from adapters.play import Run, play
+from reports.check.command import make_page
+from reports.check.verdict import check_file
+from reports.run import suite
+from reports.run.archive import Archive, load_trajectory, trajectory_file
+from scenarios.catalogue import scenario
+from tests.reports.terminal.command_line import crosscheck
+from tests.solvers.mutants import CORRECT
+
+TEXTS = {path.name: path.read_text() for path in CORRECT if path.name in ("plain.js", "plain.py", "arrays.py")}
+# A flight twice as fast: of a number that is in the file, in a module beside it, or compiled by numba.
+FASTER = {
+    "plain.js": ("sphere.position.x += ", "sphere.position.x += 2 * "),
+    "plain.py": ("sphere.position.x += ", "sphere.position.x += 2 * "),
+    "arrays.py": ("disks.position[moves] += ", "disks.position[moves] += 2 * "),
+}
+BESIDE = TEXTS["plain.py"].replace("sphere.position.x += ", "sphere.position.x += helper.factor() * ")
+COMPILED = "\nimport helper\nfrom numba import njit\n\n@njit(cache=True)\ndef factor():\n    return {}\n"
+WORDS = ["run", "head_on_equal_e09", "--dt", str(1 / 60)]
+
+
+def place(folder: Path, file: str, factor: int) -> Path:
+    """Write a solver whose flight is `factor` times as fast, by what stands in `file`, and return where it is."""
+    if file in TEXTS:
+        old, new = FASTER[file]
+        assert old in TEXTS[file]
+        (folder / file).write_text(TEXTS[file].replace(old, new) if factor == 2 else TEXTS[file])
+        return folder / file
+    (folder / "helper.py").write_text(f"def factor():\n    return {factor}\n")
+    if file == "compiled":
+        (folder / "solver.py").write_text(BESIDE.replace("helper.", "") + COMPILED.format(factor))
+    elif file == "compiled beside":
+        compiled = COMPILED.format("helper.factor()")
+        (folder / "solver.py").write_text(BESIDE.replace("helper.", "") + compiled)
+        (folder / "helper.py").write_text(f"from numba import njit\n\n@njit\ndef factor():\n    return {factor}\n")
+    else:
+        (folder / "solver.py").write_text("import helper\n" + BESIDE)
+    return folder / "solver.py"
+
+
+SAVED = [*TEXTS, "beside", "compiled", "compiled beside"]
+
+
+def played(row) -> Run:
+    """A scene of two disks by it."""
+    engine, question = row.make(), scenario("head_on_equal_e09")
+    run = play(engine, "x:own", question, question.dt(1))
+    engine.close()
+    assert run.status == "ok", run.reason
+    return run
+
+
+@pytest.mark.parametrize("file", SAVED)
+def test_the_text_that_was_read_is_played_whatever_is_saved_since(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
+):
+    """A row made before plays the old text, one made after the new one, and neither what numba kept of the other."""
+    monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
+    before = engine_file(place(tmp_path, file, 1))
+    after = engine_file(place(tmp_path, file, 2))
+    first, second, again = played(before), played(after), played(before)
+
+    at_start = [run.trajectory.position[1] - run.trajectory.position[0] for run in (first, second, again)]
+    assert np.allclose(at_start[1], 2 * at_start[0], rtol=1e-9)  # by the rounding of a difference of positions
+    assert np.array_equal(at_start[0], at_start[2])
+    assert before.source != after.source
+
+
+@pytest.mark.parametrize("file", ["compiled", "compiled beside"])
+def test_what_numba_keeps_would_be_taken_for_another_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str):
+    """The negative control: compiled from where the file is, the old text's code is played for the new one."""
+    monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(solver_process, "kept_copies", lambda solver, _: solver.path.parent)
+    before = engine_file(place(tmp_path, file, 1))
+    after = engine_file(place(tmp_path, file, 2))
+    first, second = played(before), played(after)
+
+    assert np.array_equal(first.trajectory.position, second.trajectory.position)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", ["plain.js", "plain.py", "beside"])
+def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
+):
+    """`run --resume` then plays the new text, to the same bits as a run of it alone."""
+    path = place(tmp_path, file, 1)
+    meanwhile(monkeypatch, lambda: place(tmp_path, file, 2))
+    assert crosscheck(*WORDS, "--engine", path.name, "--out", "out", cwd=tmp_path).returncode == 0
+    old = flight(tmp_path / "out")
+    monkeypatch.undo()
+    assert crosscheck("run", "--resume", "out", cwd=tmp_path).returncode == 0
+    assert crosscheck(*WORDS, "--engine", path.name, "--out", "fresh", cwd=tmp_path).returncode == 0
+
+    assert len(old[0]) == 1
+    assert flight(tmp_path / "out") == flight(tmp_path / "fresh")
+    assert flight(tmp_path / "out") != old
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", ["plain.js", "beside"])
+def test_a_file_that_vanishes_during_a_run_is_played_to_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
+):
+    """All of it was read; to go on with such a run is refused in a sentence, for nobody knows what would be played."""
+    path = place(tmp_path, file, 1)
+    meanwhile(monkeypatch, path.unlink)
+    done = crosscheck(*WORDS, "--engine", path.name, "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path)
+    monkeypatch.undo()
+    statuses = {record["status"] for record in Archive.read(tmp_path / "out").records}
+    again = crosscheck("run", "--resume", "out", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert statuses == {"ok"}
+    assert again.returncode == 2
+    assert f"{path.name}: No such file or directory; name a file that can be read" in again.stderr
+
+
+def meanwhile(monkeypatch: pytest.MonkeyPatch, act: Callable[[], object]) -> None:
+    """When a run has begun, before any cell is played, `act`."""
+    begin = suite.begin
+
+    def begin_and_act(*given) -> None:
+        begin(*given)
+        act()
+
+    monkeypatch.setattr(suite, "begin", begin_and_act)
+
+
+def flight(out: Path) -> tuple[list[str], list[bytes]]:
+    """The keys of the cells in a run's journal, and the positions that it has of each."""
+    keys = [record["cell"] for record in Archive.read(out).records]
+    return keys, [load_trajectory(trajectory_file(out, key)).position.tobytes() for key in keys]
+
+
+def test_the_page_of_a_check_shows_the_text_that_was_checked(tmp_path: Path):
+    """Its digest and its smallest scene, though the file is gone since."""
+    path = place(tmp_path, "plain.js", 2)
+    digest = read_solver(path).digest
+    check = check_file(path)
+    path.unlink()
+    make_page(tmp_path / "check.html", check)
+    page = (tmp_path / "check.html").read_text()
+
+    assert check.faults
+    assert digest in page
+    assert "The smallest scene" in page
+
+
+@pytest.mark.slow
+def test_a_replay_says_that_the_file_is_another(tmp_path: Path):
+    """What is played is what is there now."""
+    path = place(tmp_path, "plain.py", 1)
+    assert crosscheck(*WORDS, "--engine", path.name, "--out", "out", cwd=tmp_path).returncode == 0
+    (record,) = Archive.read(tmp_path / "out").records
+    same = crosscheck("replay", record["cell"], "--out", "out", cwd=tmp_path)
+    place(tmp_path, "plain.py", 2)
+    other = crosscheck("replay", record["cell"], "--out", "out", cwd=tmp_path)
+
+    assert "has changed since" not in same.stderr
+    assert "plain.py or a version has changed since: what is played is what is there now" in other.stderr
+    assert "bits:   other than recorded" in other.stdout
+
+
+def test_a_run_says_which_modules_beside_the_file_were_played(tmp_path: Path):
+    """In its settings, with a hash over all, so that two runs can be told apart."""
+    run = played(engine_file(place(tmp_path, "beside", 1)))
+
+    assert run.settings["from beside it"][1].startswith("helper.py; sha256 of all ")
+    assert json.dumps(run.settings)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda path: os.mkfifo(path), "helper.py: is no file"),
+        (lambda path: path.write_bytes(b"\0"), "helper.py: is not text"),
+        (lambda path: path.write_bytes(b"#" * (LARGEST + 1)), "helper.py: has 1.0 MB"),
+        (lambda path: path.symlink_to("nothing"), ""),
+    ],
+)
+def test_a_module_beside_the_file_that_cannot_be_read_is_named(
+    tmp_path: Path, make: Callable[[Path], object], said: str
+):
+    """Nothing is waited for; a link to nothing is no module, as for Python."""
+    make(tmp_path / "helper.py")
+    (tmp_path / "solver.py").write_text("import helper\n" + TEXTS["plain.py"])
+    if not said:
+        assert read_solver(tmp_path / "solver.py").beside == ()
+        return
+    with pytest.raises(NotASolver, match=said):
+        read_solver(tmp_path / "solver.py")
+
+
+def test_modules_beside_the_file_are_read_up_to_a_limit(tmp_path: Path):
+    """A package of 2 MB is no solver."""
+    (tmp_path / "package").mkdir()
+    for k in range(4):
+        (tmp_path / "package" / f"part{k}.py").write_text("#" * (LARGEST // 2))
+    (tmp_path / "solver.py").write_text("def f():\n    import package.part0\n")
+
+    with pytest.raises(NotASolver, match=r"solver\.py: imports more than 1 MB from beside it"):
+        read_solver(tmp_path / "solver.py")

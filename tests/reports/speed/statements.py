@@ -1,0 +1,131 @@
+"""What README.md and reports/speed/README.md say in numbers, from the kept tables.
+
+`python -m tests.reports.speed.statements` prints it. Every engine is named of which a statement does not hold, so that
+none can be spoken for by the others.
+"""
+
+from __future__ import annotations
+
+import re
+
+import pandas as pd
+
+from adapters.engines import ENGINES
+from reports.speed import explained, figures
+from reports.speed.figures import AGAINST, AGAINST_BARE
+from reports.speed.tables import no_nearer
+from reports.speed.versus import LATE, OWN
+
+SHIPPED = tuple(name for name in ENGINES if name.endswith(":shipped"))
+MATCHED = tuple(name for name in ENGINES if name.endswith(":matched"))
+MILLIONTH = "1e-6"
+
+
+def named(table: pd.DataFrame) -> pd.DataFrame:
+    """With a column name, `engine:profile`."""
+    return table.assign(name=table.engine + ":" + table.profile)
+
+
+def caption(kept: pd.DataFrame) -> str:
+    """Of the picture: what half a step buys with end-of-step detection, and who reaches a millionth of a radius."""
+    late = [OWN, *MATCHED]
+    falls, grows = (table.loc[late].to_numpy() for table in pooled(kept))
+    falls, grows = falls[:, :-1] / falls[:, 1:], grows[:, 1:] / grows[:, :-1]
+    rows = named(kept[(kept.figure == "cost at accuracy") & (kept["at"] == MILLIONTH)]).set_index("name")
+    got = {name: of(rows.note[name])[0] for name in rows.index}
+    failed = named(kept[kept.figure == "pooled error"])
+    lost = max(int(of(note)[0]) for note in failed[failed.name == "event_driven:float64"].note)
+    reached = [got[name] for name in (OWN, *LATE)]
+    return (
+        f"half the step divides the error by {falls.min():.1f} to {falls.max():.1f} and multiplies the cost by "
+        f"{grows.min():.1f} to {grows.max():.1f}. They reach a millionth of a radius in {min(reached)} to "
+        f"{max(reached)} of {of(rows.note.iloc[0])[1]} scenes, `reference:ordered` in {got['reference:ordered']}, the "
+        f"event-driven engine in {got['event_driven:float64']} (it fails in {lost})."
+    )
+
+
+def costs(kept: pd.DataFrame) -> str:
+    """In how many scenes our own solver costs least at the same steps; who costs less elsewhere, and where."""
+    rows, bare = (named(kept[(kept.figure == figure) & (kept["at"] == "")]) for figure in (AGAINST, AGAINST_BARE))
+    total = max(int(of(note)[1]) for note in rows.note)
+    less = scenes_of(rows)
+    said = f"Of the engines with end-of-step detection, `{OWN}` costs least in {total - len(less)} of {total} scenes"
+    said += ". In the others these cost less:\n\n| scene | engines |\n|---|---|\n" if less else ".\n"
+    said += "".join(f"| {scene} | {', '.join(names)} |\n" for scene, names in less.items())
+    without = scenes_of(bare)
+    if set(without) != set(less):
+        said += f"\nWithout what an idle step costs, some engine costs less in {len(without)} scenes: "
+        said += f"{', '.join(without) if without else 'none'}.\n"
+    changed = named(kept[(kept.figure == AGAINST) & (kept["at"] != "")])
+    cheaper = scenes_of(changed.assign(name=changed.name + " with " + changed["at"]))
+    if cheaper:
+        names = dict.fromkeys(name for names in cheaper.values() for name in names)
+        return f"{said}\nWith one setting changed: {', '.join(names)} cost less in {', '.join(cheaper)}.\n"
+    return f"{said}\nNone of {len(changed)} changed settings of the matched engines costs less in any scene tried.\n"
+
+
+def scenes_of(rows: pd.DataFrame) -> dict[str, list[str]]:
+    """Scene -> the engines that cost less there."""
+    found: dict[str, list[str]] = {}
+    for row in rows.itertuples(index=False):
+        for scene in where(row.note):
+            found.setdefault(scene, []).append(row.name)
+    return dict(sorted(found.items()))
+
+
+def where(note: str) -> list[str]:
+    """The scenes of a note like "2 of 38: one another"."""
+    return note.split(":")[1].split()
+
+
+def of(note: str) -> tuple[int, int]:
+    """k and n of a note that begins with, or holds, "k of n"."""
+    found = re.search(r"(\d+) of (\d+)", note)
+    assert found is not None, note
+    return int(found[1]), int(found[2])
+
+
+def pooled(kept: pd.DataFrame) -> list[pd.DataFrame]:
+    """Error in radii and cost, pooled over the scenes: a row an engine, a column a step, coarse to fine."""
+    table = named(kept)
+    return [table[table.figure == f"pooled {what}"].pivot(index="name", columns="at", values="value")
+            for what in ("error", "cost")]  # fmt: skip
+
+
+def as_far(kept: pd.DataFrame) -> str:
+    """How far off the matched engines are at the same step, over our own solver."""
+    error, _ = pooled(kept)
+    over = error.loc[list(MATCHED)] / error.loc[OWN]
+    return (
+        f"At the same step the matched engines are {over.min(axis=None):.1f} to {over.max(axis=None):.1f} times as far "
+        f"off as `{OWN}`.\n"
+    )
+
+
+def nearer(orders: pd.DataFrame) -> str:
+    """In how many scenes finer steps bring an engine no nearer, engine by engine."""
+    rows = named(orders)
+    none = rows[no_nearer(rows)].groupby("name").size()
+    said = (
+        f"From the coarsest to the finest step the error falls by less than a tenth in so many of "
+        f"{rows.scenario.nunique()} scenes:\n\n| engine | shipped | matched |\n|---|---|---|\n"
+    )
+    for pair in zip(SHIPPED, MATCHED, strict=True):
+        said += f"| {pair[0].split(':')[0]} | {' | '.join(str(none.get(name, 0)) for name in pair)} |\n"
+    return said
+
+
+def budget(table: pd.DataFrame) -> str:
+    """How much of the errors is explained, and over how much of the scenes."""
+    said = explained.sentence(table)
+    return f"{said[0].upper()}{said[1:]}.\n"
+
+
+def measured() -> str:
+    """All that reports/speed/README.md says in numbers, as it stands there."""
+    kept, orders, table = (figures.read(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED))
+    return "\n".join([costs(kept), as_far(kept), nearer(orders), budget(table)])
+
+
+if __name__ == "__main__":
+    print(caption(figures.read(figures.KEPT)), measured(), sep="\n\n")

@@ -1,0 +1,169 @@
+"""The kept tables are those of this code, and the documents' statements on speed follow from them, engine by engine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from adapters.engines import ENGINES
+from adapters.mechanisms.habits import HABITS
+from reports.speed import budget, explained, figures, ladder, tables
+from reports.speed.budget import budget_of
+from reports.speed.effort import FULL, QUICK
+from reports.speed.measure import Measured
+from reports.speed.plan import SCENE, middle
+from reports.speed.versus import LATE, OWN
+from scenarios.catalogue import SCENARIOS, scenario
+from tests.reports.speed import statements as speed_figures
+from tests.reports.speed.statements import MATCHED, SHIPPED
+
+DIGITS = 2e-3  # four digits are kept
+
+
+def kept_row(path: object, scene: str, name: str) -> pd.Series:
+    """One row of `ORDERS` or `EXPLAINED`."""
+    table = speed_figures.named(figures.read(path))  # type: ignore[arg-type]
+    return table[(table.scenario == scene) & (table.name == name)].iloc[0]
+
+
+@pytest.mark.parametrize("name", list(ENGINES))
+def test_the_kept_orders_are_those_of_the_code(name: str):
+    """One scene on the ladder of the full form: verdict, slope and the error at the finest step, of every engine."""
+    scene = "head_on_unequal_e09"
+    rungs = FULL.ladder(ladder.open_scene(scene, 0))
+    rows = ladder.errors_of(scene, 0, name, ENGINES[name].make, rungs)
+    now = tables.orders(Measured(errors=pd.DataFrame(rows).assign(kind=SCENE)), 0).iloc[0]
+    kept = kept_row(figures.ORDERS, scene, name)
+
+    assert kept.verdict == now.verdict
+    for end in ("coarsest_error", "finest_error"):
+        assert kept[end] == pytest.approx(now[end], rel=DIGITS, abs=1e-9)  # below: rounding of another machine
+    if now.finest_error > 1e-9:
+        assert kept.slope == pytest.approx(now.slope, rel=DIGITS, nan_ok=True)
+
+
+@pytest.mark.parametrize("name", list(HABITS))
+def test_the_kept_budget_is_that_of_the_code(name: str):
+    """One scene: the error and how far it was followed; what is left unexplained may be rounding."""
+    scene = "slow_hit"
+    rows = pd.DataFrame(budget_of(scene, 0, name, middle(scene)), columns=budget.COLUMNS)
+    now, kept = explained.explained(rows).iloc[0], kept_row(figures.EXPLAINED, scene, name)
+
+    assert kept.error_radii == pytest.approx(now.error_radii, rel=DIGITS)
+    assert kept.unexplained_radii == pytest.approx(now.unexplained_radii, rel=0.1, abs=1e-5 * now.error_radii)
+    assert (kept.until_s, kept.horizon_s, kept.duration_s) == pytest.approx(
+        (now.until_s, now.horizon_s, now.duration_s), rel=DIGITS
+    )
+
+
+def test_the_kept_tables_have_every_scene_and_engine():
+    """Nobody is left out of a count by not being in the table."""
+    orders, budgets = (speed_figures.named(figures.read(path)) for path in (figures.ORDERS, figures.EXPLAINED))
+
+    assert set(zip(orders.scenario, orders.name)) == {(scene, name) for scene in SCENARIOS for name in ENGINES}
+    assert set(zip(budgets.scenario, budgets.name)) == {(scene, name) for scene in SCENARIOS for name in HABITS}
+
+
+def orders(**stays: int) -> pd.DataFrame:
+    """Two scenes; an engine's shipped profile comes no nearer in so many."""
+    return pd.DataFrame([
+        {"scenario": f"scene {k}", "engine": name.split(":")[0], "profile": name.split(":")[1],
+         "coarsest_error": 1.0, "failed": 0, "steps": 4,
+         "finest_error": 0.95 if name in SHIPPED and k < stays.get(name.split(":")[0], 0) else 0.8}
+        for name in ENGINES for k in range(2)
+    ])  # fmt: skip
+
+
+def test_the_sentence_on_finer_steps_counts_each_engine():
+    """What is true of both Box2Ds is not said of pymunk."""
+    said = speed_figures.nearer(orders(box2d=1, box2d_v3=2)).splitlines()
+
+    assert said[0].endswith("falls by less than a tenth in so many of 2 scenes:")
+    assert said[-3:] == ["| pymunk | 0 | 0 |", "| box2d | 1 | 0 |", "| box2d_v3 | 2 | 0 |"]
+    assert speed_figures.nearer(orders(pymunk=1)) != speed_figures.nearer(orders(box2d=1))
+
+
+def test_no_nearer_is_read_from_the_ends_of_the_ladder():
+    """A tenth less is nearer; a finest step that fails or is no better is not; nor count rounding and all failed."""
+    table = pd.DataFrame(
+        [(1.0, 0.89, 0), (1.0, 0.91, 0), (1.0, np.inf, 1), (np.inf, np.inf, 4), (1e-14, 2e-14, 0), (np.inf, 1.0, 1)],
+        columns=["coarsest_error", "finest_error", "failed"],
+    ).assign(steps=4)
+
+    assert tables.no_nearer(table).tolist() == [False, True, True, False, False, False]
+
+
+def row(figure: str, name: str, at: str, value: float, note: str = "") -> dict:
+    """A row of the figures."""
+    return dict(zip(("engine", "profile"), name.split(":"))) | {
+        "figure": figure, "at": at, "value": value, "note": note,
+    }  # fmt: skip
+
+
+def against(cheaper: dict[str, str], bare: dict[str, str], changed: str = "") -> pd.DataFrame:
+    """Figures of two scenes in which these engines cost less than our own solver, in "k of 2: scenes"."""
+    rows = [row(figures.AGAINST, name, "", 2.0, cheaper.get(name, "0 of 2: ")) for name in LATE]
+    rows += [row(figures.AGAINST_BARE, name, "", np.nan, bare.get(name, "0 of 2: ")) for name in LATE]
+    return pd.DataFrame([*rows, row(figures.AGAINST, "pymunk:matched", "sleeping", 2.0, changed or "0 of 1: ")])
+
+
+def test_who_costs_less_than_our_own_solver_is_named():
+    """With the scene, and why where it is known; without idle steps; and with a changed setting."""
+    alone = speed_figures.costs(against({}, {}))
+    thrust = {"pymunk:matched": "1 of 2: ship_thrust"}
+
+    assert alone == (
+        f"Of the engines with end-of-step detection, `{OWN}` costs least in 2 of 2 scenes.\n\n"
+        "None of 1 changed settings of the matched engines costs less in any scene tried.\n"
+    )
+    said = speed_figures.costs(against(thrust, thrust))
+    assert "costs least in 1 of 2 scenes. In the others these cost less:" in said
+    assert "| ship_thrust | pymunk:matched |" in said
+    assert "idle step" not in said
+    other = speed_figures.costs(against({"box2d:matched": "1 of 2: free_fall"}, thrust))
+    assert "| free_fall | box2d:matched |" in other
+    assert "Without what an idle step costs, some engine costs less in 1 scenes: ship_thrust." in other
+    changed = speed_figures.costs(against({}, {}, "1 of 1: free_fall"))
+    assert changed.endswith("With one setting changed: pymunk:matched with sleeping cost less in free_fall.\n")
+
+
+def pooled(worse: str = "") -> pd.DataFrame:
+    """Figures of three steps: every error is halved, every cost doubled; one engine is three times as far off."""
+    rows = []
+    for name in ENGINES:
+        for rung in range(3):
+            error = 0.1 * (3.0 if name == worse else 1.0) / 2**rung
+            lost = "failed in 1 of 2" if name == "event_driven:float64" else "failed in 0 of 2"
+            rows += [row("pooled error", name, str(rung), error, lost), row("pooled cost", name, str(rung), 2.0**rung)]
+        rows.append(row("cost at accuracy", name, "1e-6", 1.0, "0 of 2, never in 2" if name in LATE else "1 of 2"))
+    return pd.DataFrame(rows)
+
+
+def test_the_sentence_on_errors_at_the_same_step_holds_for_the_worst_and_the_best():
+    """The range is that of all matched engines."""
+    assert speed_figures.as_far(pooled()).startswith("At the same step the matched engines are 1.0 to 1.0 times as far")
+    for name in MATCHED:
+        assert "are 1.0 to 3.0 times as far" in speed_figures.as_far(pooled(name))
+
+
+def test_the_caption_counts_scenes_and_failures():
+    """Of the event-driven engine, too."""
+    assert speed_figures.caption(pooled()) == (
+        "half the step divides the error by 2.0 to 2.0 and multiplies the cost by 2.0 to 2.0. They reach a millionth "
+        "of a radius in 0 to 1 of 2 scenes, `reference:ordered` in 1, the event-driven engine in 1 (it fails in 1)."
+    )
+
+
+def test_the_readme_says_how_much_each_form_measures():
+    """Disks of the quick and of the full form; steps of a scene in the default run."""
+    root = Path(__file__).parents[3]
+    text = " ".join((root / "reports" / "speed" / "README.md").read_text("utf-8").split())
+
+    assert f"the cost of up to {QUICK.sizes[-1]} disks" in text
+    assert f"`--full` takes all scenes and {FULL.sizes[-1]:,} disks".replace(",", " ") in text
+    assert set(FULL.scenes) == set(SCENARIOS)
+    assert {len(scenario(name).substeps) for name in SCENARIOS} == {4}
+    assert "at 4 step sizes" in (root / "README.md").read_text("utf-8")

@@ -1,0 +1,107 @@
+"""What a measurement has got is kept as it ends, and a log is told now and then how far it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from adapters.engines import read_row
+from reports.run.journal import Journal
+from reports.speed import ladder, measure
+from reports.speed.command import kept_of
+from reports.speed.effort import QUICK
+from reports.speed.kept import Kept
+from reports.speed.measure import done
+from reports.speed.plan import Plan
+from reports.terminal import progress as terminal
+from reports.terminal.exits import FolderTaken
+from reports.terminal.progress import Progress
+from scenarios.catalogue import scenario
+from tests.reports.terminal.command_line import crosscheck
+
+
+def test_what_has_ended_is_not_measured_again(tmp_path: Path):
+    """A journal of the same plan gives back every number, infinities too; one of another plan is not lost to it."""
+    rows = [{"error_radii": np.inf, "change_radii": np.nan, "reason": "no"}]
+    with Journal(tmp_path) as journal:
+        Kept(journal, {"seed": 0}, resume=False).add(("error", "scene", 1), rows)
+    with Journal(tmp_path) as journal:
+        again = Kept(journal, {"seed": 0}, resume=True)
+        with Progress() as progress:
+            found = dict(done({("error", "scene", 1): fails}, 1, progress, "error", kept=again))
+
+        assert len(again) == 1
+        assert found["error", "scene", 1][0]["error_radii"] == np.inf
+        assert np.isnan(found["error", "scene", 1][0]["change_radii"])
+    with Journal(tmp_path) as journal:
+        with pytest.raises(FolderTaken, match="holds 1 results of an interrupted run of something else"):
+            Kept(journal, {"seed": 1}, resume=True)
+        with pytest.raises(FolderTaken, match="ask again with --resume"):
+            Kept(journal, {"seed": 0}, resume=False)
+    with Journal(tmp_path) as journal:  # nothing was lost by asking
+        assert len(Kept(journal, {"seed": 0}, resume=True)) == 1
+
+
+def test_what_was_measured_of_a_solver_that_was_saved_since_is_of_something_else(tmp_path: Path):
+    """Its rows would stand beside those of another text under one name."""
+    solver = tmp_path / "solver.js"
+    solver.write_text("function integrate(sphere, dt) {}")
+    plan = Plan(("slow_hit",), [f"{solver}:own"], QUICK, 0, 1, whole=False)
+    header: dict[str, Any] = {"seed": 0, "versions": {}, "machine": ""}
+    read_row(f"{solver}:own")
+    with Journal(tmp_path) as journal:
+        kept_of(plan, header, journal, resume=False).add(("error", "scene", 1), [{"reason": "no"}])
+    with Journal(tmp_path) as journal:
+        assert len(kept_of(plan, header, journal, resume=True)) == 1
+        solver.write_text("function integrate(sphere, dt) { }")
+        read_row(f"{solver}:own")
+        with pytest.raises(FolderTaken, match="of something else"):
+            kept_of(plan, header, journal, resume=True)
+
+
+def fails() -> None:
+    """Must not be called."""
+    raise AssertionError("done again")
+
+
+@pytest.mark.parametrize(("quiet", "lines"), [(0.0, 2), (1e9, 0)])
+def test_a_log_gets_a_line_now_and_then(
+    quiet: float, lines: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """A bar is not drawn into a file, and a line a task would be too many: so much time lies between two."""
+    monkeypatch.setattr(terminal, "QUIET", quiet)
+    with Progress() as progress:
+        progress.start(2, 2, "error")
+        progress.done("error: free_fall")
+        progress.done("error: slow_hit")
+
+    assert capsys.readouterr().err.count(" of 2, ") == lines
+
+
+def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Ctrl-C where the times begin: exit 130. With --resume no error is looked for a second time; else none is lost."""
+    words = ("speed", "free_fall", "--engine", "reference:exercise", "--out", "out")
+    with monkeypatch.context() as patch:
+        patch.setattr(measure, "measure_times", interrupted)
+        first = crosscheck(*words, cwd=tmp_path)
+    unasked = crosscheck(*words, cwd=tmp_path)
+    monkeypatch.setattr(ladder, "errors_of", fails)
+    second = crosscheck(*words, "--resume", cwd=tmp_path)
+
+    assert first.returncode == 130
+    assert "ask again with --resume" in first.stderr
+    assert unasked.returncode == 2
+    assert "holds 2 results of an interrupted run" in unasked.stderr
+    assert second.returncode == 0, second.stderr
+    assert "that had ended: 2" in second.stderr  # a ladder, and what its error is made of
+    assert len(pd.read_csv(tmp_path / "out" / "speed_errors.csv")) == len(QUICK.ladder(scenario("free_fall")))
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def interrupted(*_: object) -> None:
+    """As Ctrl-C does."""
+    raise KeyboardInterrupt

@@ -1,0 +1,154 @@
+"""Orders, flags, fronts and costs at an accuracy come out as known beforehand."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from reports.speed import ladder
+from reports.speed.order import (
+    ELSEWHERE,
+    EXACT,
+    ORDER,
+    UNCLEAR,
+    UNKNOWN,
+    UNSTEADY,
+    bootstrap,
+    median_interval,
+    order_of,
+    verdict_of,
+)  # fmt: skip
+from reports.speed.pareto import FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach, front
+from tests.reports.speed.clockwork import Late
+
+RUNGS = [1, 2, 4, 8, 16]
+DT = 0.01 / np.array(RUNGS)
+
+
+def measured(order: int, **how: float):
+    """dt, errors and changes of a method of known error, played through a scene without hits in between."""
+    rows = ladder.errors_of("near_miss", 0, "late:own", partial(Late, order, **how), RUNGS)
+    columns = (np.array([row[name] for row in rows]) for name in ("dt_s", "error_radii", "change_radii"))
+    dt, errors, changes = columns
+    return dt, errors[None], changes[None]
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_method_of_known_order_gives_its_order(order: int):
+    """Error dt^p: the slope is p, with an interval as narrow as rounding."""
+    found = order_of(*measured(order, size=100.0))
+
+    assert found.slope == pytest.approx(order, abs=1e-6)
+    assert found.high - found.low < 1e-6
+    assert found.verdict == ORDER
+
+
+def test_a_method_that_closes_in_on_something_else_is_flagged():
+    """Half a radius aside whatever dt is, and first order on top of it."""
+    assert order_of(*measured(1, size=1.0, aside=0.1)).verdict == ELSEWHERE
+
+
+def test_a_method_on_its_way_is_not_flagged():
+    """The same first order without the part aside: negative control of the flag."""
+    assert order_of(*measured(1, size=1.0)).verdict == ORDER
+
+
+def test_an_exact_method_has_no_order():
+    """Below the finest accuracy asked for there is only rounding."""
+    found = order_of(*measured(1, size=1e-12))
+
+    assert found.verdict == EXACT
+    assert np.isnan(found.slope)
+
+
+def test_an_error_that_rises_with_a_finer_step_is_not_monotone():
+    """By more than a tenth; a rise below the finest accuracy asked for is rounding, and no matter."""
+    changes = np.full(4, 1.0)
+
+    assert verdict_of(np.array([1e-1, 1e-2, 3e-2, 1e-3]), changes) == UNSTEADY
+    assert verdict_of(np.array([1e-1, 1e-2, 1.05e-2, 1e-3]), changes) == ORDER
+    assert verdict_of(np.array([1e-1, 1e-7, 5e-7, 1e-8]), changes) == ORDER
+
+
+def test_a_scatter_as_wide_as_its_fall_is_no_order():
+    """The error falls from step to step, but once by 0.1 % and once by a thousandfold: the slope may be anything."""
+    errors = np.array([[1.0, 0.999, 0.998, 0.001]])
+
+    assert order_of(DT[:4], errors, np.ones((1, 4))).verdict == UNCLEAR
+
+
+def test_too_few_points_are_no_order():
+    """A straight line through two points has no scatter."""
+    assert order_of(DT[:2], np.array([[1.0, 0.5]]), np.array([[np.nan, 0.5]])).verdict == UNKNOWN
+
+
+def test_the_slope_of_many_draws_has_an_interval_that_holds_the_order():
+    """Errors c dt with c drawn anew for every seed and dt, as the phase of a hit in its step is."""
+    rng = np.random.default_rng(0)
+    errors = rng.uniform(0.2, 1.8, (64, len(DT))) * DT
+    found = order_of(DT, errors, np.full(errors.shape, 1.0))
+
+    assert found.low < 1.0 < found.high
+    assert found.high - found.low < 0.5
+
+
+def test_the_bootstrap_interval_covers_the_median_as_often_as_it_says():
+    """Medians of 16 normal numbers: 95 % intervals hold 0 in 90 % to 99 % of 400 trials (binomial: +- 3 %)."""
+    rng = np.random.default_rng(1)
+    held = 0
+    for trial in range(400):
+        low, high = median_interval(rng.normal(size=16), trial)
+        held += low <= 0.0 <= high
+
+    assert 0.90 <= held / 400 <= 0.99
+
+
+def test_the_bootstrap_of_a_mean_is_as_wide_as_theory_says():
+    """The mean of m numbers of unit spread: 2 x 1.96 / sqrt(m), to 15 % (1000 resamples)."""
+    values = np.random.default_rng(2).normal(size=400)
+    low, high = bootstrap(values, lambda drawn: float(drawn.mean()))
+
+    assert high - low == pytest.approx(2 * 1.96 * values.std() / 20, rel=0.15)
+
+
+def test_a_failed_draw_widens_the_interval_up_to_infinity():
+    """Half of the draws failed: the median may be anything above."""
+    low, high = median_interval(np.array([1.0, 2.0, np.inf, np.inf]))
+
+    assert low == 1.0
+    assert high == np.inf
+
+
+def test_the_front_is_who_nobody_beats():
+    """Cheapest first; of equal cost the more accurate, of equal error the cheaper; without a cost: left out."""
+    cost = np.array([1.0, 2.0, 2.0, 4.0, 8.0, np.nan, 16.0])
+    error = np.array([9.0, 5.0, 4.0, 6.0, 4.0, 0.0, 1.0])
+
+    assert front(cost, error) == [0, 2, 6]
+
+
+def test_the_cost_of_an_accuracy_is_that_of_the_cheapest_dt_that_keeps_it():
+    """Errors 0.5, 0.02, 0.2, 0.05, 0.01: a lucky second rung does not count, as a finer one is worse again."""
+    cost, error = 1.0 / DT, np.array([0.5, 0.02, 0.2, 0.05, 0.01])
+
+    assert cost_to_reach(0.1, DT, cost, error, ORDER)[:2] == (cost[3], DT[3])
+    assert cost_to_reach(0.3, DT, cost, error, ORDER)[:2] == (cost[1], DT[1])
+
+
+def test_what_is_not_reached_says_why():
+    """Not down to the finest dt, at no dt at all, or nothing was played."""
+    cost, error = 1.0 / DT, np.array([0.5, 0.4, 0.3, 0.25, 0.21])
+
+    assert cost_to_reach(0.1, DT, cost, error, ORDER).why == NOT_REACHED
+    assert cost_to_reach(0.1, DT, cost, error, ELSEWHERE).why == UNREACHABLE
+    assert cost_to_reach(0.1, DT, cost, np.full(5, np.inf), UNKNOWN).why == FAILED
+    assert cost_to_reach(0.3, DT, cost, error, ELSEWHERE).why == ""
+
+
+def test_a_failed_finest_step_does_not_pass_for_an_accuracy():
+    """The rung below the failed one was accurate, but it is not known whether it stays so."""
+    error = np.array([0.5, 0.05, 0.05, 0.05, np.inf])
+
+    assert cost_to_reach(0.1, DT, 1.0 / DT, error, ORDER).why == NOT_REACHED

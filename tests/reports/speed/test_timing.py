@@ -1,0 +1,156 @@
+"""Times are of `step` alone, in interleaved rounds, and every sample is kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from reports.speed import ladder, sizes
+from reports.speed.effort import QUICK
+from reports.speed.estimate import READY, all_rounds
+from reports.speed.timing import FEWEST_ROUNDS, WARM_UP, Sample, Spent, Timed, interleaved, summed_up
+from scenarios.catalogue import scenario
+from scenarios.model import Scene
+from tests.reports.speed.clockwork import Sleeper
+
+EACH = 1e-3
+SLACK = 0.5  # of a fixed time: a busy machine wakes a sleeper late, never early
+
+
+def fixed(seconds: float, wrapping: float = 0.0) -> Timed:
+    """Something that says it took so long; one run is two of its units."""
+    return Timed(f"{seconds}", lambda: Spent(seconds, wrapping), 2.0)
+
+
+def table(samples: list[Sample]) -> pd.DataFrame:
+    """As a table."""
+    return pd.DataFrame([sample._asdict() for sample in samples])
+
+
+def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
+    """Loading takes five times as long as a step, and hearing of hits fifty times: neither is in it."""
+    held = ladder.held("near_miss", 0).scenario
+    steps = held.samples
+    samples = ladder.times_of("near_miss", 0, {("sleeper:own", 1, 0): partial(Sleeper, EACH)}, 3, 1.0)
+    best = summed_up(table(samples), ["key"]).best.iloc[0]
+
+    assert steps * EACH / held.duration <= best <= (1 + SLACK) * steps * EACH / held.duration
+
+
+def test_what_wrapping_in_python_took_is_told_apart():
+    """A quarter of each step goes into wrapping: it is left out of the cost, and told beside it."""
+    players = {("sleeper:own", 1, 0): partial(Sleeper, EACH, EACH / 4)}
+    row = summed_up(table(ladder.times_of("near_miss", 0, players, 3, 1.0)), ["key"]).iloc[0]
+
+    rate = scenario("near_miss").samples / scenario("near_miss").duration
+    assert row.wrapping == pytest.approx(rate * EACH / 4)
+    assert rate * EACH * 3 / 4 <= row.best <= rate * EACH * (3 / 4 + SLACK)
+
+
+def test_an_engine_against_itself_reads_one():
+    """The noise floor of two sleepers is the clock's own: sleeping is never early, and the fastest is on time."""
+    players = {("sleeper:own", 1, copy): partial(Sleeper, EACH) for copy in (0, 1)}
+    best = summed_up(table(ladder.times_of("near_miss", 0, players, 5, 1.0)), ["key"]).best
+
+    assert best[1] / best[0] == pytest.approx(1.0, abs=0.05)
+
+
+def test_every_round_visits_all_in_an_order_of_its_own_and_keeps_every_sample():
+    """Places are a permutation in each round, the rounds differ, and the same seed gives the same orders."""
+    what = [fixed(0.1 * k) for k in range(1, 8)]
+    samples, again = interleaved(what, 6, 100.0, seed=3), interleaved(what, 6, 100.0, seed=3)
+    rounds = table(samples).groupby("round").key.agg(list)
+
+    assert sorted(rounds.index) == list(range(WARM_UP, 6))
+    assert all(sorted(keys) == sorted(one.key for one in what) for keys in rounds)
+    assert len({tuple(keys) for keys in rounds}) > 1
+    assert [sample.key for sample in samples] == [sample.key for sample in again]
+
+
+def test_what_is_slow_sits_out_the_rounds_left_but_not_the_first():
+    """Its time is used up after one sample; the other goes on."""
+    rounds = table(interleaved([fixed(0.1), fixed(9.0)], 8, 1.0, seed=0)).groupby("key")["round"].agg(list)
+
+    assert rounds["9.0"] == list(range(WARM_UP, FEWEST_ROUNDS))
+    assert rounds["0.1"] == list(range(WARM_UP, 8))
+
+
+@pytest.mark.parametrize("run", [0.0019, 0.0099, 0.03, 9.0])
+def test_the_estimate_counts_the_rounds_that_are_taken(run: float):
+    """All of them, those that the budget is enough for, and those that are always taken."""
+    effort = replace(QUICK, rounds=8, budget=0.05)
+    samples = interleaved([fixed(run)], effort.rounds, effort.budget, seed=0)
+
+    assert all_rounds(run, effort) == pytest.approx(len(samples) * (run + READY))
+
+
+def test_a_sample_is_filled_with_runs_and_told_per_unit():
+    """Runs of 0.1 ms fill 1 ms with ten; the cost is per unit of amount, of which a run has two."""
+    sample = interleaved([fixed(1.01e-4)], 1, 1.0, seed=0)[0]
+
+    assert sample.runs == 10
+    assert sample.cost == pytest.approx(1.01e-4 / 2)
+
+
+def test_the_summary_leaves_the_warm_up_out_and_has_quartiles_and_the_fastest():
+    """Of 1, 2, 3, 4, 9 and a warm-up of 100."""
+    costs = [100.0, 1.0, 2.0, 3.0, 4.0, 9.0]
+    samples = [Sample("a", k, 0, cost, 0.0, 1) for k, cost in enumerate(costs, start=WARM_UP)]
+    row = summed_up(table(samples), ["key"]).iloc[0]
+
+    assert (row.cost, row.low, row.high, row.best, row.rounds) == (3.0, 2.0, 4.0, 1.0, 5)
+
+
+def test_what_grows_as_a_power_of_n_gives_the_power_and_stops_where_it_would_take_too_long():
+    """Cost n^1.5: the exponent is 1.5 with an interval of no width; foreseen costs follow the same law."""
+    n = np.array([10.0, 100.0, 1000.0, 10_000.0])
+    course = [(int(k), float(k**1.5)) for k in n]
+
+    assert sizes.exponent(n, n**1.5) == pytest.approx((1.5, 1.5, 1.5))
+    assert sizes.foreseen(course, 100_000) == pytest.approx(1e5**1.5)
+    assert np.isnan(sizes.exponent(n[:3], n[:3])).all()
+
+
+def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
+    """A gas that loses energy falls asleep, so whoever took more steps of it would look cheaper."""
+    ages: list[int] = []
+
+    class Ageing(Sleeper):
+        def load(self, scene: Scene, dt: float) -> None:
+            super().load(scene, dt)
+            ages.append(0)
+
+        def step(self, count: int = 1) -> None:
+            ages[-1] += count
+
+    sizes.costs({"quick:own": partial(Ageing, 0.0)}, (10,), 12, 1.0, patience=1.0, seed=0)
+
+    assert len(ages) > 12
+    assert max(ages) <= sizes.FRESH + sizes.WARM_STEPS
+
+
+def test_an_engine_that_would_take_too_long_a_step_stops_and_is_told_of():
+    """A sleeper of 2 ms a step, the same for every size, is stopped only by a patience below that."""
+    players = {"sleeper:own": partial(Sleeper, 2e-3)}
+    samples, stopped = sizes.costs(players, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)
+
+    assert {sample.key[1] for sample in samples} == {3, 4}
+    assert list(stopped) == [("sleeper:own", 5)]
+    assert "longer than 0.001 s" in stopped["sleeper:own", 5]
+
+
+def test_the_gas_of_any_size_covers_the_same_share_and_overlaps_nowhere():
+    """Area of the disks over that of the box; nearest neighbours and walls are farther than they reach."""
+    for n in (3, 10, 100, 137):
+        scene = sizes.gas(n, 0)
+        side = scene.walls.max()
+        apart = np.linalg.norm(scene.position[:, None] - scene.position, axis=2) + 9 * np.eye(n)
+
+        assert n * np.pi * sizes.RADIUS**2 / side**2 == pytest.approx(sizes.COVERED)
+        assert apart.min() > 2 * sizes.RADIUS
+        assert scene.position.min() > sizes.RADIUS
+        assert scene.position.max() < side - sizes.RADIUS

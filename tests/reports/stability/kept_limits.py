@@ -1,0 +1,134 @@
+"""The limits of the pinned versions in the full form, which the quick one must find again.
+
+`crosscheck stability --full --out OUT && python -m tests.reports.stability.kept_limits OUT` makes the table anew. An
+atlas of some cases, or engines, replaces their rows and keeps the others.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+from math import inf, nan
+from pathlib import Path
+from typing import NamedTuple
+
+from reports.page import style
+from reports.stability.cases import CASES
+from reports.stability.limits import ONLY_BEYOND, Limit, players_of
+
+FILE = Path(__file__).parents[3] / "tests" / "data" / "stability_limits.csv"
+COLUMNS = ("engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "verdict", "monotone",
+           "spacing", "seeds", "form", "reason", "tested")  # fmt: skip
+
+
+class Kept(NamedTuple):
+    """A row of the file: case, player, form, verdict, where it works and fails, its reason and how that was tested."""
+
+    case: str
+    player: str
+    form: str
+    verdict: str
+    works_at: float
+    fails_at: float
+    monotone: bool
+    reason: str
+    tested: str
+
+
+def kept() -> list[Kept]:
+    """The file's rows."""
+    return [
+        Kept(
+            row["case"], player_of(row), row["form"], row["verdict"], number(row["works_at"]),
+            number(row["fails_at"]), row["monotone"] == "True", row["reason"], row["tested"],
+        )
+        for row in rows_of(FILE)
+    ]  # fmt: skip
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """The rows of a limits.csv."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def player_of(row: dict[str, str]) -> str:
+    """engine:profile."""
+    return f"{row['engine']}:{row['profile']}"
+
+
+def number(text: str) -> float:
+    """A number, or nan for nothing."""
+    return float(text) if text else nan
+
+
+def reaches(limit: Kept | Limit) -> tuple[float, float]:
+    """The bracket on a line on which harsher is larger: from what works to what fails; open where nothing does.
+
+    What works only beyond a limit fails on the mild side of it: its line runs the other way.
+    """
+    harsher = CASES[limit.case].harsher * (-1 if limit.verdict == ONLY_BEYOND else 1)
+    works = -inf if limit.works_at != limit.works_at else harsher * limit.works_at
+    fails = inf if limit.fails_at != limit.fails_at else harsher * limit.fails_at
+    return works, fails
+
+
+def agrees(one: Kept | Limit, other: Kept | Limit) -> bool:
+    """Whether two searches found the same: the same verdict, and brackets that meet.
+
+    What did not fail as far as one went may fail beyond in the other.
+    """
+    (works, fails), (works_too, fails_too) = reaches(one), reaches(other)
+    backwards = [limit.verdict == ONLY_BEYOND for limit in (one, other)]
+    return backwards[0] == backwards[1] and max(works, works_too) <= min(fails, fails_too)
+
+
+IN_README = {
+    "tunnelling_head_on": "step displacement / radius, head-on collision",
+    "tunnelling_thin_wall": "the same, thin wall",
+    "slow_hit": "closing speed at e = 1, m/s",
+    "scale_down": "a scene made smaller",
+    "far_from_origin": "distance from the origin, m",
+    "spin": "rotation in a step, rad",
+    "bounce_drift": "dt over fall time, ball at e = 1",
+    "column": "disks on each other",
+    "fast_gas": "step displacement / radius, gas at e = 1",
+}
+PLAYERS = ("reference:exercise", "pymunk:matched", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
+           "box2d_v3:matched", "event_driven:float64")  # fmt: skip
+
+
+def readme_table() -> str:
+    """The table of reports/stability/README.md: where players fail; a dash: not as far as was tried."""
+    found = {(row.case, row.player): row for row in kept()}
+    heads = [player.replace(":", "<br>") for player in PLAYERS]
+    lines = [f"| fails at | {' | '.join(heads)} |", "|---|" + "---|" * len(PLAYERS)]
+    for case, what in IN_README.items():
+        cells = [in_words(found[case, player]) for player in PLAYERS]
+        lines.append(f"| {what} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def in_words(row: Kept) -> str:
+    """Where it fails first, to two digits; * where it works again beyond."""
+    words = {"does not fail": "–", "never works": "everywhere"}
+    return words.get(row.verdict, style.number(row.fails_at, 2) + ("" if row.monotone else "*"))
+
+
+def keep(folder: Path) -> None:
+    """Put the limits of a folder's atlas in its full form into the file, in the order of cases and players."""
+    found = rows_of(folder / "limits.csv")
+    if not found or {row["form"] for row in found} != {"full"}:
+        raise SystemExit(f"{folder}: holds no full atlas; make one: crosscheck stability --full --out {folder}")
+    rows = {(row["case"], player_of(row)): row for row in [*rows_of(FILE), *found]}
+    with FILE.open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows[key] for name, case in CASES.items() for player in players_of(case)
+                         if (key := (name, player)) in rows)  # fmt: skip
+
+
+if __name__ == "__main__":
+    for folder in sys.argv[1:]:
+        keep(Path(folder))
+    print(readme_table())

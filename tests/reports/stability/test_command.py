@@ -1,0 +1,191 @@
+"""`crosscheck stability`: its files, its page, what it says of bad input, and what a second run keeps."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from playwright.sync_api import Browser, Page
+
+from reports import cli
+from reports.run.journal import JOURNAL
+from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
+from reports.stability.cases import CASES
+from reports.stability.command import write_files
+from reports.stability.maps import MAPS
+from tests.reports.page.browsing import opened
+from tests.reports.terminal.command_line import crosscheck
+
+pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
+
+ROOT = Path(__file__).parents[3]
+ASKED = ("slow_hit", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_break")
+
+
+@pytest.fixture(scope="module")
+def atlas(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An atlas of two cases, a scene file and a map, on two players."""
+    out = tmp_path_factory.mktemp("atlas") / "out"
+    players = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
+    done = crosscheck("stability", *ASKED, "--vary", "speed", *players, "--out", out, cwd=ROOT / "tests" / "data")
+    assert done.returncode == 0, done.stderr
+    assert "stability.html" in done.stdout
+    return out
+
+
+def test_the_table_of_limits_is_a_file(atlas: Path):
+    """A row a case and player, columns as documented, and the threshold of Box2D in it."""
+    table = pd.read_csv(atlas / "limits.csv")
+
+    assert list(table.columns) == list(COLUMNS)
+    assert set(table.case) == {"slow_hit", "tunnelling_thin_wall", "scenes/two.toml:speed"}
+    row = table[(table.case == "slow_hit") & (table.engine == "box2d")].iloc[0]
+    assert row.fails_at < 1.0 < row.works_at
+    assert (row.unit, row.predicate, row.seeds) == ("m/s", "restitution off", CASES["slow_hit"].runs)
+    assert set(pd.read_csv(atlas / "maps.csv")["map"]) == {"dt_and_speed"}
+
+
+def test_the_first_failing_run_is_kept(atlas: Path):
+    """A file for each limit, none where nothing failed."""
+    found = {path.name for path in (atlas / "trajectories").iterdir()}
+
+    assert "slow_hit.box2d-shipped.npz" in found
+    assert "slow_hit.pymunk-matched.npz" not in found
+
+
+def test_the_same_journal_gives_the_same_table(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Table and page are made from what the journal holds, and from the scene file that it names."""
+    monkeypatch.chdir(ROOT / "tests" / "data")
+    again = tmp_path / "again"
+    shutil.copytree(atlas, again)
+    write_files(again)
+
+    assert (again / "limits.csv").read_bytes() == (atlas / "limits.csv").read_bytes()
+
+
+def test_what_has_ended_is_not_played_again(atlas: Path, monkeypatch: pytest.MonkeyPatch):
+    """Of an interrupted run of the same versions all is kept; of another version nothing."""
+    monkeypatch.chdir(ROOT / "tests" / "data")  # where its scene file is
+    plan = Plan(["slow_hit", "grazing"], ["dt_and_speed"], [], ["box2d:shipped", "pymunk:matched"], "quick", 1, "")
+    had, done = done_before(atlas, plan)
+
+    kept = {(task.name, task.player) for task in done}
+    assert ("slow_hit", "box2d:shipped") in kept
+    assert ("dt_and_speed", "pymunk:matched") in kept
+    assert all(task.name != "grazing" for task in done)
+    assert set(done) < set(tasks_of(plan))
+    assert Task("limit", "slow_hit", "box2d:shipped", "full") not in done
+    journal = (atlas / "journal.jsonl").read_text().splitlines()
+    header = json.loads(journal[0])
+    header["header"]["versions"]["pymunk"] = "6"
+    other = atlas.parent / "other"
+    other.mkdir()
+    (other / "journal.jsonl").write_text("\n".join([json.dumps(header), *journal[1:]]) + "\n")
+    assert done_before(other, plan) == (had, set())
+
+
+def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_else(atlas: Path, tmp_path: Path):
+    """Without --resume, or with it for other cases, it is refused, and the journal stays as it was."""
+    part = tmp_path / "out.part"
+    shutil.copytree(atlas, part)
+    before = (part / JOURNAL).read_bytes()
+    players = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
+    again = crosscheck("stability", "slow_hit", *players, "--out", "out", cwd=tmp_path)
+    other = crosscheck("stability", "spin", *players, "--out", "out", "--resume", cwd=tmp_path)
+
+    assert (again.returncode, other.returncode) == (2, 2)
+    assert "out.part holds 10 results of an interrupted run: to go on with it, ask again with --resume" in again.stderr
+    assert "interrupted run of something else" in other.stderr
+    assert (part / JOURNAL).read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["slow_hits"], "case 'slow_hits' is not known; did you mean slow_hit"),
+        (["scenes/two.toml", "--vary", "mass"], "--vary 'mass' is not known; did you mean mass_ratio?"),
+        (["--vary", "dt"], "--vary dt: varies a scene file, and none is named; name FILE.toml"),
+        (["nowhere.toml"], "nowhere.toml: no such file or directory"),
+        (["--engine", "bullet"], "engine 'bullet' is not known"),
+        (["slow_hit", "--engine", "solvers/correct/plain.py"], "a file is not driven to its limits: crosscheck check"),
+        (["scenes/still.toml", "--vary", "mass_ratio"], "still.toml: --vary mass_ratio: no disk moves"),
+        (["scenes/still.toml", "--vary", "dt"], "still.toml: --vary dt: it lasts less than ten steps of an eighth"),
+    ],
+)
+def test_bad_input_is_one_clear_sentence(words: list[str], says: str):
+    """Exit 2, no traceback, nothing played."""
+    done = crosscheck("stability", *words, cwd=ROOT / "tests" / "data")
+
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.fixture(params=[1280, 400])
+def page(request: pytest.FixtureRequest, browser: Browser, atlas: Path):
+    """The page in a browser without a network, and what its console said."""
+    uri, size = (atlas / "stability.html").as_uri(), {"width": request.param, "height": 900}
+    page, faults = opened(browser, uri, viewport=size, offline=True)
+    yield page
+    page.context.close()
+    assert faults == []
+
+
+def test_a_failure_is_one_click_away_and_opens_just_before_it(page: Page):
+    """The button shows the player's run; time stands before the event, and the event is in sight."""
+    section = page.locator("#c-tunnelling_thin_wall")
+    section.scroll_into_view_if_needed()
+    page.wait_for_function("() => window.players && window.players['tunnelling_thin_wall']")
+    section.locator("button.watch").first.click()
+    page.wait_for_function("() => players['tunnelling_thin_wall'].pack.layers[0].name === 'pymunk:matched'")
+    opens, event, end = page.evaluate(
+        "() => { const p = players['tunnelling_thin_wall']; return [p.time, p.pack.event.t, p.until]; }"
+    )
+
+    assert opens < event <= end
+    assert "the hit is missed" in section.locator(".says").inner_text()
+    page.evaluate("() => players['tunnelling_thin_wall'].seek(players['tunnelling_thin_wall'].until)")
+    truth, played = page.evaluate(
+        "() => ['truth', 'pymunk:matched'].map((name) => players['tunnelling_thin_wall'].positions(name)[0][0])"
+    )
+    assert truth < 0 < played  # it is on the wrong side of the wall
+
+
+def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, atlas: Path):
+    """No sideways scrolling, at most 8 MB, a cell for every value of a map."""
+    width, inner = page.evaluate("() => [document.documentElement.scrollWidth, innerWidth]")
+    html = (atlas / "stability.html").read_text()
+
+    assert width <= inner
+    assert len(html) < 8e6
+    assert not re.search(r"(?:src|href)=\"https?:", html)
+    one = MAPS["dt_and_speed"]
+    assert page.locator(".grid tbody td").count() == 2 * len(one.x) * len(one.y)
+
+
+def test_the_atlas_and_the_report_point_at_each_other_where_they_are_made(atlas: Path):
+    """From folder to folder of the defaults; both ways."""
+    report, limits = Path("reports/out/latest/report.html"), Path("reports/out/stability/stability.html")
+    parameter = inspect.signature(cli.stability).parameters["out"].default
+    assert (cli.DEFAULT_OUT, parameter) == (report.parent, limits.parent)
+    assert 'href="../latest/report.html"' in (atlas / "stability.html").read_text()
+    assert 'href="../stability/stability.html"' in (ROOT / "reports" / "page.html.j2").read_text()
+
+
+def test_every_case_of_the_issue_is_there():
+    """The names under which the eighteen cases stand."""
+    wanted = {
+        "tunnelling_head_on", "tunnelling_offset", "tunnelling_thin_wall", "tunnelling_thick_wall", "near_miss",
+        "dt_gas_of_100", "bounce_drift", "slow_hit", "scale_up", "scale_down", "far_from_origin", "dense_gas",
+        "long_gas", "long_wrapped_gas",
+        "mass_ratio", "heavy_on_light", "heavy_in_gas", "column", "overlap_energy", "overlap_recovery", "overfull_box",
+        "pile_comes_to_rest", "ball_comes_to_rest", "grazing", "spin", "stiff_push", "insertion_order", "restart",
+        "thermometer", "equipartition",
+    }  # fmt: skip
+
+    assert wanted <= set(CASES)

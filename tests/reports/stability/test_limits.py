@@ -1,0 +1,115 @@
+"""The quick form finds every limit of the full form again: a hidden failure, or another engine, shows up here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from reports.stability.cases import CASES
+from reports.stability.limits import NEVER_FAILS, QUICK, Limit, players_of
+from reports.stability.players import PLAYERS
+from reports.stability.search import Search
+from tests.reports.stability.kept_limits import Kept, agrees, in_words, kept
+
+KEPT = kept()
+FAST = ("slow_hit", "scale_up", "scale_down", "far_from_origin", "spin", "near_miss", "restitution",
+        "tunnelling_head_on", "tunnelling_thin_wall")  # fmt: skip
+CHANGED = (
+    "the quick form is wrong, or an engine or a case has changed: look at it, then keep the new limits: "
+    "crosscheck stability CASE --full --out OUT && python -m tests.reports.stability.kept_limits OUT"
+)
+
+
+@cache
+def quick(case: str, player: str) -> Limit:
+    """Found here and now in the quick form."""
+    return Search(CASES[case], player, QUICK).limit()
+
+
+def assert_agrees(row: Kept) -> None:
+    """The quick form's bracket holds the full form's limit: strict both ways."""
+    found = quick(row.case, row.player)
+    assert agrees(found, row), f"{found.verdict}, {found.works_at} to {found.fails_at}, for {row}: {CHANGED}"
+
+
+def name_of(row: Kept) -> str:
+    """As a test is called."""
+    return f"{row.case}-{row.player}"
+
+
+@pytest.mark.parametrize("row", [row for row in KEPT if row.case in FAST], ids=name_of)
+def test_the_quick_form_finds_the_limit_of_the_full_one(row: Kept):
+    """Of the cases that take a tenth of a second."""
+    assert_agrees(row)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", [row for row in KEPT if row.case not in FAST], ids=name_of)
+def test_the_quick_form_finds_every_other_limit_of_the_full_one(row: Kept):
+    """Of all the others, the suite's own scenes among them."""
+    assert_agrees(row)
+
+
+def test_every_case_and_player_is_kept():
+    """None is left out."""
+    asked = {(name, player) for name, case in CASES.items() for player in players_of(case)}
+
+    assert {(row.case, row.player) for row in KEPT} == asked
+    assert {row.player for row in KEPT} == set(PLAYERS)
+
+
+def test_every_limit_has_a_reason_and_an_untested_one_is_called_likely():
+    """A limit without a sentence on why would be a number to wonder at."""
+    for row in KEPT:
+        if row.verdict == NEVER_FAILS:
+            assert row.reason == ""
+        else:
+            assert row.reason
+            unknown = row.reason.startswith("not known")
+            assert unknown or row.reason.startswith("likely: ") == (row.tested == ""), row
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.25])
+def test_an_engine_that_fails_earlier_or_later_is_noticed(factor: float):
+    """The negative control: a limit moved by a quarter either way, and one that is gone."""
+    row = next(row for row in KEPT if (row.case, row.player) == ("slow_hit", "box2d:shipped"))
+    now = quick(row.case, row.player)
+
+    assert agrees(now, row)
+    assert not agrees(replace(now, works_at=now.works_at * factor, fails_at=now.fails_at * factor), row)
+    assert not agrees(quick(row.case, "reference:exercise"), row)
+
+
+def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
+    """The negative control: the scan as it was once, few heights of the ball and few values, called 0.057 a limit."""
+    row = next(row for row in KEPT if (row.case, row.player) == ("bounce_drift", "reference:exercise"))
+    flattering = Limit(row.case, row.player, "quick", "limit", 0.0545, 0.0572, ())
+
+    assert not agrees(flattering, row)
+    assert row.fails_at < 0.006
+
+
+@pytest.mark.parametrize("player", ["reference:exercise", "reference:lesson", "box2d:shipped"])
+def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(player: str):
+    """At values, heights and phases that no form has played, the ball comes back wherever it is said to.
+
+    Each of these loses or gains up to |v| dt of height a bounce, 2 dt over the fall time: 1 % from 0.005 on.
+    """
+    found = quick("bounce_drift", player)
+    case = CASES["bounce_drift"]
+    others = [0.0021, 0.0026, 0.0034, 0.0039, 0.0043, 0.0046]
+    search = Search(replace(case, scene=lambda x, run: case.scene(x, run + 100), runs=8), player, QUICK)
+
+    assert found.works_at <= 0.0053
+    assert all(search.trial(x, 8).works for x in others if x < found.works_at)
+    assert not search.trial(1.1 * found.fails_at, 8).works
+
+
+def test_a_limit_that_is_not_the_only_edge_is_marked():
+    """In a table the first failure, and a star."""
+    row = next(row for row in KEPT if row.case == "slow_hit" and row.player == "box2d:shipped")
+
+    assert row.monotone
+    assert in_words(row._replace(monotone=False)) == in_words(row) + "*"

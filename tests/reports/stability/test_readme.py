@@ -1,0 +1,66 @@
+"""What reports/stability/README.md says of limits is what the full form found, for every engine it names."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from reports.stability.cases import CASES
+from reports.stability.limits import FULL, QUICK
+from tests.reports.stability.kept_limits import IN_README, PLAYERS, in_words, kept
+
+TEXT = (Path(__file__).parents[3] / "reports/stability/README.md").read_text("utf-8")
+FOUND = {(row.case, row.player): row for row in kept()}
+
+
+def cells_of(text: str) -> dict[tuple[str, str], str]:
+    """(row, engine:profile) -> what stands there, of the table whose first heading is "fails at"."""
+    lines = text[text.index("| fails at |") :].split("\n\n")[0].splitlines()
+    head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    players = [name.replace("<br>", ":") for name in head[1:]]
+    return {(row[0], player): cell for row in rows for player, cell in zip(players, row[1:], strict=True)}
+
+
+CELLS = cells_of(TEXT)
+
+
+@pytest.mark.parametrize("player", PLAYERS)
+@pytest.mark.parametrize("case", IN_README)
+def test_a_number_of_the_table_is_the_first_failure_of_the_full_form(case: str, player: str):
+    """Row and column by their headings, to the digits that are shown."""
+    assert CELLS[IN_README[case], player] == in_words(FOUND[case, player])
+
+
+def test_the_table_has_no_other_rows_and_no_other_columns():
+    """Nothing in it that no limit holds."""
+    assert {row for row, _ in CELLS} == set(IN_README.values())
+    assert {player for _, player in CELLS} == set(PLAYERS)
+
+
+def test_a_number_that_is_no_longer_true_is_noticed():
+    """The negative control: one digit of one engine."""
+    line = f"| {IN_README['bounce_drift']} |"
+    old = CELLS[IN_README["bounce_drift"], PLAYERS[0]]
+    wrong = cells_of(TEXT.replace(f"{line} {old} |", f"{line} 0.057 |"))
+
+    differ = [key for key, cell in wrong.items() if cell != CELLS[key]]
+    assert differ == [(IN_README["bounce_drift"], PLAYERS[0])]
+    assert wrong[differ[0]] != in_words(FOUND["bounce_drift", PLAYERS[0]])
+
+
+def test_what_is_said_of_the_two_forms_is_what_they_do():
+    """How many runs, and how close the brackets are."""
+    pattern = r"up to (\d+) runs.{0,200}?to\s+(\d+) %.{0,400}?`--full`.{0,200}?to\s+(\d+) %"
+    said = re.search(pattern, " ".join(TEXT.split()))
+
+    assert said is not None
+    assert [int(number) for number in said.groups()] == [
+        max(case.runs for case in CASES.values()), round(100 * (QUICK.ratio - 1)), round(100 * (FULL.ratio - 1)),
+    ]  # fmt: skip
+
+
+def test_what_the_readme_says_is_of_the_full_form():
+    """Its numbers are read off nothing coarser."""
+    assert {FOUND[case, player].form for case in IN_README for player in PLAYERS} == {"full"}

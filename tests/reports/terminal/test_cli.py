@@ -1,0 +1,285 @@
+"""The command line as people and scripts use it: files, words, exit status."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from adapters.engines import ENGINES
+from reports.commands.truth import waiting
+from reports.compare.comparison import COLUMNS
+from reports.compare.metrics import METRICS
+from scenarios.catalogue import SCENARIOS
+from tests.reports.terminal.command_line import crosscheck, process
+
+SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
+SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference", "--engine", "pymunk:matched", "--dt", str(1 / 60)]
+
+
+@pytest.fixture(scope="module")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a finished run of two scenarios and three players."""
+    cwd = tmp_path_factory.mktemp("small")
+    done = process(*SMALL, "--out", "here", cwd=cwd)
+
+    assert done.returncode == 0, done.stderr
+    assert str(cwd / "here" / "report.html") in done.stdout
+    return cwd / "here"
+
+
+def test_help_loads_no_number_library():
+    """`--help` answers at once because nothing heavy is imported for it."""
+    code = (
+        "import sys, reports.cli\n"
+        "from typer.testing import CliRunner\n"
+        "assert CliRunner().invoke(reports.cli.app, ['run', '--help']).exit_code == 0\n"
+        "print([name for name in ('numpy', 'pandas', 'numba', 'plotly', 'pymunk') if name in sys.modules])"
+    )
+
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_list_explains_every_engine_scenario_and_metric(tmp_path: Path):
+    """Every name of the three tables is in the list, with a line."""
+    listed = crosscheck("list", cwd=tmp_path).stdout
+
+    for name in (*ENGINES, *SCENARIOS, *METRICS):
+        assert name in listed
+
+
+def test_a_run_writes_its_files(small_run: Path):
+    """Tables, journal, machine, page, and a trajectory a cell."""
+    runs = pd.read_csv(small_run / "runs.csv", keep_default_na=False)
+    deviations = pd.read_csv(small_run / "deviations.csv")
+    lines = [json.loads(line) for line in (small_run / "journal.jsonl").read_text().splitlines()]
+
+    assert list(deviations.columns) == list(COLUMNS)
+    assert len(runs) == 2 * 4
+    assert set(runs.status) == {"ok"}
+    assert {path.stem for path in (small_run / "trajectories").iterdir()} == set(runs.cell)
+    assert "header" in lines[0]
+    assert lines[-1]["footer"]["tasks"] == 8 + 4  # and the conformance of four players
+    assert json.loads((small_run / "machine.json").read_text())["seed"] == 0
+    assert (small_run / "report.html").stat().st_size < 8e6
+
+
+def test_tables_are_made_again_from_the_journal(small_run: Path):
+    """`report` gives the same bytes."""
+    names = ("deviations.csv", "runs.csv")
+    before = {name: (small_run / name).read_bytes() for name in names}
+    for name in names:
+        (small_run / name).unlink()
+
+    assert crosscheck("report", small_run, cwd=small_run.parent).returncode == 0
+    assert {name: (small_run / name).read_bytes() for name in names} == before
+
+
+@pytest.mark.slow
+def test_the_same_command_gives_the_same_numbers_whatever_the_workers(small_run: Path, tmp_path: Path):
+    """deviations.csv is byte for byte the same with one worker as with all."""
+    assert crosscheck(*SMALL, "--workers", "1", "--out", "again", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "again" / "deviations.csv").read_bytes() == (small_run / "deviations.csv").read_bytes()
+
+
+@pytest.mark.slow
+def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
+    """A TOML file is compared with the oracle's truth too; its run can be reported again without the file."""
+    scene = tmp_path / "mine.toml"
+    scene.write_text((SCENES / "two.toml").read_text())
+    done = crosscheck("run", scene, "--engine", "pymunk", "--out", "out", cwd=tmp_path)
+    versus = set(pd.read_csv(tmp_path / "out" / "deviations.csv").versus)
+    scene.unlink()
+
+    assert done.returncode == 0, done.stderr
+    assert versus == {"itself", "truth", "pymunk:matched"}
+    assert crosscheck("report", "out", cwd=tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["run", "head_on_equl_e1"], "scenario 'head_on_equl_e1' is not known; did you mean head_on_equal_e1"),
+        (["run", "slow_hit", "--engine", "pymonk"], "engine 'pymonk' is not known; did you mean pymunk"),
+        (["run", "slow_hit", "--engine", "box2d:mached"], "did you mean box2d:matched"),
+        (["run", "slow_hit", "--dt", "0.007"], "--dt 0.007 does not fit slow_hit"),
+        (["run", "slow_hit", "--dt", "-1"], "--dt -1 does not fit slow_hit"),
+        (["run", "slow_hit", "--dt", "nan"], "--dt nan does not fit slow_hit"),
+        (["run", "nowhere.toml"], "nowhere.toml"),
+        (["run", "slow_hit", "--seed", "-1"], "--seed"),
+        (["list", "engine"], "did you mean engines"),
+        (["truth", "asteroid"], "scenario 'asteroid' is not known; did you mean asteroids"),
+        (["truth", "nowhere.toml"], "nowhere.toml"),
+        (["report", "nowhere"], "nowhere: has no journal.jsonl"),
+        (["fly"], "fly"),
+    ],
+)
+def test_bad_input_is_one_clear_message_and_exit_2(words: list[str], said: str, tmp_path: Path):
+    """The message says what is wrong and what is near; no traceback; nothing is written."""
+    done = crosscheck(*words, cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_truth_prints_the_exact_answer(tmp_path: Path):
+    """For people with the ends of its list of hits, for programs as JSON with all of them."""
+    told, listed = (crosscheck("truth", "line_gas", *more, cwd=tmp_path).stdout for more in ([], ["--events"]))
+    for word in ("closed form", "horizon", "error bound", "258 more: --events"):
+        assert word in told
+    assert len(listed.splitlines()) > 272
+    answer = json.loads(crosscheck("truth", "asteroids", "--json", cwd=tmp_path).stdout)
+    assert answer["method"] in ("certified", "two-precision")
+    assert (answer["valid_until_s"], answer["reason"], len(answer["hits"])) == (10.0, "", 20)
+
+
+def test_truth_says_why_there_is_none(tmp_path: Path):
+    """Exit 1: the scene is read, the answer is not known."""
+    turning = (
+        SCENES / "two.toml"
+    ).read_text() + '\n[[thrust]]\ndisk = 0\nstart = 0\nstop = 1\nforce = [1, 0]\nframe = "body"\n'
+    (tmp_path / "turning.toml").write_text(turning)
+    done = crosscheck("truth", "turning.toml", cwd=tmp_path)
+
+    assert done.returncode == 1
+    assert "no exact answer: a push that turns with its disk" in done.stderr
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_who_waits_for_an_exact_answer_is_told_so_on_a_terminal_only(
+    terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """A script reads the error stream."""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: terminal)
+    with waiting("the exact answer to it"):
+        pass
+    assert ("the exact answer to it" in capsys.readouterr().err) == terminal
+
+
+@pytest.mark.parametrize("words", [["run", "--out", "new"], ["truth"], ["stability", "--vary", "speed"], ["play"]])
+def test_a_pipe_for_a_scene_hangs_no_command(words: list[str], tmp_path: Path):
+    """Nobody writes into it."""
+    os.mkfifo(tmp_path / "pipe.toml")
+    done = process(words[0], "pipe.toml", *words[1:], cwd=tmp_path)
+    assert done.returncode == 2
+    assert "pipe.toml: is a pipe or a device; must be a readable TOML file" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_truth_tells_what_comes_to_rest_and_all_outcomes(tmp_path: Path):
+    """A rest is a line of the list; a break shot ends in a table of two outcomes, of which none is the truth."""
+    told = crosscheck("truth", str(SCENES / "settles.toml"), cwd=tmp_path).stdout
+    assert "comes to rest" in told
+    broken = crosscheck("truth", str(SCENES / "break.toml"), cwd=tmp_path).stdout
+    for words in ("2 outcomes; none is the truth", "0: (-0.125, -0.216506)", "0: (-0.125, 0.216506)", "still known"):
+        assert words in broken
+    answer = json.loads(crosscheck("truth", str(SCENES / "break.toml"), "--json", cwd=tmp_path).stdout)
+    assert len(answer["outcomes"]) == 2
+    assert answer["outcomes"][0]["order"]
+    assert any("momentum" in said for said in answer["still_known"])
+
+
+def test_all_faults_of_all_scene_files_come_at_once(tmp_path: Path):
+    """Two bad files, three faults, three lines."""
+    (tmp_path / "a.toml").write_text((SCENES / "two.toml").read_text().replace("radius = 0.25", "radius = -0.25"))
+    (tmp_path / "b.toml").write_text("name = 3\n")
+    done = crosscheck("run", "a.toml", "b.toml", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "a.toml: disk[0].radius = -0.25: must be positive" in done.stderr
+    assert "b.toml: name = 3" in done.stderr
+
+
+def test_a_scene_file_may_not_take_a_name_that_is_taken(tmp_path: Path):
+    """Two scenes of one name would be one row in the table."""
+    (tmp_path / "mine.toml").write_text((SCENES / "two.toml").read_text().replace('"two-disks"', '"slow_hit"'))
+    done = crosscheck("run", "mine.toml", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "taken by a scenario of the catalogue" in done.stderr
+
+
+def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_path: Path):
+    """Files that are not ours are never overwritten, not even beside a run of ours."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.txt").write_text("years of work")
+    (small_run / "note.txt").write_text("mine")
+    done = crosscheck(*SMALL, "--out", "out", cwd=tmp_path), crosscheck(*SMALL, "--out", small_run, cwd=tmp_path)
+    (small_run / "note.txt").unlink()
+
+    assert [one.returncode for one in done] == [2, 2]
+    assert "thesis.txt" in done[0].stderr
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.parametrize(
+    ("words", "file", "said"),
+    [
+        (SMALL, "limits.csv", "holds limits.csv, and no made.json says that crosscheck run made it"),
+        (["stability", "slow_hit"], "runs.csv", "holds runs.csv, and no made.json says that crosscheck stability made"),
+    ],
+)
+def test_a_folder_of_another_command_is_left_alone(words: list[str], file: str, said: str, tmp_path: Path):
+    """A run does not replace an atlas, nor an atlas a run."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / file).touch()
+    done = crosscheck(*words, "--out", "out", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert [path.name for path in tmp_path.rglob("*")] == ["out", file]
+
+
+@pytest.mark.slow
+def test_an_earlier_run_is_replaced_as_a_whole(small_run: Path):
+    """The second run into a folder leaves nothing of the first behind, and no folder beside it."""
+    again = crosscheck("run", "near_miss", "--engine", "pymunk:matched", "--out", "here", cwd=small_run.parent)
+
+    assert again.returncode == 0
+    assert set(pd.read_csv(small_run / "runs.csv").scenario) == {"near_miss"}
+    assert [path.name for path in small_run.parent.iterdir()] == ["here"]
+
+
+@pytest.mark.slow
+def test_a_trajectory_that_is_gone_is_a_failure_of_its_cell(small_run: Path, tmp_path: Path):
+    """Deleted or torn files are errors with a reason in runs.csv; where nothing is left, exit 1."""
+    copy = tmp_path / "copy"
+    shutil.copytree(small_run, copy)
+    one, *others = sorted((copy / "trajectories").iterdir())
+    one.write_bytes(one.read_bytes()[:100])
+    some = crosscheck("report", "copy", cwd=tmp_path)
+    runs = pd.read_csv(copy / "runs.csv")
+    for path in others:
+        path.unlink()
+
+    assert some.returncode in (0, 1)  # 1 if it was the only cell of its engine
+    assert runs[runs.status == "error"].reason.str.contains("is not what was written").tolist() == [True]
+    assert crosscheck("report", "copy", cwd=tmp_path).returncode == 1
+    assert set(pd.read_csv(copy / "runs.csv").status) == {"error"}
+
+
+@pytest.mark.slow
+def test_a_scene_that_was_changed_after_it_was_played_is_not_reported(tmp_path: Path):
+    """Trajectories are judged by the scene they were played from, or not at all."""
+    crosscheck("run", SCENES / "two.toml", "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path)
+    [stored] = (tmp_path / "out" / "scenes").iterdir()
+    stored.write_text(stored.read_text().replace("mass = 2.0", "mass = 3.0"))
+    done = crosscheck("report", "out", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "two-disks is not the scene any more that was played" in done.stderr
+
+
+def test_the_folder_one_is_in_is_not_replaced(tmp_path: Path):
+    """Not the folder itself, and none above it."""
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    done = [crosscheck(*SMALL, "--out", out, cwd=tmp_path / "a" / "b") for out in (".", "..", "/")]
+
+    assert [one.returncode for one in done] == [2, 2, 2]
+    assert all("is where you are" in one.stderr for one in done)

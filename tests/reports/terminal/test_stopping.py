@@ -1,0 +1,292 @@
+"""SIGTERM and Ctrl-C end every command within 3 s wherever it is, also in C code that never returns."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from reports.commands.run import what_is_kept
+from reports.run.folders import RUN, begun, replace_folder
+from reports.run.made import Made, put_made
+from reports.terminal.exits import STATUS, Stopped, broken_off, stoppable
+from tests.reports.run.sweeps import ended_in
+from tests.reports.run.test_kills import alive
+from tests.reports.terminal.command_line import crosscheck, wait_for
+from tests.reports.terminal.stopping import AT_MOST, Command, assert_ended, busyness
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for what is left in /proc")
+
+SOLVERS = Path(__file__).parents[3] / "tests" / "solvers" / "correct"
+TRUTH, ANSWER = "scenarios.truth.exact:OracleTruth.record", "scenarios.truth.exact:computed"
+BOTH = [signal.SIGTERM, signal.SIGINT]
+FILE = """
+name = "two"
+duration = 1.0
+sample_interval = 0.05
+substeps = [1, 2]
+restitution = 1.0
+[[disk]]
+position = [-1.0, 0.0]
+velocity = [1.0, 0.0]
+radius = 0.5
+mass = 1.0
+[[disk]]
+position = [1.0, 0.0]
+velocity = [-1.0, 0.0]
+radius = 0.5
+mass = 1.0
+"""
+TWO = ["run", "two.toml", "slow_hit", "--engine", "pymunk:shipped", "--out", "out"]
+SOCKET = (  # RFC 6455, 1.2: a page opens its socket
+    "GET /fly HTTP/1.1\r\nHost: localhost:PORT\r\nOrigin: http://localhost:PORT\r\nUpgrade: websocket\r\n"
+    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+)
+# The stages of every command, each with what never returns there.
+STALLED = {
+    "the answer in run": (TWO, TRUTH),
+    "the comparison in run": (TWO, "reports.compare.comparison:_measure"),
+    "the answer in report": (["report", "done"], TRUTH),
+    "the comparison in report": (["report", "done"], "reports.compare.comparison:_measure"),
+    "the answer in truth": (["truth", "two.toml"], TRUTH),
+    "the answer in speed": (["speed", "two.toml", "--engine", "pymunk:shipped", "--out", "out"], TRUTH),
+    "a limit in stability": (
+        ["stability", "two.toml", "--vary", "dt", "--engine", "pymunk:shipped", "--out", "out"], TRUTH,
+    ),
+    "a scene in check": (["check", SOLVERS / "plain.py"], ANSWER),
+    "a scene in check of a folder": (["check", SOLVERS], ANSWER),
+    "a lesson in lesson --export": (["lesson", "order", "--export", "order.html"], "reports.lessons.lesson:play"),
+    "a cell in replay": (["replay", "", "--out", "done"], "reports.run.playing:play"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of `TWO`."""
+    folder = tmp_path_factory.mktemp("done")
+    (folder / "two.toml").write_text(FILE)
+    assert crosscheck(*TWO, cwd=folder).returncode == 0
+    return folder / "out"
+
+
+@pytest.fixture
+def place(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where a command is started: the scene, and a run of which nothing has been compared. No answer is known."""
+    monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "two.toml").write_text(FILE)
+    shutil.copytree(done, tmp_path / "done")
+    shutil.rmtree(tmp_path / "done" / "compared")
+    return tmp_path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", BOTH)
+@pytest.mark.parametrize("stage", STALLED)
+def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(place: Path, stage: str, how: int):
+    """Ctrl-C goes to the whole group, as from a terminal, SIGTERM to the command alone: no process outlives it."""
+    words, stalled = STALLED[stage]
+    if words[0] == "replay":
+        words = [words[0], pd.read_csv(place / "done" / "runs.csv").cell[0], *words[2:]]
+    command = Command(*words, cwd=place, stalled=stalled).stalled()
+    ended = command.stop(how, whole_group=how == signal.SIGINT)
+
+    assert_ended(ended, how)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", BOTH)
+def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: int):
+    """Told to stop while it compares: the sentence counts the cells, and --resume gives the bytes of a whole run."""
+    command = Command(*TWO, cwd=place, stalled="reports.compare.comparison:_measure").stalled()
+    had = ended_in(place / "out.part")
+    ended = command.stop(how)
+    resumed = crosscheck("run", "--resume", "out", cwd=place)
+
+    assert_ended(ended, how)
+    assert {signal.SIGTERM: "Terminated.", signal.SIGINT: "Interrupted."}[how] in ended.said
+    assert f"The {ended_in(place / 'out.part') or had} cells that were played are kept." in ended.said
+    assert resumed.returncode == 0, resumed.stderr
+    assert (place / "out" / "deviations.csv").read_bytes() == (done / "deviations.csv").read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", BOTH)
+@pytest.mark.parametrize("words", [["run"], ["list"], ["diff", "done", "done"], ["report", "done"], ["check", SOLVERS]])
+@pytest.mark.parametrize("after", [0.3, 1.0, 2.0])
+def test_a_command_ends_whenever_it_is_told(place: Path, words: list, how: int, after: float):
+    """While it imports, starts workers, writes: after so many s, wherever that is; what has ended by itself is done."""
+    command = Command(*words, cwd=place)
+    started = os.times().elapsed
+    while os.times().elapsed - started < after and command.process.poll() is None:
+        pass
+    if command.process.poll() is not None:
+        return
+    ended = command.stop(how, whole_group=True)
+
+    assert ended.seconds < AT_MOST * busyness(), ended
+    assert ended.status in (128 + how, 0), ended  # 0: it was done
+    assert not ended.left
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("how", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 0)])
+@pytest.mark.parametrize(
+    ("words", "stalled", "asked"),
+    [
+        (["lesson"], "reports.lessons.lesson:play:waits", "GET /lesson/order HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+        (["play", "--engine", "reference"], "reports.game.session:Flight:waits", SOCKET),
+    ],
+)
+def test_a_server_ends_though_a_page_never_gets_its_answer(
+    place: Path, words: list, stalled: str, asked: str, how: int, status: int
+):
+    """Ctrl-C is how it is stopped, and no fault; a page that has asked for what never comes is not waited for."""
+    command = Command(*words, cwd=place, stalled=stalled).when(lambda: "localhost:" in printed(place))
+    port = int(printed(place).split("localhost:")[1].split("/")[0])
+    with socket.create_connection(("127.0.0.1", port)) as page:
+        page.sendall(asked.replace("PORT", str(port)).encode())
+        ended = command.stalled().stop(how)
+
+    assert (ended.status, ended.left) == (status, [])
+    assert ended.seconds < AT_MOST * busyness()
+    assert "Stopped." in printed(place)
+
+
+def printed(place: Path) -> str:
+    """What a command has printed so far."""
+    return (place / ".stdout").read_text()
+
+
+@pytest.mark.slow
+def test_what_takes_too_long_is_said_and_the_other_scene_is_judged(place: Path):
+    """--timeout reaches the exact answer: rows that say so, exit 1, and both commands that look at it say the same."""
+    said = "two is not judged: the exact answer took longer than 2 s (--timeout)"
+    run = Command(*TWO, "--timeout", "2", cwd=place, stalled=TRUTH)
+    assert run.process.wait(300) == 1, run.errors.read_text()
+    complained = run.errors.read_text()
+    table = pd.read_csv(place / "out" / "deviations.csv")
+    rows = table[table.note.str.startswith("not judged", na=False)]
+    report = crosscheck("report", "out", cwd=place)
+    truth = Command("truth", "two.toml", "--timeout", "2", cwd=place, stalled=TRUTH)
+    later = crosscheck("run", "--resume", "out", "--timeout", "60", cwd=place)
+
+    assert said in complained
+    assert set(rows.scenario) == {"two"}
+    assert set(rows.note) == {"not judged: the exact answer took longer than 2 s (--timeout)"}
+    assert len(rows) == 2
+    assert "truth" in set(table[table.scenario == "slow_hit"].versus)
+    assert (report.returncode, said in report.stderr) == (1, True)
+    assert truth.process.wait(120) == 1
+    assert "two: the exact answer took longer than 2 s (--timeout)\n" in truth.errors.read_text()
+    assert later.returncode == 0
+    assert "not judged" not in (place / "out" / "deviations.csv").read_text()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("number", STATUS)
+def test_a_command_is_told_until_it_has_heard(number: int):
+    """What is raised in a destructor is lost: a second later it is raised again, and not once it has been heard."""
+
+    class Deaf:
+        def __del__(self) -> None:
+            signal.raise_signal(number)
+
+    before = signal.getsignal(number), signal.getsignal(signal.SIGALRM)
+    signal.signal(number, signal.default_int_handler)
+    with stoppable() as listening:
+        try:
+            lost = Deaf()
+            del lost
+            signal.pause()
+        except Stopped as stopped:
+            status = stopped.status
+    signal.signal(number, before[0])
+
+    assert listening.status == status == STATUS[number]
+    assert signal.getsignal(signal.SIGALRM) == before[1]
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_a_second_ctrl_c_does_not_cut_the_sentence_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """Impatience while it is said what is kept: it is said, and the status is that of the first signal."""
+
+    def kept() -> str:
+        signal.raise_signal(signal.SIGINT)
+        return "All is kept."
+
+    with pytest.raises(SystemExit) as end, broken_off(tmp_path, kept):
+        signal.raise_signal(signal.SIGTERM)
+
+    assert end.value.code == 143
+    assert "Terminated. All is kept." in capsys.readouterr().err
+
+
+def test_a_finished_run_takes_its_place_whole_whenever_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """SIGTERM between the two renames: the old run is gone, the new one is there, and it is said that all is done."""
+    made, target, rename = tmp_path / "out.part", tmp_path / "out", Path.rename
+    for folder, text in ((made, "new"), (target, "old")):
+        folder.mkdir()
+        (folder / "journal.jsonl").write_text(text)
+    begun(made, RUN)
+    put_made(target, Made(RUN.command, True, {}))
+
+    def rename_and_tell(path: Path, to: Path) -> Path:
+        signal.raise_signal(signal.SIGTERM)
+        return rename(path, to)
+
+    monkeypatch.setattr(Path, "rename", rename_and_tell)
+    with pytest.raises(SystemExit) as end, broken_off(made, lambda: what_is_kept(target)):
+        replace_folder(made, target, RUN)
+
+    assert end.value.code == 143
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert (target / "journal.jsonl").read_text() == "new"
+    assert f"Terminated. All is done: {target}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("endless.js", "function integrate(sphere, dt) { while (true) {} }"),
+        ("endless.py", "def integrate(sphere, dt):\n    while True:\n        pass\n"),
+    ],
+)
+def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: str, text: str):
+    """`kill -9` of a process that waits, for 60 s, for a call: the process of the file does not stay behind."""
+    (tmp_path / name).write_text(text)
+    question = {"spheres": [[0.0] * 12], "calls": [["integrate", 0, 1e-3]], "world": False}
+    asks = (
+        "from pathlib import Path; from adapters.own_solver.file import read_solver; "
+        "from adapters.own_solver.process import SolverProcess; "
+        f"SolverProcess(read_solver(Path({str(tmp_path / name)!r}))).do('ask', {question}, 60.0)"
+    )
+    asking = subprocess.Popen([sys.executable, "-c", asks], stderr=subprocess.DEVNULL)
+    wait_for(lambda: asked_by(asking.pid) and busy(asked_by(asking.pid)[0]))
+    (solver,) = asked_by(asking.pid)
+    asking.kill()
+    asking.wait()
+    killed = time.monotonic()
+    wait_for(lambda: not alive(solver))
+
+    assert time.monotonic() - killed < 2.0 * busyness()
+
+
+def asked_by(parent: int) -> list[int]:
+    """The processes that a process has started."""
+    return [int(pid) for pid in Path(f"/proc/{parent}/task/{parent}/children").read_text().split()]
+
+
+def busy(pid: int) -> bool:
+    """Whether a process has loaded what it needs and is in its loop: 2 s of processor time."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") > 2.0

@@ -1,0 +1,234 @@
+"""The oracle against closed forms, a float64 simulation, and itself in other numbers; and where it refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scenarios.catalogue import scenario
+from scenarios.families.placing import box, lay_out, scatter
+from scenarios.model import Scenario, Scene, Thrust
+from scenarios.truth.exact import ACCURACY, TruthRecord, computed
+from scenarios.truth.oracle import events as oracle_events
+from scenarios.truth.oracle.events import Path, trace
+from scenarios.truth.oracle.numbers import balls, decimals, has_balls, mpfr
+from tests.scenarios.test_catalogue import smallest_gap
+from tests.scenarios.test_closed_forms import FLYING, simulate
+
+DRAWN = ("asteroids", "falling_box", "gas_of_100")
+COUNTS = {"asteroids": 20, "falling_box": 980, "gas_of_100": 1974}
+
+
+def asked(scene: Scene, duration: float = 2.0, **fields) -> Scenario:
+    """A scenario of this scene, sampled 50 times."""
+    return Scenario("scene", "?", "here", scene, duration, duration / 50, **fields)
+
+
+def states(scene: Scenario, record: TruthRecord):
+    """The trajectory of a record at the scenario's samples, beyond the horizon of float64, too."""
+    return replace(record, followed_until=np.inf).sampled(scene.scene, scene.thrusts, scene.times)
+
+
+def drawn(seed: int, n: int = 5, restitution: float = 1.0, gravity: float = 0.0, **fields) -> Scene:
+    """Disks of several sizes and masses in a box of 2 m."""
+    rng = np.random.default_rng(seed)
+    radius = rng.uniform(0.05, 0.2, n)
+    return lay_out(
+        position=scatter(rng, [-0.8, -0.8], [0.8, 0.8], radius), velocity=rng.normal(size=(n, 2)), radius=radius,
+        mass=rng.uniform(0.5, 5, n), restitution=restitution, walls=box([-1, -1], [1, 1]), gravity=[0, gravity],
+        **fields,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def records() -> dict[str, TruthRecord]:
+    """The records of the drawn scenes, computed here and now."""
+    return {name: computed(scenario(name)) for name in DRAWN}
+
+
+@pytest.mark.parametrize("name", [*FLYING, "ship_thrust", "spin_under_torque"])
+def test_it_finds_what_the_closed_form_says(name: str):
+    """Same positions, same hits with the same impulses, to 1e-12."""
+    one = scenario(name)
+    record = computed(one)
+    expected, found = one.truth(one.times), states(one, record)
+    k = min(len(expected), len(found))
+
+    assert k > 0.8 * len(
+        one.times
+    )  # an accumulation ends the oracle, not the closed form; an unstable orbit the latter
+    np.testing.assert_allclose(found.position[:k], expected.position[:k], rtol=0, atol=ACCURACY)
+    np.testing.assert_allclose(found.angle[:k], expected.angle[:k], rtol=0, atol=ACCURACY)
+    hits, others = (sorted(zip(c.collisions.i, c.collisions.j, c.collisions.t, c.collisions.impulse)) for c in
+                    (found, expected))  # fmt: skip
+    if name in ("bouncing_ball_e09", "disk_between_static_disks"):  # one lists no bounces below 1e-4 s, one ends early
+        until = min(max(hit[2] for hit in each) for each in (hits, others)) + ACCURACY
+        hits, others = ([hit for hit in each if hit[2] <= until] for each in (hits, others))
+    assert [hit[:2] for hit in hits] == [hit[:2] for hit in others]
+    # The closed form of Galperin's hits divides by tangents of up to pi.
+    times = [[hit[2] for hit in each] for each in (hits, others)]
+    np.testing.assert_allclose(*times, rtol=2e-13 if name == "galperin_314" else 0, atol=ACCURACY)
+    # Impulses of 2e6 N s in the heaviest lane.
+    np.testing.assert_allclose([hit[3] for hit in hits], [hit[3] for hit in others], rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_the_drawn_scenes_are_answered_to_their_end(name: str, records: dict[str, TruthRecord]):
+    """No reason to stop, no overlap at any sample, as many hits as ever."""
+    one, record = scenario(name), records[name]
+    truth = states(one, record)
+
+    assert record.reason == ""
+    assert len(truth) == len(one.times)
+    assert len(truth.collisions) == COUNTS[name]
+    assert truth.error_bound < ACCURACY
+    assert smallest_gap(one.scene, truth.position).min() >= -ACCURACY
+    assert ((record.events[:, 4] > 0) & (record.events[:, 4] < 1 + 1e-15)).all()
+
+
+@given(seed=st.integers(0, 10**6), restitution=st.sampled_from([1.0, 0.9, 0.5]), gravity=st.sampled_from([0.0, -3]))
+@settings(max_examples=25, deadline=None)
+def test_it_finds_the_hits_of_a_float64_simulation(seed: int, restitution: float, gravity: float):
+    """All pairs, no records, no filter: the same first ten hits, before float64 loses its digits."""
+    gravity = gravity if restitution > 0.5 else 0.0  # what comes to rest stops the clock of the simulation
+    one = asked(drawn(seed, 4, restitution, gravity), 1.0)
+    found = states(one, computed(one)).collisions.t[:10]
+    path = simulate(one.scene, float(found[-1]) + 1e-9 if len(found) else 1.0)[1:]
+
+    # Ten hits lose at most as many digits: 1e-16 times 10^6 or so.
+    np.testing.assert_allclose(found, [t for t, _, _ in path], rtol=0, atol=1e-9)
+
+
+def test_all_numbers_give_the_same(records: dict[str, TruthRecord]):
+    """Decimals and mpfr, at one and at two precisions, agree in every leg; gravity and a static disk included."""
+    walled = drawn(3, 5, 0.9, -2.0)
+    mass = np.append(walled.mass[:-1], np.inf)
+    velocity = np.vstack([walled.velocity[:-1], [[0, 0]]])
+    one = asked(replace(walled, mass=mass, velocity=velocity, inertia=None), 1.5)
+    for each in (scenario("asteroids"), one):
+        with_mpfr, with_decimals = computed(each, mpfr), computed(each, decimals)
+        np.testing.assert_allclose(with_mpfr.legs, with_decimals.legs, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(with_mpfr.events, with_decimals.events, rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(records["asteroids"].legs, computed(scenario("asteroids"), mpfr).legs)
+
+
+@pytest.mark.skipif(not has_balls(), reason="python-flint is an extra")
+def test_interval_arithmetic_proves_every_comparison(records: dict[str, TruthRecord]):
+    """The drawn scenes are certified; balls that are too wide say so instead of guessing."""
+    assert {name: record.method for name, record in records.items()} == dict.fromkeys(DRAWN, "certified")
+    one = scenario("gas_of_100")
+    with pytest.raises(ArithmeticError):
+        trace(one.scene, [], one.duration, balls(64))
+
+
+def last_of(path: Path) -> np.ndarray:
+    """(n, 7) the last leg of each disk."""
+    return np.array([[float(x) for x in legs[-1][:7]] for legs in path.legs])
+
+
+def test_the_order_of_the_disks_does_not_matter():
+    """Permuted, the same motion."""
+    scene, order = drawn(5, 6, 0.9, -1.0), np.random.default_rng(1).permutation(6)
+    names = ("position", "velocity", "radius", "mass", "inertia", "angle", "angular_velocity")
+    permuted = replace(scene, **{name: getattr(scene, name)[order] for name in names})
+    here, there = (last_of(trace(each, [], 2.0, mpfr(256))) for each in (scene, permuted))
+
+    np.testing.assert_array_equal(here[order], there)
+
+
+def test_a_mirrored_scene_moves_as_the_mirror_image():
+    """Left and right swapped, bit for bit."""
+    scene, flip = drawn(6, 6, 0.9, -1.0), np.array([-1.0, 1.0])
+    mirrored = replace(scene, position=scene.position * flip, velocity=scene.velocity * flip, walls=scene.walls * flip)
+    here, there = (last_of(trace(each, [], 2.0, mpfr(256))) for each in (scene, mirrored))
+
+    np.testing.assert_array_equal(here * [1, -1, 1, -1, 1, -1, 1], there)
+
+
+def test_time_runs_backwards_at_restitution_one():
+    """From the end state in float64, with reversed velocities, back to the start."""
+    one = asked(drawn(7, 6), 3.0)
+    truth = states(one, computed(one))
+    assert len(truth.collisions) > 20
+    back = asked(replace(one.scene, position=truth.position[-1], velocity=-truth.velocity[-1]), 3.0)
+    start = states(back, computed(back)).at(-1)
+
+    # The end is rounded by 1e-16, and some forty hits enlarge that.
+    np.testing.assert_allclose(start.position, one.scene.position, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(start.velocity, -one.scene.velocity, rtol=0, atol=1e-5)
+
+
+def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
+    """The static side does not fall: contact times of fourth order, checked by the gap they leave."""
+    bumper = lay_out(
+        position=[[0.3, 2.0], [0, 0.5]], velocity=[[-0.2, 0], [0, 0]], radius=[0.25, 0.5], mass=[1, np.inf],
+        walls=[[[1, -3], [2, -3]]], gravity=[0, -9.81], restitution=1.0,
+    )  # fmt: skip
+    one = asked(bumper, 1.5)
+    assert computed(one).method == ("certified" if has_balls() else "two-precision")
+    truth = states(one, computed(one))
+    t = truth.collisions.t[0]
+    at = np.array([0.3 - 0.2 * t, 2 - 9.81 * t**2 / 2])
+
+    assert truth.collisions.j[0] == 1
+    assert np.hypot(*(at - [0, 0.5])) == pytest.approx(0.75, abs=1e-15 * 4)
+    # Onto the end of a wall, from the side: blamed on the wall.
+    edge = replace(bumper, position=[[1.0 - 0.1, 0.0], [-5, 0]], velocity=np.zeros((2, 2)))
+    hit = computed(asked(edge, 1.2)).events[0]
+    drop = np.sqrt(2 * (3 - np.sqrt(0.25**2 - 0.1**2)) / 9.81)
+    assert hit[:3].tolist() == [pytest.approx(drop, rel=1e-15), 0, -1]
+    assert hit[4] == pytest.approx(np.sqrt(1 - 0.16), rel=1e-14)
+
+
+def test_pushes_carry_a_disk_into_a_wall():
+    """From rest, s = F t2 / 2m; the push ends, the disk flies on."""
+    scene = lay_out(
+        position=[[0, 0]], velocity=[[0, 0]], radius=[0.5], mass=[2], walls=[[[2, -1], [2, 1]]], restitution=1
+    )
+    one = asked(scene, 4.0, thrusts=[Thrust(0, 0.0, 1.0, [3.0, 0.0], 0.5)])
+    record = computed(one)
+
+    # 0.75 m and 1.5 m/s at 1 s, then the other 0.75 m in half a second.
+    np.testing.assert_allclose(record.events[:, :4], [[1.5, 0, -1, 6.0]], rtol=1e-15)
+    assert states(one, record).angular_velocity[-1, 0] == pytest.approx(2.0, rel=1e-15)
+
+
+def test_an_edge_of_the_wrap_sets_the_centre_onto_the_other():
+    """Period 4 s over a box of 4 m at 1 m/s, velocity kept."""
+    scene = lay_out(
+        position=[[1, 0]], velocity=[[1, 0]], radius=[0.1], mass=[1], restitution=1, wrap=[[-2, -2], [2, 2]]
+    )
+    one = asked(scene, 10.0)
+    truth = states(one, computed(one))
+
+    np.testing.assert_allclose(truth.position[:, 0, 0], (one.times + 3) % 4 - 2, rtol=0, atol=1e-14)
+
+
+def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):
+    """With too few bits for the scene the truth ends early, and says so."""
+    monkeypatch.setattr("scenarios.truth.exact.FEWEST_BITS", 56)
+    monkeypatch.setattr("scenarios.truth.exact.MOST_BITS", 100)
+    one = scenario("falling_box")
+    record = computed(one)
+
+    assert 0.1 < record.valid_until < one.duration
+    assert "used up" in record.reason
+    whole = one.truth(one.times)
+    k = len(states(one, record))
+    np.testing.assert_allclose(states(one, record).position, whole.position[:k], rtol=0, atol=2 * ACCURACY)
+
+
+def test_a_stale_record_taken_for_fresh_is_caught(monkeypatch: pytest.MonkeyPatch, records: dict[str, TruthRecord]):
+    """The bug of the first prototype: two precisions agree on a wrong motion, the gaps and the hits do not."""
+    monkeypatch.setattr(oracle_events.Motion, "stale", lambda _self, _record: False)
+    one = scenario("asteroids")
+    wrong = computed(one, mpfr)
+
+    assert (
+        smallest_gap(one.scene, states(one, wrong).position).min() < -ACCURACY or len(wrong.events) != COUNTS[one.name]
+    )
+    assert not np.array_equal(wrong.events[:, :3], records[one.name].events[:, :3])

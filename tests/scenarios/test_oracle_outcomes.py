@@ -1,0 +1,220 @@
+"""Where contacts come at once: one outcome is the truth, several are all told; and where the oracle has no answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import gmpy2
+import numpy as np
+import pytest
+
+from scenarios.catalogue import scenario
+from scenarios.families.placing import box, lay_out
+from scenarios.model import Scenario, Scene, Thrust
+from scenarios.no_truth import NoTruth, truth_at
+from scenarios.truth.exact import computed, with_oracle
+from scenarios.truth.oracle import ahead as oracle_ahead
+from scenarios.truth.oracle.numbers import mpfr
+from scenarios.truth.oracle.ties import Contact, Matter, Touch
+from scenarios.truth.record import TruthRecord
+from tests.scenarios.test_oracle import asked, states
+
+ROW = lay_out(position=[[-2, 0], [0, 0], [0.5, 0], [1, 0]], velocity=[[1, 0], [0, 0], [0, 0], [0, 0]],
+              radius=[0.25] * 4, mass=[1] * 4, restitution=1.0)  # fmt: skip
+
+
+def test_contacts_that_touch_are_resolved_one_after_the_other_where_only_one_approaches():
+    """The cradle whose disks touch exactly: the last flies off, the others rest."""
+    one = asked(ROW, 3.0)
+    truth = states(one, computed(one))
+
+    assert truth.collisions.t.tolist() == [1.5, 1.5, 1.5]
+    np.testing.assert_allclose(truth.velocity[-1], [[0, 0], [0, 0], [0, 0], [1, 0]], rtol=0, atol=1e-15)
+
+
+def test_a_corner_at_a_right_angle_has_one_outcome():
+    """Both walls at once, e = 0.5, either order."""
+    scene = lay_out(
+        position=[[0, 0]], velocity=[[1, 1]], radius=[0.5], mass=[1], walls=box([-2, -2], [2, 2]), restitution=0.5
+    )
+    one = asked(scene, 2.5)
+    truth = states(one, computed(one))
+
+    assert truth.collisions.t.tolist() == [1.5, 1.5]
+    assert truth.velocity[-1, 0].tolist() == [-0.5, -0.5]
+
+
+BREAK = lay_out(position=[[-2, 0], [np.sqrt(0.75), 0.5], [np.sqrt(0.75), -0.5]], velocity=[[1, 0], [0, 0], [0, 0]],
+                radius=[0.5] * 3, mass=[1] * 3, restitution=1.0)  # fmt: skip
+BALL = lay_out(position=[[0, 1], [0, 2]], velocity=[[0, 0], [0, 0]], radius=[0.25, 0.25], mass=[1, 1],
+               walls=[[[-9, 0], [9, 0]]], gravity=[0, -9.81], restitution=0.1)  # fmt: skip
+SEAM = lay_out(position=[[1.5, 0], [-1.8, 0.1]], velocity=[[1, 0], [0, 0]], radius=[0.3, 0.3], mass=[1, 1],
+               restitution=1, wrap=[[-2, -2], [2, 2]])  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("scene", "until", "reason"),
+    [
+        (BREAK, 2.0, "disks 0, 1, 2 touch at once and the outcome depends on the order of their hits (2 outcomes)"),
+        # The upper one falls 1.25 m onto the lower one, which rests since sqrt(1.5 / 9.81) 1.1 / 0.9 s.
+        (BALL, np.sqrt(2.5 / 9.81), "disks 0, 1 touch at once and their hits do not end"),
+        (SEAM, 0.5, "disk 0 re-enters over the edge of the wrap onto disk 1 at t = 0.5 s"),
+    ],
+)
+def test_the_truth_ends_where_there_is_no_more_of_it(scene: Scene, until: float, reason: str):
+    """The horizon is the instant itself, and the reason names it and the disks."""
+    one = asked(scene, 4.0)
+    record = computed(one)
+
+    assert record.valid_until == pytest.approx(until, rel=1e-15)
+    assert reason in record.reason
+    assert f"at t = {until:.4g}"[:10] in record.reason
+    assert states(one, record).t[-1] <= record.valid_until
+    assert states(one, record).reason == record.reason
+
+
+BODY = [Thrust(0, 0.0, 1.0, [1.0, 0.0], frame="body")]
+CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201, 2)), radius=[0.1] * 201, mass=[1] * 201, restitution=1)  # fmt: skip # noqa: E501
+
+
+@pytest.mark.parametrize(
+    ("one", "reason"),
+    [
+        (asked(replace(ROW, position=ROW.position * [0.9, 1])), "disk 1 and disk 2 overlap by 0.05 m at the start"),
+        (asked(replace(BALL, position=[[0, 0.1], [0, 2]])), "disk 0 and wall 0 overlap by 0.15 m at the start"),
+        (asked(ROW, thrusts=BODY), "a push that turns with its disk"),
+        (asked(CROWD), "201 disks are more than the 200"),
+        (asked(replace(SEAM, radius=[1e-9, 1])), "a radius of 1e-09 m is below 1e-06 m"),
+        (asked(replace(BALL, velocity=[[1e9, 0], [0, 0]])), r"the largest velocity is 1e\+09 \(SI\), above 1e\+06"),
+    ],
+)
+def test_what_it_cannot_do_is_refused(one: Scenario, reason: str):
+    """With one sentence; nothing is pushed apart."""
+    with pytest.raises(NoTruth, match=reason):
+        computed(one)
+
+
+def ends(record: TruthRecord) -> list[dict[int, tuple[float, float]]]:
+    """The outcomes of a record: disk -> velocity."""
+    return [
+        {int(i): (vx, vy) for _, i, vx, vy in record.outcomes[record.outcomes[:, 0] == k].tolist()}
+        for k in sorted({*record.outcomes[:, 0]})
+    ]
+
+
+def row(speeds: list[float], mass: list[float], restitution: float = 1.0, gaps: tuple[float, ...] = ()) -> Scene:
+    """Disks of radius 0.25 on a line, touching but for `gaps` before the second, the third ..."""
+    steps = 0.5 + np.array([*gaps, *[0.0] * (len(speeds) - 1 - len(gaps))])
+    x = np.append(0.0, np.cumsum(steps))
+    return lay_out(
+        position=np.stack([x, 0 * x], -1), velocity=np.stack([speeds, 0 * x], -1), radius=[0.25] * len(x), mass=mass,
+        restitution=restitution,
+    )  # fmt: skip
+
+
+def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_hits():
+    """The cue ends with (-1/8, -+0.2165); the second target, hit first, with (3/4, 0.433)."""
+    one = asked(BREAK, 4.0)
+    record = computed(one)
+    found = sorted(ends(record), key=lambda end: end[0][1])
+
+    assert len(found) == 2
+    for end, mirror, first in zip(found, (1, -1), (1, 2)):
+        np.testing.assert_allclose(end[0], (-1 / 8, -mirror * np.sqrt(3) / 8), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(end[first], (0.75, mirror * np.sqrt(3) / 4), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(end[3 - first], (0.375, -mirror * np.sqrt(3) / 8), rtol=0, atol=1e-15)
+    for k in (0, 1):
+        assert {*map(tuple, record.orders[record.orders[:, 0] == k, 1:].tolist())} <= {(0, 1), (0, 2), (1, 0), (2, 0)}
+    assert states(one, record).t[-1] < record.valid_until  # none of them is scored
+
+
+def test_a_squeeze_of_unequal_masses_has_two_outcomes():
+    """Masses 1, 3, 1 from both sides at once: (-0.5, -0.25, 1.25) or mirrored."""
+    record = computed(asked(row([1, 0, -1], [1, 3, 1], gaps=(1.0, 1.0)), 2.0))
+    found = sorted([end[i][0] for i in range(3)] for end in ends(record))
+
+    np.testing.assert_allclose(found, [[-1.25, 0.25, 0.5], [-0.5, -0.25, 1.25]], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(("coming", "outcomes"), [(1, (8, 8)), (2, (22, 24))])
+def test_a_cradle_that_loses_energy_has_many_outcomes(coming: int, outcomes: tuple[int, int]):
+    """Five at e = 0.9: 8 with one disk coming in, 22 to 24 with two; they differ by 3e-5 and 4e-3 m/s."""
+    gaps = tuple(float(k + 1 == coming) for k in range(coming))
+    record = computed(asked(row([1.0] * coming + [0.0] * (5 - coming), [1] * 5, 0.9, gaps), 2.0))
+    spread = np.ptp([[end[i][0] for i in end] for end in ends(record)], axis=0).max()
+
+    assert outcomes[0] <= len(ends(record)) <= outcomes[1]
+    assert spread == pytest.approx({1: 3e-5, 2: 4e-3}[coming], rel=0.3)
+
+
+def test_taking_the_hits_of_a_chain_as_they_come_is_caught(monkeypatch: pytest.MonkeyPatch):
+    """The planted bug: each hit by itself. It ends in one of the eight, as if there were no others."""
+    one = asked(row([1.0, 0, 0, 0, 0], [1] * 5, 0.9, (1.0,)), 2.0)
+    assert len(ends(computed(one))) == 8
+    monkeypatch.setattr(oracle_ahead.Ahead, "alone", lambda *_: True)
+    assert computed(one).reason == ""
+
+
+@pytest.mark.parametrize("coming", [1, 2])
+def test_a_cradle_that_keeps_its_energy_has_one(coming: int):
+    """Velocities sorted, and proven to be where balls are installed."""
+    gaps = tuple(float(k + 1 == coming) for k in range(coming))
+    one = asked(row([1.0] * coming + [0.0] * (5 - coming), [1] * 5, 1.0, gaps), 2.0)
+    record = computed(one)
+
+    assert (record.reason, len(record.outcomes)) == ("", 0)
+    assert states(one, record).velocity[-1, :, 0].tolist() == [0.0] * (5 - coming) + [1.0] * coming
+
+
+@pytest.mark.parametrize(
+    ("degrees", "restitution", "outcomes"),
+    [(90, 0.5, 1), (90, 1.0, 1), (60, 1.0, 1), (45, 1.0, 1), (72, 1.0, 2), (50, 1.0, 2), (60, 0.5, 2)],
+)
+def test_a_wedge_of_a_whole_part_of_180_degrees_has_one_outcome(degrees: int, restitution: float, outcomes: int):
+    """A disk between two walls: at 180 / k degrees one for e = 1, at 90 degrees for every e, else two."""
+    k = mpfr(256)
+    with k.precise():
+        angle = gmpy2.const_pi() * degrees / 180
+        one, zero = gmpy2.mpfr(1), gmpy2.mpfr(0)
+        touches = [
+            Touch(Contact("wall", 0, 0, 1), zero, -one),
+            Touch(Contact("wall", 0, 1, 1), -gmpy2.sin(angle), gmpy2.cos(angle)),
+        ]
+        found = Matter(k, [one], k.exact(restitution), False).outcomes(touches, {0: (k.exact(-1.0), k.exact(-0.3))})[0]
+
+    assert len(found) == outcomes
+    assert all(end.velocities for end in found)
+
+
+TILTED = lay_out(position=[[0, 1]], velocity=[[0, 0]], radius=[0.5], mass=[1], gravity=[0, -9.81], restitution=0.5,
+                 walls=[[[-3, 2.25], [0, 0]], [[0, 0], [3, 2.25]]])  # fmt: skip
+
+
+def test_what_can_still_be_said_is_said():
+    """Momentum along the floor, energy; on a wedge, where no direction is free, energy alone."""
+    flat, wedge = (computed(asked(scene, 4.0)) for scene in (BALL, TILTED))
+
+    assert any("lie along (1, 0), so their momentum that way, 0 N s, stays" in said for said in flat.remains)
+    assert any("their kinetic energy" in said and "can only fall" in said for said in flat.remains)
+    assert wedge.reason
+    assert len(wedge.remains) == 1
+
+
+def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
+    """`truth_at` names the time, the horizon and the reason; `truth` gives what is known, be it nothing."""
+    for one, reason in (
+        (with_oracle(asked(BREAK, 4.0)), "(2 outcomes)"),
+        (scenario("disk_between_static_disks"), "the unstable orbit"),
+    ):
+        until = one.truth(one.times).valid_until
+        before, after = np.array([0.0, until * 0.99]), np.array([until * 1.01])
+
+        assert len(truth_at(one, before)) == 2
+        assert len(one.truth(after)) == 0
+        with pytest.raises(NoTruth, match=r"the truth of .* ends at its horizon at .* s") as refusal:
+            truth_at(one, np.append(before, after))
+        assert f"t = {after[0]:.9g} s" in str(refusal.value)
+        assert reason in str(refusal.value)
+        assert refusal.value.at == until
+    with pytest.raises(ValueError, match="is known up to 4 s"):
+        truth_at(with_oracle(asked(BREAK, 4.0)), np.array([5.0]))
