@@ -24,6 +24,7 @@ from reports.speed.plan import PLAIN, SCENE, Player
 from reports.stability import lines as atlas_lines
 from reports.stability.atlas import Task, found_limit, journalled
 from reports.stability.command import write_files
+from reports.stability.limits import Limit
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import law_of
 from scenarios.catalogue import scenario
@@ -227,3 +228,15 @@ def test_pages_are_made_of_what_is_taken(atlas: Path, tmp_path: Path):
     for number, line, what in random.Random(15).sample(taken, SAMPLE):
         write_files(put(tmp_path, whole, number, line))
         assert (tmp_path / "stability.html").exists(), what
+
+
+def test_a_text_that_reads_nan_stays_a_text(measured: Path, atlas: Path, tmp_path: Path):
+    """It became a number when it was read back, and a traceback where it was taken for text."""
+    whole = [json.loads(line) for line in (measured / JOURNAL).read_text().splitlines()]
+    whole[1]["result"][0]["reason"] = "nan"
+    with Journal(put(tmp_path, whole)) as journal:
+        assert Kept(journal, HEADER, True, SCENES)[tuple(whole[1]["task"])][0]["reason"] == "nan"
+    whole = [json.loads(line) for line in (atlas / JOURNAL).read_text().splitlines()]
+    whole[1]["limit"]["source"] = "nan"
+    _, results = journalled(put(tmp_path, whole))
+    assert [one.source for one in results.values() if isinstance(one, Limit)] == ["nan"]

@@ -13,6 +13,10 @@ from reports.journal_lines import checked_lines, no_use
 from reports.speed.lines import KINDS, scene_of, stranger
 from scenarios.model import Scenario
 
+TEXT = frozenset(
+    ("kind", "scenario", "engine", "profile", "change", "status", "reason", "part", "note", "truth", "stopped", "task")
+)  # columns of results that hold words
+
 
 class Kept:
     """The results of tasks: those of an interrupted measurement of the same, and those of this one as they come.
@@ -56,11 +60,20 @@ class Kept:
 
     def __getitem__(self, task: tuple) -> Any:
         """What it gave."""
-        return numbers(self.results[json.dumps(task)])
+        return numbered(self.results[json.dumps(task)])
 
     def add(self, task: tuple, result: Any) -> None:
         """Keep what a task gave."""
         self.journal.append({"task": task, "result": result})
+
+
+def numbered(value: Any) -> Any:
+    """As `numbers`, but for what is text, which may be "nan"."""
+    if isinstance(value, list):
+        return [numbered(item) for item in value]
+    if isinstance(value, dict):
+        return {key: item if key in TEXT else numbered(item) for key, item in value.items()}
+    return numbers(value)
 
 
 def misfit(line: Mapping[str, Any], scenarios: Mapping[str, Scenario]) -> str:
@@ -70,4 +83,4 @@ def misfit(line: Mapping[str, Any], scenarios: Mapping[str, Scenario]) -> str:
         return ""
     if scene not in scenarios:
         return f"task = {str(line['task'])[:60]}: must be of a scene that is measured"
-    return stranger(numbers(line), scenarios[scene])
+    return stranger(numbered(line), scenarios[scene])

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from reports.foreign_text import put_text
-from reports.journal import JOURNAL, Journal, numbers, plain
+from reports.journal import JOURNAL, Journal, plain
 from reports.journal_lines import checked_lines, no_use
 from reports.machine import about
 from reports.made import digest_of, writing
@@ -201,8 +201,13 @@ def wrong(result: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
 
 def limit_from(record: dict[str, Any]) -> Limit:
     """The limit of a line of the journal, where what is not finite is text."""
-    known = numbers(record)
-    return Limit(**known | {"trials": tuple(Trial(**trial) for trial in known["trials"])})
+    trials = tuple(Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"])
+    return Limit(**record | floats(record, "works_at", "fails_at", "spacing", "seconds") | {"trials": trials})
+
+
+def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
+    """These of a record as numbers: of the other fields a text may be "nan"."""
+    return {name: float(record[name]) for name in names}
 
 
 def done_before(folder: Path, plan: Plan) -> tuple[int, set[Task]]:
