@@ -30,11 +30,11 @@ HEADINGS = ("t, s", "disk", "other", "impulse, N s", "cos of impact angle")
 
 
 def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float) -> NoReturn:
-    """Print the exact answer to a scene; exits 1 where there is none within `timeout` s, 2 on what is no scene."""
+    """Print the exact answer to a scene, up to where `timeout` s lead; exits 1 where there is none, 2 on no scene."""
     (checked,) = checked_scenes([scene], [], False, seed)
     scenario = open_scene(checked, seed)
     # In a worker, which can be stopped whatever it is doing.
-    task = partial(record_here, checked, seed)
+    task = partial(record_here, checked, seed, timeout)
     with waiting(f"the exact answer to {scenario.name}"), closing(run_all({checked: task}, 1, timeout)) as results:
         [(_, record)] = results
     if isinstance(record, Failure | str):

@@ -19,8 +19,10 @@ from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
 from scenarios.truth.cache import UNREADABLE, packed, unpacked
 from scenarios.truth.exact import CLOSED_FORM, OracleTruth, TruthRecord
+from scenarios.truth.oracle.work import Clock
 
 OK, NONE = "ok", "none"
+FOLLOWED = 0.5  # of the time for an answer: its horizon takes up to three quarters as long as its events
 SAID = "answer.json"  # in the file of an answer, beside the arrays of its record
 
 
@@ -92,18 +94,22 @@ def read_answer(path: Path) -> Answer | None:
     return Answer(TruthRecord(**fields) if fields else None, status, reason, timeout)
 
 
-def record_here(scene: str, seed: int) -> TruthRecord | str:
-    """In the worker: the record of a scene by catalogue name or file, or why there is none."""
+def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
+    """In the worker: the record of a scene by catalogue name or file, or why there is none.
+
+    Before `timeout` s are over, after which the worker is stopped, it is that of what was found until then.
+    """
+    reason = f"the limit of {timeout:g} s was reached (a longer --timeout gives more)"
     try:
-        return record_of(open_scene(scene, seed))
+        return record_of(open_scene(scene, seed), Clock(FOLLOWED * timeout, reason))
     except NoTruth as refusal:
         return str(refusal)
 
 
-def record_of(scenario: Scenario) -> TruthRecord:
-    """The oracle's record, or a record of what a closed form says. Raises `NoTruth`."""
+def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
+    """The oracle's record, as far as a `clock` lets it, or a record of what a closed form says. Raises `NoTruth`."""
     if isinstance(scenario.truth, OracleTruth):
-        record = scenario.truth.record()
+        record = scenario.truth.record(clock)
         if record.valid_until < scenario.sample_interval:
             raise NoTruth(record.reason)
         return record

@@ -1,7 +1,7 @@
 """The files of a run, read back; everything is made from the journal and the trajectories.
 
 journal.jsonl   a header, a line a cell as it ends, a footer; after a run was resumed, another header and footer; what
-                a line holds is said in journal_lines.py
+                a line holds is said in run_lines.py
 trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to its last good state;
                 the line of the cell has the file's digest, and what does not match it is as good as none
 scenes/         copies of the scene files
@@ -24,11 +24,11 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from adapters.play import Run
-from reports.run.journal import JOURNAL, MISSED, lines_of
-from reports.run.journal_lines import kind_of
+from reports.run.journal import JOURNAL
+from reports.run.journal_lines import checked_lines, no_use
+from reports.run.run_lines import KINDS
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
-ASKED = "without it nobody knows what was asked for: play it again into another --out"
 Numbered = dict[Hashable, tuple[int, dict[str, Any]]]  # what a line is of -> its number, and the line
 STATE = ("position", "velocity", "angle", "angular_velocity")
 HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
@@ -65,8 +65,7 @@ class Archive:
         last: dict[str, Numbered] = {"cell": {}, "conformance": {}, "known_answer": {}}
         timings: dict[str, list[float]] = {}
         seconds, complete = 0.0, False
-        for number, line in enumerate(lines_of(folder), 1):
-            kind = kind_of_line(folder, number, line)
+        for number, kind, line in checked_lines(folder, KINDS):
             complete = kind == "footer"
             if complete:
                 seconds += line["footer"]["seconds"]
@@ -80,27 +79,13 @@ class Archive:
             raise ValueError(f"{folder / JOURNAL}: has no header, so nothing was played")
         for number, record in last["cell"].values():
             if fault := stranger(record, header):
-                raise ValueError(no_use(folder, number, fault, MISSED))
+                raise ValueError(no_use(folder, number, fault, KINDS.missed))
         records, conformance, known = ([line for _, line in last[kind].values()] for kind in last)
         records = [as_found(folder, record) for record in records]
         by_engine = {line["of"]: line for line in conformance}
         return Archive(
             folder, header, records, by_engine, known, timings, seconds if complete else float("nan"), complete
         )
-
-
-def kind_of_line(folder: Path, number: int, line: Any) -> str:
-    """Which of `KINDS` it is; raises `ValueError`, naming the line and what does not fit."""
-    try:
-        return kind_of(line)
-    except (ValueError, RecursionError) as fault:
-        head = isinstance(line, dict) and "header" in line
-        raise ValueError(no_use(folder, number, str(fault), ASKED if head else MISSED)) from None
-
-
-def no_use(folder: Path, number: int, fault: str, cure: str) -> str:
-    """A sentence on a line that cannot be used, and what to do."""
-    return f"{folder / JOURNAL}: line {number}: {fault}; {cure}"
 
 
 def what_of(record: dict[str, Any]) -> tuple:

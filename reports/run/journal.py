@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 JOURNAL = "journal.jsonl"
-MISSED = "delete that line, and run --resume plays what it was of"  # what to do about one that cannot be used
 
 
 class Busy(Exception):
@@ -61,11 +60,11 @@ class Journal:
             raise
 
 
-def lines_of(folder: Path) -> Iterator[dict[str, Any]]:
+def lines_of(folder: Path, missed: str = "delete that line") -> Iterator[Any]:
     """The lines of a folder's journal; a last line that was torn is left out.
 
     Raises:
-        ValueError: naming another line that is no JSON.
+        ValueError: naming another line that is no JSON, and what to do about what is `missed`.
     """
     with (folder / JOURNAL).open("rb") as journal:
         for number, line in enumerate(journal, start=1):
@@ -73,7 +72,7 @@ def lines_of(folder: Path) -> Iterator[dict[str, Any]]:
                 yield json.loads(line.decode())  # for null bytes are taken for UTF-32 else
             except (ValueError, RecursionError) as error:  # of brackets in brackets in brackets
                 if line.endswith(b"\n"):
-                    raise ValueError(f"{folder / JOURNAL}: line {number}: is not JSON: {error}; {MISSED}") from error
+                    raise ValueError(f"{folder / JOURNAL}: line {number}: is not JSON: {error}; {missed}") from error
 
 
 def plain(value: Any) -> Any:

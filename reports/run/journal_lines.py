@@ -1,17 +1,18 @@
-"""The schema of a run's journal: what every kind of line holds, and in a sentence what does not fit."""
+"""What a journal's lines are read by: a table of their kinds, each a model, and in a sentence what does not fit."""
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, InstanceOf, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, InstanceOf, ValidationError
 from pydantic_core import ErrorDetails
 
-from adapters.play import STATUSES
+from reports.run.journal import JOURNAL, lines_of
 
-MOST_ROUNDS = 10_000  # of timings: each takes as long as all middle steps of a run
 NOT_FINITE = ("nan", "inf", "-inf")  # as `plain` of journal.py writes them
 SHOWN = 60  # characters of a value that does not fit
 
@@ -95,137 +96,47 @@ class Machine(Line):
     cores: Annotated[int, Field(ge=1, le=10**6)]
 
 
-class Header(Line):
-    """What was asked for, and by what it was played."""
+class Kinds(NamedTuple):
+    """The lines that a journal may have.
 
-    command: Words
-    seed: Seed
-    started: Words
-    versions: dict[Words, Words]
-    machine: Machine
-    scenes: list[File]
-    engines: list[Player]
-    dts: list[Step]
-    full: bool
-    timings: Annotated[int, Field(ge=0, le=MOST_ROUNDS)]
-    folder: File
-    names: dict[File, Name]
-    tasks: Count
+    Attributes:
+        models: the key by which a line of a kind is known -> its model.
+        missed: what to do about a line that cannot be used.
+        asked: what to do about a header that cannot.
+    """
+
+    models: Mapping[str, type[Line]]
+    missed: str
+    asked: str = "without it nobody knows what was asked for: name another --out"
 
 
-class CellLine(Line):
-    """How a cell ended."""
+def checked_lines(folder: Path, kinds: Kinds) -> Iterator[tuple[int, str, dict[str, Any]]]:
+    """Number, kind and line, for each line of a folder's journal.
 
-    cell: Digest
-    scene_hash: Digest
-    scene: File
-    seed: Seed
-    substeps: Annotated[int, Field(ge=1, le=2**53)]
-    scenario: Name
-    engine: Engine
-    profile: Profile
-    dt_s: Step
-    status: Literal[STATUSES]  # type: ignore[valid-type]
-    reason: Words
-    step: Annotated[int, Field(ge=-1, le=2**53)]
-    until_s: Number
-    seconds: Number
-    timeout_s: Annotated[float, Field(ge=0, le=1e6)]
-    outside: bool
-    file: Literal[""] | Digest
-    settings: dict[Words, Annotated[list[Setting], Field(min_length=2, max_length=2)]]
-    versions: dict[Words, Words]
+    Raises:
+        ValueError: naming a line that is no JSON, or does not fit, key and value, what is allowed, and what to do.
+    """
+    for number, line in enumerate(lines_of(folder, kinds.missed), 1):
+        try:
+            kind = kind_of(line, kinds.models)
+        except (ValueError, RecursionError) as fault:
+            head = isinstance(line, dict) and "header" in line
+            raise ValueError(no_use(folder, number, str(fault), kinds.asked if head else kinds.missed)) from None
+        yield number, kind, line
 
 
-class Probed(Line):
-    """What one probe found, as `Finding`."""
-
-    engine: Engine
-    profile: Profile
-    probe: Words
-    asked: Words
-    got: Said
-    expected: Said
-    bound: Number
-    verdict: Literal["keeps", "departs", "breaks"]
-    note: Words
+def no_use(folder: Path, number: int, fault: str, cure: str) -> str:
+    """A sentence on a line that cannot be used, and what to do."""
+    return f"{folder / JOURNAL}: line {number}: {fault}; {cure}"
 
 
-class ConformanceLine(Line):
-    """What the probes found in an engine."""
-
-    conformance: list[Probed]
-    of: Player
-    key: Literal[""] | Digest
-
-    @model_validator(mode="after")
-    def of_one(self) -> ConformanceLine:
-        """All are of the engine that the line is of."""
-        if any(f"{one.engine}:{one.profile}" != self.of for one in self.conformance):
-            raise ValueError("conformance: must be of one engine, which `of` names")
-        return self
-
-
-class Known(Line):
-    """A published number and ours."""
-
-    column: Words
-    dt_s: Step
-    published_J2: Number
-    made_by: Words
-    source: Words
-    ours_J2: Number
-
-
-class KnownAnswerLine(Line):
-    """A known answer that was made again."""
-
-    known_answer: Known
-    of: Words
-    key: Literal[""] | Digest
-
-
-class TimingLine(Line):
-    """A timing of a cell."""
-
-    timing: Digest
-    round: Count
-    seconds: Seconds
-
-
-class Footer(Line):
-    """How much was done."""
-
-    tasks: Count
-    played: Count
-    seconds: Seconds
-
-
-class HeaderLine(Line):
-    """The first line."""
-
-    header: Header
-
-
-class FooterLine(Line):
-    """The last line."""
-
-    footer: Footer
-
-
-KINDS: dict[str, type[Line]] = {
-    "header": HeaderLine, "cell": CellLine, "conformance": ConformanceLine, "known_answer": KnownAnswerLine,
-    "timing": TimingLine, "footer": FooterLine,
-}  # fmt: skip
-
-
-def kind_of(line: Any) -> str:
-    """Which of `KINDS` a line is; raises `ValueError`, as the end of a sentence, if it is none or does not fit."""
-    kinds = [kind for kind in KINDS if kind in line] if isinstance(line, dict) else []
+def kind_of(line: Any, models: Mapping[str, type[Line]]) -> str:
+    """Which of the kinds a line is; raises `ValueError`, as the end of a sentence, if it is none or does not fit."""
+    kinds = [kind for kind in models if kind in line] if isinstance(line, dict) else []
     if len(kinds) != 1:
-        raise ValueError(f"must be one of {', '.join(KINDS)}")
+        raise ValueError(f"must be one of {', '.join(models)}")
     try:
-        KINDS[kinds[0]].model_validate(line)
+        models[kinds[0]].model_validate(line)
     except ValidationError as error:
         raise ValueError(sentence(error.errors(include_url=False)[0])) from None
     return kinds[0]

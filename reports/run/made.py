@@ -58,9 +58,10 @@ def read_made(folder: Path) -> Made | None:
         if not stat.S_ISREG(path.lstat().st_mode):
             return None
         made = Made(**json.loads(path.read_bytes()))
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, RecursionError):  # the last of brackets in brackets in brackets
         return None
-    return made if isinstance(made.command, str) and isinstance(made.files, dict) else None
+    whole = isinstance(made.command, str) and isinstance(made.finished, bool) and isinstance(made.files, dict)
+    return made if whole else None
 
 
 def put_made(folder: Path, made: Made) -> None:
@@ -111,9 +112,11 @@ def as_written(path: Path, digest: str | None) -> bool:
 
 
 def digest_of(path: str | Path) -> str:
-    """SHA-256 of a file, 64 hex digits; "" if it cannot be read."""
-    with suppress(OSError), Path(path).open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    """SHA-256 of a file, 64 hex digits; "" if it cannot be read, or is none that ends."""
+    with suppress(OSError, ValueError):
+        if Path(path).is_file():
+            with Path(path).open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
     return ""
 
 

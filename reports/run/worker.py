@@ -24,7 +24,7 @@ STARTING = 120.0  # s for Python to start and to import what a task is made of, 
 ATTEMPTS = 3  # at a task whose worker was killed from outside
 OUTSIDE = {-signal.SIGKILL, -signal.SIGTERM, 0}  # exits that no engine makes by a fault of its own
 PRINTED = 65536  # bytes of what a task prints that are kept: faulthandler writes up to 100 lines a thread
-ASKING = "adapters/own_solver/process.py"  # waits for what a solver's file answers
+ASKING = "own_solver/process.py"  # waits for what a solver's file answers
 INNERMOST = re.compile(r'most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)')
 
 

@@ -20,7 +20,7 @@ from reports.run.folders import discard, given_back, open_part, place_of, replac
 from reports.run.journal import Journal
 from reports.run.machine import about
 from reports.run.made import Kind, digest_of, writing
-from reports.speed import figures
+from reports.speed import figures, ladder
 from reports.speed.effort import FULL, QUICK
 from reports.speed.explained import sentence
 from reports.speed.kept import Kept
@@ -81,7 +81,8 @@ def kept_of(plan: Plan, header: Mapping[str, Any], journal: Journal, resume: boo
         "scenes": plan.scenes, "files": files, "engines": plan.engines, "effort": asdict(plan.effort),
         "whole": plan.whole,
     }  # fmt: skip
-    return Kept(journal, asked | {key: header[key] for key in ("seed", "versions", "machine")}, resume)
+    scenarios = {scene: ladder.open_scene(scene, seed) for scene, seed in plan.draws}
+    return Kept(journal, asked | {key: header[key] for key in ("seed", "versions", "machine")}, resume, scenarios)
 
 
 def carry_out(plan: Plan, header: dict[str, Any], kept: Kept, resume: bool) -> tuple[Results, dict[str, Any]]:

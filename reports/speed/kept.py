@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from typing import Any
 
 from reports.run.folders import may_go_on
-from reports.run.journal import Journal, lines_of, numbers, plain
+from reports.run.journal import Journal, numbers, plain
+from reports.run.journal_lines import checked_lines, no_use
+from reports.speed.lines import KINDS, scene_of, stranger
+from scenarios.model import Scenario
+
+TEXT = frozenset(
+    ("kind", "scenario", "engine", "profile", "change", "status", "reason", "part", "note", "truth", "stopped", "task")
+)  # columns of results that hold words
 
 
 class Kept:
@@ -16,20 +24,27 @@ class Kept:
     A task is a tuple of strings and whole numbers, a result what JSON can hold, numbers that are not finite included.
     """
 
-    def __init__(self, journal: Journal, header: dict[str, Any], resume: bool) -> None:
-        """Go on, if `resume` and the journal is of a measurement with the very same `header`.
+    def __init__(
+        self, journal: Journal, header: dict[str, Any], resume: bool, scenarios: Mapping[str, Scenario]
+    ) -> None:
+        """Go on, if `resume` and the journal is of a measurement with the very same `header`, of these `scenarios`.
 
         Raises:
             FolderTaken: as `may_go_on`.
-            ValueError: the journal is none of a measurement.
+            ValueError: naming a line of the journal that does not fit.
         """
-        self.journal = journal
-        lines = list(lines_of(journal.path.parent))
-        for number, line in enumerate(lines, start=1):
-            if not isinstance(line, dict) or not line.keys() >= ({"task", "result"} if number > 1 else {"header"}):
-                raise ValueError(f"{journal.path}: line {number} is no line of a measurement")
-        same = bool(lines) and lines[0].get("header") == json.loads(json.dumps(plain(header)))
-        may_go_on(journal.path.parent, len(lines[1:]), same, resume)
+        self.journal, folder = journal, journal.path.parent
+        lines = []
+        for number, kind, line in checked_lines(folder, KINDS):
+            if (kind == "header") != (number == 1):
+                what = "only the first line may be the header" if number > 1 else "the first line must be the header"
+                raise ValueError(no_use(folder, number, what, KINDS.asked if number == 1 else KINDS.missed))
+            lines.append(line)
+        same = bool(lines) and lines[0]["header"] == json.loads(json.dumps(plain(header)))
+        may_go_on(folder, len(lines[1:]), same, resume)
+        for number, line in enumerate(lines[1:] if same else [], start=2):
+            if fault := misfit(line, scenarios):
+                raise ValueError(no_use(folder, number, fault, KINDS.missed))
         self.results = {json.dumps(line["task"]): line["result"] for line in lines[1:]} if same else {}
         if not same:
             os.truncate(journal.path, 0)
@@ -45,8 +60,27 @@ class Kept:
 
     def __getitem__(self, task: tuple) -> Any:
         """What it gave."""
-        return numbers(self.results[json.dumps(task)])
+        return numbered(self.results[json.dumps(task)])
 
     def add(self, task: tuple, result: Any) -> None:
         """Keep what a task gave."""
         self.journal.append({"task": task, "result": result})
+
+
+def numbered(value: Any) -> Any:
+    """As `numbers`, but for what is text, which may be "nan"."""
+    if isinstance(value, list):
+        return [numbered(item) for item in value]
+    if isinstance(value, dict):
+        return {key: item if key in TEXT else numbered(item) for key, item in value.items()}
+    return numbers(value)
+
+
+def misfit(line: Mapping[str, Any], scenarios: Mapping[str, Scenario]) -> str:
+    """Why a line is of none of the scenarios by name or file, as the end of a sentence; "" if it is of one."""
+    scene = scene_of(line["task"])
+    if not scene:
+        return ""
+    if scene not in scenarios:
+        return f"task = {str(line['task'])[:60]}: must be of a scene that is measured"
+    return stranger(numbered(line), scenarios[scene])

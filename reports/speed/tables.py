@@ -169,8 +169,10 @@ def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
 def noise(measured: Measured) -> pd.DataFrame:
     """A row a scenario and player: ratio of the median costs of an engine and its copy in the same rounds."""
     samples = measured.samples[measured.samples.kind == SCENE]
-    both = summed_up(samples, ["scenario", *WHO, "dt_s", "copy_of"]).pivot(
-        index=["scenario", *WHO, "dt_s"], columns="copy_of", values="cost"
+    both = (
+        summed_up(samples, ["scenario", *WHO, "dt_s", "copy_of"])
+        .pivot(index=["scenario", *WHO, "dt_s"], columns="copy_of", values="cost")
+        .reindex(columns=[0, 1])
     )
     return (both[1] / both[0]).dropna().rename("ratio").reset_index()
 

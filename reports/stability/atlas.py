@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.run.journal import JOURNAL, Journal, lines_of, numbers, plain
+from reports.run.journal import JOURNAL, Journal, plain
+from reports.run.journal_lines import checked_lines, no_use
 from reports.run.machine import about
 from reports.run.made import digest_of, writing
 from reports.run.runner import run_all
@@ -24,6 +25,7 @@ from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
 from reports.stability.failures import keep_failure
 from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Trial, players_of
+from reports.stability.lines import KINDS, impossible, unknown_player
 from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.search import Search
 from reports.stability.touching import TOUCHING, LawOf, law_of
@@ -167,29 +169,45 @@ def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | M
     """The headers in a folder's journal, and what came of every task; of two lines on one the later holds.
 
     Raises:
-        ValueError: naming a line that is none of an atlas.
+        ValueError: naming a line that does not fit.
     """
     made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
         "limit": limit_from, "map": MapOf.from_record, "law": LawOf.from_record,
     }  # fmt: skip
     headers: list[dict[str, Any]] = []
     results: dict[Task, Limit | MapOf | LawOf] = {}
-    for number, line in enumerate(lines_of(folder), start=1):
-        try:
-            if "header" in line:
-                headers.append({"versions": line["header"]["versions"]} | line["header"])
-            elif "footer" not in line:
-                task = Task(**line["task"])
-                results[task] = made[task.kind](line[task.kind])
-        except (KeyError, TypeError, ValueError, AttributeError):
-            raise ValueError(f"{folder / JOURNAL}: line {number} is no line of an atlas") from None
+    for number, kind, line in checked_lines(folder, KINDS):
+        if kind == "header":
+            headers.append(line["header"])
+        elif kind == "task":
+            task = Task(**line["task"])
+            result = made[task.kind](line[task.kind])
+            files = headers[-1]["files"] if headers else {}
+            if fault := unknown_player(result, files) or wrong(result, files):
+                raise ValueError(no_use(folder, number, fault, KINDS.missed))
+            results[task] = result
+    if results and not headers:
+        raise ValueError(f"{folder / JOURNAL}: has no header; {KINDS.asked}")
     return headers, results
+
+
+def wrong(result: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
+    """As `impossible`, of a limit whose case is known: not of a file that is not what it was."""
+    path = "" if not isinstance(result, Limit) or result.case in CASES else result.case.rpartition(":")[0]
+    if not isinstance(result, Limit) or (path and digest_of(path) != files[path]):
+        return ""
+    return impossible(result, case_named(result.case))
 
 
 def limit_from(record: dict[str, Any]) -> Limit:
     """The limit of a line of the journal, where what is not finite is text."""
-    known = numbers(record)
-    return Limit(**known | {"trials": tuple(Trial(**trial) for trial in known["trials"])})
+    trials = tuple(Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"])
+    return Limit(**record | floats(record, "works_at", "fails_at", "spacing", "seconds") | {"trials": trials})
+
+
+def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
+    """These of a record as numbers: of the other fields a text may be "nan"."""
+    return {name: float(record[name]) for name in names}
 
 
 def done_before(folder: Path, plan: Plan) -> tuple[int, set[Task]]:
@@ -202,8 +220,7 @@ def done_before(folder: Path, plan: Plan) -> tuple[int, set[Task]]:
     well = {task for task, result in results.items() if result.status == "ok"}
     versions = about("", 0)["versions"]
     same = all(
-        header["versions"] == versions
-        and all(digest_of(path) == digest for path, digest in header.get("files", {}).items())
+        header["versions"] == versions and all(digest_of(path) == digest for path, digest in header["files"].items())
         for header in headers
     )
     return len(well), well & set(tasks_of(plan)) if same else set()

@@ -35,16 +35,31 @@ def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
             beside_file(path).write_bytes(packed(part_of(scenario.truth(scenario.times), shown, scenario), small=True))
 
 
-def kept_failure(limit: Limit, folder: Path) -> tuple[Trajectory, Trajectory | None] | None:
-    """What was saved: the failing run and the one beside it; None if nothing was, or it cannot be read."""
+def kept_failure(limit: Limit, folder: Path, scenario: Scenario) -> tuple[Trajectory, Trajectory | None] | None:
+    """What was saved: the failing run and the one beside it; None if nothing was, or it is not of the scenario."""
     path = file_of(limit, folder)
-    if not path.exists():
+    if not path.exists() or limit.failing is None:
         return None
     beside = beside_file(path)
     try:
-        return load_trajectory(path), load_trajectory(beside) if beside.exists() else None
+        found = load_trajectory(path), load_trajectory(beside) if beside.exists() else None
     except UNREADABLE:  # torn by a crash: what it was found from is not
         return None
+    most = len(near(limit.failing, scenario))
+    return found if all(one is None or of_scenario(one, scenario, most) for one in found) else None
+
+
+def of_scenario(one: Trajectory, scenario: Scenario, most: int) -> bool:
+    """Whether arrays that were read back are those of at most so many samples of the scenario."""
+    k, n, hits = len(np.atleast_1d(one.t)), scenario.scene.n, one.collisions
+    shapes = {"t": (k,), "position": (k, n, 2), "velocity": (k, n, 2), "angle": (k, n), "angular_velocity": (k, n)}
+    columns = [hits.t, hits.i, hits.j, hits.impulse]
+    return (
+        k <= most
+        and all(getattr(one, name).shape == shape for name, shape in shapes.items())
+        and all(column.shape == hits.t.shape == (hits.t.size,) and column.dtype.kind in "iuf" for column in columns)
+        and bool(((hits.i >= 0) & (hits.i < n) & (hits.j < n)).all())
+    )
 
 
 def file_of(limit: Limit, folder: Path) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -111,11 +112,14 @@ def section_of(case: Case, limits: list[Limit], folder: Path) -> Section:
 
 def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
     """The first failing run at the limit, from just before the failure; None if nothing was kept."""
-    failing, kept = limit.failing, kept_failure(limit, folder)
-    if failing is None or kept is None:
+    failing = limit.failing
+    if failing is None or not isfinite(failing.value):
+        return None
+    scenario = case.scene(failing.value, failing.first)
+    kept = kept_failure(limit, folder, scenario)
+    if kept is None or failing.disk >= scenario.scene.n:
         return None
     played, beside = kept
-    scenario = case.scene(failing.value, failing.first)
     shown = near(failing, scenario)
     layers: list[tuple[Run | None, Trajectory]] = [(named(limit), played)]
     if beside is not None and len(beside):

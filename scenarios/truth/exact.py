@@ -15,6 +15,7 @@ from scenarios.truth.oracle.bodies import Leg
 from scenarios.truth.oracle.events import trace
 from scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
 from scenarios.truth.oracle.path import Path
+from scenarios.truth.oracle.work import Clock, Work
 from scenarios.truth.record import TruthRecord, record_of
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be told apart
@@ -25,6 +26,7 @@ WORK = 40_000  # steps of the event loop for one attempt, some twenty seconds; f
 HEAVY = 4096  # bits that make a step twice as dear as one of few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, HIT_BY_HIT, NOTHING = "closed form", "hit by hit, in many digits", "nothing"
+COARSE = 0.45  # of the time that is left for both of two precisions: the finer one takes a little longer
 ACCURACY = 1e-12  # radii of the smallest disk, and s; two precisions that differ by more have parted
 
 
@@ -50,15 +52,17 @@ class OracleTruth:
             raise NoTruth(record.reason)
         return record.sampled(one.scene, one.thrusts, t)
 
-    def record(self) -> TruthRecord:
-        """The record: from the cache, or computed and put there. Raises `NoTruth`."""
+    def record(self, clock: Clock | None = None) -> TruthRecord:
+        """The record: from the cache, or computed and put there, unless a `clock` cut it off. Raises `NoTruth`."""
         if self.known is not None:
             return self.known
         key = key_of(self.scenario, has_balls())
         found = look_up(key)
         if found is None:
-            found = vars(computed(self.scenario))
-            keep(key, found)
+            clock = clock or Clock()
+            found = vars(computed(self.scenario, None, clock))
+            if not clock.struck:
+                keep(key, found)
         return TruthRecord(**found)
 
 
@@ -79,10 +83,13 @@ def with_oracle(scenario: Scenario) -> Scenario:
     return replace(scenario, truth=oracle_truth(scenario), without_truth="")
 
 
-def computed(scenario: Scenario, kind: Callable[[int], Numbers] | None = None) -> TruthRecord:
+def computed(
+    scenario: Scenario, kind: Callable[[int], Numbers] | None = None, clock: Clock | None = None
+) -> TruthRecord:
     """The record of a scenario: proven by balls where they are installed and can, else the same at two precisions.
 
     kind: numbers to compute it in, at two precisions, whatever is installed.
+    clock: when it is over, the record is that of what was found until then.
 
     Raises:
         NoTruth: the scene has more than the oracle can do, or bodies overlap at the start.
@@ -95,24 +102,30 @@ def computed(scenario: Scenario, kind: Callable[[int], Numbers] | None = None) -
     if any(push.frame == "body" and push.force.any() for push in thrusts):
         raise NoTruth("a push that turns with its disk makes paths whose contacts no polynomial gives")
     pushes = [push for push in thrusts if push.force.any()]
-    record = certified(scenario, pushes) if kind is None and has_balls() else None
-    return record or two_precisions(scenario, pushes, kind or digits)
+    clock = clock or Clock()
+    record = certified(scenario, pushes, clock) if kind is None and has_balls() else None
+    return record or two_precisions(scenario, pushes, kind or digits, clock)
 
 
-def certified(scenario: Scenario, pushes: Sequence[Thrust]) -> TruthRecord | None:
+def certified(scenario: Scenario, pushes: Sequence[Thrust], clock: Clock) -> TruthRecord | None:
     """The record by interval arithmetic, which proves every comparison; None where no precision decides one.
 
-    How far the first bits reach tells how many are needed for all: a motion loses them at a steady rate.
+    How far the first bits reach tells how many are needed for all: a motion loses them at a steady rate. When the
+    `clock` is over it is that of the attempt which got farthest.
     """
     bits, before, until, accuracy = FEWEST_BITS, 0.0, scenario.duration, accuracy_of(scenario)
+    attempts: list[tuple[Path, int]] = []
     while bits <= MOST_BITS:
         try:
-            path = trace(scenario.scene, pushes, until, balls(bits), steps(bits))
+            path = trace(scenario.scene, pushes, until, balls(bits), Work(steps(bits), clock))
             error, reached = spread(path, until), until
-            if error < accuracy:
+            if error < accuracy and not clock.struck:
                 return record_of(scenario, path, error, bits, "certified")
         except Undecided as doubt:
-            reached = doubt.t
+            path, reached = replace(doubt.path, end=doubt.t), doubt.t
+        attempts.append((path, bits))
+        if clock.struck:
+            return farthest(scenario, attempts, clock)
         # Bits help against chaos, not where two things are equal.
         if reached <= before * LEAST_GAIN and before < until:
             return None
@@ -126,35 +139,71 @@ def steps(bits: int) -> int:
     return int(WORK / (1 + bits / HEAVY))
 
 
+def farthest(scenario: Scenario, attempts: Sequence[tuple[Path, int]], clock: Clock) -> TruthRecord:
+    """The record of the attempt that got farthest, as far as it is exact; each is a path and the bits it is in."""
+    found = [(exact_until(path, scenario.duration, accuracy_of(scenario)), path, bits) for path, bits in attempts]
+    (end, error), path, bits = max(found, key=lambda one: one[0][0])
+    if end < path.end or not path.reason:
+        path = replace(path, end=end, reason=f"{clock.reason} at t = {end:.9g} s", disks=[], outcomes=[], named=[])
+    return record_of(scenario, path, error, bits, "certified")
+
+
+def exact_until(path: Path, until: float, accuracy: float) -> tuple[float, float]:
+    """Up to when the spread of a path is less than `accuracy` m, to the last place of float64, and the spread then."""
+    table, end = widths(path), min(path.end, until)
+    if (most := widest(table, end)) < accuracy:
+        return end, most
+    held, lost = 0.0, end
+    for _ in range(64):  # halvings
+        middle = (held + lost) / 2
+        held, lost = (middle, lost) if widest(table, middle) < accuracy else (held, middle)
+    return held, widest(table, held)
+
+
 def spread(path: Path, until: float) -> float:
     """m, how far the right motion may be from the middle of the balls, at worst."""
-    widths = [
-        [leg.x.rad(), leg.y.rad(), leg.vx.rad(), leg.vy.rad(), leg.t.rad(), abs(leg.vx), abs(leg.vy), leg.t]
-        + [x.rad() for x in leg.hop or ()]
-        for legs in path.legs for leg in legs
-    ]  # fmt: skip
-    most = 0.0
-    for x, y, u, v, late, vx, vy, t, *hop in ([float(each) for each in row] for row in widths):
-        left = max(min(path.end, until) - t, 0.0)
-        most = max(most, max(x, y) + late * max(vx, vy) + (max(u, v) + sum(hop)) * left)
-    return most
+    return widest(widths(path), min(path.end, until))
 
 
-def two_precisions(scenario: Scenario, pushes: Sequence[Thrust], kind: Callable[[int], Numbers]) -> TruthRecord:
-    """The record in numbers of one kind, up to where twice as many bits say the same."""
+def widths(path: Path) -> Array:
+    """(l, 3) of every leg: when it begins, s, how wide its balls are then, m, and by how much they widen, m/s."""
+    rows = []
+    for leg in (leg for legs in path.legs for leg in legs):
+        x, y, u, v, late = (float(ball.rad()) for ball in (leg.x, leg.y, leg.vx, leg.vy, leg.t))
+        speed = max(float(abs(leg.vx)), float(abs(leg.vy)))
+        rows.append((float(leg.t), max(x, y) + late * speed, max(u, v) + sum(float(x.rad()) for x in leg.hop or ())))
+    return np.array(rows)
+
+
+def widest(table: Array, until: float) -> float:
+    """m, the widest that the legs of a table of `widths` get up to `until` s."""
+    begun = table[table[:, 0] <= until]
+    return float((begun[:, 1] + begun[:, 2] * (until - begun[:, 0])).max())
+
+
+def two_precisions(
+    scenario: Scenario, pushes: Sequence[Thrust], kind: Callable[[int], Numbers], clock: Clock
+) -> TruthRecord:
+    """The record in numbers of one kind, up to where twice as many bits say the same, or the `clock` is over."""
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
+    attempts: list[tuple[Path, float, int]] = []
     while True:
-        coarse, fine = (trace(scene, pushes, until, kind(each), steps(each)) for each in (bits, 2 * bits))
+        coarse = trace(scene, pushes, until, kind(bits), Work(steps(bits), clock, COARSE))
+        fine = trace(scene, pushes, until, kind(2 * bits), Work(steps(2 * bits), clock))
         parted, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
-        if parted >= end or 2 * bits >= MOST_BITS:
+        if clock.struck and coarse.end < fine.end:
+            fine = replace(fine, end=end, reason=coarse.reason, disks=[], outcomes=[], named=[])
+        if parted < end:
+            reason = f"the digits of {2 * bits} bits are used up at t = {parted:.9g} s"
+            fine = replace(fine, end=parted, reason=reason, disks=[], outcomes=[])
+        attempts.append((fine, error, 2 * bits))
+        if parted >= end or 2 * bits >= MOST_BITS or clock.struck:
             break
         needed = ceil(SPARE * bits * until / max(parted, until * bits / MOST_BITS))
         bits = min(max(2 * bits, needed), MOST_BITS // 2)
-    if parted < end:
-        reason = f"the digits of {2 * bits} bits are used up at t = {parted:.9g} s"
-        fine = replace(fine, end=parted, reason=reason, disks=[], outcomes=[])
-    return record_of(scenario, fine, error, 2 * bits, "two-precision")
+    best = max(attempts, key=lambda attempt: min(attempt[0].end, until)) if clock.struck else attempts[-1]
+    return record_of(scenario, *best, "two-precision")
 
 
 def _out_of_scale(scenario: Scenario) -> str:

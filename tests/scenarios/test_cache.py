@@ -32,7 +32,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
     real = oracle.computed
 
-    def computed(one: Scenario) -> TruthRecord:
+    def computed(one: Scenario, *_: object) -> TruthRecord:
         names.append(one.name)
         return real(one)
 

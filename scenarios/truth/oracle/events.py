@@ -19,16 +19,16 @@ from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 from scenarios.truth.oracle.path import Ends, Event, Path, Recent, Record, ambiguous
 from scenarios.truth.oracle.resting import lie_down, next_in_line, press, settle
 from scenarios.truth.oracle.ties import Blow, Contact, Outcome, Touch
+from scenarios.truth.oracle.work import Work
 
 MOST_IDLE = 100  # contacts on end without a hit: their signs contradict each other
-MOST_STEPS = 60_000  # hits, edges crossed, records made anew, orders of simultaneous hits tried
 
 
 class Motion:
-    """A scene on its way to `until` s, in the numbers `k` and `left` steps; arithmetic only within `k.precise()`."""
+    """A scene on its way to `until` s, in the numbers `k`, for so much `work`; arithmetic only within `k.precise()`."""
 
-    def __init__(self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, left: int) -> None:
-        self.k, self.until, self.scene, self.left = k, until, scene, left
+    def __init__(self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work) -> None:
+        self.k, self.until, self.scene, self.work = k, until, scene, work
         self.bodies = Bodies(scene, k)
         self.ahead = Ahead(self.bodies)
         self.records: list[Record | None] = [None] * scene.n
@@ -46,15 +46,13 @@ class Motion:
         try:
             self.begin()
             while self.advance():
-                self.left -= 1
-                if self.left < 0:
-                    raise Ends(float(self.now), f"the work allowed for an answer in {self.k.bits} bits is used up")
+                self.work.step(float(self.now), self.k.bits)
         except Ends as end:
             self.path.end, self.path.reason = end.t, str(end)
             self.path.disks, self.path.outcomes = end.disks, end.outcomes
             self.path.named = [[self.bodies.pair(blow.contact) for blow in one.blows] for one in end.outcomes]
         except Undecided:
-            raise Undecided(float(self.now)) from None
+            raise Undecided(float(self.now), self.path) from None
         return self.path
 
     def begin(self) -> None:
@@ -190,7 +188,7 @@ class Motion:
         else:
             resting = frozenset(c for held in bodies.held for c in held)
             ends, tried = bodies.matter.outcomes(touches, v, resting, bodies.upright)
-            self.left -= tried
+            self.work.left -= tried
             if len(ends) != 1 or not ends[0].velocities:
                 names = ", ".join(str(i) for i in disks if i < self.scene.n)
                 raise Ends(now, ambiguous(names, ends), disks, [end for end in ends if end.velocities])
@@ -293,7 +291,7 @@ class Motion:
                 self.predict(i)
 
 
-def trace(scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, most: int = MOST_STEPS) -> Path:
-    """The motion of `scene` under `thrusts` up to `until` s, in `most` steps at most. Raises what `Bodies` raises."""
+def trace(scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work | None = None) -> Path:
+    """The motion of `scene` under `thrusts` up to `until` s, as far as `work` goes. Raises what `Bodies` raises."""
     with k.precise():
-        return Motion(scene, thrusts, until, k, most).run()
+        return Motion(scene, thrusts, until, k, work or Work()).run()

@@ -20,11 +20,11 @@ Number = Any
 
 
 class Undecided(ArithmeticError):
-    """A ball holds zero, so its sign is not proven; at `t` s of a motion."""
+    """A ball holds zero, so its sign is not proven; at `t` s of a motion, of which `path` is what was found."""
 
-    def __init__(self, t: float = 0.0) -> None:
+    def __init__(self, t: float = 0.0, path: Any = None) -> None:
         super().__init__(t)
-        self.t = t
+        self.t, self.path = t, path
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from websockets.sync.client import connect
 
 from adapters.engines import ENGINES
 from reports.commands.serve import application
-from reports.game import command
 from reports.game.command import PATIENCE, own_rows
 from reports.game.server import Game
+from reports.page import server
 from tests.reports.game.test_page import fly
 from tests.reports.page.browsing import opened, served
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
@@ -124,7 +124,7 @@ def test_a_file_that_cannot_fly_is_told_before_anything_is_served(
 ):
     """One line that names the file, exit 2."""
     (tmp_path / "Exercise.js").write_text(text)
-    monkeypatch.setattr(command, "serve", lambda *_: pytest.fail("it was served"))
+    monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
     done = crosscheck("play", "--engine", "Exercise.js", "--engine", "reference", cwd=tmp_path)
 
     assert done.returncode == 2
@@ -136,7 +136,7 @@ def test_a_file_that_cannot_fly_is_told_before_anything_is_served(
 
 def test_every_file_that_cannot_fly_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A line each; the good one is not named, and none of them is left among the engines."""
-    monkeypatch.setattr(command, "serve", lambda *_: pytest.fail("it was served"))
+    monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
     shutil.copy(SOLVER, tmp_path / "good.js")
     (tmp_path / "a.js").write_text("(")
     (tmp_path / "b.js").write_text("var nothing = 0;")
@@ -218,7 +218,7 @@ def test_any_name_of_a_folder_will_do(browser: Browser, tmp_path: Path, monkeypa
 )
 def test_what_is_asked_wrongly_is_told(words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """One line, exit 2, before anything is served: not a page that cannot begin."""
-    monkeypatch.setattr(command, "serve", lambda *_: pytest.fail("it was served"))
+    monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
     solver(tmp_path)
     for k in range(17):
         shutil.copy(SOLVER, tmp_path / f"{k}.js")

@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Page
 from adapters.engines import ENGINES
 from adapters.play import Run, play
 from reports.compare.comparison import Comparison, compare
+from reports.lessons.catalogue import LESSONS
 from reports.page.charts import CHARTS
 from reports.page.page import write_page
 from scenarios.catalogue import scenario
@@ -59,7 +60,7 @@ def path(comparisons: list[Comparison], tmp_path_factory: pytest.TempPathFactory
     write_page(
         path, comparisons, untrusted=set(),
         findings=["One.", HOSTILE, "Three."], conformance=conformance,
-        known_answers=pd.DataFrame([known]), about=about,
+        known_answers=pd.DataFrame([known]), about=about, lessons=LESSONS,
     )  # fmt: skip
     return path
 
@@ -257,7 +258,14 @@ def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:
     about = {"command": "crosscheck run nothing", "seed": 1, "machine": {}, "versions": {}, "started": "", "seconds": 0}
     nothing = pd.DataFrame()
     write_page(
-        tmp_path / "r.html", [], findings=[], untrusted=set(), conformance=nothing, known_answers=nothing, about=about
+        tmp_path / "r.html",
+        [],
+        findings=[],
+        untrusted=set(),
+        conformance=nothing,
+        known_answers=nothing,
+        about=about,
+        lessons=LESSONS,
     )
 
     assert "crosscheck run nothing" in (tmp_path / "r.html").read_text()

@@ -12,6 +12,7 @@ import pytest
 
 from adapters.engines import ENGINES
 from reports.commands.diff import show_difference
+from reports.lessons.catalogue import LESSONS
 from reports.page.report import make_report
 from reports.run import suite
 from reports.run.archive import digest
@@ -32,7 +33,7 @@ def run(folder: Path, workers: int) -> Path:
     folder.mkdir()
     with Journal(folder) as journal, Progress() as progress:
         carry_out(PLAN, Means(workers), journal, progress)
-        make_report(folder, progress.say)
+        make_report(folder, progress.say, LESSONS)
     return folder
 
 

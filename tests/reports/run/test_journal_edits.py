@@ -12,7 +12,8 @@ import pytest
 
 from reports.run.archive import Archive
 from reports.run.journal import JOURNAL
-from reports.run.journal_lines import KINDS, kind_of
+from reports.run.journal_lines import kind_of
+from reports.run.run_lines import KINDS
 from tests.reports.run.small_runs import make
 from tests.reports.terminal.command_line import Done, crosscheck
 
@@ -61,8 +62,8 @@ def edited(line: dict[str, Any], at: tuple, value: Any) -> dict[str, Any]:
 def edits(folder: Path) -> Iterator[tuple[int, dict[str, Any], str]]:
     """(Number of a line, the line edited, what was done), for every field of every kind of line, to all of `WRONG`."""
     lines = [json.loads(line) for line in (folder / JOURNAL).read_text().splitlines()]
-    first = {kind_of(line): number for number, line in reversed([*enumerate(lines)])}
-    assert set(first) == set(KINDS)
+    first = {kind_of(line, KINDS.models): number for number, line in reversed([*enumerate(lines)])}
+    assert set(first) == set(KINDS.models)
     for kind, number in first.items():
         for at in places(lines[number]):
             for what, value in WRONG.items():
@@ -109,7 +110,7 @@ def test_every_edit_of_every_field_is_taken_or_refused(made: Path):
     refused = taken = 0
     for _, line, _ in edits(made):
         try:
-            kind_of(line)
+            kind_of(line, KINDS.models)
             taken += 1
         except ValueError:
             refused += 1

@@ -65,7 +65,7 @@ def test_every_good_cell_is_kept(ended):
     [
         ("raises", "error", "RuntimeError: no such luck"),
         ("aborts", "crashed", "SIGABRT in misbehave, line "),
-        ("aborts", "crashed", 'of tests/reports/run/control_engines.py; it had printed "assertion failed: mass > 0"'),
+        ("aborts", "crashed", 'of run/control_engines.py; it had printed "assertion failed: mass > 0"'),
         ("segfaults", "crashed", "SIGSEGV in string_at, line "),
         ("hangs", "timeout", "stopped after 3 s in misbehave, line "),
         ("devours", "error", "MemoryError: took more than 500 MB (--memory)"),

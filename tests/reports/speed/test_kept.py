@@ -23,27 +23,39 @@ from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 
+TASK = ("error", "scene", "slow_hit", 0, "reference:exercise", "", 1)
+FAILED = {
+    "scenario": "slow_hit", "seed": 0, "engine": "reference", "profile": "exercise", "dt_s": scenario("slow_hit").dt(1),
+    "substeps": 1, "status": "error", "reason": "no", "until_s": 0.5, "duration_s": scenario("slow_hit").duration,
+    "error_radii": np.inf, "change_radii": np.nan,
+}  # fmt: skip
+SCENES = {"slow_hit": scenario("slow_hit")}
+HEADER: dict[str, Any] = {
+    "scenes": ["slow_hit"], "files": {}, "engines": ["reference:exercise"], "effort": {}, "whole": False, "seed": 0,
+    "versions": {}, "machine": {"system": "", "architecture": "", "processor": "", "cores": 1},
+}  # fmt: skip
+
 
 def test_what_has_ended_is_not_measured_again(tmp_path: Path):
     """A journal of the same plan gives back every number, infinities too; one of another plan is not lost to it."""
-    rows = [{"error_radii": np.inf, "change_radii": np.nan, "reason": "no"}]
+    rows = [FAILED]
     with Journal(tmp_path) as journal:
-        Kept(journal, {"seed": 0}, resume=False).add(("error", "scene", 1), rows)
+        Kept(journal, HEADER, resume=False, scenarios=SCENES).add(TASK, rows)
     with Journal(tmp_path) as journal:
-        again = Kept(journal, {"seed": 0}, resume=True)
+        again = Kept(journal, HEADER, resume=True, scenarios=SCENES)
         with Progress() as progress:
-            found = dict(done({("error", "scene", 1): fails}, 1, progress, "error", kept=again))
+            found = dict(done({TASK: fails}, 1, progress, "error", kept=again))
 
         assert len(again) == 1
-        assert found["error", "scene", 1][0]["error_radii"] == np.inf
-        assert np.isnan(found["error", "scene", 1][0]["change_radii"])
+        assert found[TASK][0]["error_radii"] == np.inf
+        assert np.isnan(found[TASK][0]["change_radii"])
     with Journal(tmp_path) as journal:
         with pytest.raises(FolderTaken, match="holds 1 results of an interrupted run of something else"):
-            Kept(journal, {"seed": 1}, resume=True)
+            Kept(journal, HEADER | {"seed": 1}, resume=True, scenarios=SCENES)
         with pytest.raises(FolderTaken, match="ask again with --resume"):
-            Kept(journal, {"seed": 0}, resume=False)
+            Kept(journal, HEADER, resume=False, scenarios=SCENES)
     with Journal(tmp_path) as journal:  # nothing was lost by asking
-        assert len(Kept(journal, {"seed": 0}, resume=True)) == 1
+        assert len(Kept(journal, HEADER, resume=True, scenarios=SCENES)) == 1
 
 
 def test_what_was_measured_of_a_solver_that_was_saved_since_is_of_something_else(tmp_path: Path):
@@ -51,10 +63,10 @@ def test_what_was_measured_of_a_solver_that_was_saved_since_is_of_something_else
     solver = tmp_path / "solver.js"
     solver.write_text("function integrate(sphere, dt) {}")
     plan = Plan(("slow_hit",), [f"{solver}:own"], QUICK, 0, 1, whole=False)
-    header: dict[str, Any] = {"seed": 0, "versions": {}, "machine": ""}
+    header: dict[str, Any] = {key: HEADER[key] for key in ("seed", "versions", "machine")}
     read_row(f"{solver}:own")
     with Journal(tmp_path) as journal:
-        kept_of(plan, header, journal, resume=False).add(("error", "scene", 1), [{"reason": "no"}])
+        kept_of(plan, header, journal, resume=False).add(TASK, [FAILED])
     with Journal(tmp_path) as journal:
         assert len(kept_of(plan, header, journal, resume=True)) == 1
         solver.write_text("function integrate(sphere, dt) { }")

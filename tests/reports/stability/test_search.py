@@ -254,7 +254,7 @@ def test_of_a_failing_run_only_what_is_shown_is_kept_and_it_shows_the_same(tmp_p
     search = Search(CASES["fast_gas"], "reference:exercise", QUICK, seen={0.3: (scenario, run)})
     (tmp_path / "trajectories").mkdir()
     keep_failure(search, found, tmp_path)
-    kept = kept_failure(found, tmp_path)
+    kept = kept_failure(found, tmp_path, scenario)
 
     assert kept is not None
     assert kept[1] is None

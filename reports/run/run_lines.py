@@ -1,0 +1,158 @@
+"""The schema of a run's journal: what every kind of line holds."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from adapters.play import STATUSES
+from reports.run.journal_lines import (
+    Count,
+    Digest,
+    Engine,
+    File,
+    Kinds,
+    Line,
+    Machine,
+    Name,
+    Number,
+    Player,
+    Profile,
+    Said,
+    Seconds,
+    Seed,
+    Setting,
+    Step,
+    Words,
+)
+
+MOST_ROUNDS = 10_000  # of timings: each takes as long as all middle steps of a run
+
+
+class Header(Line):
+    """What was asked for, and by what it was played."""
+
+    command: Words
+    seed: Seed
+    started: Words
+    versions: dict[Words, Words]
+    machine: Machine
+    scenes: list[File]
+    engines: list[Player]
+    dts: list[Step]
+    full: bool
+    timings: Annotated[int, Field(ge=0, le=MOST_ROUNDS)]
+    folder: File
+    names: dict[File, Name]
+    tasks: Count
+
+
+class CellLine(Line):
+    """How a cell ended."""
+
+    cell: Digest
+    scene_hash: Digest
+    scene: File
+    seed: Seed
+    substeps: Annotated[int, Field(ge=1, le=2**53)]
+    scenario: Name
+    engine: Engine
+    profile: Profile
+    dt_s: Step
+    status: Literal[STATUSES]  # type: ignore[valid-type]
+    reason: Words
+    step: Annotated[int, Field(ge=-1, le=2**53)]
+    until_s: Number
+    seconds: Number
+    timeout_s: Annotated[float, Field(ge=0, le=1e6)]
+    outside: bool
+    file: Literal[""] | Digest
+    settings: dict[Words, Annotated[list[Setting], Field(min_length=2, max_length=2)]]
+    versions: dict[Words, Words]
+
+
+class Probed(Line):
+    """What one probe found, as `Finding`."""
+
+    engine: Engine
+    profile: Profile
+    probe: Words
+    asked: Words
+    got: Said
+    expected: Said
+    bound: Number
+    verdict: Literal["keeps", "departs", "breaks"]
+    note: Words
+
+
+class ConformanceLine(Line):
+    """What the probes found in an engine."""
+
+    conformance: list[Probed]
+    of: Player
+    key: Literal[""] | Digest
+
+    @model_validator(mode="after")
+    def of_one(self) -> ConformanceLine:
+        """All are of the engine that the line is of."""
+        if any(f"{one.engine}:{one.profile}" != self.of for one in self.conformance):
+            raise ValueError("conformance: must be of one engine, which `of` names")
+        return self
+
+
+class Known(Line):
+    """A published number and ours."""
+
+    column: Words
+    dt_s: Step
+    published_J2: Number
+    made_by: Words
+    source: Words
+    ours_J2: Number
+
+
+class KnownAnswerLine(Line):
+    """A known answer that was made again."""
+
+    known_answer: Known
+    of: Words
+    key: Literal[""] | Digest
+
+
+class TimingLine(Line):
+    """A timing of a cell."""
+
+    timing: Digest
+    round: Count
+    seconds: Seconds
+
+
+class Footer(Line):
+    """How much was done."""
+
+    tasks: Count
+    played: Count
+    seconds: Seconds
+
+
+class HeaderLine(Line):
+    """The first line."""
+
+    header: Header
+
+
+class FooterLine(Line):
+    """The last line."""
+
+    footer: Footer
+
+
+KINDS = Kinds(
+    {
+        "header": HeaderLine, "cell": CellLine, "conformance": ConformanceLine, "known_answer": KnownAnswerLine,
+        "timing": TimingLine, "footer": FooterLine,
+    },
+    "delete that line, and run --resume plays what it was of",
+    "without it nobody knows what was asked for: play it again into another --out",
+)  # fmt: skip

@@ -1,0 +1,263 @@
+"""The schema of the journal of `crosscheck speed`: what a line holds, and what of it must be as scene and task say."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, ValidationError, model_validator
+
+from adapters.play import STATUSES
+from reports.run.journal_lines import (
+    Count,
+    File,
+    Kinds,
+    Line,
+    Machine,
+    Number,
+    Player,
+    Seconds,
+    Seed,
+    Step,
+    Words,
+    number,
+    sentence,
+)  # fmt: skip
+from reports.speed.timing import WARM_UP
+from scenarios.model import Scenario
+
+
+def length(value: Any) -> Any:
+    """A number that is not negative, or not known; raises `ValueError`."""
+    if isinstance(number(value), str | int | float) and value != "-inf" and (isinstance(value, str) or value >= 0):
+        return value
+    raise ValueError("must be a number that is not negative")
+
+
+Length = Annotated[Any, AfterValidator(length)]
+Cost = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]  # s: no task may take as long
+Substeps = Annotated[int, Field(ge=1, le=10**7)]
+
+
+class Header(Line):
+    """The measurement that was asked for; only the very same is gone on with."""
+
+    scenes: list[File]
+    files: dict[File, Words]
+    engines: list[Player]
+    effort: dict[Words, Any]
+    whole: bool
+    seed: Seed
+    versions: dict[Words, Words]
+    machine: Machine
+
+
+class HeaderLine(Line):
+    """The first line."""
+
+    header: Header
+
+
+class Row(Line):
+    """What the rows of all tables have."""
+
+    scenario: Words
+    engine: Words
+    profile: Words
+
+    @property
+    def name(self) -> str:
+        """Of the player."""
+        return f"{self.engine}:{self.profile}"
+
+
+class ErrorRow(Row):
+    """As of `ladder.errors_of`."""
+
+    seed: Seed
+    dt_s: Step
+    substeps: Substeps
+    status: Literal[STATUSES]  # type: ignore[valid-type]
+    reason: Words
+    until_s: Seconds
+    duration_s: Seconds
+    error_radii: Length
+    change_radii: Length
+
+
+class BudgetRow(Row):
+    """As of `budget.budget_of`, which leaves out what it does not know."""
+
+    seed: Seed
+    dt_s: Step
+    until_s: Seconds
+    horizon_s: Seconds
+    duration_s: Seconds
+    part: Words
+    note: Words
+    position_radii: Length = 0.0
+    energy: Length = 0.0
+    share: Number = 0.0
+    off_engine_radii: Length = 0.0
+    off_reference_radii: Length = 0.0
+    off_apart_radii: Length = 0.0
+    closed_apart_radii: Length = 0.0
+
+
+class SampleRow(Row):
+    """As of `measure.sample_row`."""
+
+    kind: Words
+    change: Words
+    dt_s: Length
+    n: Count
+    copy_of: Literal[0, 1]
+    singly: bool
+    round: Annotated[int, Field(ge=WARM_UP, le=10**6)]
+    place: Count
+    cost: Cost
+    wrapping: Cost
+    runs: Annotated[int, Field(ge=1, le=10**6)]
+
+
+class Errors(Line):
+    """What a ladder gave."""
+
+    result: Annotated[list[ErrorRow], Field(min_length=1)]
+
+
+class Budget(Line):
+    """What the parts of an error are."""
+
+    result: Annotated[list[BudgetRow], Field(min_length=1)]
+
+
+class Samples(Line):
+    """What was timed together: of each thing every round from the warm-up on."""
+
+    result: list[SampleRow]
+
+    @model_validator(mode="after")
+    def whole(self) -> Samples:
+        """No round is missing, and none is there twice."""
+        rounds = defaultdict[tuple, list[int]](list)
+        for row in self.result:
+            what = (row.kind, row.scenario, row.name, row.change, str(row.dt_s), row.n, row.copy_of, row.singly)
+            rounds[what].append(row.round)
+        for what, those in rounds.items():
+            if sorted(those) != list(range(WARM_UP, WARM_UP + len(those))):
+                raise ValueError(f"result: must have each round of {what[2]} once, from {WARM_UP} on")
+        if any((*what[:-1], not what[-1]) not in rounds for what in rounds if what[0] == "idle"):
+            raise ValueError("result: must have each engine singly and not")
+        if any((*what[:-2], 0, what[-1]) not in rounds for what in rounds):
+            raise ValueError("result: must have a copy_of 0 of each engine")
+        return self
+
+
+class SizesOf(Line):
+    """What steps cost by the number of disks, and who was not measured with so many."""
+
+    samples: list[SampleRow]
+    stopped: list[Annotated[list[Any], Field(min_length=3, max_length=3)]]
+
+    @model_validator(mode="after")
+    def known(self) -> SizesOf:
+        """As of `Samples`; and each that stopped is a player, a number of disks and why."""
+        Samples(result=self.samples)
+        for name, n, why in self.stopped:
+            if not (isinstance(name, str) and name.count(":") == 1 and type(n) is int and isinstance(why, str)):
+                raise ValueError("result.stopped: must be of [ENGINE:PROFILE, number of disks, why]")
+        return self
+
+
+class Sizes(Line):
+    """The same, as a result."""
+
+    result: SizesOf
+
+
+class Closed(Line):
+    """As of `models.closed_form`."""
+
+    scenario: Words
+    truth: Words
+    closed_us: Length
+
+
+class Truth(Line):
+    """The same, as a result."""
+
+    result: Closed
+
+
+RESULTS: dict[tuple[str, ...], type[Line]] = {
+    ("error", "scene"): Errors, ("error", "feature"): Errors, ("error", "dial"): Errors, ("budget",): Budget,
+    ("time", "scene"): Samples, ("time", "feature"): Samples, ("time", "dial"): Samples, ("time", "idle"): Samples,
+    ("time", "size"): Sizes, ("time", "truth"): Truth,
+}  # fmt: skip
+"""How a task begins -> what it gives."""
+PARTS = {Errors: (7, 64), Budget: (3, 3), Samples: (2, 3), Sizes: (2, 2), Truth: (3, 3)}  # of its task, from and to
+
+
+class TaskLine(Line):
+    """What a task gave."""
+
+    task: Annotated[list[Words | Count], Field(min_length=2, max_length=64)]
+    result: Any
+
+    @model_validator(mode="after")
+    def of_its_task(self) -> TaskLine:
+        """The result is of that kind, and its rows are of what the task names."""
+        task = self.task
+        begins = tuple(map(str, task[:2]))
+        model = RESULTS.get(begins, RESULTS.get(begins[:1]))
+        if model is None:
+            raise ValueError(f"task = {str(task)[:60]}: must begin as one of {', '.join(map(' '.join, RESULTS))}")
+        low, high = PARTS[model]
+        if not low <= len(task) <= high or (model is Samples and (len(task) == 2) != (begins[1] == "idle")):
+            raise ValueError(f"task = {str(task)[:60]}: must have as many parts as one of its kind")
+        try:
+            found: Any = model.model_validate({"result": self.result})
+        except ValidationError as error:
+            raise ValueError(sentence(error.errors(include_url=False)[0])) from None
+        if begins[0] == "error":
+            here = [(row.seed, row.name, row.substeps) for row in found.result]
+            if here != [(task[3], task[4], rung) for rung in task[6:]]:
+                raise ValueError("result: must have a row for each step that the task names, of its seed and player")
+        if begins[0] == "budget" and any(row.name != task[2] for row in found.result):
+            raise ValueError("result: must be of the player that the task names")
+        if model is Samples and any(row.kind != begins[1] for row in found.result):
+            raise ValueError("result: must be of the kind that the task names")
+        return self
+
+
+KINDS = Kinds(
+    {"header": HeaderLine, "task": TaskLine},
+    "delete that line, and --resume measures again what it was of",
+    "without it nobody knows what was asked for: delete the folder, or name another --out",
+)
+
+
+def scene_of(task: list) -> str:
+    """The scene that a task is of; "" if it is of none."""
+    if task[0] == "budget":
+        return str(task[1])
+    return str(task[2]) if len(task) > 2 else ""
+
+
+def stranger(line: Mapping[str, Any], scenario: Scenario) -> str:
+    """Why a result is none of that scenario, as the end of a sentence; "" if it is."""
+    rows = line["result"] if isinstance(line["result"], list) else [line["result"]]
+    for k, row in enumerate(rows):
+        if row["scenario"] != scenario.name:
+            return f"result[{k}].scenario = {row['scenario']!r}: must be {scenario.name!r}"
+        if "dt_s" in row:
+            substeps = row.get("substeps") or round(scenario.sample_interval / row["dt_s"])
+            if row["dt_s"] != scenario.dt(max(substeps, 1)):
+                return f"result[{k}].dt_s = {row['dt_s']!r}: must divide the scene's sample interval as the task does"
+        if row.get("duration_s", scenario.duration) != scenario.duration:
+            return f"result[{k}].duration_s = {row['duration_s']!r}: must be {scenario.duration!r}"
+        if row.get("until_s", 0.0) > scenario.duration * (1 + 1e-9):  # a rounding of samples times interval
+            return f"result[{k}].until_s = {row['until_s']!r}: must be at most {scenario.duration!r}"
+    return ""

@@ -1,0 +1,170 @@
+"""`crosscheck truth --timeout`: an answer that takes longer is given up to where it got, exact so far, and not kept."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from reports.run.answers import record_of
+from scenarios.catalogue import scenario
+from scenarios.families.placing import box, lay_out
+from scenarios.model import Scenario
+from scenarios.no_truth import NoTruth
+from scenarios.truth import cache as truth_cache
+from scenarios.truth import exact as oracle
+from scenarios.truth.exact import computed, with_oracle
+from scenarios.truth.oracle import work as oracle_work
+from scenarios.truth.oracle.events import trace
+from scenarios.truth.oracle.numbers import Undecided, balls, digits, has_balls
+from scenarios.truth.oracle.work import Clock
+from scenarios.truth.record import TruthRecord
+from tests.reports.terminal.command_line import crosscheck
+
+REASON, CUT = "the limit of 5 s was reached", 20.0
+KINDS = [None, digits] if has_balls() else [digits]
+LONG = """\
+name = "long"
+duration = 1000000
+sample_interval = 1
+substeps = [1]
+restitution = 1.0
+gravity = [0.0, 0.0]
+[box]
+low = [-0.5, -0.5]
+high = [0.5, 0.5]
+[[disk]]
+position = [0, 0]
+velocity = [-2.1938145353255925, 2.084602421623396]
+radius = 0.3
+mass = 1.0
+"""
+
+
+def boxed(speed: float = 1.1) -> Scenario:
+    """Two disks that cross a box for some hundred hits."""
+    scene = lay_out(
+        position=[[0.3, 0.4], [0.7, 0.6]], velocity=[[speed, 0.7], [-0.4, 0.9]], radius=[0.05, 0.05], mass=[1.0, 1.0],
+        walls=box([0.0, 0.0], [1.0, 1.0]), restitution=1.0,
+    )  # fmt: skip
+    return with_oracle(Scenario("boxed", "?", "", scene, 12.0, 0.05))
+
+
+@pytest.fixture
+def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that is looked at gets on by a second, so that the same step is the last on every machine."""
+    ticks = count()
+    monkeypatch.setattr(oracle_work, "monotonic", lambda: float(next(ticks)))
+
+
+def begins_as(short: TruthRecord, whole: TruthRecord) -> bool:
+    """Whether all that the shorter record has is in the longer one, to the bit."""
+    until = short.valid_until
+    here, there = (record.legs[record.legs[:, 1] <= until] for record in (short, whole))
+    events, others = (record.events[record.events[:, 0] <= until] for record in (short, whole))
+    return np.array_equal(here, there) and np.array_equal(events, others, equal_nan=True)
+
+
+@pytest.mark.usefixtures("ticking")
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_answer_that_time_ends_is_the_beginning_of_the_whole_one(kind: Callable):
+    """To the bit, in the numbers that prove and in those of two precisions; it says what ended it, and when."""
+    clock = Clock(CUT, REASON)
+    short, whole = computed(boxed(), kind, clock), computed(boxed(), kind)
+
+    assert clock.struck
+    assert 2.0 < short.valid_until < 0.9 * boxed().duration
+    assert short.reason.startswith(f"{REASON} at t = ")
+    assert whole.reason == ""
+    assert len(short.events) > 5
+    assert short.method == whole.method
+    assert begins_as(short, whole)
+
+
+@pytest.mark.usefixtures("ticking")
+def test_a_last_place_in_the_start_is_another_beginning():
+    """The control: what was compared above is compared to the bit."""
+    short = computed(boxed(float(np.nextafter(1.1, 2))), digits, Clock(CUT, REASON))
+
+    assert not begins_as(short, computed(boxed(), digits))
+
+
+@pytest.mark.usefixtures("ticking")
+@pytest.mark.parametrize("seconds", [3.0, 30.0, 300.0, 3000.0])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: float):
+    """Whichever attempt in how many bits the time ended: it is within the error bounds of the whole answer."""
+    one = scenario("line_gas")
+    short, whole = computed(one, kind, Clock(seconds, REASON)), computed(one, kind)
+    until = min(short.valid_until, whole.valid_until, one.duration)
+    t = np.linspace(0.0, max(until - 1e-9, 0.0), 200)
+    here, there = (record.sampled(one.scene, one.thrusts, t) for record in (short, whole))
+    known = min(len(here), len(there))
+
+    apart = np.abs(here.position[:known] - there.position[:known]).max()
+    assert apart <= short.error_bound + whole.error_bound
+    assert short.error_bound <= 1e-9 * one.scene.radius.min()
+
+
+@pytest.mark.skipif(not has_balls(), reason="needs python-flint")
+@pytest.mark.usefixtures("ticking")
+def test_more_time_never_gives_less():
+    """Of several attempts the one that got farthest counts, not the one that was under way."""
+    one = scenario("line_gas")
+    reached = [min(computed(one, None, Clock(float(s), REASON)).valid_until, one.duration) for s in range(20, 380, 60)]
+
+    assert reached == sorted(reached)
+    assert reached[0] < reached[-1]
+
+
+@pytest.mark.skipif(not has_balls(), reason="needs python-flint")
+def test_an_answer_ends_before_its_balls_are_too_wide():
+    """In few bits a chaotic motion is soon lost: it is cut to where it is exact, to the last place."""
+    one, accuracy = scenario("line_gas"), 1e-12
+    with pytest.raises(Undecided) as lost:
+        trace(one.scene, [], one.duration, balls(56))
+    path = replace(lost.value.path, end=lost.value.t)
+    end, error = oracle.exact_until(path, one.duration, accuracy)
+
+    assert 0 < end < lost.value.t
+    assert error < accuracy <= oracle.spread(path, one.duration)
+    assert oracle.widest(oracle.widths(path), end * (1 + 1e-9)) >= accuracy
+
+
+@pytest.mark.usefixtures("ticking")
+def test_what_depends_on_the_machine_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The next one computes it anew, and what has no limit of time is kept as ever."""
+    monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
+    one = boxed()
+    record_of(one, Clock(CUT, REASON))
+    assert truth_cache.look_up(truth_cache.key_of(one, has_balls())) is None
+
+    whole = record_of(one)
+    assert whole.reason == ""
+    assert truth_cache.look_up(truth_cache.key_of(one, has_balls())) is not None
+    assert record_of(one, Clock(0.0, REASON)).valid_until == whole.valid_until  # it is there already
+
+
+@pytest.mark.usefixtures("ticking")
+def test_where_time_ends_before_the_first_sample_there_is_no_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """And that is said."""
+    monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
+    with pytest.raises(NoTruth, match=REASON):
+        record_of(replace(boxed(), sample_interval=0.5), Clock(0.0, REASON))
+
+
+@pytest.mark.slow
+def test_an_endless_scene_is_answered_up_to_the_limit_of_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A disk in a box for 10^6 s: exit 0, and how far it got; half the limit is for following it."""
+    monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "long.toml").write_text(LONG)
+    done = crosscheck("truth", "long.toml", "--timeout", "10", "--json", cwd=tmp_path)
+    said = json.loads(done.stdout)
+
+    assert done.returncode == 0
+    assert 1.0 < said["valid_until_s"] < said["duration_s"]
+    assert "the limit of 10 s was reached (a longer --timeout gives more) at t = " in said["reason"]
+    assert not (tmp_path / "cache").exists()
