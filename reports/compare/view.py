@@ -10,15 +10,17 @@ import numpy as np
 
 from adapters.engine import FLOAT64
 from reports.compare import laws
-from reports.compare.collisions import Matched, Restitutions, effective_restitution, match
+from reports.compare.collisions import Matched, match
 from reports.compare.delays import WINDOW, Jumps, collision_free, energy_range, momentum_outside, nearest_velocity
 from reports.compare.faces import on_faces
+from reports.compare.restitution import Restitutions, effective_restitution
 from scenarios.model import Array, Collisions, Scenario, Trajectory
 
 SLOWEST = 401**0.5  # sample intervals of falling; irrational, as of a threshold that speeds may be equal to
 LEAST_SHARE = 0.1
-"""Of the samples after the start that must carry a number for it to be judged by. An engine errs in collisions: what is
-left of a run in less than a tenth of its samples is mostly the flight before the first of them, where nobody errs."""
+"""Of the samples after the start, or of the true collisions, that must carry a number for it to be judged by. An engine
+errs in collisions: what is left of a run in less than a tenth of its samples is mostly the flight before the first of
+them, where nobody errs; and those of the collisions that a step can tell apart are the easiest."""
 NOT_JUDGED = "not judged"  # how the note of a number begins that too little carries; its value is NaN
 
 
