@@ -9,23 +9,24 @@ import numpy as np
 
 from reports.compare.collisions import by_pair, pair_keys
 from reports.compare.faces import SAME
+from reports.compare.restitution import Restitutions
 from reports.compare.view import LEAST_SHARE, Value, View, not_judged
 
 
 def restitution(view: View) -> Value | None:
     """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the samples."""
-    values, _, below = view.restitutions
-    return _read(float(np.median(values)), len(values), below) if len(values) else _unread(below)
+    read = view.restitutions
+    return _read(float(np.median(read.values)), read) if len(read.values) else _unread(read)
 
 
 def restitution_error(view: View) -> Value | None:
     """Largest |e - what the scene states| over the collisions that can be read off the samples."""
-    values, times, below = view.restitutions
-    if not len(values):
-        return _unread(below)
-    off = np.abs(values - view.scenario.scene.restitution)
+    read = view.restitutions
+    if not len(read.values):
+        return _unread(read)
+    off = np.abs(read.values - view.scenario.scene.restitution)
     worst = int(np.argmax(off))
-    return _read(float(off[worst]), len(values), below)._replace(at=float(times[worst]))
+    return _read(float(off[worst]), read)._replace(at=float(read.times[worst]))
 
 
 def collision_count_error(view: View) -> Value | None:
@@ -68,13 +69,19 @@ def hit_delay_max_dt(view: View) -> Value | None:
     return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
 
 
-def _read(value: float, read: int, below: int) -> Value:
-    return Value(value, note=f"{read} collisions read" + (f", {below} below the floor" if below else ""))
+def _read(value: float, read: Restitutions) -> Value:
+    return Value(value, note=f"{len(read.values)} collisions read{_unread_ones(read)}")
 
 
-def _unread(below: int) -> Value | None:
-    """None where no collision could be read for other reasons than rounding."""
-    return not_judged(f"no collision read, {below} below the floor") if below else None
+def _unread(read: Restitutions) -> Value | None:
+    """None where no collision could be read for other reasons than these."""
+    return not_judged(f"no collision read{_unread_ones(read)}") if read.below or read.unfinished else None
+
+
+def _unread_ones(read: Restitutions) -> str:
+    """How many collisions were not read, and why."""
+    below = f", {read.below} below the floor" if read.below else ""
+    return below + (f", {read.unfinished} not over" if read.unfinished else "")
 
 
 def _carried(view: View) -> str:

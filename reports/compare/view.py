@@ -105,6 +105,12 @@ class View:
         return np.where(self.judged, laws.lengths(self.played.velocity - expected), np.nan)
 
     @cached_property
+    def angular_velocity_apart(self) -> Array:
+        """(k, n) rad/s between the two; no collision changes a spin, so that none is late or early."""
+        assert self.other is not None
+        return np.abs(self.played.angular_velocity - self.other.angular_velocity)
+
+    @cached_property
     def momentum_apart(self) -> Array:
         """(k,) kg m/s between the momenta of the two, of the truth within the detection delay; nan if not judged.
 
@@ -167,7 +173,7 @@ class View:
         Slow collisions are left out under gravity, which is taken out of the samples to first order only.
         """
         if self.scenario.thrusts:
-            return Restitutions(np.zeros(0), np.zeros(0), 0)
+            return Restitutions(np.zeros(0), np.zeros(0), 0, 0)
         scene = self.scenario.scene
         slowest = SLOWEST * float(np.linalg.norm(scene.gravity)) * self.scenario.sample_interval
         return effective_restitution(self.played, scene, slowest, self.rounding)
