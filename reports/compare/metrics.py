@@ -140,6 +140,12 @@ def velocity_max(view: View) -> Value | None:
     return _largest_of_disks(np.where(view.judged, view.velocity_apart, 0.0), view)
 
 
+@over_judged
+def angular_velocity_max(view: View) -> Value | None:
+    """Largest difference of angular velocity of any disk in any sample that `velocity_max` is judged in."""
+    return _largest_of_disks(np.where(view.judged, view.angular_velocity_apart, 0.0), view)
+
+
 def angle_rms(view: View) -> Value | None:
     """Root mean square difference of angle over disks and samples."""
     return Value(_rms(view.angle_apart))
@@ -207,6 +213,7 @@ METRICS: dict[str, Metric] = {
     "position_rms": Metric(position_rms, "m", (TRUTH, ENGINE)),
     "velocity_max": Metric(velocity_max, "m/s", (TRUTH, ENGINE)),
     "velocity_rms": Metric(velocity_rms, "m/s", (TRUTH, ENGINE)),
+    "angular_velocity_max": Metric(angular_velocity_max, "rad/s", (TRUTH, ENGINE)),
     "angle_max": Metric(angle_max, "rad", (TRUTH, ENGINE)),
     "angle_rms": Metric(angle_rms, "rad", (TRUTH, ENGINE)),
     "time_to_1pct_s": Metric(time_to_1pct_s, "s", (TRUTH, ENGINE), "higher"),
