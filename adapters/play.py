@@ -121,7 +121,8 @@ def pushed_steps(
 ) -> Iterator[tuple[int, list[tuple[Thrust, float]]]]:
     """Cut steps first .. first + count into (how many, pushes): one by one where a thrust is on, else in one go.
 
-    A push carries the share of the step during which its thrust is on, so that its impulse is exact.
+    A push carries the share of the step during which its thrust is on, so that its impulse is exact. It acts over all
+    of the step: what that displaces a disk by is told by thrust_grid.py.
     """
     if not thrusts:
         yield count, []

@@ -150,6 +150,25 @@ def contact(path, s: float) -> tuple[float, float, float, float]:  # type: ignor
 
 
 @compiled
+def lift(path, s: float, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
+    """m/s2 at which the gap opens at s as one slides past the other: v2 / distance, and nothing along a wall's face.
+
+    Two that touch and slide past each other part, however hard they are pressed together, if that is more.
+    """
+    x, y, u, v, a, b, along, up, _ = path
+    px, py = x + (u + a * s / 2) * s, y + (v + b * s / 2) * s
+    part = 0.0
+    if along != 0.0 or up != 0.0:
+        part = (px * along + py * up) / (along * along + up * up)
+        if 0.0 < part < 1.0:
+            return 0.0
+        part = min(max(part, 0.0), 1.0)
+    slide = (v + b * s) * nx - (u + a * s) * ny
+    distance = sqrt((px - part * along) ** 2 + (py - part * up) ** 2)
+    return slide * slide / distance if distance > 0.0 else 0.0
+
+
+@compiled
 def meeting(path, since: float) -> float:  # type: ignore[no-untyped-def]
     """The first s from `since` to 0 at which the gap is closed and closes on, or inf."""
     low, high = since, 0.0
@@ -206,7 +225,7 @@ def collide(disks: Disks, world: World, pull, i: int, j: int, s: float, dt: floa
         path = path_to_wall(x, v, pull, disks.radius, i, world.walls, -1 - j)
         wi, wj = 1.0 / disks.mass[i], 0.0
     _, rate, nx, ny = contact(path, s)
-    speed, inward, hold = max(-rate, 0.0), -(path[4] * nx + path[5] * ny), 0.0
+    speed, inward, hold = max(-rate, 0.0), -(path[4] * nx + path[5] * ny) - lift(path, s, nx, ny), 0.0
     if 2.0 * e * speed < inward * dt * REST:  # it would be back at once, and ever sooner: it rests, and is held
         e, hold = 0.0, inward / (wi + wj)
     J = (1.0 + e) * speed / (wi + wj)

@@ -137,7 +137,7 @@ class Thrust:
 
     Attributes:
         disk: index into the scene.
-        start, stop: s; the push acts for start <= t < stop.
+        start, stop: s; the push acts for start <= t < stop. Inside a step every engine is off (`thrust_grid.py`).
         force: (2,) N.
         torque: N m.
         frame: "world", or "body": the force turns with the disk's angle.

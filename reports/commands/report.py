@@ -9,6 +9,7 @@ from typing import NoReturn
 from rich.table import Table
 
 from adapters.play import STATUSES
+from adapters.thrust_grid import off_grid_note
 from reports.lessons.catalogue import LESSONS
 from reports.page import overview
 from reports.page.report import Report, make_report
@@ -53,6 +54,9 @@ def print_summary(report: Report, page: str) -> None:
     console.print(table)
     for sentence in report.findings:
         console.print(sentence, highlight=False)
+    for comparison in report.comparisons:
+        if note := off_grid_note(comparison.scenario):
+            console.print(f"{comparison.scenario.name}: {note}.", highlight=False)
     console.print(statuses(report), highlight=False)
     if failed := failures(report, Path(page).parent):
         console.print(failed, highlight=False, soft_wrap=True)

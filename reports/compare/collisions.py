@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from reports.compare import laws
 from reports.compare.delays import WINDOW
-from reports.compare.faces import SAME, interval, on_faces
-from scenarios.model import Array, Collisions, Scene, Trajectory
+from reports.compare.faces import SAME
+from scenarios.model import Array, Collisions
 
 # Hits and steps lie on one grid, and so do halves of the time between hits. No bound is one of it, where rounding would
 # decide: all are roots of numbers that have none.
@@ -29,11 +28,13 @@ class Matched:
         delay: (m,) s, played time less true time of each hit found.
         missed: (time s, i, j) of true hits not found.
         invented: (time s, i, j) of played hits that are not true.
+        judged: how many true hits would count as missed if they were not found.
     """
 
     delay: Array
     missed: list[tuple[float, int, int]]
     invented: list[tuple[float, int, int]]
+    judged: int
 
     @property
     def first_wrong(self) -> tuple[float, str] | None:
@@ -64,12 +65,13 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
     mine, its = (by_pair(hits, resting, end - SAME * dt) for hits in (played, true))
     pairs = np.union1d(mine.key, its.key)
     limits = [np.append(np.searchsorted(side.key, pairs), len(side.key)) for side in (mine, its)]
-    partner, lost, extra = judge(mine.t, limits[0], its.t, limits[1], dt, end)
+    partner, lost, extra, judged = judge(mine.t, limits[0], its.t, limits[1], dt, end)
     found = partner >= 0
     return Matched(
         delay=mine.t[found] - its.t[partner[found]],
         missed=[(float(its.t[k]), int(its.i[k]), int(its.j[k])) for k in np.flatnonzero(lost)],
         invented=[(float(mine.t[k]), int(mine.i[k]), int(mine.j[k])) for k in np.flatnonzero(extra)],
+        judged=int(judged),
     )
 
 
@@ -99,7 +101,9 @@ def by_pair(hits: Collisions, resting: np.ndarray, end: float) -> ByPair:
 
 @njit(cache=True)
 def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no-untyped-def]
-    """Pair by pair: (partner of each played hit or -1, true hits that are missed, played hits that are invented)."""
+    """Pair by pair: (partner of each played hit or -1, true hits that are missed, played hits that are invented, how
+    many true hits are judged)."""
+    judged = 0
     partner = np.full(len(played), -1)
     lost, extra = np.zeros(len(true), dtype=np.bool_), np.zeros(len(played), dtype=np.bool_)
     for k in range(len(played_limits) - 1):
@@ -116,6 +120,7 @@ def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no
             for m in range(b - a):
                 partner[p + chosen[m]] = a + m
         lost[a:b] = (gap >= CROWDED * dt) & (its < end - WINDOW * dt)
+        judged += lost[a:b].sum()
         for m in range(p, q):
             t, other = played[m], partner[m]
             if other >= 0 and abs(t - true[other]) > max(HALF * gap[other - a], FAR * dt):
@@ -124,7 +129,7 @@ def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no
                 lost[other] = False
             else:
                 extra[m] = t < end - WINDOW * dt and not among_crowded(t, its, gap, dt)
-    return partner, lost, extra
+    return partner, lost, extra, judged
 
 
 @njit(cache=True)
@@ -172,97 +177,3 @@ def closest_in_order(few, many, same):  # type: ignore[no-untyped-def]
         chosen[k] = k + skips
         skips = skipped[k, skips]
     return chosen
-
-
-class Restitutions(NamedTuple):
-    """What was read off samples: e and time of each collision, (m,) and (m,) s, and how many were below the floor."""
-
-    values: Array
-    times: Array
-    below: int
-
-
-CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold hit far more
-FLOOR = 100  # times the rounding of the velocities that a change must have: e is then read to a hundredth or so
-
-
-def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, rounding: float) -> Restitutions:
-    """Restitution of each collision that can be read off the samples.
-
-    One can be read if neither disk has another in the same sample interval or the next, and none of them
-    changes its spin (friction): then the change of velocity points along the normal n, and e = -(dv'.n) / (dv.n).
-    Two disks must also change their momenta by as much, and a disk at a wall along the wall's normal: else
-    something was hit of which the player did not tell. Those closing slower than `slowest` m/s are left out.
-
-    Those that change the velocities by no more than `FLOOR` times their rounding, which is relative, are below the
-    floor: their normal, and with it e, would be noise. What gravity adds before and after is taken out with the
-    velocities, and rounded as they are. Engines tell such collisions of a contact that lasts: Box2D 3.1 of a disk
-    that slides along a wall whenever it comes nearer at any speed at all.
-    """
-    t, spin, collisions = trajectory.t, trajectory.angular_velocity, on_faces(trajectory, scene)
-    # A hit at the instant of a sample, at the end of its step, belongs to the interval that ends there.
-    before = np.searchsorted(t, collisions.t - SAME * interval(trajectory), side="left") - 1
-    busy: dict[tuple[int, int], int] = {}
-    for k, i, j in zip(before, collisions.i, collisions.j):
-        for disk in (i, j):
-            busy[k, disk] = busy.get((k, disk), 0) + 1
-    values, times, below = [], [], 0
-    for k, i, j, when in zip(before, collisions.i, collisions.j, collisions.t):
-        disks = (i, j) if j >= 0 else (i,)
-        alone = all(busy[k, disk] == 1 and (k + 1, disk) not in busy for disk in disks)
-        if alone and 0 <= k < len(t) - 1 and not scene.static[i]:
-            earlier, later = around(trajectory, scene, k, when)
-            moving = [disk for disk in disks if not scene.static[disk]]
-            if is_rounding(earlier, later, moving, rounding):
-                below += 1
-                continue
-            turned = np.abs(spin[k + 1] - spin[k]) * scene.radius
-            closing, parting = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
-            if closing > max(slowest, 0.0):
-                values.append(parting / closing)
-                times.append(when)
-    return Restitutions(np.array(values), np.array(times), below)
-
-
-def around(trajectory: Trajectory, scene: Scene, k: int, when: float) -> tuple[Array, Array]:
-    """(n, 2) m/s just before and just after `when` s, from the samples k and k + 1 around it and gravity."""
-    t, velocity = trajectory.t, trajectory.velocity
-    falling = np.where(scene.static[:, None], 0.0, scene.gravity)
-    return velocity[k] + falling * (when - t[k]), velocity[k + 1] - falling * (t[k + 1] - when)
-
-
-def is_rounding(earlier: Array, later: Array, moving: list[int], rounding: float) -> bool:
-    """Whether the change of a disk that moves, or that of both to each other, is below the floor."""
-    change = later[moving] - earlier[moving]
-    speed = laws.lengths(earlier[moving]) + laws.lengths(later[moving])
-    between = change[0] - change[-1] if len(moving) > 1 else change[0]
-    floor = FLOOR * rounding
-    return bool((laws.lengths(change) <= floor * speed).any() or laws.lengths(between) <= floor * speed.sum())
-
-
-def speeds_along_normal(
-    earlier: Array, later: Array, scene: Scene, i: int, j: int, turned: Array
-) -> tuple[float, float]:
-    """m/s at which disk i and disk or wall j close before and part after a collision; `turned` (n,) m/s by friction.
-
-    The normal is that of the change of their velocity to each other, whichever of the two is named first.
-    (nan, nan) if the change is not that of one frictionless collision.
-    """
-    change = later - earlier
-    one, two = (change[i], change[j]) if j >= 0 else (change[i], np.zeros(2))
-    between = one - two
-    normal = between / (np.linalg.norm(between) or 1.0)
-    if j >= 0 and not scene.static[j]:
-        kicks = scene.mass[i] * one, scene.mass[j] * two
-        untold = np.linalg.norm(kicks[0] + kicks[1]) > CLEAN * max(map(np.linalg.norm, kicks))
-        slid = (turned[[i, j]] > CLEAN * laws.lengths(change[[i, j]])).any()
-    elif j < 0:
-        start, end = scene.walls[-1 - j]
-        untold = abs(one @ (end - start)) > CLEAN * np.linalg.norm(end - start) * np.linalg.norm(one)
-        slid = turned[i] > CLEAN * np.linalg.norm(one)
-    else:
-        untold, slid = False, turned[i] > CLEAN * np.linalg.norm(one)
-    if untold or slid:
-        return np.nan, np.nan
-    before, after = (earlier[i] - earlier[j], later[i] - later[j]) if j >= 0 else (earlier[i], later[i])
-    return float(-before @ normal), float(after @ normal)

@@ -146,11 +146,15 @@ def deviation(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
 def apart(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
     """(k, n, 2) m from b to a, as `deviation`."""
     k = min(len(a), len(b))
-    way = a.position[:k] - b.position[:k]
-    if scene.wrap is not None:
-        size = scene.wrap[1] - scene.wrap[0]
-        way = way - size * np.round(way / size)
-    return way
+    return nearer_way(a.position[:k] - b.position[:k], scene)
+
+
+def nearer_way(way: Array, scene: Scene) -> Array:
+    """(..., 2) m: the same, or across an edge where the scene wraps and that is shorter."""
+    if scene.wrap is None:
+        return way
+    size = scene.wrap[1] - scene.wrap[0]
+    return way - size * np.round(way / size)
 
 
 def lengths(vectors: Array) -> Array:

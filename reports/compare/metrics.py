@@ -11,9 +11,8 @@ from functools import wraps
 
 import numpy as np
 
+from reports.compare import collision_metrics as collisions
 from reports.compare import laws, scales, violations
-from reports.compare.collisions import by_pair, pair_keys
-from reports.compare.faces import SAME
 from reports.compare.view import LEAST_SHARE, Value, View, not_judged
 from scenarios.model import Array
 
@@ -91,22 +90,6 @@ def energy_loss_error(view: View) -> Value | None:
     return Value(excess, at=float(view.played.t[last]), note=f"the delay explains {width:.2g}" if width else "")
 
 
-def restitution(view: View) -> Value | None:
-    """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the samples."""
-    values, _, below = view.restitutions
-    return _read(float(np.median(values)), len(values), below) if len(values) else _unread(below)
-
-
-def restitution_error(view: View) -> Value | None:
-    """Largest |e - what the scene states| over the collisions that can be read off the samples."""
-    values, times, below = view.restitutions
-    if not len(values):
-        return _unread(below)
-    off = np.abs(values - view.scenario.scene.restitution)
-    worst = int(np.argmax(off))
-    return _read(float(off[worst]), len(values), below)._replace(at=float(times[worst]))
-
-
 def penetration_radii(view: View) -> Value | None:
     """Largest overlap in any sample, in radii of the smaller disk."""
     if view.scenario.scene.n + len(view.scenario.scene.walls) < 2:
@@ -157,6 +140,12 @@ def velocity_max(view: View) -> Value | None:
     return _largest_of_disks(np.where(view.judged, view.velocity_apart, 0.0), view)
 
 
+@over_judged
+def angular_velocity_max(view: View) -> Value | None:
+    """Largest difference of angular velocity of any disk in any sample that `velocity_max` is judged in."""
+    return _largest_of_disks(np.where(view.judged, view.angular_velocity_apart, 0.0), view)
+
+
 def angle_rms(view: View) -> Value | None:
     """Root mean square difference of angle over disks and samples."""
     return Value(_rms(view.angle_apart))
@@ -176,55 +165,8 @@ def time_to_1pct_s(view: View) -> Value | None:
     return Value(float(view.played.t[k]), int(np.argmax(off[k])), float(view.played.t[k]))
 
 
-def collision_count_error(view: View) -> Value | None:
-    """Hits of the player less hits of the other, whenever they come; pairs at rest from the start are not counted."""
-    resting = pair_keys(view.hits[1])[view.hits[1].impulse == 0]
-    counted = (by_pair(hits, resting, view.end - SAME * view.dt) for hits in view.hits)
-    played, true = (len(hits.t) for hits in counted)
-    return Value(played - true, note=f"{played} of {true}")
-
-
-def collisions_missed(view: View) -> Value | None:
-    """Hits of the other, of those that a step can tell apart, that the player does not have at their time."""
-    return Value(len(view.matched.missed), note=f"of {len(view.hits[1])}")
-
-
-def collisions_invented(view: View) -> Value | None:
-    """Hits of the player that the other does not have at their time."""
-    return Value(len(view.matched.invented))
-
-
-def first_wrong_collision_s(view: View) -> Value | None:
-    """When the first hit is missed or invented, and whose; `inf` if none is."""
-    if view.matched.first_wrong is None:
-        return Value(np.inf, note="none")
-    at, what = view.matched.first_wrong
-    return Value(at, at=at, note=what)
-
-
-def hit_delay_dt(view: View) -> Value | None:
-    """Median over the hits of played time less true time, in dt; a hit is dated to the end of its step."""
-    delay = view.matched.delay
-    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
-
-
-def hit_delay_max_dt(view: View) -> Value | None:
-    """Largest difference in time of any hit from the true one, in dt."""
-    delay = view.matched.delay
-    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
-
-
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
-
-
-def _read(value: float, read: int, below: int) -> Value:
-    return Value(value, note=f"{read} collisions read" + (f", {below} below the floor" if below else ""))
-
-
-def _unread(below: int) -> Value | None:
-    """None where no collision could be read for other reasons than rounding."""
-    return not_judged(f"no collision read, {below} below the floor") if below else None
 
 
 def _largest(series: Array | None, view: View) -> Value | None:
@@ -271,6 +213,7 @@ METRICS: dict[str, Metric] = {
     "position_rms": Metric(position_rms, "m", (TRUTH, ENGINE)),
     "velocity_max": Metric(velocity_max, "m/s", (TRUTH, ENGINE)),
     "velocity_rms": Metric(velocity_rms, "m/s", (TRUTH, ENGINE)),
+    "angular_velocity_max": Metric(angular_velocity_max, "rad/s", (TRUTH, ENGINE)),
     "angle_max": Metric(angle_max, "rad", (TRUTH, ENGINE)),
     "angle_rms": Metric(angle_rms, "rad", (TRUTH, ENGINE)),
     "time_to_1pct_s": Metric(time_to_1pct_s, "s", (TRUTH, ENGINE), "higher"),
@@ -281,14 +224,14 @@ METRICS: dict[str, Metric] = {
     "energy_apart": Metric(energy_apart, "1", (TRUTH, ENGINE)),
     "energy_created": Metric(energy_created, "1", (ITSELF,)),
     "energy_loss_error": Metric(energy_loss_error, "1", (TRUTH,), "zero"),
-    "restitution": Metric(restitution, "1", (ITSELF,), "as stated"),
-    "restitution_error": Metric(restitution_error, "1", (ITSELF,)),
+    "restitution": Metric(collisions.restitution, "1", (ITSELF,), "as stated"),
+    "restitution_error": Metric(collisions.restitution_error, "1", (ITSELF,)),
     "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,)),
     "disks_through_walls": Metric(disks_through_walls, "disks", (ITSELF,)),
-    "collision_count_error": Metric(collision_count_error, "hits", (TRUTH, ENGINE), "zero"),
-    "collisions_missed": Metric(collisions_missed, "hits", (TRUTH, ENGINE)),
-    "collisions_invented": Metric(collisions_invented, "hits", (TRUTH, ENGINE)),
-    "first_wrong_collision_s": Metric(first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"),
-    "hit_delay_dt": Metric(hit_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
-    "hit_delay_max_dt": Metric(hit_delay_max_dt, "dt", (TRUTH, ENGINE)),
+    "collision_count_error": Metric(collisions.collision_count_error, "hits", (TRUTH, ENGINE), "zero"),
+    "collisions_missed": Metric(collisions.collisions_missed, "hits", (TRUTH, ENGINE)),
+    "collisions_invented": Metric(collisions.collisions_invented, "hits", (TRUTH, ENGINE)),
+    "first_wrong_collision_s": Metric(collisions.first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"),
+    "hit_delay_dt": Metric(collisions.hit_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
+    "hit_delay_max_dt": Metric(collisions.hit_delay_max_dt, "dt", (TRUTH, ENGINE)),
 }

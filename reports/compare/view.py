@@ -10,15 +10,17 @@ import numpy as np
 
 from adapters.engine import FLOAT64
 from reports.compare import laws
-from reports.compare.collisions import Matched, Restitutions, effective_restitution, match
+from reports.compare.collisions import Matched, match
 from reports.compare.delays import WINDOW, Jumps, collision_free, energy_range, momentum_outside, nearest_velocity
 from reports.compare.faces import on_faces
+from reports.compare.restitution import Restitutions, effective_restitution
 from scenarios.model import Array, Collisions, Scenario, Trajectory
 
 SLOWEST = 401**0.5  # sample intervals of falling; irrational, as of a threshold that speeds may be equal to
 LEAST_SHARE = 0.1
-"""Of the samples after the start that must carry a number for it to be judged by. An engine errs in collisions: what is
-left of a run in less than a tenth of its samples is mostly the flight before the first of them, where nobody errs."""
+"""Of the samples after the start, or of the true collisions, that must carry a number for it to be judged by. An engine
+errs in collisions: what is left of a run in less than a tenth of its samples is mostly the flight before the first of
+them, where nobody errs; and those of the collisions that a step can tell apart are the easiest."""
 NOT_JUDGED = "not judged"  # how the note of a number begins that too little carries; its value is NaN
 
 
@@ -103,6 +105,12 @@ class View:
         return np.where(self.judged, laws.lengths(self.played.velocity - expected), np.nan)
 
     @cached_property
+    def angular_velocity_apart(self) -> Array:
+        """(k, n) rad/s between the two; no collision changes a spin, so that none is late or early."""
+        assert self.other is not None
+        return np.abs(self.played.angular_velocity - self.other.angular_velocity)
+
+    @cached_property
     def momentum_apart(self) -> Array:
         """(k,) kg m/s between the momenta of the two, of the truth within the detection delay; nan if not judged.
 
@@ -165,7 +173,7 @@ class View:
         Slow collisions are left out under gravity, which is taken out of the samples to first order only.
         """
         if self.scenario.thrusts:
-            return Restitutions(np.zeros(0), np.zeros(0), 0)
+            return Restitutions(np.zeros(0), np.zeros(0), 0, 0)
         scene = self.scenario.scene
         slowest = SLOWEST * float(np.linalg.norm(scene.gravity)) * self.scenario.sample_interval
         return effective_restitution(self.played, scene, slowest, self.rounding)

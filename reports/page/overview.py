@@ -136,11 +136,15 @@ def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: 
 
 
 def pool(metric: str, name: str, found: Sequence[Found]) -> tuple[float, str]:
-    """The median, for hits the sum, of a metric over the scenarios in which it is judged; in how many it is, or not."""
+    """The median, for hits the sum, of a metric over the scenarios in which it is judged; in how many it is, or not.
+
+    Where nobody can miss a hit, as there is none, those that are invented count alone.
+    """
     kinds = ("collisions_missed", "collisions_invented") if metric == "wrong_hits" else (metric,)
     known = [[each[name, kind] for kind in kinds if (name, kind) in each] for each in found]
-    totals = [sum(one.value for one in each) for each in known if each and all(one.judged for one in each)]
-    left_out = sum(not one.judged for each in known for one in each[:1])
+    judged = [[one.value for one in each if one.judged] for each in known]
+    totals = [sum(each) for each in judged if each]
+    left_out = sum(bool(each) for each in known) - len(totals)
     remark = f"in {len(totals)} scenarios" + (f", {NOT_JUDGED} in {left_out}" if left_out else "")
     if not totals:
         return np.nan, remark

@@ -18,6 +18,7 @@ from plotly.offline import get_plotlyjs
 
 from adapters.matched import searched
 from adapters.play import Run
+from adapters.thrust_grid import off_grid_note
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
 from reports.page import overview, style
@@ -101,6 +102,7 @@ def write_page(
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
         heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, lessons=lessons, truth_of=truth_of,
+        off_grid_note=off_grid_note,
         common=by_name(common), trust=how_far_to_trust(comparisons), searched=by_engine(searched()),
     )  # fmt: skip
     put_text(path, html)

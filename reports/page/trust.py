@@ -28,7 +28,7 @@ def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
             "reference and event_driven are this project's, and it also judges them. So the exact answers import none "
             "of their code, which a test keeps so; the settings of every engine are searched by the same command, on "
             "scenes that are not scored; and solvers that stand still, gain energy or double their speed must be "
-            "caught in every scene."
+            "caught in every scene in which something moves."
         ),
     }
 

@@ -187,6 +187,25 @@ def test_the_horizon_does_not_depend_on_the_units_of_length_and_time():
     assert computed(quick).followed_until == pytest.approx(until / 8, rel=1e-9)
 
 
+def test_the_horizon_is_shorter_beside_a_disk_far_away_that_nothing_meets():
+    """As the rounding is that of the largest coordinate in the scene (horizon.py); the control moves no farther."""
+    position = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-0.7, 0.8)])
+    velocity = np.random.default_rng(4).normal(0, 3, (6, 2))
+    walls = [[[-2, -2], [2, -2]], [[2, -2], [2, 2]], [[2, 2], [-2, 2]], [[-2, 2], [-2, -2]]]
+
+    def followed(far: float, y: float = 0.0) -> float:
+        """s, with a disk at rest at x = `far` m, outside of the box."""
+        scene = Scene(
+            position=[*position, [far, y]], velocity=[*velocity, [0.0, 0.0]], radius=[0.3] * 7, mass=[1] * 7,
+            walls=walls, restitution=1,
+        )  # fmt: skip
+        return computed(asked(scene, 10.0)).followed_until
+
+    near, middle, far = map(followed, (3.0, 30.0, 300.0))
+    assert far < middle < near < 10
+    assert followed(3.0, y=1.5) == near
+
+
 def test_the_exact_answer_shares_no_code_with_the_event_engine():
     """Nothing of the oracle or of its horizon imports what the scored engine `event_driven` is made of."""
     folder = File(of_horizon.__file__).parent

@@ -139,7 +139,8 @@ class Change:
 
     def factor(self, unit: str) -> float:
         """By how much a number of this unit is to change."""
-        return {"m": self.length, "m/s": self.length / self.time, "s": self.time}.get(unit, 1.0)
+        rates = {"m": self.length, "m/s": self.length / self.time, "s": self.time, "rad/s": 1 / self.time}
+        return rates.get(unit, 1.0)
 
 
 CUT = 0.37  # of each wall

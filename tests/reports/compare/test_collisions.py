@@ -50,6 +50,9 @@ def test_hits_that_no_step_can_tell_apart_are_not_blamed():
     found = match(hits(*played, 1.99, 2.01), hits(*true), 10.0, 0.01)
 
     assert found.first_wrong is None
+    silent = match(hits(), hits(*true), 10.0, 0.01)
+    assert found.judged == silent.judged == len(silent.missed)
+    assert 0 < found.judged < len(true)
 
 
 def test_weight_on_a_contact_at_rest_is_no_hit():
@@ -58,6 +61,7 @@ def test_weight_on_a_contact_at_rest_is_no_hit():
     weight = Collisions.of([(0.1, 0, -1, 0.3), (0.5, 0, -1, 0.3)])
 
     assert match(weight, resting, 1.0, 0.01).first_wrong is None
+    assert match(weight, resting, 1.0, 0.01).judged == 0
 
 
 def test_matching_in_order_is_the_closest_there_is():

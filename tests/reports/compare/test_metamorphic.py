@@ -287,6 +287,6 @@ def test_a_scene_ten_times_as_fast_gives_the_same_numbers_in_its_own_file():
         tables.append(compare(one, runs).table)
     slow, fast = tables
     assert slow.metric.tolist() == fast.metric.tolist()
-    factor = slow.unit.map({"m/s": 10.0, "s": 0.1}).fillna(1.0)
+    factor = slow.unit.map({"m/s": 10.0, "rad/s": 10.0, "s": 0.1}).fillna(1.0)
     # Chaos spreads the rounding of the velocities a millionfold by the end, as the horizon of the scene says.
     np.testing.assert_allclose(fast.value, slow.value * factor, rtol=1e-8, atol=1e-9)

@@ -6,9 +6,9 @@ import pytest
 from adapters.engine import FLOAT32, FLOAT64
 from adapters.engines import ENGINES
 from adapters.play import play
-from reports.compare import collisions
-from reports.compare.collisions import FLOOR, effective_restitution
+from reports.compare import restitution
 from reports.compare.metrics import METRICS
+from reports.compare.restitution import FLOOR, effective_restitution
 from reports.compare.view import NOT_JUDGED, Value, View
 from scenarios.catalogue import scenario
 from scenarios.model import Collisions, Scene, Trajectory
@@ -72,7 +72,7 @@ def test_a_contact_that_lasts_is_no_collision(name: str, substeps: int):
 
 def test_without_the_floor_it_would_be_read_as_minus_one(monkeypatch: pytest.MonkeyPatch):
     """The control: of most of the collisions that are read nothing is left of the velocity but its sign."""
-    monkeypatch.setattr(collisions, "FLOOR", 0.0)
+    monkeypatch.setattr(restitution, "FLOOR", 0.0)
     found = read("gas_of_100", "box2d_v3:shipped", 1)["restitution"]
 
     assert found is not None
@@ -89,7 +89,7 @@ def test_what_is_below_the_floor_is_counted_in_the_note():
         assert value is not None
         assert np.isnan(value.value)
         assert value.note.startswith(f"{NOT_JUDGED}: no collision read, ")
-        assert value.note.endswith(" below the floor")
+        assert " below the floor" in value.note
     assert matched is not None
     assert matched.note.endswith(" collisions read")
     assert galperin is not None

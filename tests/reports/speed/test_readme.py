@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import pandas as pd
+
+from adapters.engines import ENGINES
 from reports.speed import figures
+from reports.speed.versus import LATE, OWN
 from tests.reports.speed import statements as speed_figures
 
 ROOT = Path(__file__).parents[3]
@@ -16,6 +21,49 @@ def test_the_caption_of_the_picture_follows_from_the_kept_table():
     """Word for word but for line breaks: `python -m tests.reports.speed.statements` prints it."""
     assert speed_figures.caption(figures.read(figures.KEPT)) in " ".join(FRONT.split())
     assert "the geometric mean of the middle half of the scenes" in " ".join(FRONT.split())
+
+
+def stated(text: str) -> list[tuple[float, float]]:
+    """Each "a to b" of what half a step divides the errors by, in the order of `LATE_BY_KIND`."""
+    of_errors = " ".join(text.split()).split("divides the error ")[1].split(", and multiplies")[0]
+    return [(float(low), float(high)) for low, high in re.findall(r"by ([\d.]+) to ([\d.]+)", of_errors)]
+
+
+def outside(kept: pd.DataFrame, text: str) -> set[str]:
+    """The engines with end-of-step detection for which what the text says of half a step is not true."""
+    falls, wrong = speed_figures.halving(kept)[0], set()
+    for names, (low, high) in zip(speed_figures.LATE_BY_KIND.values(), stated(text), strict=True):
+        for name in names:
+            # A number is printed to a tenth.
+            if not ((falls.loc[name] > low - 0.051) & (falls.loc[name] < high + 0.051)).all():
+                wrong.add(name)
+    return wrong
+
+
+def test_what_half_a_step_buys_is_true_of_every_engine_with_end_of_step_detection():
+    """None is left out, and the ranges hold for each; one whose error grows is no exception without a word.
+
+    The control: with a tenth of the coarsest error an engine falls out of its range, whichever it is.
+    """
+    kept, late = figures.read(figures.KEPT), {OWN, *LATE}
+    spoken_of = [name for names in speed_figures.LATE_BY_KIND.values() for name in names]
+    assert sorted(spoken_of) == sorted(late)
+    assert late == set(ENGINES) - {"reference:ordered", "event_driven:float64"}
+    assert outside(kept, FRONT) == set()
+    assert ("below 1: it grows" in FRONT) == (speed_figures.halving(kept)[0] < 1).any(axis=None)
+
+    for name in late:
+        worse = kept.copy()
+        coarsest = (worse.figure == "pooled error") & (worse["at"] == "0")
+        worse.loc[coarsest & (worse.engine + ":" + worse.profile == name), "value"] /= 10
+        assert outside(worse, FRONT) == {name}
+
+
+def test_the_scenes_in_which_smaller_steps_do_not_help_are_counted_for_every_engine():
+    """The authors' own solvers too."""
+    table = SPEED.split("falls by less than a tenth")[1]
+
+    assert [name for name in ENGINES if f"\n| {name} | " not in table] == []
 
 
 def test_the_page_on_speed_ends_with_what_follows_from_the_kept_tables():

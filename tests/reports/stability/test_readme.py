@@ -50,6 +50,18 @@ def test_a_number_that_is_no_longer_true_is_noticed():
     assert wrong[differ[0]] != in_words(FOUND["bounce_drift", PLAYERS[0]])
 
 
+def test_the_number_of_phases_behind_a_limit_is_said():
+    """In the words of the page and of README: no limit was found with more."""
+    most = max(case.runs for case in CASES.values())
+    page = (Path(__file__).parents[3] / "reports/stability/stability.html.j2").read_text("utf-8")
+    limit = FOUND["tunnelling_head_on", "box2d_v3:matched"]
+
+    assert f"It holds at the phases that were played, {most} at most" in TEXT
+    assert most == CASES["tunnelling_head_on"].runs == CASES["near_miss"].runs
+    assert "in fewer than one of %d may not have been seen' % (case.runs, case.runs)" in page
+    assert f"a step displacement of {limit.works_at:.4g} radii" in " ".join(TEXT.split())
+
+
 def test_what_is_said_of_the_two_forms_is_what_they_do():
     """How many runs, and how close the brackets are."""
     pattern = r"up to (\d+) runs.{0,200}?to\s+(\d+) %.{0,400}?`--full`.{0,200}?to\s+(\d+) %"

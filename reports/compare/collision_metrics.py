@@ -1,0 +1,99 @@
+"""The metrics of collisions: restitution, and which collisions a player found, missed, invented, and how late.
+
+Each is a row of `METRICS` (metrics.py).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reports.compare.collisions import by_pair, pair_keys
+from reports.compare.faces import SAME
+from reports.compare.restitution import Restitutions
+from reports.compare.view import LEAST_SHARE, Value, View, not_judged
+
+
+def restitution(view: View) -> Value | None:
+    """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the samples."""
+    read = view.restitutions
+    return _read(float(np.median(read.values)), read) if len(read.values) else _unread(read)
+
+
+def restitution_error(view: View) -> Value | None:
+    """Largest |e - what the scene states| over the collisions that can be read off the samples."""
+    read = view.restitutions
+    if not len(read.values):
+        return _unread(read)
+    off = np.abs(read.values - view.scenario.scene.restitution)
+    worst = int(np.argmax(off))
+    return _read(float(off[worst]), read)._replace(at=float(read.times[worst]))
+
+
+def collision_count_error(view: View) -> Value | None:
+    """Hits of the player less hits of the other, whenever they come; pairs at rest from the start are not counted."""
+    resting = pair_keys(view.hits[1])[view.hits[1].impulse == 0]
+    counted = (by_pair(hits, resting, view.end - SAME * view.dt) for hits in view.hits)
+    played, true = (len(hits.t) for hits in counted)
+    return Value(played - true, note=f"{played} of {true}")
+
+
+def collisions_missed(view: View) -> Value | None:
+    """Hits of the other, of those that a step can tell apart, that the player does not have at their time."""
+    if not view.hits[1].t.size:
+        return not_judged("no collision to miss")
+    return _unjudged(view) or Value(len(view.matched.missed), note=_carried(view))
+
+
+def collisions_invented(view: View) -> Value | None:
+    """Hits of the player that the other does not have at their time."""
+    return _unjudged(view) or Value(len(view.matched.invented), note=_carried(view))
+
+
+def first_wrong_collision_s(view: View) -> Value | None:
+    """When the first hit is missed or invented, and whose; `inf` if none is."""
+    if (unjudged := _unjudged(view)) is not None:
+        return unjudged
+    at, what = view.matched.first_wrong or (np.nan, "none")
+    return Value(np.inf if np.isnan(at) else at, at=at, note=f"{what}, {_carried(view)}")
+
+
+def hit_delay_dt(view: View) -> Value | None:
+    """Median over the hits of played time less true time, in dt; a hit is dated to the end of its step."""
+    delay = view.matched.delay
+    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+
+
+def hit_delay_max_dt(view: View) -> Value | None:
+    """Largest difference in time of any hit from the true one, in dt."""
+    delay = view.matched.delay
+    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+
+
+def _read(value: float, read: Restitutions) -> Value:
+    return Value(value, note=f"{len(read.values)} collisions read{_unread_ones(read)}")
+
+
+def _unread(read: Restitutions) -> Value | None:
+    """None where no collision could be read for other reasons than these."""
+    return not_judged(f"no collision read{_unread_ones(read)}") if read.below or read.unfinished else None
+
+
+def _unread_ones(read: Restitutions) -> str:
+    """How many collisions were not read, and why."""
+    below = f", {read.below} below the floor" if read.below else ""
+    return below + (f", {read.unfinished} not over" if read.unfinished else "")
+
+
+def _carried(view: View) -> str:
+    """Of how many of the other's collisions an engine can be told that it has missed them (collisions.py: `match`)."""
+    return f"{view.matched.judged} of {len(view.hits[1])} collisions judged"
+
+
+def _unjudged(view: View) -> Value | None:
+    """None where enough is judged, or where the other has no collision: then every collision of a player is invented.
+
+    Where most collisions are too close together for a step, or lie on contacts that rest, most of what a player
+    reports is excused: that it misses and invents nothing says nothing.
+    """
+    few = view.matched.judged < LEAST_SHARE * len(view.hits[1])
+    return not_judged(f"only {_carried(view)}") if few else None
