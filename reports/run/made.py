@@ -44,11 +44,19 @@ class Kind(NamedTuple):
 
 
 class Made(NamedTuple):
-    """made.json: the command, whether all that it makes is there, and path -> SHA-256, None while it is written."""
+    """made.json.
+
+    Attributes:
+        command: that made the folder.
+        finished: whether all that it makes is there.
+        files: path -> SHA-256, None while it is written.
+        out: name of the folder whose place this one is to take; "" once it has.
+    """
 
     command: str
     finished: bool
     files: dict[str, str | None]
+    out: str = ""
 
 
 def read_made(folder: Path) -> Made | None:
@@ -60,8 +68,8 @@ def read_made(folder: Path) -> Made | None:
         made = Made(**json.loads(path.read_bytes()))
     except (OSError, ValueError, TypeError, RecursionError):  # the last of brackets in brackets in brackets
         return None
-    whole = isinstance(made.command, str) and isinstance(made.finished, bool) and isinstance(made.files, dict)
-    return made if whole else None
+    types = {"command": str, "finished": bool, "files": dict, "out": str}
+    return made if all(isinstance(getattr(made, name), kind) for name, kind in types.items()) else None
 
 
 def put_made(folder: Path, made: Made) -> None:
