@@ -2,12 +2,12 @@
 
 import sys
 
-from reports.terminal.safe_path import leave_out_current_folder
+from adapters.safe_path import keep_path_safe
 
 
 def main() -> None:
     """Do what the command line asks for."""
-    leave_out_current_folder()  # before anything else is imported
+    keep_path_safe()  # before anything else is imported
     from reports.terminal.exits import ends_when_told, refuse
     from reports.terminal.streams import printing
 

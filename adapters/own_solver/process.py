@@ -8,7 +8,6 @@ import pickle
 import select
 import signal
 import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,9 +18,11 @@ from typing import Any
 from adapters.engine import NotStarted
 from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
 from adapters.own_solver.worker import HERE
+from adapters.safe_path import path_of_this, python
 from scenarios.truth.cache import folder
 
 STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
+WORK = "from adapters.own_solver.worker import work; work()"
 INTRUDED = "wrote into the channel that its answers come by"
 GRACE = 4.0  # s beyond what the calls of a request may take
 Request = tuple[str, Any, float]
@@ -48,7 +49,7 @@ class SolverProcess:
         copies = kept_copies(solver, kept) if compiled and kept and self.kind == "python" else None
         # Plain Python gives the same bits as numba, and starts 20 s sooner.
         settings = {"PYTHONDONTWRITEBYTECODE": "1"} | ({} if copies else {"NUMBA_DISABLE_JIT": "1"})
-        settings["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # as here, without the current folder
+        settings["PYTHONPATH"] = path_of_this()
         if kept is not None:
             settings["NUMBA_CACHE_DIR"] = str(kept / "numba")
         hello = self.start(pickle.dumps((solver, copies)).hex(), settings)
@@ -83,7 +84,7 @@ class SolverProcess:
         self.process: subprocess.Popen[bytes] | None = None
         try:
             self.process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "adapters.own_solver.worker"],
+                python(WORK),
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | settings,
                 start_new_session=True, bufsize=0,
             )  # fmt: skip

@@ -22,8 +22,10 @@ from adapters.engine import NotStarted
 from adapters.own_solver import process as solver_process
 from adapters.own_solver.engine import engine_file
 from adapters.own_solver.file import read_solver
+from adapters.own_solver.process import WORK
 from adapters.own_solver.worker import HERE, MEMORY
 from adapters.play import play
+from adapters.safe_path import python
 from reports.run import runner, worker
 from reports.run.archive import Archive
 from reports.run.cells import Cell
@@ -198,7 +200,7 @@ def little_memory() -> None:
 def test_a_worker_with_little_memory_can_still_start_a_solver():
     """A limit that is lower than the solver's own stays as it is: nobody but root may raise it."""
     with subprocess.Popen(
-        [sys.executable, "-P", "-m", "adapters.own_solver.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        python(WORK), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         preexec_fn=little_memory, start_new_session=True,
     ) as process:  # fmt: skip
         assert process.stdin is not None
