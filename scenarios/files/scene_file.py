@@ -5,9 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import math
-import os
 import re
-import stat
 import tomllib
 from collections.abc import Iterable, Iterator
 from itertools import islice
@@ -19,6 +17,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from scenarios.families.placing import box
+from scenarios.files.regular import opened
 from scenarios.files.tables import TABLES, SceneTable
 from scenarios.model import Array, Scenario, Scene, Thrust
 from scenarios.truth.exact import with_oracle
@@ -69,9 +68,7 @@ def read_scene_file(path: str | Path) -> Scenario:
 
 def _parsed(path: Path) -> dict[str, Any]:
     try:
-        with open(path, "rb", opener=_without_waiting) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise SceneFileError(["is a pipe or a device; must be a readable TOML file"])
+        with opened(path) as file:
             data = file.read(MOST_BYTES + 1)
         text = data[:MOST_BYTES].decode()
         if len(data) > MOST_BYTES:
@@ -92,11 +89,6 @@ def _parsed(path: Path) -> dict[str, Any]:
         raise SceneFileError([f"{where}: {what[0].lower()}{what[1:]}; must be TOML"]) from None
     except ValueError as error:  # Python's own limits: a null byte in a path, an integer of 4300 digits
         raise SceneFileError([f"{str(error).split(';')[0].lower()}; must be a readable TOML file"]) from None
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    """Opens as `open` does, but does not wait for somebody to write into a pipe."""
-    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _checked(table: dict[str, Any]) -> SceneTable:
