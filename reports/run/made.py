@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from reports.run.journal import JOURNAL
 from reports.terminal.exits import FolderTaken
-from reports.terminal.foreign_text import is_part, put_text
+from reports.terminal.foreign_text import encoded, is_part, put_text
 
 MADE = "made.json"
 HEAD = 4096  # bytes at the beginning of a file among which its mark is
@@ -187,8 +187,19 @@ def may_replace(target: Path, kind: Kind, option: str = "--out") -> None:
         raise FolderTaken(f"{option} {target}: holds what {kind.command} has not finished; {hint}")
 
 
+def sealed(text: str) -> str:
+    """The text of a page or of XML with a comment at its end by which `may_overwrite` knows that nobody changed it."""
+    return f"{text}<!-- as it was written: sha256 {hashlib.sha256(encoded(text)).hexdigest()} -->\n"
+
+
+def is_sealed(data: bytes) -> bool:
+    """Whether a file has the bytes that `sealed` gave."""
+    text, seal, _ = data.rpartition(b"<!-- as it was written: ")
+    return bool(seal) and data == encoded(sealed(text.decode(errors="replace")))
+
+
 def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
-    """Raise `FolderTaken` unless the file `path` is absent, a pipe or a device, or begins with the mark of our own.
+    """Raise `FolderTaken` unless the file `path` is absent, a pipe or a device, or our own, which nobody has changed.
 
     `OSError` if it cannot be looked into, or its folder is not there.
     """
@@ -198,4 +209,7 @@ def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
         with path.open("rb") as file:
             if mark not in file.read(HEAD):
                 raise FolderTaken(f"{option} {path}: is there and no {what}; name another file")
+            file.seek(0)
+            if not is_sealed(file.read()):
+                raise FolderTaken(f"{option} {path}: is a {what} that was changed since; name another file, or move it")
     path.parent.stat()
