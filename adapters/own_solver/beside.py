@@ -60,6 +60,12 @@ def is_library(name: str, folder: Path) -> bool:
 def files_of(folder: Path, name: str) -> Sequence[Path]:
     """The files of a module in `folder`, of a package all; none if it is not there."""
     package, module = folder / name, folder / f"{name}.py"
+    try:
+        module.lstat()
+    except FileNotFoundError:
+        pass
+    except OSError:  # no file can have so long a name
+        return []
     if module.exists() and not (package / "__init__.py").exists():
         return [module]
     return sorted(package.rglob("*.py"))

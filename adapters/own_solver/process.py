@@ -24,6 +24,7 @@ from scenarios.truth.cache import folder
 STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
 WORK = "from adapters.own_solver.worker import work; work()"
 INTRUDED = "wrote into the channel that its answers come by"
+LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27
 GRACE = 4.0  # s beyond what the calls of a request may take
 Request = tuple[str, Any, float]
 """A command of the worker, its argument, and how long it may take, s."""
@@ -132,16 +133,20 @@ class SolverProcess:
         """One line from the process."""
         assert self.process is not None
         assert self.process.stdout is not None
-        received, deadline = b"", monotonic() + limit
+        received, deadline = bytearray(), monotonic() + limit
         while not received.endswith(b"\n"):
-            ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, deadline - monotonic()))
-            if not ready:
+            left = deadline - monotonic()
+            ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, left))
+            if not ready or left < 0:  # for who writes without end is always ready
                 self.close()
                 raise SolverFailed("timeout", f"does not come back within {limit:g} s and had to be stopped")
             chunk = os.read(self.process.stdout.fileno(), 1 << 20)
             if not chunk:
                 raise self.lost()
             received += chunk
+            if len(received) > LONGEST_ANSWER:
+                self.close()
+                raise SolverFailed("crashed", INTRUDED)
         try:
             return json.loads(received)
         except ValueError:
