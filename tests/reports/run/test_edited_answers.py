@@ -95,6 +95,16 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("edit", EDITS)
+def test_an_edited_answer_is_as_good_as_none(tmp_path: Path, edit: str):
+    """Whatever was done to its file: nothing of it is read, and nothing is waited for."""
+    put_answer(tmp_path / "one.npz", Answer(record_of(scenario("slow_hit")), "ok", "", 60.0))
+    EDITS[edit](tmp_path / "one.npz")
+
+    assert read_answer(tmp_path / "one.npz") is None
+
+
+@pytest.mark.parametrize("edit", [pytest.param(name, marks=pytest.mark.slow) if k else name
+                                  for k, name in enumerate(EDITS)])  # fmt: skip
 def test_an_edited_answer_is_computed_again_and_said(whole: Path, tmp_path: Path, edit: str):
     """All numbers are as they were, though every share was deleted with it."""
     out = Path(shutil.copytree(whole, tmp_path / "out"))
@@ -142,6 +152,7 @@ def test_numbers_of_a_record_are_numbers_and_its_texts_texts():
     assert not is_said([good])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["trajectories", "compared"])
 @pytest.mark.parametrize("words", [("report", "out"), ("diff", "whole", "out")], ids=["report", "diff"])
 def test_a_pipe_in_a_result_folder_is_waited_for_by_nobody(whole: Path, tmp_path: Path, place: str, words: Any):
