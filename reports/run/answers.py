@@ -16,9 +16,9 @@ from reports.run.archive import digest
 from reports.run.scenes import open_scene
 from reports.run.worker_process import Failure
 from reports.terminal.foreign_text import put_bytes
-from scenarios.files.regular import opened
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
+from scenarios.regular import opened
 from scenarios.truth.cache import UNREADABLE, packed, unpacked
 from scenarios.truth.exact import CLOSED_FORM, OracleTruth, TruthRecord
 from scenarios.truth.oracle.work import Clock

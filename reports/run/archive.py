@@ -28,8 +28,8 @@ from adapters.play import Run
 from reports.run.journal import JOURNAL
 from reports.run.journal_lines import checked_lines, no_use
 from reports.run.run_lines import KINDS
-from scenarios.files.regular import all_of, opened
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
+from scenarios.regular import all_of, opened
 
 Numbered = dict[Hashable, tuple[int, dict[str, Any]]]  # what a line is of -> its number, and the line
 STATE = ("position", "velocity", "angle", "angular_velocity")

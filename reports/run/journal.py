@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.files.regular import opened
+from scenarios.regular import opened
 
 JOURNAL = "journal.jsonl"
 

@@ -28,8 +28,8 @@ from reports.run.cells import Cell, versions
 from reports.run.scenes import must_fit, played_scenario
 from reports.run.worker_process import Failure, allow
 from reports.terminal.foreign_text import put_bytes
-from scenarios.files.regular import all_of
 from scenarios.model import Scenario
+from scenarios.regular import all_of
 
 # By which runs are compared.
 JUDGES = ("reports/compare/**/*.py", "scenarios/**/*.py")  # wherever in these folders a file lies

@@ -37,7 +37,7 @@ from reports.run.shares import (
 from reports.run.worker_process import Failure
 from reports.terminal.exits import say as warn
 from reports.terminal.foreign_text import encoded, is_part, put_text, whole
-from scenarios.files.regular import all_of
+from scenarios.regular import all_of
 
 TABLES = ("deviations.csv", "runs.csv")
 

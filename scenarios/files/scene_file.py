@@ -18,9 +18,9 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from scenarios.families.placing import box
-from scenarios.files.regular import opened
 from scenarios.files.tables import TABLES, SceneTable
 from scenarios.model import Array, Scenario, Scene, Thrust
+from scenarios.regular import opened
 from scenarios.truth.exact import with_oracle
 
 MOST_BYTES = 5_000_000

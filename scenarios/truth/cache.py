@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.files.regular import opened
 from scenarios.model import Scenario, frozen
+from scenarios.regular import opened
 
 HERE = Path(__file__).parent
 ARRAYS = {"legs": 12, "events": 5, "outcomes": 4, "orders": 3}
