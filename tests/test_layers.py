@@ -17,8 +17,8 @@ LAYERS = {
     "scenarios": ["regular", "model", "no_truth", "truth", "families", "files", "catalogue"],
     "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines", "record", "exact"],
     "adapters": [
-        "engine matched safe_path", "float32 play", "reference pymunk box2d box2d_v3 event_driven", "own_solver", "engines",
-        "mechanisms conformance",
+        "engine matched safe_path", "float32 play", "reference pymunk box2d box2d_v3 event_driven", "own_solver",
+        "engines", "mechanisms conformance",
     ],
     "reports": [
         "terminal compare", "run", "page", "check speed stability game tune", "lessons", "commands", "cli", "__main__",
