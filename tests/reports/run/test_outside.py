@@ -18,8 +18,8 @@ from typing import Any
 
 import pytest
 
+from adapters import safe_path
 from adapters.engine import NotStarted
-from adapters.own_solver import process as solver_process
 from adapters.own_solver.engine import engine_file
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import WORK
@@ -111,7 +111,7 @@ def test_a_worker_that_does_not_come_up_is_not_the_fault_of_its_task(tmp_path: P
 
 def test_a_process_of_a_solver_that_cannot_start_is_not_the_fault_of_its_file(monkeypatch: pytest.MonkeyPatch):
     """It is neither a row of the check nor the status of a run."""
-    monkeypatch.setattr(solver_process.sys, "executable", shutil.which("false"))
+    monkeypatch.setattr(safe_path.sys, "executable", shutil.which("false"))
     question, engine = scenario(SCENE), engine_file(RIGHT).make()
 
     with pytest.raises(NotStarted, match=r"the process for a solver's file could not be started: .*exit status 1"):
