@@ -1,13 +1,15 @@
 """The command `crosscheck`, or `python -m reports`: it can be told to stop before it has imported what it needs."""
 
+import os
 import sys
-
-from reports.terminal.safe_path import leave_out_current_folder
 
 
 def main() -> None:
     """Do what the command line asks for."""
-    leave_out_current_folder()  # before anything else is imported
+    sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))  # for the next line alone
+    from adapters.safe_path import keep_path_safe  # and no adapters.py of the current folder
+
+    keep_path_safe()  # before anything else is imported
     from reports.terminal.exits import ends_when_told, refuse
     from reports.terminal.streams import printing
 

@@ -37,7 +37,10 @@ Workers = Annotated[int, typer.Option(min=0, help="Processes that play at once; 
 Timeout = Annotated[
     float,
     typer.Option(
-        min=0.1, max=1e6, metavar="S", help="That a cell, or an exact answer, may take; then it is stopped, in C too."
+        min=0.1,
+        max=1e6,
+        metavar="S",
+        help="That a cell, or an exact answer, may take; then it is stopped, in C too (truth: given up to there).",
     ),
 ]
 Memory = Annotated[

@@ -14,11 +14,11 @@ MAY_IMPORT = {
 }
 # From the bottom up; what stands in one line does not import each other. A folder's own files are its layer "".
 LAYERS = {
-    "scenarios": ["model", "no_truth", "truth", "families", "files", "catalogue"],
+    "scenarios": ["regular", "model", "no_truth", "truth", "families", "files", "catalogue"],
     "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines", "record", "exact"],
     "adapters": [
-        "engine matched", "float32 play", "reference pymunk box2d box2d_v3 event_driven", "own_solver", "engines",
-        "mechanisms conformance",
+        "engine matched safe_path", "float32 play", "reference pymunk box2d box2d_v3 event_driven", "own_solver",
+        "engines", "mechanisms conformance",
     ],
     "reports": [
         "terminal compare", "run", "page", "check speed stability game tune", "lessons", "commands", "cli", "__main__",

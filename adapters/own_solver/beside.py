@@ -18,6 +18,8 @@ from pathlib import Path
 from types import CodeType
 from typing import Any
 
+from adapters.safe_path import PACKAGES
+
 
 def modules_beside(folder: Path, text: str, read: Callable[[Path], str]) -> Iterator[tuple[str, str]]:
     """File, relative to `folder`, and text of every neighbour that `text` imports, or that such a one imports."""
@@ -49,7 +51,7 @@ def imported_by(text: str) -> set[str]:
 
 def is_library(name: str, folder: Path) -> bool:
     """Whether a module is found elsewhere than in `folder`."""
-    if name in sys.builtin_module_names or name in sys.stdlib_module_names:
+    if name in sys.builtin_module_names or name in sys.stdlib_module_names or name in PACKAGES:
         return True
     spec = PathFinder.find_spec(name, [path for path in sys.path if Path(path).resolve() != folder])
     return spec is not None and spec.origin is not None  # a folder without __init__.py is found after all others
@@ -58,6 +60,12 @@ def is_library(name: str, folder: Path) -> bool:
 def files_of(folder: Path, name: str) -> Sequence[Path]:
     """The files of a module in `folder`, of a package all; none if it is not there."""
     package, module = folder / name, folder / f"{name}.py"
+    try:
+        module.lstat()
+    except FileNotFoundError:
+        pass
+    except OSError:  # no file can have so long a name
+        return []
     if module.exists() and not (package / "__init__.py").exists():
         return [module]
     return sorted(package.rglob("*.py"))

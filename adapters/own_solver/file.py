@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 import hashlib
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,7 +37,7 @@ class SolverFailed(Exception):
     """
 
     def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
-        what = printable(what)
+        what = printable(what[: LONGEST + 1])  # cut first: to escape millions of letters takes longer than a call may
         what = what if len(what) <= LONGEST else what[:LONGEST] + " ..."
         super().__init__(what)
         self.kind, self.what, self.line, self.column = kind, what, line, column
@@ -110,9 +111,10 @@ def read_module(path: Path) -> str:
 def read_bytes(path: Path, wanted: str) -> bytes:
     """All of a small file; raises `NotASolver`, with what is `wanted` in the place of something that is no file."""
     try:
-        if path.exists() and not path.is_file():
+        about = path.stat()
+        if not stat.S_ISREG(about.st_mode):
             raise NotASolver(f"{path}: is no file; {wanted}")  # a pipe would be waited for
-        size = path.stat().st_size
+        size = about.st_size
         if size > LARGEST:
             raise NotASolver(f"{path}: has {size / 1e6:.1f} MB; a solver has a few kilobytes, at most 1 MB is read")
         return path.read_bytes()
@@ -124,7 +126,10 @@ def read_bytes(path: Path, wanted: str) -> bytes:
 
 def dangling(path: Path) -> bool:
     """Whether it is a link to nothing."""
-    return path.is_symlink() and not path.exists()
+    try:
+        return path.is_symlink() and not path.exists()
+    except OSError:  # a name that no file can have, as it is too long
+        return False
 
 
 def decoded(path: Path, data: bytes) -> str:

@@ -8,7 +8,6 @@ import pickle
 import select
 import signal
 import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,10 +18,13 @@ from typing import Any
 from adapters.engine import NotStarted
 from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
 from adapters.own_solver.worker import HERE
+from adapters.safe_path import path_of_this, python
 from scenarios.truth.cache import folder
 
 STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
+WORK = "from adapters.own_solver.worker import work; work()"
 INTRUDED = "wrote into the channel that its answers come by"
+LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27
 GRACE = 4.0  # s beyond what the calls of a request may take
 Request = tuple[str, Any, float]
 """A command of the worker, its argument, and how long it may take, s."""
@@ -48,7 +50,7 @@ class SolverProcess:
         copies = kept_copies(solver, kept) if compiled and kept and self.kind == "python" else None
         # Plain Python gives the same bits as numba, and starts 20 s sooner.
         settings = {"PYTHONDONTWRITEBYTECODE": "1"} | ({} if copies else {"NUMBA_DISABLE_JIT": "1"})
-        settings["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # as here, without the current folder
+        settings["PYTHONPATH"] = path_of_this()
         if kept is not None:
             settings["NUMBA_CACHE_DIR"] = str(kept / "numba")
         hello = self.start(pickle.dumps((solver, copies)).hex(), settings)
@@ -83,7 +85,7 @@ class SolverProcess:
         self.process: subprocess.Popen[bytes] | None = None
         try:
             self.process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "adapters.own_solver.worker"],
+                python(WORK),
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | settings,
                 start_new_session=True, bufsize=0,
             )  # fmt: skip
@@ -131,16 +133,20 @@ class SolverProcess:
         """One line from the process."""
         assert self.process is not None
         assert self.process.stdout is not None
-        received, deadline = b"", monotonic() + limit
+        received, deadline = bytearray(), monotonic() + limit
         while not received.endswith(b"\n"):
-            ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, deadline - monotonic()))
-            if not ready:
+            left = deadline - monotonic()
+            ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, left))
+            if not ready or left < 0:  # for who writes without end is always ready
                 self.close()
                 raise SolverFailed("timeout", f"does not come back within {limit:g} s and had to be stopped")
             chunk = os.read(self.process.stdout.fileno(), 1 << 20)
             if not chunk:
                 raise self.lost()
             received += chunk
+            if len(received) > LONGEST_ANSWER:
+                self.close()
+                raise SolverFailed("crashed", INTRUDED)
         try:
             return json.loads(received)
         except ValueError:

@@ -94,7 +94,8 @@ def tell(answers: IO[str], what: Any) -> None:
     answers.flush()
 
 
-if __name__ == "__main__":
+def work() -> None:
+    """All that the process does."""
     sys.dont_write_bytecode = True
     try:
         main()

@@ -17,7 +17,7 @@ from adapters.own_solver.process import SolverProcess
 from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
 from reports.check.verdict import NONE, FileCheck, check_file
-from reports.run.made import may_overwrite
+from reports.run.made import may_overwrite, sealed
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
 from reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
@@ -60,7 +60,11 @@ def files_of(path: Path) -> list[Path]:
 
     Where every solver has a folder of its own, a folder without one stands among them.
     """
-    if not path.exists():
+    try:
+        there = path.exists()
+    except OSError as fault:  # a name of 300 letters, say
+        refuse([f"{path}: {fault.strerror or fault}; name a file or a folder"])
+    if not there:
         refuse([f"{path}: is not there; name an Exercise.js, a solver.py or a folder of them"])
     if not path.is_dir():
         return [path]
@@ -144,6 +148,6 @@ def smallest_here(solver: SolverText, restitution: float) -> Smallest | None:
 def write(path: Path, text: str) -> None:
     """Write a file that was asked for; exits 2 if that is not possible."""
     try:
-        put_text(path, text)
+        put_text(path, sealed(text))
     except OSError as fault:
         refuse([f"--junit {path}: {fault.strerror or fault}; name a file that can be written"])

@@ -37,14 +37,16 @@ def as_junit(checks: Sequence[FileCheck]) -> str:
     for one in checks:
         skipped = sum(row.verdict == "not asked" for row in one.rows)
         suite = ElementTree.SubElement(
-            suites, "testsuite", name=str(one.path), tests=str(len(one.rows) or 1), failures=str(len(one.faults)),
-            errors=str(int(bool(one.refused))), skipped=str(skipped),
+            suites, "testsuite", name=plain(str(one.path)), tests=str(len(one.rows) or 1),
+            failures=str(len(one.faults)), errors=str(int(bool(one.refused))), skipped=str(skipped),
         )  # fmt: skip
         if one.refused:
-            case = ElementTree.SubElement(suite, "testcase", classname=one.path.name, name="file: is a solver")
+            case = ElementTree.SubElement(suite, "testcase", classname=plain(one.path.name), name="file: is a solver")
             ElementTree.SubElement(case, "error", message=plain(one.refused))
         for row in one.rows:
-            case = ElementTree.SubElement(suite, "testcase", classname=one.path.name, name=f"{row.task}: {row.name}")
+            case = ElementTree.SubElement(
+                suite, "testcase", classname=plain(one.path.name), name=plain(f"{row.task}: {row.name}")
+            )
             if row.verdict == "fault":
                 failure = ElementTree.SubElement(case, "failure", message=plain(row.cause))
                 failure.text = plain(f"{row.asked}\ncame: {row.got}\nexpected: {row.expected}\nread: {row.read}")

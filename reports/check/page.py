@@ -12,6 +12,7 @@ from reports.check.verdict import FileCheck
 from reports.page import style
 from reports.page.documents import looks_as_json, render
 from reports.page.replay import pack_layers, ratio_of
+from reports.run.made import sealed
 from reports.terminal.foreign_text import put_text
 from scenarios.model import Scenario, Trajectory
 
@@ -34,7 +35,7 @@ def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
         looks_json=looks_as_json(looks), generator=GENERATOR, version=version("crosscheck2d"),
         digest="" if check.solver is None else check.solver.digest,
     )  # fmt: skip
-    put_text(path, html)
+    put_text(path, sealed(html))
 
 
 def layers_of(name: str, smallest: Smallest | None) -> list[tuple[Run | None, Trajectory]]:

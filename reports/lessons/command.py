@@ -17,7 +17,7 @@ from reports.lessons.lesson import Lesson
 from reports.lessons.pages import ALONE, FILES, Links, index_page, offline, told
 from reports.run.arguments import unknown
 from reports.run.folders import made_anew, place_of
-from reports.run.made import Kind, may_overwrite, writing
+from reports.run.made import Kind, may_overwrite, sealed, writing
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
 from reports.terminal.exits import FAILED, FolderTaken, refuse, say
@@ -111,5 +111,5 @@ def write_pages(pages: Mapping[Path, Lesson], links: Links, besides: dict[str, C
                 answers[path][task[1]] = result
                 progress.done(f"{lesson.number} {lesson.title}")
                 if len(answers[path]) == len(lesson.grid):
-                    put_text(path, offline(lesson, answers.pop(path), links))
+                    put_text(path, sealed(offline(lesson, answers.pop(path), links)))
     return found

@@ -39,6 +39,8 @@ def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
 
 def closest(off: pd.DataFrame) -> str:
     """Who comes closest to the exact answers."""
+    if off.columns.empty and len(off):
+        return "No engine that counts was played to its end in a scene with an exact answer, so nobody is scored."
     if off.empty:
         return "No scene here has an exact answer, so nobody is scored: only laws and differences are shown."
     medians = off.median().sort_values()

@@ -6,17 +6,19 @@ import io
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from zipfile import ZipFile
 
 import numpy as np
 
 from reports.compare.comparison import answered
+from reports.run.archive import digest
 from reports.run.scenes import open_scene
 from reports.run.worker_process import Failure
 from reports.terminal.foreign_text import put_bytes
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
+from scenarios.regular import opened
 from scenarios.truth.cache import UNREADABLE, packed, unpacked
 from scenarios.truth.exact import CLOSED_FORM, OracleTruth, TruthRecord
 from scenarios.truth.oracle.work import Clock
@@ -77,21 +79,29 @@ def put_answer(path: Path, answer: Answer) -> None:
     """Write it whole or not at all."""
     whole = io.BytesIO(b"" if answer.record is None else packed(vars(answer.record)))
     with ZipFile(whole, "a") as file:
-        file.writestr(SAID, json.dumps(answer[1:]))
+        said = list(answer[1:])
+        file.writestr(SAID, json.dumps([*said, digest_of(file, path.name, said)]))
     put_bytes(path, whole.getvalue())
 
 
+def digest_of(file: ZipFile, name: str, said: list[Any]) -> str:
+    """16 hex digits over all that is in the file of an answer, and what it is called: by that it is of its scene."""
+    inside = sorted(set(file.namelist()) - {SAID})
+    return digest(b"\0".join([json.dumps([name, said, inside]).encode(), *map(file.read, inside)]))
+
+
 def read_answer(path: Path) -> Answer | None:
-    """What `put_answer` wrote; None if it is not there or not that any more, as the sums in the file tell."""
+    """What `put_answer` wrote; None if it is not there or not that any more, as the digest in the file tells."""
     try:
-        with ZipFile(path) as file:
-            (status, reason, timeout), whole = json.loads(file.read(SAID)), len(file.namelist()) > 1
+        with opened(path) as there, ZipFile(there) as file:
+            *said, written = json.loads(file.read(SAID))
+            if written != digest_of(file, path.name, said):
+                return None
+            whole = len(file.namelist()) > 1
         fields = unpacked(path) if whole else None
+        return None if whole and fields is None else Answer(TruthRecord(**fields) if fields else None, *said)
     except UNREADABLE:
         return None
-    if whole and fields is None:
-        return None
-    return Answer(TruthRecord(**fields) if fields else None, status, reason, timeout)
 
 
 def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:

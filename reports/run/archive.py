@@ -16,6 +16,7 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Hashable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -28,6 +29,7 @@ from reports.run.journal import JOURNAL
 from reports.run.journal_lines import checked_lines, no_use
 from reports.run.run_lines import KINDS
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
+from scenarios.regular import all_of, opened
 
 Numbered = dict[Hashable, tuple[int, dict[str, Any]]]  # what a line is of -> its number, and the line
 STATE = ("position", "velocity", "angle", "angular_velocity")
@@ -130,7 +132,7 @@ def digest(data: bytes) -> str:
 @cache
 def digest_of_file(path: Path, *_: int) -> str:
     """The same of a file that is there, once for every inode, size and time of change."""
-    return digest(path.read_bytes())
+    return digest(all_of(path))
 
 
 def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -> Run:
@@ -178,7 +180,7 @@ def packed(trajectory: Trajectory, small: bool = False) -> bytes:
 
 def load_trajectory(file: Path | BinaryIO) -> Trajectory:
     """What `packed` put into a file."""
-    with np.load(file) as saved:
+    with nullcontext(file) if not isinstance(file, Path) else opened(file) as there, np.load(there) as saved:
         hits = Collisions(**{name: frozen(saved[key], saved[key].dtype) for name, key in HITS.items()})
         t, position, velocity, angle, angular_velocity = (frozen(saved[name]) for name in ("t", *STATE))
         return Trajectory(t, position, velocity, angle, angular_velocity, hits)

@@ -179,7 +179,7 @@ def table_of(folder: Path) -> pd.DataFrame:
     columns = list(table.columns) == list(COLUMNS)
     if not (columns and same):
         why = "is not what was written" if columns else "its columns are not those of this version"
-        raise ValueError(f"{path}: {why}; make it again: crosscheck report {folder}")
+        raise ValueError(f"{path}: {why}; delete it, and make it again: crosscheck report {folder}")
     return table
 
 

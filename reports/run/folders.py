@@ -11,7 +11,7 @@ from pathlib import Path
 
 from reports.run.archive import Archive
 from reports.run.journal import JOURNAL, Busy, Journal
-from reports.run.made import Kind, Made, may_replace, may_write, put_made, read_made, stranger_in
+from reports.run.made import MADE, Kind, Made, may_replace, may_write, put_made, read_made, stranger_in
 from reports.terminal.exits import FolderTaken, unbroken
 
 RUN = Kind(
@@ -43,18 +43,38 @@ def open_part(out: Path, kind: Kind) -> Journal:
     """The journal of what will be `out`, where that is while it is made; raises as `may_replace`, or `OSError`."""
     part = part_of(out)
     may_replace(out, kind)
-    may_write(part, kind)
+    may_be_part(part, out, kind)
     part.mkdir(parents=True, exist_ok=True)
     journal = held(part, out)
     with given_back(journal):
-        begun(part, kind)
+        begun(part, kind, out)
     return journal
 
 
-def begun(part: Path, kind: Kind) -> None:
-    """Record in a folder that it is this program's, and not finished; what it has recorded before stays."""
+def may_be_part(part: Path, out: Path, kind: Kind, option: str = "--out") -> None:
+    """Raise as `may_write`, and also if `part` is somebody's finished result that is only called so."""
+    may_write(part, kind, option)
+    if not is_interrupted(part, out):
+        raise FolderTaken(
+            f"{option} {out}: {part} is needed while it is made, and holds a finished result; move that elsewhere, or "
+            "name another folder"
+        )
+
+
+def is_interrupted(part: Path, out: Path) -> bool:
+    """Whether the folder may be `out` while that is made, not a finished result: one may have been made by `--out`.
+
+    What was killed when all was done, a moment before it took the place of `out`, still says that it is to do so.
+    """
+    made = read_made(part)
+    return made is None or not made.finished or made.out == out.name
+
+
+def begun(part: Path, kind: Kind, out: Path) -> None:
+    """Record in a folder that it is this program's, will be `out`, and is not finished; other records stay."""
     made = read_made(part) or Made(kind.command, False, {})
-    put_made(part, made._replace(finished=False))
+    if (anew := made._replace(finished=False, out=out.name)) != made or not (part / MADE).exists():
+        put_made(part, anew)
 
 
 @contextmanager
@@ -116,7 +136,7 @@ def open_again(out: Path) -> Journal:
         OSError: it cannot be opened.
     """
     part = part_of(out)
-    may_write(part, RUN, "--resume")
+    may_be_part(part, out, RUN, "--resume")
     may_replace(out, RUN, "--resume")
     if (part / JOURNAL).is_file():
         return held(part, out)
@@ -132,7 +152,7 @@ def reopened(journal: Journal, out: Path) -> None:
         with unbroken():
             out.rename(part)
             journal.path = part / JOURNAL
-    begun(part, RUN)
+    begun(part, RUN, out)
 
 
 def held(folder: Path, out: Path) -> Journal:
@@ -145,9 +165,11 @@ def held(folder: Path, out: Path) -> Journal:
 
 def found(out: Path) -> Path:
     """The folder of a run into `out`: itself, or where it is while it lasts; raises `FolderTaken` if there is none."""
-    for folder in (out, part_of(out)):
-        if (folder / JOURNAL).is_file():
-            return folder
+    part = part_of(out)
+    if (out / JOURNAL).is_file():
+        return out
+    if (part / JOURNAL).is_file() and is_interrupted(part, out):
+        return part
     raise FolderTaken(f"{out}: has no {JOURNAL}, so it is not the folder of a run")
 
 
@@ -162,7 +184,7 @@ def replace_folder(made: Path, target: Path, kind: Kind) -> None:
     record = read_made(made)
     assert record is not None
     with unbroken():
-        put_made(made, record._replace(finished=True))
+        put_made(made, record._replace(finished=True, out=target.name))
         old = next(old for k in count() if not os.path.lexists(old := target.with_name(f"{target.name}.old{k or ''}")))
         replaced = target.exists()
         if replaced:
@@ -173,6 +195,7 @@ def replace_folder(made: Path, target: Path, kind: Kind) -> None:
             if replaced:
                 old.rename(target)
             raise
+        put_made(target, record._replace(finished=True, out=""))
         if replaced:
             shutil.rmtree(old, ignore_errors=True)
 
@@ -189,7 +212,7 @@ def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
     part = target.with_name(f"{target.name}.part-{os.getpid()}")
     part.mkdir(parents=True)
     try:
-        begun(part, kind)
+        begun(part, kind, target)
         yield part
     except BaseException:
         shutil.rmtree(part, ignore_errors=True)

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from scenarios.regular import opened
+
 JOURNAL = "journal.jsonl"
 
 
@@ -66,7 +68,7 @@ def lines_of(folder: Path, missed: str = "delete that line") -> Iterator[Any]:
     Raises:
         ValueError: naming another line that is no JSON, and what to do about what is `missed`.
     """
-    with (folder / JOURNAL).open("rb") as journal:
+    with opened(folder / JOURNAL) as journal:
         for number, line in enumerate(journal, start=1):
             try:
                 yield json.loads(line.decode())  # for null bytes are taken for UTF-32 else

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from reports.run.journal import JOURNAL
 from reports.terminal.exits import FolderTaken
-from reports.terminal.foreign_text import is_part, put_text
+from reports.terminal.foreign_text import encoded, is_part, put_text
 
 MADE = "made.json"
 HEAD = 4096  # bytes at the beginning of a file among which its mark is
@@ -44,11 +44,19 @@ class Kind(NamedTuple):
 
 
 class Made(NamedTuple):
-    """made.json: the command, whether all that it makes is there, and path -> SHA-256, None while it is written."""
+    """made.json.
+
+    Attributes:
+        command: that made the folder.
+        finished: whether all that it makes is there.
+        files: path -> SHA-256, None while it is written.
+        out: name of the folder whose place this one is to take; "" once it has.
+    """
 
     command: str
     finished: bool
     files: dict[str, str | None]
+    out: str = ""
 
 
 def read_made(folder: Path) -> Made | None:
@@ -60,8 +68,8 @@ def read_made(folder: Path) -> Made | None:
         made = Made(**json.loads(path.read_bytes()))
     except (OSError, ValueError, TypeError, RecursionError):  # the last of brackets in brackets in brackets
         return None
-    whole = isinstance(made.command, str) and isinstance(made.finished, bool) and isinstance(made.files, dict)
-    return made if whole else None
+    types = {"command": str, "finished": bool, "files": dict, "out": str}
+    return made if all(isinstance(getattr(made, name), kind) for name, kind in types.items()) else None
 
 
 def put_made(folder: Path, made: Made) -> None:
@@ -179,8 +187,19 @@ def may_replace(target: Path, kind: Kind, option: str = "--out") -> None:
         raise FolderTaken(f"{option} {target}: holds what {kind.command} has not finished; {hint}")
 
 
+def sealed(text: str) -> str:
+    """The text of a page or of XML with a comment at its end by which `may_overwrite` knows that nobody changed it."""
+    return f"{text}<!-- as it was written: sha256 {hashlib.sha256(encoded(text)).hexdigest()} -->\n"
+
+
+def is_sealed(data: bytes) -> bool:
+    """Whether a file has the bytes that `sealed` gave."""
+    text, seal, _ = data.rpartition(b"<!-- as it was written: ")
+    return bool(seal) and data == encoded(sealed(text.decode(errors="replace")))
+
+
 def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
-    """Raise `FolderTaken` unless the file `path` is absent, a pipe or a device, or begins with the mark of our own.
+    """Raise `FolderTaken` unless the file `path` is absent, a pipe or a device, or our own, which nobody has changed.
 
     `OSError` if it cannot be looked into, or its folder is not there.
     """
@@ -190,4 +209,7 @@ def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
         with path.open("rb") as file:
             if mark not in file.read(HEAD):
                 raise FolderTaken(f"{option} {path}: is there and no {what}; name another file")
+            file.seek(0)
+            if not is_sealed(file.read()):
+                raise FolderTaken(f"{option} {path}: is a {what} that was changed since; name another file, or move it")
     path.parent.stat()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -28,6 +29,7 @@ from reports.run.scenes import must_fit, played_scenario
 from reports.run.worker_process import Failure, allow
 from reports.terminal.foreign_text import put_bytes
 from scenarios.model import Scenario
+from scenarios.regular import all_of
 
 # By which runs are compared.
 JUDGES = ("reports/compare/**/*.py", "scenarios/**/*.py")  # wherever in these folders a file lies
@@ -48,8 +50,9 @@ class Gathering:
         failed: scene -> why it could not be compared.
     """
 
-    def __init__(self, archive: Archive, missing: Iterable[Cell], timeout: float) -> None:
-        """`timeout`: s that an exact answer may take; what has had less is tried again."""
+    def __init__(self, archive: Archive, missing: Iterable[Cell], timeout: float, warn: Callable[[str], None]) -> None:
+        """`timeout`: s that an exact answer may take; what has had less is tried again; `warn` hears what is torn."""
+        self.warn = warn
         self.folder, self.players, self.timeout = archive.folder, archive.header["engines"], timeout
         self.missing = Counter(cell.scene for cell in missing)
         self.records: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
@@ -82,6 +85,8 @@ class Gathering:
         records = in_order(self.records[scene].values(), self.players)
         asked = answer_file(self.folder, records)
         answer = read_answer(asked)
+        if answer is None and asked not in self.scenes and os.path.lexists(asked):
+            self.warn(f"{asked.name} is not what was written: that exact answer is computed again")
         if asked not in self.scenes and (answer is None or answer.may_be_had(self.timeout)):
             self.scenes[asked] = scene
             yield asked, partial(answer_here, self.folder, records)
@@ -104,6 +109,7 @@ class Gathering:
         scene = self.scenes[path]
         self.had.add(path)
         if path.suffix == ANSWER:
+            away_with_what_is_no_file(path)
             put_answer(path, no_answer(result, self.timeout) if isinstance(result, Failure) else result)
             yield from self.task_of(scene)
         elif isinstance(result, Failure):
@@ -111,7 +117,14 @@ class Gathering:
         elif result.damaged:
             self.unkept[scene] = result.csv
         else:
+            away_with_what_is_no_file(path)
             keep_share(path, result.csv)
+
+
+def away_with_what_is_no_file(path: Path) -> None:
+    """Delete a pipe or a link that has the name of an answer or a share: it would be written into."""
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        path.unlink()
 
 
 def in_order(records: Iterable[dict[str, Any]], players: Sequence[str]) -> list[dict[str, Any]]:
@@ -182,7 +195,7 @@ def keep_share(path: Path, csv: bytes) -> None:
 
 def kept_share(path: Path) -> bytes:
     """What `keep_share` wrote; raises `OSError`, or `ValueError` if it is that no more."""
-    first, _, csv = path.read_bytes().partition(b"\n")
+    first, _, csv = all_of(path).partition(b"\n")
     if first != digest(csv).encode():
         raise ValueError(f"{path}: is not what was written; delete it, and it is made again")
     return csv

@@ -102,7 +102,7 @@ def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) ->
     missing = {task: work for task, work in tasks.items() if task not in done}
     cells = [task for task in missing if isinstance(task, Cell)]
     alone = {cell for cell in cells if plan.engines[cell.engine].leaves_state}
-    gathering = Gathering(archive, cells, means.timeout)
+    gathering = Gathering(archive, cells, means.timeout, progress.note)
     comparing: deque[Any] = deque(gathering.whole())
     progress.start(len(missing), len(tasks))
     limits = means.timeout, means.memory

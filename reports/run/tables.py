@@ -35,7 +35,9 @@ from reports.run.shares import (
     share_file,
 )
 from reports.run.worker_process import Failure
+from reports.terminal.exits import say as warn
 from reports.terminal.foreign_text import encoded, is_part, put_text, whole
+from scenarios.regular import all_of
 
 TABLES = ("deviations.csv", "runs.csv")
 
@@ -89,7 +91,7 @@ def compare_missing(archive: Archive, by_scene: Mapping[str, Records], say: Call
     """Have the answers and make the shares that are not kept, in worker processes, each within its time."""
     (archive.folder / "compared").mkdir(exist_ok=True)
     # As much time as the cells had: it is the same option.
-    gathering = Gathering(archive, [], max(record["timeout_s"] for record in archive.records))
+    gathering = Gathering(archive, [], max(record["timeout_s"] for record in archive.records), warn)
     tasks = deque(gathering.whole())
     for records in by_scene.values():
         scenario_of(archive.folder, records)  # a scene that is another one now is found here
@@ -163,7 +165,7 @@ def seal_of(folder: Path) -> Path:
 
 def is_sealed(folder: Path) -> bool:
     """Whether deviations.csv is as it was written."""
-    return seal_of(folder).read_bytes() == digest((folder / "deviations.csv").read_bytes()).encode()
+    return all_of(seal_of(folder)) == digest(all_of(folder / "deviations.csv")).encode()
 
 
 def sweep(folder: Path, kept: Set[Path]) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from adapters.safe_path import path_of_this, python
 from reports.run.worker_process import CLOCK, Failure
 from reports.terminal.foreign_text import legible
 
@@ -24,6 +25,7 @@ STARTING = 120.0  # s for Python to start and to import what a task is made of, 
 ATTEMPTS = 3  # at a task whose worker was killed from outside
 OUTSIDE = {-signal.SIGKILL, -signal.SIGTERM, 0}  # exits that no engine makes by a fault of its own
 PRINTED = 65536  # bytes of what a task prints that are kept: faulthandler writes up to 100 lines a thread
+WORK = "from reports.run.worker_process import main; main(sys.argv[1:])"
 ASKING = "own_solver/process.py"  # waits for what a solver's file answers
 INNERMOST = re.compile(r'most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)')
 
@@ -42,12 +44,10 @@ class Worker:
         self.output, printing = os.pipe()
         self.trail = nameless_file()
         # As here, so that it finds what a task is made of, but nothing that only lies where this command was started.
-        path = os.pathsep.join(filter(None, sys.path))
         self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "reports.run.worker_process",
-             *map(str, (theirs.fileno(), self.trail, memory))],
+            [*python(WORK), *map(str, (theirs.fileno(), self.trail, memory))],
             stdin=subprocess.DEVNULL, stdout=printing, stderr=printing, pass_fds=(theirs.fileno(), self.trail),
-            env=os.environ | {"PYTHONPATH": path},
+            env=os.environ | {"PYTHONPATH": path_of_this()},
         )  # fmt: skip
         theirs.close()
         os.close(printing)

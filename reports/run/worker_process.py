@@ -96,16 +96,9 @@ def prepare(memory: int) -> None:
 
 
 def main(arguments: Sequence[Any]) -> None:
-    """`python -m reports.run.worker_process CONNECTION TRAIL MEMORY`: two file descriptors and a number of bytes."""
+    """What the process does; its words are CONNECTION TRAIL MEMORY: two file descriptors and a number of bytes."""
     global _trail, _parent
     connection, trail, memory = (int(argument) for argument in arguments)
     _trail, _parent = trail, Connection(connection)
     prepare(memory)
     serve(_parent, memory)
-
-
-if __name__ == "__main__":
-    # As the module that tasks import, not as __main__: there is one trail.
-    from reports.run.worker_process import main as run
-
-    run(sys.argv[1:])

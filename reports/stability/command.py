@@ -27,7 +27,7 @@ from reports.stability.page import write_page
 from reports.stability.touching import TOUCHING, AtGap
 from reports.stability.vary import VARIES, cannot_vary
 from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, broken_off, refuse, say
+from reports.terminal.exits import DONE, FAILED, Unusable, broken_off, refuse, say
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 from scenarios.files.scene_file import SceneFileError, read_scene_file
@@ -62,7 +62,10 @@ def find_limits(
     with broken_off(part, lambda: kept), journal, Progress() as progress:
         carry_out(plan, journal, done, progress)
         progress.say("writing the tables and the page")
-        found = write_files(part)
+        try:
+            found = write_files(part)
+        except SceneFileError as fault:  # it was there when all began
+            raise Unusable(str(fault)) from fault
         replace_folder(part, out, STABILITY)
     finish(found, out)
 

@@ -32,11 +32,10 @@ def put_text(path: Path, text: str) -> None:
 
 def put_bytes(path: Path, data: bytes) -> None:
     """Write a file as `whole` does; a pipe or a device is written to as it comes. Raises `OSError`."""
-    path = path.resolve()
-    if path.exists() and not path.is_file():
+    if path.exists() and not path.is_file():  # asked before links are followed: /dev/stdout leads to no path at all
         path.write_bytes(data)
         return
-    with whole(path) as file:
+    with whole(path.resolve()) as file:
         file.write(data)
 
 

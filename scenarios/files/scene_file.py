@@ -5,9 +5,8 @@ from __future__ import annotations
 import difflib
 import json
 import math
-import os
 import re
-import stat
+import sys
 import tomllib
 from collections.abc import Iterable, Iterator
 from itertools import islice
@@ -21,9 +20,11 @@ from pydantic_core import ErrorDetails
 from scenarios.families.placing import box
 from scenarios.files.tables import TABLES, SceneTable
 from scenarios.model import Array, Scenario, Scene, Thrust
+from scenarios.regular import opened
 from scenarios.truth.exact import with_oracle
 
 MOST_BYTES = 5_000_000
+LONG_NUMBER = re.compile(r"(?<![\w.])\d[\d_]{4000,}")
 MOST_FAULTS = 100  # listed; n disks in one place would make n2 / 2 lines
 
 # Disks placed to touch are off by the rounding of their coordinates; a few thousand roundings are forgiven.
@@ -69,9 +70,8 @@ def read_scene_file(path: str | Path) -> Scenario:
 
 def _parsed(path: Path) -> dict[str, Any]:
     try:
-        with open(path, "rb", opener=_without_waiting) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise SceneFileError(["is a pipe or a device; must be a readable TOML file"])
+        text = ""
+        with opened(path) as file:
             data = file.read(MOST_BYTES + 1)
         text = data[:MOST_BYTES].decode()
         if len(data) > MOST_BYTES:
@@ -91,12 +91,12 @@ def _parsed(path: Path) -> dict[str, Any]:
             where = f"line {text.count(chr(10)) + 1}, column {len(text) - text.rfind(chr(10))}"
         raise SceneFileError([f"{where}: {what[0].lower()}{what[1:]}; must be TOML"]) from None
     except ValueError as error:  # Python's own limits: a null byte in a path, an integer of 4300 digits
+        if long := LONG_NUMBER.search(text):
+            line = text.count("\n", 0, long.start()) + 1
+            key = text[text.rfind("\n", 0, long.start()) + 1 : long.start()].partition("=")[0].strip()
+            what = f"line {line}: {_shortened(key)}: an integer of {len(long[0])} digits"
+            raise SceneFileError([f"{what}; must be a number of at most {sys.get_int_max_str_digits()}"]) from None
         raise SceneFileError([f"{str(error).split(';')[0].lower()}; must be a readable TOML file"]) from None
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    """Opens as `open` does, but does not wait for somebody to write into a pipe."""
-    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _checked(table: dict[str, Any]) -> SceneTable:

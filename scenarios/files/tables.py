@@ -15,6 +15,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInf
 from pydantic_core import PydanticCustomError
 
 MOST_DISKS = 100_000
+MOST_WALLS = 10_000
+MOST_PAIRS = 20_000_000  # disks times walls, each of which is measured when a scene is read: some 2 s
 MOST_STEPS = 10_000_000  # over the whole dt ladder, for one engine
 SMALLEST, LARGEST = 1e-9, 1e9
 """The scale of a scene, SI: no number of it is larger than `LARGEST`, nothing that has a size (radius, mass, time,
@@ -164,10 +166,18 @@ class SceneTable(_Table):
     gravity: Pair = Field([0.0, 0.0], description="two finite numbers [x, y] (m/s2)")
     restitution: Strict = Field(ge=0, le=1, description="from 0 to 1")
     disk: list[DiskTable] = Field(min_length=1, max_length=MOST_DISKS, description=f"1 to {MOST_DISKS} [[disk]] tables")
-    wall: list[WallTable] = Field([], description="[[wall]] tables")
+    wall: list[WallTable] = Field([], max_length=MOST_WALLS, description=f"at most {MOST_WALLS} [[wall]] tables")
     box: CornersTable | None = Field(None, description="one [box] table with low and high")
     wrap: CornersTable | None = Field(None, description="one [wrap] table with low and high")
     thrust: list[ThrustTable] = Field([], description="[[thrust]] tables")
+
+    @field_validator("wall")
+    @classmethod
+    def _can_be_measured(cls, walls: list[WallTable], info: ValidationInfo) -> list[WallTable]:
+        most = MOST_PAIRS // max(1, len(info.data.get("disk", [])))
+        if len(walls) > most:
+            raise ValueError(f"{len(walls)} walls for so many disks; must be at most {most}")
+        return walls
 
     @field_validator("restitution")
     @classmethod

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.model import Scenario, frozen
+from scenarios.regular import opened
 
 HERE = Path(__file__).parent
 ARRAYS = {"legs": 12, "events": 5, "outcomes": 4, "orders": 3}
@@ -66,7 +67,7 @@ def look_up(key: str) -> dict[str, Any] | None:
 # What reading a torn or foreign archive raises: it is as good as none. One bit makes an unknown compression
 # (NotImplementedError), an encrypted file (RuntimeError), or an array larger than any memory.
 UNREADABLE = (OSError, ValueError, LookupError, EOFError, TypeError, RuntimeError, MemoryError, SyntaxError,
-              zipfile.BadZipFile, zlib.error)  # fmt: skip
+              zipfile.BadZipFile, zlib.error, RecursionError)  # fmt: skip
 
 
 def packed(fields: dict[str, Any]) -> bytes:
@@ -80,14 +81,28 @@ def packed(fields: dict[str, Any]) -> bytes:
 def unpacked(path: Path) -> dict[str, Any] | None:
     """The fields of the record in a file that holds what `packed` gave; None if it cannot be read in full."""
     try:
-        with np.load(path, allow_pickle=False) as saved:
+        with opened(path) as file, np.load(file, allow_pickle=False) as saved:
             arrays = {name: frozen(saved[name]) for name in ARRAYS}
             numbers = json.loads(str(saved["numbers"]))
-        if any(arrays[name].shape[1:] != (width,) for name, width in ARRAYS.items()) or set(numbers) != set(NUMBERS):
-            return None
     except UNREADABLE:
         return None
-    return arrays | numbers | {"remains": tuple(numbers["remains"])}
+    fits = all(arrays[name].shape[1:] == (width,) for name, width in ARRAYS.items()) and is_said(numbers)
+    return arrays | numbers | {"remains": tuple(numbers["remains"])} if fits else None
+
+
+def is_said(numbers: Any) -> bool:
+    """Whether they are what `NUMBERS` are: anybody may have edited the file."""
+    if not isinstance(numbers, dict) or set(numbers) != set(NUMBERS):
+        return False
+    of = {type(numbers[name]) for name in ("valid_until", "error_bound", "followed_until")}
+    texts = numbers["remains"]
+    return (
+        of <= {int, float}
+        and type(numbers["bits"]) is int
+        and all(isinstance(numbers[name], str) for name in ("method", "reason"))
+        and isinstance(texts, list)
+        and all(isinstance(text, str) for text in texts)
+    )
 
 
 def keep(key: str, fields: dict[str, Any]) -> bool:

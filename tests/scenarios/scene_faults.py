@@ -192,7 +192,7 @@ FAULTS = [
     (
         "duration = 2.0",
         f"duration = {'9' * 5000}",
-        "exceeds the limit (4300 digits) for integer string conversion",
+        'line 4: "duration": an integer of 5000 digits; must be a number of at most 4300',
     ),
     ("duration = 2.0", f"duration = 0x{'9' * 5000}", "duration = 0x9999999999999"),
     (

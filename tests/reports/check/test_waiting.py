@@ -6,7 +6,6 @@ import json
 import os
 import pickle
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from time import process_time
@@ -17,7 +16,9 @@ from py_mini_racer import JSTimeoutException
 
 from adapters.own_solver.file import NotASolver, read_solver
 from adapters.own_solver.javascript import JavaScriptSolver
+from adapters.own_solver.process import WORK
 from adapters.own_solver.worker import HERE
+from adapters.safe_path import python
 
 SECONDS = 16.0  # for a process that starts and is stopped late, on a busy machine
 JS = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.js").read_text()
@@ -51,7 +52,7 @@ def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Pat
     """V8 stops the loop after its limit; nobody is there to hear it, and no process is left behind."""
     (tmp_path / "Exercise.js").write_text("while (true) {}")
     worker = subprocess.Popen(
-        [sys.executable, "-P", "-m", "adapters.own_solver.worker"],
+        python(WORK),
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     assert worker.stdin is not None

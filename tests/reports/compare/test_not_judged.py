@@ -201,3 +201,12 @@ def test_a_failed_run_is_no_number_that_is_not_judged():
 
     assert table.metric.tolist() == ["status"]
     assert not table.note.str.startswith(NOT_JUDGED).any()
+
+
+def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
+    """The only engine broke the protocol: there is an exact answer, and nobody to be held to it."""
+    comparisons = [compared(known_until("slow_hit", 5))]
+    alone, without = findings(comparisons, set(NAMES))[0], findings([], set())[0]
+
+    assert alone == "No engine that counts was played to its end in a scene with an exact answer, so nobody is scored."
+    assert without.startswith("No scene here has an exact answer")

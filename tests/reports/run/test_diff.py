@@ -205,3 +205,16 @@ def test_a_scene_that_is_not_judged_any_more_is_worse(before: Path, after: Path)
     assert {(one.before, one.after, one.verdict) for one in worse} == {("judged", why, "worse")}
     assert {(one.before, one.after, one.verdict) for one in better} == {(why, "judged", "better")}
     assert exit_of(before, after) == 1
+
+
+def test_what_diff_advises_about_a_table_that_was_edited_works(before: Path, after: Path):
+    """Nothing of somebody's is written over by `report`, so the table has to go first."""
+    whole = (after / "deviations.csv").read_bytes()
+    (after / "deviations.csv").write_bytes(whole + b"mine")
+    with pytest.raises(ValueError, match="delete it, and make it again: crosscheck report"):
+        difference(before, after)
+    (after / "deviations.csv").unlink()
+    make_report(after, print, LESSONS)
+
+    assert (after / "deviations.csv").read_bytes() == whole
+    assert not difference(before, after).worse

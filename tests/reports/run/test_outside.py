@@ -18,12 +18,14 @@ from typing import Any
 
 import pytest
 
+from adapters import safe_path
 from adapters.engine import NotStarted
-from adapters.own_solver import process as solver_process
 from adapters.own_solver.engine import engine_file
 from adapters.own_solver.file import read_solver
+from adapters.own_solver.process import WORK
 from adapters.own_solver.worker import HERE, MEMORY
 from adapters.play import play
+from adapters.safe_path import python
 from reports.run import runner, worker
 from reports.run.archive import Archive
 from reports.run.cells import Cell
@@ -109,7 +111,7 @@ def test_a_worker_that_does_not_come_up_is_not_the_fault_of_its_task(tmp_path: P
 
 def test_a_process_of_a_solver_that_cannot_start_is_not_the_fault_of_its_file(monkeypatch: pytest.MonkeyPatch):
     """It is neither a row of the check nor the status of a run."""
-    monkeypatch.setattr(solver_process.sys, "executable", shutil.which("false"))
+    monkeypatch.setattr(safe_path.sys, "executable", shutil.which("false"))
     question, engine = scenario(SCENE), engine_file(RIGHT).make()
 
     with pytest.raises(NotStarted, match=r"the process for a solver's file could not be started: .*exit status 1"):
@@ -198,7 +200,7 @@ def little_memory() -> None:
 def test_a_worker_with_little_memory_can_still_start_a_solver():
     """A limit that is lower than the solver's own stays as it is: nobody but root may raise it."""
     with subprocess.Popen(
-        [sys.executable, "-P", "-m", "adapters.own_solver.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        python(WORK), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         preexec_fn=little_memory, start_new_session=True,
     ) as process:  # fmt: skip
         assert process.stdin is not None

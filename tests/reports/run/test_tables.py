@@ -128,10 +128,10 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_
         path.unlink()
     archive = Archive.read(copy)
     cells = [Cell(one["scene"], one["seed"], name_of(one), one["substeps"]) for one in archive.records]
-    gathering = Gathering(replace(archive, records=[]), cells, 60.0)
+    gathering = Gathering(replace(archive, records=[]), cells, 60.0, pytest.fail)
     made = [(record["scene"], [*gathering.ended(record)]) for record in archive.records]
     last = {scene: max(k for k, (which, _) in enumerate(made) if which == scene) for scene, _ in made}
-    resumed = [path.name for path, _ in Gathering(archive, cells[:1], 60.0).whole()]
+    resumed = [path.name for path, _ in Gathering(archive, cells[:1], 60.0, pytest.fail).whole()]
     first = [task for _, tasks in made for task in tasks]
     assert gathering.asked == list(last)  # of which the person is told who waits for them
     assert not gathering.playing
@@ -142,7 +142,7 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_
     assert all(len(tasks) <= 1 for _, tasks in made)
     assert [name.split("-")[0] for name in resumed] == [scene for scene in last if scene != cells[0].scene]
     assert [path.suffix for path, _ in (*first, *then)] == [ANSWER] * 2 + [".csv"] * 2
-    assert after == list(Gathering(archive, [], 60.0).whole()) == gathering.asked == []
+    assert after == list(Gathering(archive, [], 60.0, pytest.fail).whole()) == gathering.asked == []
     assert {path: path.read_bytes() for path in (copy / "compared").glob("*.csv")} == {
         path: text for path, text in whole.items() if path.suffix == ".csv"
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
@@ -13,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from adapters import safe_path
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.run import worker
@@ -20,7 +22,6 @@ from reports.run.cells import Cell
 from reports.run.playing import play_here
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
-from reports.terminal import safe_path
 from scenarios.catalogue import scenario
 from tests.reports.run.control_engines import Controlled, row
 from tests.reports.terminal.command_line import CROSSCHECK
@@ -74,9 +75,7 @@ def test_a_worker_imports_nothing_of_the_folder_it_is_started_in(
 
 def test_without_the_safe_path_a_worker_is_caught_and_its_cell_is_no_result(ran, monkeypatch: pytest.MonkeyPatch):
     """The negative control: the traps work; and what came of it is said to lie outside the engine."""
-    start = subprocess.Popen
-    unsafe = lambda words, **how: start([word for word in words if word != "-P"], **how)  # noqa: E731
-    monkeypatch.setattr(worker.subprocess, "Popen", unsafe)
+    monkeypatch.setattr(worker, "python", lambda statements: [sys.executable, "-c", f"import sys; {statements}"])
     ended = in_a_worker()
 
     assert ran() != ""
@@ -141,16 +140,88 @@ def test_a_pythonpath_with_the_current_folder_runs_nothing_of_it(tmp_path: Path,
     assert (done.returncode, ran()) == (0, ""), done.stderr
 
 
-def test_only_the_current_folder_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """What else somebody has put on the path stays; so does the folder that this program is in."""
+@pytest.fixture
+def path(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """`sys.path`, to be changed at will; what finds modules is then as it was, too."""
+    monkeypatch.setattr(sys, "meta_path", sys.meta_path[:])
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    return sys.path
+
+
+def test_only_the_current_folder_and_that_of_the_program_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: list[str]
+):
+    """What else somebody has put on the path stays."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", ["", str(tmp_path), "/else", *sys.path])
-    safe_path.leave_out_current_folder()
-    assert sys.path[0] == "/else"
-    monkeypatch.chdir(ROOT)
-    monkeypatch.setattr(sys, "path", [str(ROOT), "/else"])
-    safe_path.leave_out_current_folder()
-    assert sys.path == [str(ROOT), "/else"]
+    path[:] = ["", str(tmp_path), "/else", str(ROOT), "/more"]
+    safe_path.keep_path_safe()
+    assert path == ["/else", "/more"]
+
+
+@pytest.mark.parametrize("of", [ast, pytest], ids=["Python's own", "installed"])
+def test_a_folder_that_modules_are_installed_in_stays_where_it_was_last(
+    monkeypatch: pytest.MonkeyPatch, path: list[str], of: Any
+):
+    """Who stands in it has it on the path twice, for `python -m` before Python's own."""
+    monkeypatch.chdir(folder := (Path(of.__file__).parent if of is ast else Path(of.__file__).parents[1]))
+    path[:] = [str(folder), "/else", str(folder), "/more"]
+    safe_path.keep_path_safe()
+    assert path == ["/else", str(folder), "/more"]
+
+
+def test_of_the_folder_of_the_program_only_its_packages_are_found():
+    """pyproject.toml beside them is no hindrance, nor a conftest.py; `tests` are found by who is told of them."""
+    found = safe_path.OwnPackages(safe_path.PACKAGES).find_spec
+    assert all(found(name) is not None for name in OURS[:4])
+    assert [found(name) for name in ("tests", "scipy", "conftest", "random")] == [None] * 4
+    assert safe_path.OwnPackages((safe_path.TESTS,)).find_spec("tests") is not None
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], str]]:
+    """A clone of the program with modules in its root that nobody asked for, and what tells which of them were run."""
+    base = tmp_path_factory.mktemp("clone")
+    ran = trapped(base / "root", {"scipy", "yaml", "pyarrow", "cffi", "random", "secrets", "numbers", *LIBRARIES})
+    for name in OURS[:4]:
+        shutil.copytree(ROOT / name, base / "root" / name, ignore=shutil.ignore_patterns("__pycache__", "out"))
+    for name, solver in SOLVERS.items():
+        (base / "root" / f"my_{name}").write_text(solver.read_text())
+    return base / "root", ran
+
+
+@pytest.mark.parametrize("begin", [["-P", "-c", "from reports.__main__ import main; main()"], ["-m", "reports"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["list", "engines"],
+        pytest.param(["check", "my_plain.py"], marks=pytest.mark.slow),
+        pytest.param(["check", "my_plain.js"], marks=pytest.mark.slow),
+        pytest.param(["run", "head_on_equal_e09", "--dt", str(1 / 60), "--engine", "reference:exercise",
+                      "--engine", "my_arrays.py", "--out", "../out"], marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_a_module_beside_readme_is_not_run_where_everybody_stands(
+    clone: tuple[Path, Callable[[], str]], begin: list[str], words: list[str]
+):
+    """The root on the path as an editable installation has it, at its end, or before all others, as `-m` does it."""
+    root, ran = clone
+    at_end = f"import sys; sys.path.append({str(root)!r}); sys.argv[0] = 'crosscheck'; "
+    begin = begin if begin[0] == "-m" else [*begin[:2], at_end + begin[2]]
+    done = subprocess.run([sys.executable, *begin, *words], cwd=root, capture_output=True, text=True, timeout=500)
+
+    assert ran() == "", done.stderr
+    assert done.returncode == 0, done.stderr
+
+
+def test_without_the_safe_path_a_module_beside_readme_is_run(clone: tuple[Path, Callable[[], str]]):
+    """The negative control: the traps of that folder work."""
+    root, ran = clone
+    code = f"import sys; sys.path.append({str(root)!r}); import numba.core.types; import scipy"
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
+
+    assert "scipy.py of the current folder was run" in done.stderr
+    assert ran() == "scipy "
+    (root.parent / f"{root.name}.ran").unlink()
 
 
 @pytest.mark.slow

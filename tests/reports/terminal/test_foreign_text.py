@@ -2,6 +2,7 @@
 
 import ast
 import json
+import os
 import unicodedata
 from pathlib import Path
 
@@ -126,3 +127,12 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyte
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
     assert (tmp_path / "a").read_bytes() == b"old"
     assert encoded("a\udcffb") == b"a\\udcffb"
+
+
+def test_what_is_written_to_a_pipe_by_its_descriptor_arrives():
+    """As `--page /dev/stdout` is where a command is piped into another: a link to what has no path."""
+    reading, writing = os.pipe()
+    with open(reading, "rb") as pipe:
+        with open(writing, "wb"):
+            put_bytes(Path(f"/dev/fd/{writing}"), b"all of it")
+        assert pipe.read() == b"all of it"

@@ -237,7 +237,7 @@ def test_a_finished_run_takes_its_place_whole_whenever_it_is_told(
     for folder, text in ((made, "new"), (target, "old")):
         folder.mkdir()
         (folder / "journal.jsonl").write_text(text)
-    begun(made, RUN)
+    begun(made, RUN, target)
     put_made(target, Made(RUN.command, True, {}))
 
     def rename_and_tell(path: Path, to: Path) -> Path:

@@ -133,6 +133,10 @@ FOREIGN: dict[str, dict[str, str]] = {
     "another made.json": {"made.json": "[1, 2]", "report.html": "mine"},
     "a made.json that is torn": {"made.json": '{"command": "crosscheck r'},
     "a made.json of other types": {"made.json": '{"command": 1, "finished": 2, "files": 3}', "scenes/a.toml": SCENE},
+    "a made.json for what is no name": {
+        "made.json": '{"command": "crosscheck run", "finished": true, "files": {}, "out": 5}',
+        "scenes/a.toml": SCENE,
+    },
     "a made.json of another command": {"made.json": '{"command": "make", "finished": true, "files": {}}'},
 }
 
@@ -221,7 +225,7 @@ def test_a_folder_that_is_where_a_link_leads_is_replaced_there(here: Path):
 def test_an_interrupted_run_is_not_replaced_under_its_own_name(here: Path, words: tuple[str, ...]):
     """`--out OUT.part` would bury what has ended in it."""
     (here / "out").rename(here / "out.part")
-    begun(here / "out.part", RUN)
+    begun(here / "out.part", RUN, here / "out")
     before = all_of(here)
     done = crosscheck(*words, cwd=here)
 
@@ -309,6 +313,9 @@ def test_what_was_killed_between_two_renames_is_gone_on_with(here: Path):
     """The old run stays aside, the new one is put in its place by --resume."""
     (here / "out").rename(here / "out.old")
     shutil.copytree(here / "out.old", here / "out.part")
+    made = read_made(here / "out.part")
+    assert made is not None
+    put_made(here / "out.part", made._replace(out="out"))
     done = crosscheck("run", "--resume", "out", cwd=here)
 
     assert done.returncode == 0, done.stderr
@@ -319,7 +326,7 @@ def test_what_was_being_written_when_it_was_killed_is_ours(tmp_path: Path):
     """A torn table, and the rest of a file that was not renamed, do not keep a run from being gone on with."""
     part = tmp_path / "out.part"
     part.mkdir()
-    begun(part, RUN)
+    begun(part, RUN, tmp_path / "out")
     killed = writing(part, ["runs.csv"])
     killed.__enter__()  # and it never comes out of it
     (part / "runs.csv").write_text("scenario,eng")
@@ -332,7 +339,7 @@ def test_what_was_being_written_when_it_was_killed_is_ours(tmp_path: Path):
 
 def test_what_is_refused_before_it_is_written_leaves_the_record_as_it_was(tmp_path: Path):
     """So that a table that somebody edits after that is still seen not to be ours."""
-    begun(tmp_path, RUN)
+    begun(tmp_path, RUN, tmp_path)
     with writing(tmp_path, ["runs.csv"]):
         (tmp_path / "runs.csv").write_text("as it was played")
     before = (tmp_path / MADE).read_bytes()

@@ -1,0 +1,29 @@
+"""Opens a file that ends: a pipe that nobody writes to would be waited for, a device may give bytes for ever."""
+
+from __future__ import annotations
+
+import os
+import stat
+from errno import EINVAL
+from pathlib import Path
+from typing import BinaryIO
+
+
+def opened(path: str | Path) -> BinaryIO:
+    """The file, to be read as bytes; raises `OSError` if it cannot be, or is a pipe or a device."""
+    file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115 - which the caller closes
+    if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        return file
+    file.close()
+    raise OSError(EINVAL, "is a pipe or a device", str(path))
+
+
+def all_of(path: str | Path) -> bytes:
+    """Its bytes; raises as `opened`."""
+    with opened(path) as file:
+        return file.read()
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Opens as `open` does, but does not wait for somebody to write into a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK)
