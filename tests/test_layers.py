@@ -17,7 +17,7 @@ LAYERS = {
     "scenarios": ["model", "no_truth", "truth", "families", "files", "catalogue"],
     "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines", "record", "exact"],
     "adapters": [
-        "engine matched", "float32 play", "reference pymunk box2d box2d_v3 event_driven", "own_solver", "engines",
+        "matched", "engine", "float32 play", "reference pymunk box2d box2d_v3 event_driven", "own_solver", "engines",
         "mechanisms conformance",
     ],
     "reports": [

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.mechanisms.features import changed_box2d
+from adapters.engines import changed
 from adapters.mechanisms.switched import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, Switched
 from adapters.play import Run, play
 from reports.compare.comparison import answered
@@ -156,7 +156,7 @@ def show_push_out(settings: Settings) -> Shown:
     x, still = [[0.0, 0.0], [0.8, 0.0]], np.zeros((2, 2))
     scenario = asked(lay_out(position=x, velocity=still, radius=[0.5] * 2, mass=[np.inf, 2.0], restitution=0.0), 0.4)
     on = Switched(BOX2D, push_most=0.2, push_share=settings["share"], slop=settings["slop"] / 1e3)
-    engine = changed_box2d(continuous=False, bullet=False, length_unit=1.0)
+    engine = changed("box2d:matched", continuous=False, bullet=False, length_unit=1.0)
     runs = [play(engine, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
     engine.close()
     curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
