@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite, nan
 from typing import Any
 
 import numpy as np
 
 from adapters.engines import ENGINES, changed
-from adapters.play import Run, play
+from adapters.play import Run, play_once
 from reports.stability.cases_gas import gas
 from reports.stability.cases_hits import flyby
 from reports.stability.cases_stacks import column
@@ -86,11 +87,7 @@ def with_iterations(player: str, scenario: Scenario, _ratio: float, count: float
     """Play with so many iterations, or substeps, whichever the engine has."""
     work = ENGINES[player].work
     assert work is not None
-    engine = changed(player, **{work.setting: int(count)})
-    try:
-        return play(engine, player, scenario, scenario.dt(1))
-    finally:
-        engine.close()
+    return play_once(partial(changed, player, **{work.setting: int(count)}), player, scenario, scenario.dt(1))
 
 
 def hit_at(x: float, y: float, run: int) -> Scenario:

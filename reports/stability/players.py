@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from adapters.engine import Engine
 from adapters.engines import ENGINES, changed
-from adapters.play import Run, play
+from adapters.play import Run, play_once
 from scenarios.model import Scenario, Scene
 
 
@@ -42,6 +42,11 @@ def varied(name: str, variant: str) -> Any:
     return Switched(engine, loaded) if loaded else engine
 
 
+def with_variant(variant: str) -> tuple[str, ...]:
+    """The keys of `PLAYERS` of all engines that have this variant."""
+    return tuple(f"{name}+{variant}" for name, row in ENGINES.items() if variant in row.variants)
+
+
 SWITCHED = tuple(
     Player(f"{name}+{variant}", partial(varied, name, variant), what)
     for name, row in ENGINES.items()
@@ -53,17 +58,8 @@ PLAYERS: dict[str, Player] = {
 
 
 def played(player: Player, scenario: Scenario) -> Run:
-    """Play a scenario at its only step size; the engine is closed again. A library that is missing is a refusal."""
-    dt = scenario.dt(scenario.substeps[0])
-    try:
-        engine = player.make()
-    except ImportError as missing:
-        name, profile = player.name.split(":")
-        return Run(name, profile, scenario.name, dt, "unsupported", f"{missing.name or missing} cannot be imported")
-    try:
-        return play(engine, player.name, scenario, dt)
-    finally:
-        engine.close()
+    """Play a scenario at its only step size."""
+    return play_once(player.make, player.name, scenario, scenario.dt(scenario.substeps[0]))
 
 
 def play_as(player: str, scenario: Scenario) -> Run:
