@@ -251,3 +251,18 @@ def test_speed_and_stability_have_the_engine_on_their_pages(grown: Path, command
     assert "toy<i>:<wbr>plain" in page
     assert "#5b6b7a" in page
     assert 'class="plot"' in page
+
+
+def test_an_engine_is_named_in_its_files_and_its_row_and_else_only_in_texts_about_it():
+    """The youngest engine, for all: what holds for it holds for the next one."""
+    about_it = {"reports/lessons/mechanisms.py", "reports/lessons/motion.py"}  # which engines a lesson shows
+    about_it |= {"reports/stability/reasons.py", "reports/stability/twins.py"}  # why an engine fails, with the source
+    named = {
+        path.relative_to(ROOT).as_posix()
+        for folder in SOURCE
+        for path in (ROOT / folder).rglob("*")
+        if path.suffix in (".py", ".js", ".j2", ".css") and "out" not in path.parts
+        and re.search(r"\bbox2d_v3\b", path.read_text(encoding="utf-8"))
+    }  # fmt: skip
+
+    assert named - about_it == {"adapters/engines.py", "adapters/mechanisms/habits.py"}
