@@ -11,6 +11,7 @@ import numpy as np
 
 from adapters.engine import KEPT, PASSED, Hit
 from adapters.float32 import must_fit, must_not_be_cut, rounding
+from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
 
 SHIPPED: dict[str, Any] = {
@@ -42,6 +43,39 @@ MATCHED: dict[str, Any] = {
 }
 """What the profiles choose: `time_unit` in s, `length_unit` in smallest radii, position iterations at e < 1 and at
 e = 1. `adapters/matched.csv` holds what else was tried."""
+
+SEARCHED = Searched(
+    MATCHED,
+    {
+        "velocity_iterations": ((8, 20, 50, 100), "passes of the impulse solver; the manual has 8"),
+        "position_iterations": ((0, 1, 3, 8), "passes of the position correction at e < 1; the manual: 3"),
+        "elastic_position_iterations": ((0, 3), "the same at e = 1"),
+        "continuous": ((False, True), "continuous collision with walls and static disks; on by default"),
+        "bullet": ((False, True), "the same between disks that move, where `continuous` is on"),
+        "elastic_continuous": ((False, True), "as `continuous`, at e = 1 without gravity"),
+        "elastic_bullet": ((False, True), "as `bullet`, at e = 1 without gravity"),
+        "sub_stepping": ((False, True), "one continuous collision a call, where `continuous` is on"),
+        "warm_starting": ((True, False), "begin with the impulses of the last step; on by default"),
+        "time_unit": ((1.0, 1e3, 1e4),
+            "s; closing speeds below a unit of length in a unit of time are inelastic, which is compiled in"),
+        "length_unit": ((0.125, 0.25, 0.5, 1.0, 3.0),
+            "smallest radii; slop 0.005, tolerance of continuous collision 0.015 and cap 2 units are compiled in"),
+        "step_unit": ((1.0, 2.0, 4.0), "ways of the fastest disk in a step: a unit of length at least"),
+    },
+    (
+        (("continuous", "bullet"), (False, True), (False, True)),
+        (("elastic_continuous", "elastic_bullet"), (True,), (True,)),
+        (("bullet", "length_unit"), (False, True), (0.125, 0.5, 1.0)),
+    ),
+    {
+        "radius of an edge (wall skin)": f"0: {GEOMETRY}",
+        "walls of boxes or chains": "two-sided segments are what the scene states",
+        "b2_velocityThreshold, b2_linearSlop, b2_maxTranslation, b2_baumgarte, b2_toiSlop":
+            "compiled in; the binding's attributes of these names are copies; moved by the units alone",
+        "contact.restitution in PreSolve": "Python code in place of the engine's own collision law",
+        "friction, linearDamping, sleeping": "0, 0 and off: as the scene states",
+    },
+)  # fmt: skip
 
 
 class Box2DEngine:

@@ -15,6 +15,7 @@ import pyb2d3
 
 from adapters.engine import PASSED, UNREAD, Hit
 from adapters.float32 import must_fit, must_not_be_cut, rounding
+from adapters.matched import Searched
 from scenarios.model import Array, Scene, State
 
 SHIPPED: dict[str, Any] = {
@@ -37,6 +38,41 @@ MATCHED: dict[str, Any] = {
 }
 """What the profiles choose: `length_unit` in smallest radii; `hertz`, `damping_ratio` and `push_speed` (m/s) are of the
 contacts. `adapters/matched.csv` holds what else was tried."""
+
+SEARCHED = Searched(
+    MATCHED,
+    {
+        "length_unit": (
+            (0.02, 0.1, 0.3, 0.5, 0.7, 1.0, 2.0),
+            "smallest radii; sets slop (0.005 units) and the margin in which contacts are foreseen (0.02 units)",
+        ),
+        "substeps": ((1, 2, 4, 8), "of a step; the manual has 4"),
+        "hertz": (
+            (10.0, 30.0, 120.0, 1e6),
+            "stiffness of a contact; 30 by default; cut at an eighth of the substeps a second",
+        ),
+        "damping_ratio": ((1.0, 3.0, 10.0, 30.0), "of a contact; 10 by default"),
+        "push_speed": ((0.0, 0.3, 3.0, 30.0), "m/s, at most, of a position correction; 3 by default"),
+        "continuous": ((False, True), "continuous collision with walls and static disks; on by default"),
+        "bullet": ((False, True), "the same between disks that move, where `continuous` is on"),
+    },
+    (
+        (("length_unit", "hertz"), (0.02, 0.3, 0.5), (30.0, 1e6)),
+        (("substeps", "hertz"), (2, 8), (30.0, 1e6)),
+        (("hertz", "damping_ratio"), (30.0, 1e6), (1.0, 3.0)),
+        (("continuous", "bullet"), (True,), (True,)),
+    ),
+    {
+        "restitution_threshold": "0: as the scene states",
+        "maximum_linear_speed": "1e9 m/s: no speed is cut",
+        "warm starting, speculative contacts": "not in the binding",
+        "linear slop, speculative margin": "compiled in; moved by the length unit alone",
+        "joint tuning": "no joints here",
+        "walls of chains or boxes": "a chain is one-sided, a segment of the scene is not",
+        "friction, damping, sleeping": "0, 0 and off: as the scene states",
+        "thread_pool": "changes the time alone",
+    },
+)
 
 LENGTH_UNIT = Lock()  # it is global to the process: threads take turns, or worlds would be made in another's unit
 

@@ -1,18 +1,22 @@
-"""The table of players: a row an engine and profile. To add one, write its file and its row."""
+"""The table of engines: a row an engine and profile. To add one, write its file and its row."""
 
 from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from adapters.engine import FLOAT32, FLOAT64, Engine, Row
+import numpy as np
+
+from adapters.engine import FLOAT32, FLOAT64, Engine, Mark, Row, Variant, Work
+from adapters.matched import Searched
 
 
-def _exercise() -> Engine:
+def _exercise(**settings: Any) -> Engine:
     from adapters.reference import Reference
     from reference_impl import crowd
 
-    return Reference(crowd)
+    return Reference(crowd, **settings)
 
 
 def _lesson() -> Engine:
@@ -29,22 +33,40 @@ def _ordered() -> Engine:
     return Reference(ordered)
 
 
-def _pymunk(profile: str) -> Engine:
+def _pymunk(profile: str, **settings: Any) -> Engine:
     from adapters.pymunk import Pymunk
 
-    return Pymunk(profile)
+    return Pymunk(profile, **settings)
 
 
-def _box2d(profile: str) -> Engine:
+def _pymunk_searched() -> Searched:
+    from adapters.pymunk import SEARCHED
+
+    return SEARCHED
+
+
+def _box2d(profile: str, **settings: Any) -> Engine:
     from adapters.box2d import Box2DEngine
 
-    return Box2DEngine(profile)
+    return Box2DEngine(profile, **settings)
 
 
-def _box2d_v3(profile: str) -> Engine:
+def _box2d_searched() -> Searched:
+    from adapters.box2d import SEARCHED
+
+    return SEARCHED
+
+
+def _box2d_v3(profile: str, **settings: Any) -> Engine:
     from adapters.box2d_v3 import Box2DV3
 
-    return Box2DV3(profile)
+    return Box2DV3(profile, **settings)
+
+
+def _box2d_v3_searched() -> Searched:
+    from adapters.box2d_v3 import SEARCHED
+
+    return SEARCHED
 
 
 def _event_driven() -> Engine:
@@ -53,39 +75,99 @@ def _event_driven() -> Engine:
     return EventDriven()
 
 
+def _what_moves_is_a_bullet(engine: Any) -> None:
+    """Of both Box2Ds: of the disks that move; a bullet sees no other bullet in 3.1."""
+    for body, velocity in zip(engine.bodies, engine.scene.velocity):
+        body.bullet = bool(velocity.any())
+
+
+# What all profiles of an engine have in common.
+_Reference = partial(Row, mark=Mark("#0a4f9e", "#6cb8ff", "circle"))
+_Pymunk = partial(
+    Row, distributions=("pymunk",), mark=Mark("#d1540a", "#ff9a4d", "triangle-up"), searched=_pymunk_searched,
+    work=Work("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
+)  # fmt: skip
+_Box2D = partial(
+    Row, distributions=("box2d-py",), mark=Mark("#00876c", "#5be0b5", "square"), searched=_box2d_searched,
+    work=Work("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
+)  # fmt: skip
+_Box2DV3 = partial(
+    Row, distributions=("pyb2d3",), mark=Mark("#b84fb0", "#c46bd8", "diamond"), searched=_box2d_v3_searched,
+    work=Work("substeps", "substeps", (1, 2, 4, 8, 16)),
+)  # fmt: skip
+_BULLETS = "continuous collision, what moves is a bullet"
+
 ENGINES: dict[str, Row] = {
-    "reference:exercise": Row(
-        _exercise, "hand-written solver of exercise 11: symplectic Euler, project, impulse", 1.0, FLOAT64
+    "reference:exercise": _Reference(
+        _exercise, "hand-written solver of exercise 11: symplectic Euler, project, impulse", 1.0, FLOAT64,
+        features={"kept in float32": {"precision": np.float32}},
     ),
-    "reference:lesson": Row(
+    "reference:lesson": _Reference(
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
     ),
-    "reference:ordered": Row(
+    "reference:ordered": _Reference(
         _ordered, "hand-written: exact flight, hits in the order in which they happen within a step", 0.5, FLOAT64
     ),
-    "pymunk:shipped": Row(
+    "pymunk:shipped": _Pymunk(
         partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64
     ),
-    "pymunk:matched": Row(
-        partial(_pymunk, "matched"), "pymunk, matched: elasticity sqrt(e), small slop", 0.0, FLOAT64
+    "pymunk:matched": _Pymunk(
+        partial(_pymunk, "matched"), "pymunk, matched: elasticity sqrt(e), small slop", 0.0, FLOAT64,
+        features={
+            "50 iterations, not 10": {"iterations": 50},
+            "200 iterations, not 10": {"iterations": 200},
+            "sleeping": {"sleep_time_threshold": 0.5},
+            "no rotation": {"turning": False},
+            "hash, not tree": {"spatial_hash": (0.6, 1000)},
+        },
+        variants={
+            "fifty_iterations": Variant({"iterations": 50}, "50 iterations for 10"),
+            "push_out": Variant({"collision_bias": (1 - 0.1) ** 60}, "overlaps pushed out as shipped"),
+        },
     ),
-    "box2d:shipped": Row(
+    "box2d:shipped": _Box2D(
         partial(_box2d, "shipped"), "box2d-py 2.3.8 as it comes: friction, sleep, threshold 1 m/s", 1.0, FLOAT32
     ),
-    "box2d:matched": Row(
+    "box2d:matched": _Box2D(
         partial(_box2d, "matched"),
-        "box2d-py, matched: units that lift its thresholds; CCD; no friction, sleep", 1.0, FLOAT32
+        "box2d-py, matched: units that lift its thresholds; CCD; no friction, sleep", 1.0, FLOAT32,
+        features={
+            "1 iteration, not 8": {"velocity_iterations": 1},
+            "30 iterations, not 8": {"velocity_iterations": 30},
+            "no push-out": {"position_iterations": 0},
+            "no CCD": {"continuous": False, "bullet": False},
+            "CCD at e = 1, too": {"elastic_continuous": True, "elastic_bullet": True},
+            "sleeping": {"sleeping": True},
+            "no warm start": {"warm_starting": False},
+            "no rotation": {"turning": False},
+        },
+        variants={
+            "bullets": Variant({"elastic_continuous": True, "continuous": True}, _BULLETS, _what_moves_is_a_bullet)
+        },
     ),
-    "box2d_v3:shipped": Row(
+    "box2d_v3:shipped": _Box2DV3(
         partial(_box2d_v3, "shipped"),
         "Box2D 3.1 (pyb2d3) as it comes: friction, sleep, threshold 1 m/s", 0.625, FLOAT32
     ),
-    "box2d_v3:matched": Row(
+    "box2d_v3:matched": _Box2DV3(
         partial(_box2d_v3, "matched"),
-        "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction", 0.625, FLOAT32
+        "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction", 0.625, FLOAT32,
+        features={
+            "1 substep, not 4": {"substeps": 1},
+            "16 substeps, not 4": {"substeps": 16},
+            "CCD": {"continuous": True},
+            "CCD, all bullets": {"continuous": True, "bullet": True},
+            "sleeping": {"sleeping": True},
+            "no rotation": {"turning": False},
+        },
+        variants={
+            "bullets": Variant({"continuous": True}, _BULLETS, _what_moves_is_a_bullet),
+            "16_substeps": Variant({"substeps": 16}, "16 substeps for 4"),
+        },
     ),
     "event_driven:float64": Row(
-        _event_driven, "from hit to hit without steps: parabolas and contact times, in float64", 0.5, FLOAT64
+        _event_driven, "from hit to hit without steps: parabolas and contact times, in float64", 0.5, FLOAT64,
+        mark=Mark("#6b5f00", "#d9c84a", "star"),
     ),
 }  # fmt: skip
 
@@ -113,3 +195,8 @@ def read_row(name: str) -> Row:
 
     _read[name] = row = engine_file(Path(name.removesuffix(OWN)))
     return row
+
+
+def changed(name: str, **settings: Any) -> Engine:
+    """The engine of a row of `ENGINES` with these parameters, as its row or its file names them."""
+    return ENGINES[name].make(**settings)

@@ -1,11 +1,32 @@
-"""The table of what was searched for the matched profiles, by `crosscheck tune`; a test holds the adapters to it."""
+"""What is searched for a matched profile by `crosscheck tune`, and the table of what came of it."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 TABLE = Path(__file__).with_suffix(".csv")
+GEOMETRY = "it would move what the scene states, so that a late collision and a wrong place make up for each other"
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The public settings of an engine, of which `crosscheck tune` searches those of the matched profile.
+
+    Attributes:
+        chosen: setting -> its value in the matched profile now; a test holds it to the table.
+        settings: setting -> (the values that are tried beside the chosen one, what it does and in which unit it is).
+        pairs: two settings that act on the same thing, tried together: names, values of the first, of the second.
+        left_alone: a setting that is not chosen by a search -> why.
+    """
+
+    chosen: Mapping[str, Any]
+    settings: Mapping[str, tuple[tuple[Any, ...], str]]
+    pairs: tuple[tuple[tuple[str, str], tuple[Any, ...], tuple[Any, ...]], ...]
+    left_alone: Mapping[str, str]
 
 
 def searched(path: Path = TABLE) -> list[dict[str, str]]:

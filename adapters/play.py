@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from math import cos, sin
 from time import perf_counter
@@ -52,6 +53,23 @@ class Run:
 
 def unwatched(state: State) -> None:
     """Nobody looks on."""
+
+
+def play_once(
+    make: Callable[[], Engine], name: str, scenario: Scenario, dt: float, watch: Callable[[State], None] = unwatched
+) -> Run:
+    """`play` on a new engine, which is closed again whatever happens; `make` is `Row.make`, `name` `engine:profile`.
+
+    A library that is missing is a refusal, with its name. Raises what `play` raises.
+    """
+    try:
+        engine = make()
+    except ImportError as missing:
+        engine_name, profile = name.split(":")
+        reason = f"{missing.name or missing} cannot be imported: {missing}"
+        return Run(engine_name, profile, scenario.name, dt, "unsupported", reason)
+    with closing(engine):
+        return play(engine, name, scenario, dt, watch)
 
 
 def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callable[[State], None] = unwatched) -> Run:

@@ -10,21 +10,49 @@ import pymunk
 from pymunk import batch
 
 from adapters.engine import Hit
+from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
 
 FIELDS = (
     batch.BodyFields.POSITION | batch.BodyFields.ANGLE | batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
 )
 
+DEFAULT_BIAS = (1 - 0.1) ** 60
 MATCHED: dict[str, Any] = {
     "iterations": 10,
     "slop": 1e-6,
-    "bias": (1 - 0.1) ** 60,
+    "bias": DEFAULT_BIAS,
     "elastic_bias": 1.0,
     "persistence": 1,
 }
 """What `matched` chooses: `slop` in smallest radii; the biases are what is left of an overlap after 1 s, at e < 1 and
 at e = 1. `adapters/matched.csv` holds what else was tried."""
+
+SEARCHED = Searched(
+    MATCHED,
+    {
+        "iterations": ((5, 10, 20, 50, 100, 200), "passes of the impulse solver; 10 by default"),
+        "slop": ((0.01, 1e-3, 1e-4, 1e-6, 0.0), "overlap left alone, in smallest radii; 0.1 m by default"),
+        "bias": (
+            (1.0, 0.3, DEFAULT_BIAS, 1e-12, 1e-24, 1e-48, 0.0),
+            "share of an overlap that is left after 1 s, at e < 1; 0.0018 by default",
+        ),
+        "elastic_bias": ((1.0, 0.3, DEFAULT_BIAS, 1e-24, 0.0), "the same at e = 1"),
+        "persistence": ((1, 2, 3), "steps for which a lost contact keeps its impulses; 3 by default"),
+    },
+    (
+        (("slop", "bias"), (1e-2, 1e-4, 0.0), (DEFAULT_BIAS, 1e-12, 1e-48, 0.0)),
+        (("slop", "elastic_bias"), (1e-3, 0.0), (DEFAULT_BIAS, 1e-24, 0.0)),
+    ),
+    {
+        "elasticity": "sqrt(e) on every shape: the engine multiplies two",
+        "shape radius of a wall": GEOMETRY,
+        "position_func, velocity_func": "Python code in place of the engine's own integrator",
+        "pre_solve callbacks": "Python code in place of the engine's own collision law",
+        "damping, friction, sleep_time_threshold": "1, 0 and none by default: as the scene states",
+        "use_spatial_hash, threads": "change the time alone: see the features of crosscheck speed",
+    },
+)
 
 
 class Pymunk:

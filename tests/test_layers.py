@@ -17,7 +17,7 @@ LAYERS = {
     "scenarios": ["regular", "model", "no_truth", "truth", "families", "files", "catalogue"],
     "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines", "record", "exact"],
     "adapters": [
-        "engine matched safe_path", "float32 play", "reference pymunk box2d box2d_v3 event_driven", "own_solver",
+        "matched safe_path", "engine", "float32 play", "reference pymunk box2d box2d_v3 event_driven", "own_solver",
         "engines", "mechanisms conformance",
     ],
     "reports": [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -52,12 +52,9 @@ class Probe:
 @contextmanager
 def loaded(row: Row, scene: Scene, dt: float = DT) -> Iterator[Engine]:
     """A fresh engine with `scene` in it, closed at the end whatever happens."""
-    engine = row.make()
-    try:
+    with closing(row.make()) as engine:
         engine.load(scene, dt)
         yield engine
-    finally:
-        engine.close()
 
 
 def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:

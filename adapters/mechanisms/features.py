@@ -9,7 +9,7 @@ from types import FunctionType, SimpleNamespace
 from typing import Any
 
 from adapters.engine import Engine
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, changed
 
 
 @dataclass(frozen=True)
@@ -32,36 +32,6 @@ class Feature:
         return ENGINES[self.engine].make
 
 
-def changed_pymunk(**changed: Any) -> Engine:
-    """pymunk, matched, with these parameters of its adapter."""
-    from adapters.pymunk import Pymunk
-
-    return Pymunk("matched", **changed)
-
-
-def changed_box2d(**changed: Any) -> Engine:
-    """Box2D 2.3, matched, with these parameters of its adapter."""
-    from adapters.box2d import Box2DEngine
-
-    return Box2DEngine("matched", **changed)
-
-
-def changed_box2d_v3(**changed: Any) -> Engine:
-    """Box2D 3.1, matched, with these parameters of its adapter."""
-    from adapters.box2d_v3 import Box2DV3
-
-    return Box2DV3("matched", **changed)
-
-
-def _float32() -> Engine:
-    import numpy as np
-
-    from adapters.reference import Reference
-    from reference_impl import crowd
-
-    return Reference(crowd, precision=np.float32)
-
-
 def _always_listing() -> Engine:
     from adapters.reference import Reference
 
@@ -79,39 +49,14 @@ def listing() -> Any:
     return SimpleNamespace(__name__="crowd", advance=njit(error_model="numpy")(advance))
 
 
-def _rows(engine: str, make: Callable[..., Engine], changes: dict[str, dict[str, Any]]) -> list[Feature]:
-    return [Feature(engine, change, partial(make, **settings)) for change, settings in changes.items()]
-
-
-FEATURES: tuple[Feature, ...] = (
-    Feature("reference:exercise", "kept in float32", _float32),
-    Feature("reference:exercise", "broad phase, always", _always_listing),
-    *_rows("pymunk:matched", changed_pymunk, {
-        "50 iterations, not 10": {"iterations": 50},
-        "200 iterations, not 10": {"iterations": 200},
-        "sleeping": {"sleep_time_threshold": 0.5},
-        "no rotation": {"turning": False},
-        "hash, not tree": {"spatial_hash": (0.6, 1000)},
-    }),
-    *_rows("box2d:matched", changed_box2d, {
-        "1 iteration, not 8": {"velocity_iterations": 1},
-        "30 iterations, not 8": {"velocity_iterations": 30},
-        "no push-out": {"position_iterations": 0},
-        "no CCD": {"continuous": False, "bullet": False},
-        "CCD at e = 1, too": {"elastic_continuous": True, "elastic_bullet": True},
-        "sleeping": {"sleeping": True},
-        "no warm start": {"warm_starting": False},
-        "no rotation": {"turning": False},
-    }),
-    *_rows("box2d_v3:matched", changed_box2d_v3, {
-        "1 substep, not 4": {"substeps": 1},
-        "16 substeps, not 4": {"substeps": 16},
-        "CCD": {"continuous": True},
-        "CCD, all bullets": {"continuous": True, "bullet": True},
-        "sleeping": {"sleeping": True},
-        "no rotation": {"turning": False},
-    }),
-)  # fmt: skip
+FEATURES: tuple[Feature, ...] = tuple(
+    feature
+    for name, row in ENGINES.items()
+    for feature in (
+        *(Feature(name, change, partial(changed, name, **settings)) for change, settings in row.features.items()),
+        *([Feature(name, "broad phase, always", _always_listing)] if name == "reference:exercise" else []),
+    )
+)
 """What an engine cannot be changed in is not here: pymunk has no CCD and always starts warm, Box2D 3.1 hides its
 warm start, and no outside engine lets its broad phase be switched off."""
 
@@ -123,14 +68,12 @@ class Dial:
     Attributes:
         engine: the row of `ENGINES` it is turned in, `engine:profile`.
         what: the number that is turned.
-        change: the engine by its parameters.
-        parameter: the name of that number among them.
+        parameter: the name of that number among those of the engine's `make`.
         values: from cheap to dear.
     """
 
     engine: str
     what: str
-    change: Callable[..., Engine]
     parameter: str
     values: tuple[int, ...]
 
@@ -141,11 +84,11 @@ class Dial:
 
     def at(self, value: int) -> Callable[[], Engine]:
         """How to make the engine with this value."""
-        return partial(self.change, **{self.parameter: value})
+        return partial(changed, self.engine, **{self.parameter: value})
 
 
-DIALS: tuple[Dial, ...] = (
-    Dial("pymunk:matched", "iterations", changed_pymunk, "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
-    Dial("box2d:matched", "iterations", changed_box2d, "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
-    Dial("box2d_v3:matched", "substeps", changed_box2d_v3, "substeps", (1, 2, 4, 8, 16)),
+DIALS: tuple[Dial, ...] = tuple(
+    Dial(name, row.work.what, row.work.setting, row.work.values)
+    for name, row in ENGINES.items()
+    if row.work is not None and name.endswith(":matched")
 )

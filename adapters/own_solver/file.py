@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.own_solver.beside import modules_beside
+from adapters.own_solver.gl_matrix import WHERE_TO, gl_matrix_of
 
 LARGEST = 2**20  # bytes; the exercise's file has about five thousand
 PATIENCE = 3  # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
@@ -65,7 +66,8 @@ class SolverText:
         kind: "javascript" or "python".
         text: with \\n at the end of lines.
         digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
-        beside: the modules that it imports from its own folder: file, relative to the folder, -> text.
+        beside: the modules that it imports from its own folder, or the gl-matrix that it calls: file, relative to the
+            folder or to the one above with its node_modules, -> text.
     """
 
     path: Path
@@ -89,7 +91,7 @@ def read_solver(path: Path) -> SolverText:
     text = decoded(path, data)
     if not text.strip():
         raise NotASolver(f"{path}: is empty; save your solver into it")
-    beside = read_beside(path, text) if kind == "python" else {}
+    beside = read_beside(path, text) if kind == "python" else read_library(path, text)
     return SolverText(path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(beside.items())))
 
 
@@ -101,6 +103,12 @@ def read_beside(path: Path, text: str) -> dict[str, str]:
         if sum(map(len, beside.values())) > LARGEST:
             raise NotASolver(f"{path}: imports more than 1 MB from beside it; a solver has a few kilobytes")
     return beside
+
+
+def read_library(path: Path, text: str) -> dict[str, str]:
+    """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises `NotASolver`."""
+    found = gl_matrix_of(path, text)
+    return {} if found is None else {found[0]: decoded(found[1], read_bytes(found[1], WHERE_TO))}
 
 
 def read_module(path: Path) -> str:

@@ -12,14 +12,12 @@ from typing import Any
 from py_mini_racer import JSEvalException, JSOOMException, JSParseException, JSTimeoutException, MiniRacer
 
 from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
+from adapters.own_solver.gl_matrix import NAMES, TAKE_OUT, WHERE_TO
 
 HEAP = 64 * 2**20  # bytes; a solver needs a hundredth of it
 LOAD_LIMIT = 2.0  # s
 NAME = "solver-file"  # how the solver's text is called in stack traces
 DRIVER = (Path(__file__).parent / "driver.js").read_text(encoding="utf-8")
-# What the exercise's page loads beside the file; from version 3 on vec2, vec3, mat4 ... are no globals any more.
-GL_MATRIX = Path(__file__).parent / "gl-matrix-2.8.1.min.js"
-CALLS_GL_MATRIX = re.compile(r"\b(?:vec[234]|mat[234]|mat2d|quat2?|glMatrix)\b")
 # Evaluated after the file, where its `let` and `const` can be seen too; a name that it lacks fails when it is used.
 BIND = """__crosscheck("bind", {
   integrate: typeof integrate === "undefined" ? null : integrate,
@@ -40,13 +38,22 @@ class JavaScriptSolver:
         self.engine = MiniRacer()
         self.engine.set_hard_memory_limit(HEAP)
         self.engine.eval(DRIVER)
-        if CALLS_GL_MATRIX.search(solver.text):
-            self.engine.eval(GL_MATRIX.read_text(encoding="utf-8"))
+        for name, text in solver.beside:
+            self.load_library(name, text)
         try:
             self.engine.eval(f"{solver.text}\n//# sourceURL={NAME}", timeout_sec=LOAD_LIMIT)
             self.functions = json.loads(str(self.engine.eval(BIND, timeout_sec=LOAD_LIMIT)))
         except JSEvalException as error:
             raise self.failure(error, LOAD_LIMIT, "while it is loaded") from None
+
+    def load_library(self, name: str, text: str) -> None:
+        """The gl-matrix, as the exercise's page loads it before the file. Raises `SolverFailed` if it is none."""
+        try:
+            self.engine.eval(f"{text}\n//# sourceURL={name}", timeout_sec=LOAD_LIMIT)
+            self.engine.eval(TAKE_OUT)
+        except JSEvalException as error:
+            said = str(error).partition("\n")[0]
+            raise SolverFailed("error", f"calls {name}, which cannot be loaded ({said}); {WHERE_TO}") from None
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
         """What the driver answers to a command; raises `SolverFailed` after `limit` s, or if the file threw."""
@@ -116,6 +123,8 @@ def plainly(what: str) -> str:
     if "Array buffer allocation failed" in what or "Invalid array length" in what:
         return f"wants more memory than it is given ({what})"
     missing = re.match(r"ReferenceError: (\w+) is not defined", what)
+    if missing and missing[1] in NAMES:
+        return f"{what}: {WHERE_TO}"
     if missing and missing[1] in OUTSIDE:
         return f"{what}: a solver is run without page, network and clock"
     if missing and missing[1] in ("module", "exports", "require"):

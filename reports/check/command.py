@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adapters.own_solver.file import KINDS, SolverFailed, SolverText, dangling
+from adapters.own_solver.gl_matrix import HANDED_OUT
 from adapters.own_solver.process import SolverProcess
 from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 PAGE, JUNIT = b'<meta name="generator" content="crosscheck check">', b'<testsuites name="crosscheck check"'
 CHECKING = 600.0  # s that a file may take: what each of its calls may take adds up to less
 NOBODYS = (".", "__", "node_modules")  # how the names of files and folders begin that no student wrote
-HANDED_OUT = ("gl-matrix.js", "gl-matrix-min.js", "mainScript.js")  # lie beside a student's file
 
 
 def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) -> None:
@@ -71,7 +71,7 @@ def files_of(path: Path) -> list[Path]:
     theirs = [one for one in path.rglob("*") if not any(p.startswith(NOBODYS) for p in one.relative_to(path).parts)]
     found = sorted(
         file for file in theirs
-        if file.suffix.lower() in KINDS and (file.is_file() or dangling(file)) and file.name not in HANDED_OUT
+        if file.suffix.lower() in KINDS and (file.is_file() or dangling(file)) and not is_handed_out(file)
     )  # fmt: skip
     if not found:
         refuse([f"{path}: {NONE}"])
@@ -96,6 +96,11 @@ def places_for(page: Path | None, junit: Path | None) -> None:
             refuse([str(fault)])
         except OSError as fault:
             refuse([f"{option} {path}: {fault.strerror or fault}; name another file"])
+
+
+def is_handed_out(file: Path) -> bool:
+    """Whether the exercise's page loads it beside a student's file."""
+    return file.match(HANDED_OUT) or file.name == "mainScript.js"
 
 
 def checked(files: Sequence[Path], progress: bool) -> list[FileCheck]:

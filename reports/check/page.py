@@ -10,7 +10,7 @@ from reports.check.rows import TASKS, shown
 from reports.check.smallest import DT, Smallest
 from reports.check.verdict import FileCheck
 from reports.page import style
-from reports.page.documents import looks_as_json, render
+from reports.page.documents import PLAYER, render
 from reports.page.replay import pack_layers, ratio_of
 from reports.run.made import sealed
 from reports.terminal.foreign_text import put_text
@@ -18,7 +18,7 @@ from scenarios.model import Scenario, Trajectory
 
 GENERATOR = "crosscheck check"
 YOURS = style.Look("#a3123a", "#ff7a93", (), "diamond", True)  # apart from the truth in any light, by style.py
-SCRIPTS = ("page/player.js", "page/player_canvas.js", "check/check.js")
+SCRIPTS = (*PLAYER, "check/check.js")
 
 
 def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
@@ -27,12 +27,12 @@ def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
     names = [style.TRUTH if run is None else run.name for run, _ in layers]
     looks = {name: style.look(name) if name == style.TRUTH else YOURS for name in names}
     html = render(
-        "check/check.html.j2", SCRIPTS, (),
-        name=check.path.name, check=check, tasks=TASKS, smallest=smallest, layers=names, looks=looks,
+        "check/check.html.j2", generator=GENERATOR, scripts=SCRIPTS if smallest else (), styles=["check/check.css"],
+        looks=looks, name=check.path.name, check=check, tasks=TASKS, smallest=smallest, layers=names,
         scene=[] if smallest is None else scene_lines(smallest.scenario), dt=shown(DT),
         replay="" if smallest is None else pack_layers(smallest.scenario, layers),
         ratio=1 if smallest is None else ratio_of(smallest.scenario, layers),
-        looks_json=looks_as_json(looks), generator=GENERATOR, version=version("crosscheck2d"),
+        version=version("crosscheck2d"),
         digest="" if check.solver is None else check.solver.digest,
     )  # fmt: skip
     put_text(path, sealed(html))

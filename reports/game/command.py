@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from contextlib import closing
 from math import inf
 from pathlib import Path
 
@@ -51,15 +52,13 @@ def own_rows(names: Sequence[str]) -> dict[str, Row]:
 
 def grounded(row: Row) -> str:
     """Why an engine cannot take a lone ship through a step; "" if it can."""
-    engine = row.make()
-    try:
-        engine.load(field_scenario(asteroids=0).scene, FRAME)
-        engine.step()
-        return fault_of(engine.read(), inf)
-    except Exception as error:  # somebody's solver may raise anything
-        return str(error) or type(error).__name__
-    finally:
-        engine.close()
+    with closing(row.make()) as engine:
+        try:
+            engine.load(field_scenario(asteroids=0).scene, FRAME)
+            engine.step()
+            return fault_of(engine.read(), inf)
+        except Exception as error:  # somebody's solver may raise anything
+            return str(error) or type(error).__name__
 
 
 def read_flight(path: Path) -> Scenario:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from adapters.engines import ENGINES
 from reports.game.flight import FRAME, SUBSTEPS
 from reports.game.parting import APART
-from reports.page.documents import looks_as_json, render
+from reports.page.documents import render
 from reports.page.style import look
 from scenarios.model import Scenario
 
@@ -16,7 +16,7 @@ def game_page(engines: Sequence[str], file: Scenario | None, mark: str) -> str:
     """The page, which begins with these engines; `file`: the flight it shows again; `mark`: its server's."""
     looks = {name: look(*name.split(":", 1)) for name in ENGINES}
     return render(
-        "game/game.html.j2", ["game/field.js", "game/game.js"], ["game/game.css"], connects=True,
-        rows=ENGINES, flown=list(engines), steps={k: FRAME / k for k in SUBSTEPS}, file=file, looks=looks, mark=mark,
-        apart=APART, looks_json=looks_as_json(looks),
+        "game/game.html.j2", generator="crosscheck play", scripts=["game/field.js", "game/game.js"],
+        styles=["game/game.css"], looks=looks, connects=True,
+        rows=ENGINES, flown=list(engines), steps={k: FRAME / k for k in SUBSTEPS}, file=file, mark=mark, apart=APART,
     )  # fmt: skip

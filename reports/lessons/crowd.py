@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from adapters.engines import ENGINES
-from adapters.play import play
+from adapters.play import play_once
 from adapters.reference import every_pair
 from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider
 from reports.page.style import TRUTH, number
@@ -41,7 +41,7 @@ def cost(name: str, scenario: Scenario) -> float:
     """µs a step, the least of some rounds: what disturbs a measurement only ever makes it longer."""
     steps = scenario.samples * SUBSTEPS
     make = every_pair if name == EVERY_PAIR else ENGINES[name].make
-    return min(play(make(), name, scenario, scenario.dt(SUBSTEPS)).seconds for _ in range(ROUNDS)) / steps * 1e6
+    return min(play_once(make, name, scenario, scenario.dt(SUBSTEPS)).seconds for _ in range(ROUNDS)) / steps * 1e6
 
 
 def show_cost(settings: Settings) -> Shown:

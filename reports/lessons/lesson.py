@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from adapters.engines import ENGINES
-from adapters.play import Run, play
+from adapters.play import Run, play_once
 from reports.compare.comparison import Comparison, answered, cut
 from reports.compare.laws import deviation
 from reports.page.replay import pack_layers, played, ratio_of
@@ -180,7 +180,7 @@ class Played:
     def by(scenario: Scenario, names: Sequence[str], substeps: int) -> Played:
         """Play it; the ladder of the scenario that is kept has this step only."""
         scenario, truth = answered(replace(scenario, substeps=(substeps,)))
-        return Played(scenario, [play_once(name, scenario, substeps) for name in names], truth)
+        return Played(scenario, [run_of(name, scenario, substeps) for name in names], truth)
 
     @cached_property
     def film(self) -> Comparison:
@@ -204,13 +204,9 @@ class Played:
         return curves
 
 
-def play_once(name: str, scenario: Scenario, substeps: int) -> Run:
-    """One run of one engine, which is closed again."""
-    engine = ENGINES[name].make()
-    try:
-        return play(engine, name, scenario, scenario.dt(substeps))
-    finally:
-        engine.close()
+def run_of(name: str, scenario: Scenario, substeps: int) -> Run:
+    """One run of one engine, by the name of its row."""
+    return play_once(ENGINES[name].make, name, scenario, scenario.dt(substeps))
 
 
 def rounded(values: Array) -> list[float]:

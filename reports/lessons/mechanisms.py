@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from adapters.mechanisms.features import changed_box2d
+from adapters.engines import changed
 from adapters.mechanisms.switched import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, Switched
-from adapters.play import Run, play
+from adapters.play import Run, play, play_once
 from reports.compare.comparison import answered
-from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
+from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, run_of
 from reports.page.style import TRUTH, number
 from scenarios.families.lesson import free_fall
 from scenarios.families.placing import lay_out
@@ -35,7 +36,7 @@ def asked(scene: Scene, duration: float) -> Scenario:
 
 def runs_of(names: Sequence[str], on: Switched, scenario: Scenario, substeps: int) -> list[Run]:
     """The engines, the reference as it is, and the reference with what is switched on."""
-    runs = [play_once(name, scenario, substeps) for name in (*names, PLAIN)]
+    runs = [run_of(name, scenario, substeps) for name in (*names, PLAIN)]
     return [*runs, play(on, SWITCHED, scenario, scenario.dt(substeps))]
 
 
@@ -156,9 +157,8 @@ def show_push_out(settings: Settings) -> Shown:
     x, still = [[0.0, 0.0], [0.8, 0.0]], np.zeros((2, 2))
     scenario = asked(lay_out(position=x, velocity=still, radius=[0.5] * 2, mass=[np.inf, 2.0], restitution=0.0), 0.4)
     on = Switched(BOX2D, push_most=0.2, push_share=settings["share"], slop=settings["slop"] / 1e3)
-    engine = changed_box2d(continuous=False, bullet=False, length_unit=1.0)
-    runs = [play(engine, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
-    engine.close()
+    without = partial(changed, "box2d:matched", continuous=False, bullet=False, length_unit=1.0)
+    runs = [play_once(without, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
     curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
     facts = [*told(runs, "linear slop in m"), distance(curves, NO_CCD, "mm")]
     return Shown([Chart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")], filmed(scenario, runs), facts)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 
 from adapters.engines import ENGINES
@@ -35,13 +37,13 @@ def two(restitution: float, ratio: float, offset: float) -> Scenario:
 
 def hit_of_the_reference(scene: Scene, dt: float) -> tuple[State, State, float]:
     """The reference's state before and after the step with its hit, and the impulse it tells, N s."""
-    engine = ENGINES["reference:exercise"].make()
-    engine.load(scene, dt)
-    before = engine.read()
-    while not engine.hits():
+    with closing(ENGINES["reference:exercise"].make()) as engine:
+        engine.load(scene, dt)
         before = engine.read()
-        engine.step()
-    return before, engine.read(), engine.hits()[0].impulse
+        while not engine.hits():
+            before = engine.read()
+            engine.step()
+        return before, engine.read(), engine.hits()[0].impulse
 
 
 def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from adapters.engines import ENGINES
-from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
+from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, run_of
 from reports.page.style import TRUTH, number
 from scenarios.families.exercise import ship_thrust
 from scenarios.families.lesson import falling_box, ping_pong
@@ -33,7 +33,7 @@ def show_particle(settings: Settings) -> Shown:
     steps = np.array([scenario.dt(k) for k in LADDER])
     errors = []
     for name in names:
-        runs = [Played(scenario, [play_once(name, scenario, k)], shown.truth) for k in LADDER]
+        runs = [Played(scenario, [run_of(name, scenario, k)], shown.truth) for k in LADDER]
         errors.append(Curve(name, steps, [run.errors()[0].y.max() for run in runs], dots=True))  # type: ignore[union-attr]
     now = [(f"{curve.name}, largest error", f"{number(curve.y.max())} m") for curve in shown.errors()]  # type: ignore[union-attr]
     return Shown(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import json
-import zlib
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cache
@@ -22,11 +20,12 @@ from reports.lessons.conventions import Convention, table
 from reports.lessons.crowd import EVERY_PAIR
 from reports.lessons.lesson import Lesson
 from reports.lessons.mechanisms import SWITCHED
-from reports.page.documents import looks_as_json, render
+from reports.page.documents import PLAYER, deflated, fragment, render
 from reports.page.server import in_thread
 from reports.page.style import Look, look
 from reports.run.cells import versions
 
+GENERATOR = "crosscheck lesson"
 STYLES = ["lessons/lesson.css"]
 GROUPS = {"A solver, piece by piece": "12345", "How engines differ": "6", "What can be compared, and how far": "78"}
 MEASURING = Lock()  # two pages that ask at once get one measurement
@@ -68,19 +67,17 @@ def lesson_page(lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, g
     k = names.index(lesson.name)
     around = [LESSONS[names[each]] if 0 <= each < len(names) else None for each in (k - 1, k + 1)]
     return render(
-        "lessons/lesson.html.j2",
-        ["page/player.js", "page/player_canvas.js", "lessons/chart.js", "lessons/lesson.js"], STYLES, connects=not grid,
-        lesson=lesson, text=[Markup(paragraph) for paragraph in lesson.text], looks=looks_of(lesson),
-        looks_json=looks_as_json(looks_of(lesson)), grid=grid, around=around, links=links, about=about(),
-        first=first,
+        "lessons/lesson.html.j2", generator=GENERATOR, scripts=[*PLAYER, "lessons/chart.js", "lessons/lesson.js"],
+        styles=STYLES, looks=looks_of(lesson), connects=not grid,
+        lesson=lesson, text=[Markup(paragraph) for paragraph in lesson.text], grid=grid, around=around,
+        links=links, about=about(), first=first,
     )  # fmt: skip
 
 
 def offline(lesson: Lesson, answers: Mapping[tuple[int, ...], Any], links: Links = ALONE) -> str:
     """One page with the answer, as of `told`, to every setting of the sliders."""
     grid = {",".join(map(str, places)): answers[places] for places in lesson.grid}
-    packed = zlib.compress(json.dumps(grid, separators=(",", ":")).encode(), 9)
-    return lesson_page(lesson, answers[lesson.start], links, base64.b64encode(packed).decode())
+    return lesson_page(lesson, answers[lesson.start], links, deflated(json.dumps(grid, separators=(",", ":"))))
 
 
 def index_page(links: Links = LIVE, rows: Sequence[Convention] = ()) -> str:
@@ -89,8 +86,8 @@ def index_page(links: Links = LIVE, rows: Sequence[Convention] = ()) -> str:
     groups = {heading: [LESSONS[name] for name in LESSONS if LESSONS[name].number[0] in numbers]
               for heading, numbers in GROUPS.items()}  # fmt: skip
     return render(
-        "lessons/index.html.j2", ["lessons/index.js"] if live else [], STYLES, connects=live, groups=groups,
-        links=links, table=None if live else Markup(conventions_page(rows, about())),
+        "lessons/index.html.j2", generator=GENERATOR, scripts=["lessons/index.js"] if live else [], styles=STYLES,
+        connects=live, groups=groups, links=links, table=None if live else Markup(conventions_page(rows, about())),
     )  # fmt: skip
 
 
@@ -102,7 +99,7 @@ def conventions_table() -> str:
 
 def conventions_page(rows: Sequence[Convention], when: Mapping[str, str]) -> str:
     """The table for a page; `when` and with what it was measured."""
-    return render("lessons/conventions.html.j2", [], [], rows=rows, about=when)
+    return fragment("lessons/conventions.html.j2", rows=rows, about=when)
 
 
 @cache

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ from reports.compare.comparison import Comparison, cut
 from reports.compare.delays import jumps_of
 from reports.compare.view import View
 from reports.page import style
+from reports.page.documents import deflated
 from scenarios.model import Array, Trajectory
 
 ZERO = 1e-17
@@ -260,3 +262,13 @@ CHARTS: dict[str, Chart] = {
     "deviation": Chart("distance to the truth over time", deviation),
     "convergence": Chart("position error against dt", convergence),
 }
+
+
+def packed_charts(drawings: Mapping[str, Drawing]) -> str:
+    """The figures as JSON, deflated, as base64; what they share with every other figure is left to page.js."""
+    figures = {}
+    for key, drawing in drawings.items():
+        if drawing.figure is not None:
+            figures[key] = drawing.figure.to_dict()
+            figures[key]["layout"].pop("template", None)
+    return deflated(json.dumps(figures, separators=(",", ":"), default=list))

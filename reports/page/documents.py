@@ -5,38 +5,79 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import zlib
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports.page import style
+from reports.terminal.foreign_text import encoded
 
 REPORTS = Path(__file__).parents[1]
+PLAYER = ("page/player.js", "page/player_canvas.js")  # the replay
+CHARTED = (*PLAYER, "page/page.js")  # replays, and charts that are drawn when they come into view
 
 
-def render(template: str, scripts: Sequence[str], styles: Sequence[str], connects: bool = False, **fields: Any) -> str:
-    """The page of `template` as text; templates, scripts and styles are paths below `reports`.
+def render(
+    template: str,
+    *,
+    generator: str,
+    scripts: Sequence[str] = (),
+    styles: Sequence[str] = (),
+    looks: Mapping[str, style.Look] = MappingProxyType({}),
+    plotly: bool = False,
+    connects: bool = False,
+    **fields: Any,
+) -> str:
+    """The page of `template`, which extends base.html.j2, as text; templates, scripts, styles: paths below `reports`.
 
-    connects: whether its scripts may talk to the server the page comes from.
+    Args:
+        generator: the command that makes it, by which a file is known as one that may be written over.
+        looks: name -> how it is drawn; `who` and `swatch` of macros.html.j2 show these names.
+        plotly: whether its charts need the library, which then stands in the page, deflated.
+        connects: whether its scripts may talk to the server the page comes from.
+        fields: what else the template names; a name that it lacks raises `jinja2.UndefinedError`.
     """
-    environment = Environment(
+    sources = [(REPORTS / script).read_text(encoding="utf-8") for script in scripts]
+    library = [plotly_source()] if plotly else []
+    sheet = css() + "".join((REPORTS / sheet).read_text(encoding="utf-8") for sheet in styles)
+    policy = content_policy([*library, *sources]) + ("; connect-src 'self'" if connects else "")
+    return fragment(
+        template, generator=generator, policy=policy, css=Markup(sheet), looks=looks, looks_json=looks_as_json(looks),
+        scripts=[Markup(source) for source in sources], library="".join(map(deflated, library)), **fields,
+    )  # fmt: skip
+
+
+def fragment(template: str, **fields: Any) -> str:
+    """A template as text, filled with `fields`: a page, or a part of one."""
+    return environment().get_template(template).render(**fields)
+
+
+def plotly_source() -> str:
+    """The whole library; imported only now, as it takes longer than a page that has no chart."""
+    from plotly.offline import get_plotlyjs
+
+    return get_plotlyjs()
+
+
+@cache
+def environment() -> Environment:
+    """How all templates are read: text is escaped, and a name that nobody has given is an error."""
+    made = Environment(
         loader=FileSystemLoader(REPORTS),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,
     )
-    environment.filters["number"] = style.number
-    environment.filters["for_script"] = for_script
-    sources = [(REPORTS / script).read_text(encoding="utf-8") for script in scripts]
-    sheet = css() + "".join((REPORTS / sheet).read_text(encoding="utf-8") for sheet in styles)
-    policy = content_policy(sources) + ("; connect-src 'self'" if connects else "")
-    return environment.get_template(template).render(
-        policy=policy, css=Markup(sheet), scripts=[Markup(source) for source in sources], **fields
-    )
+    made.filters["number"] = style.number
+    made.filters["for_script"] = for_script
+    return made
 
 
 def css() -> str:
@@ -62,3 +103,8 @@ def content_policy(scripts: Sequence[str]) -> str:
     hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     allowed = " ".join(f"'sha256-{digest}'" for digest in hashes)
     return f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
+
+
+def deflated(text: str) -> str:
+    """Text, deflated, as base64: what `unpack` of player.js reads."""
+    return base64.b64encode(zlib.compress(encoded(text), 9)).decode()

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import json
-import zlib
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,9 +9,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from adapters.matched import searched
 from adapters.play import Run
@@ -22,15 +16,15 @@ from adapters.thrust_grid import off_grid_note
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
 from reports.page import overview, style
-from reports.page.charts import CHARTS, POINTS, Drawing
-from reports.page.documents import REPORTS, content_policy, css, looks_as_json
+from reports.page.charts import CHARTS, POINTS, Drawing, packed_charts
+from reports.page.documents import CHARTED, render
 from reports.page.replay import frames, name_of, pack, played, ratio_of
 from reports.page.trust import how_far_to_trust
 from reports.run.known_answers import MEANING
-from reports.terminal.foreign_text import encoded, put_text
+from reports.terminal.foreign_text import put_text
 from scenarios.catalogue import SCENARIOS
 
-SCRIPTS = ("page/player.js", "page/player_canvas.js", "page/page.js")
+GENERATOR = "crosscheck run"
 VERDICTS = ("keeps", "departs", "breaks")
 FAMILIES = {
     "scenarios.families.lesson": "The lesson",
@@ -83,24 +77,14 @@ def write_page(
     names = overview.names_of(comparisons)
     common = overview.common_settings(comparisons)
     sections = [section_of(comparison, names, common) for comparison in comparisons]
-    plotly, scripts = get_plotlyjs(), [(REPORTS / script).read_text(encoding="utf-8") for script in SCRIPTS]
-    environment = Environment(
-        loader=FileSystemLoader(REPORTS),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    environment.filters["number"] = style.number
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
-    html = environment.get_template("page/page.html.j2").render(
+    html = render(
+        "page/page.html.j2", generator=GENERATOR, scripts=CHARTED, looks=looks, plotly=True,
         names=names, sections=sections, families=by_family(sections), findings=findings, about=about, points=POINTS,
-        engines=versions_of(comparisons), steps=step_range(comparisons), columns=overview.SUMMARY, looks=looks,
+        engines=versions_of(comparisons), steps=step_range(comparisons), columns=overview.SUMMARY,
         summary=overview.summary(comparisons, names, untrusted), heat_map=overview.heat_map(comparisons, names),
         conformance=conformance_matrix(conformance), departures=departures(conformance), probes=records(conformance),
         known_answers=records(known_answers), known_answers_text=about.get("known_answers_text", MEANING),
-        css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
-        library=deflated(plotly), policy=content_policy([plotly, *scripts]),
         heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, lessons=lessons, truth_of=truth_of,
         off_grid_note=off_grid_note,
         common=by_name(common), trust=how_far_to_trust(comparisons), searched=by_engine(searched()),
@@ -130,21 +114,6 @@ def section_of(comparison: Comparison, names: Sequence[str], common: overview.Se
         settings=by_name(own),
         pairs=overview.between_engines(comparison, names),
     )
-
-
-def packed_charts(drawings: Mapping[str, Drawing]) -> str:
-    """The figures as JSON, deflated, as base64; what they share with every other figure is left to page.js."""
-    figures = {}
-    for key, drawing in drawings.items():
-        if drawing.figure is not None:
-            figures[key] = drawing.figure.to_dict()
-            figures[key]["layout"].pop("template", None)
-    return deflated(json.dumps(figures, separators=(",", ":"), default=list))
-
-
-def deflated(text: str) -> str:
-    """Text, deflated, as base64: what `unpack` of player.js reads."""
-    return base64.b64encode(zlib.compress(encoded(text), 9)).decode()
 
 
 def by_family(sections: Sequence[Section]) -> dict[str, list[Section]]:

@@ -6,6 +6,8 @@ import math
 from typing import NamedTuple
 from zlib import crc32
 
+from adapters.engine import Mark
+from adapters.engines import ENGINES
 from reports.terminal.foreign_text import encoded
 
 TRUTH = "truth"
@@ -43,17 +45,7 @@ class Look(NamedTuple):
         return ",".join(f"{length}px" for length in self.dash) or "solid"
 
 
-# (light, dark, shape). Against page and player each colour has more than 3 : 1, which WCAG 2 asks of graphics, and any
-# two of the four engines are 0.06 or more apart in OKLab, also as seen with protan-, deuteran- and tritanopia (matrices
-# of Machado et al., IEEE TVCG 15, 1291, 2009). Where colour is not seen at all, shape and dash tell them apart.
-ENGINE = {
-    "reference": ("#0a4f9e", "#6cb8ff", "circle"),
-    "pymunk": ("#d1540a", "#ff9a4d", "triangle-up"),
-    "box2d": ("#00876c", "#5be0b5", "square"),
-    "box2d_v3": ("#b84fb0", "#c46bd8", "diamond"),
-    "event_driven": ("#6b5f00", "#d9c84a", "star"),
-    TRUTH: ("#16191d", "#f4f4f2", "circle"),
-}
+OF_TRUTH = Mark("#16191d", "#f4f4f2", "circle")
 # The shapes as SVG paths about the origin, as large as an 8 px mark of plotly.
 PATHS = {
     "circle": "M4,0A4,4 0 1 1 -4,0A4,4 0 1 1 4,0Z",
@@ -67,9 +59,10 @@ PATHS = {
     "bowtie": "M-4.2,-3.2V3.2L0,0L4.2,3.2V-3.2L0,0Z",
     "star": "M0,-5L1.3,-1.7L4.8,-1.5L2.1,0.7L2.9,4L0,2.2L-2.9,4L-2.1,0.7L-4.8,-1.5L-1.3,-1.7Z",
 }
-OTHERS = (
-    ("#5b6b7a", "#9fb0c0", "cross"), ("#a3123a", "#ff7a93", "triangle-down"),
-    ("#5a3d9e", "#b7a1ff", "hexagon"), ("#3d6b1f", "#a4d67a", "pentagon"), ("#7a4a21", "#e0a878", "bowtie"),
+PALETTE = (
+    Mark("#5b6b7a", "#9fb0c0", "cross"), Mark("#a3123a", "#ff7a93", "triangle-down"),
+    Mark("#5a3d9e", "#b7a1ff", "hexagon"), Mark("#3d6b1f", "#a4d67a", "pentagon"),
+    Mark("#7a4a21", "#e0a878", "bowtie"),
 )  # fmt: skip
 DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3)}
 SWITCHED = (1, 2)  # a profile with one thing switched, `matched+...`
@@ -85,10 +78,24 @@ HEAT_DARK = (
 
 
 def look(engine: str, profile: str = "") -> Look:
-    """How `engine:profile` is drawn; an engine without a row gets one of `OTHERS` by its name."""
-    light, dark, shape = ENGINE.get(engine) or OTHERS[crc32(encoded(engine)) % len(OTHERS)]
+    """How `engine:profile`, or the truth, is drawn."""
+    light, dark, shape = OF_TRUTH if engine == TRUTH else mark_of(engine)
     dash = SWITCHED if "+" in profile else DASHED.get(profile, ())
     return Look(light, dark, dash, shape, not dash)
+
+
+def mark_of(engine: str) -> Mark:
+    """What its row of `ENGINES` says; of those whose rows say nothing the first has the first of `PALETTE`, and so on.
+
+    An engine without a row, such as a solver's file, has one of `PALETTE` by its name, in every run the same.
+    """
+    marks: dict[str, Mark | None] = {}
+    for name, row in ENGINES.items():
+        marks.setdefault(name.partition(":")[0], row.mark)
+    if engine not in marks:
+        return PALETTE[crc32(encoded(engine)) % len(PALETTE)]
+    unnamed = [name for name, mark in marks.items() if mark is None]
+    return marks[engine] or PALETTE[unnamed.index(engine) % len(PALETTE)]
 
 
 def heat(value: float) -> int:

@@ -11,11 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
+from adapters.engines import ENGINES
 from scenarios.model import Scenario
 
 PLAYERS = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")  # wherever in these folders a file lies
 ROOT = Path(__file__).parents[2]
-DECIDING = ("pymunk", "box2d-py", "pyb2d3", "mini-racer", "numba", "numpy", "crosscheck2d")
+DECIDING = ("mini-racer", "numba", "numpy", "crosscheck2d")  # besides the distributions of the engines
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def scene_hash(scenario: Scenario) -> str:
 def versions() -> dict[str, str]:
     """Package -> version of all that decides a number; "missing" if it is not installed."""
     found = {}
-    for package in DECIDING:
+    for package in dict.fromkeys((*(each for row in ENGINES.values() for each in row.distributions), *DECIDING)):
         try:
             found[package] = version(package)
         except PackageNotFoundError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,15 +68,14 @@ def mean_squared_error_of(name: str, dt: float) -> float:
         position=[[0.0, HEIGHT]], velocity=[[0.0, 0.0]], radius=[RADIUS], mass=[MASS], restitution=1.0,
         gravity=[0.0, -GRAVITY], walls=[[[-1.0, 0.0], [1.0, 0.0]]],
     )  # fmt: skip
-    engine = ENGINES[name].make()
-    engine.load(scene, dt)
     steps = round(DURATION / dt)
     y, v = np.empty(steps), np.empty(steps)
-    for k in range(steps):
-        state = engine.read()
-        y[k], v[k] = state.position[0, 1], state.velocity[0, 1]
-        engine.step()
-    engine.close()
+    with closing(ENGINES[name].make()) as engine:
+        engine.load(scene, dt)
+        for k in range(steps):
+            state = engine.read()
+            y[k], v[k] = state.position[0, 1], state.velocity[0, 1]
+            engine.step()
     return mean_squared_error(y, v)
 
 

@@ -12,9 +12,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from adapters.conformance.conform import Finding, conform
-from adapters.conformance.probe import DT, plain
+from adapters.conformance.probe import loaded, plain
 from adapters.engine import Row
-from adapters.play import Run, play, unwatched
+from adapters.play import Run, play_once, unwatched
 from reports.run.archive import packed, parts_of
 from reports.run.cells import Cell, source_hash, versions
 from reports.run.worker_process import allow, leave
@@ -33,16 +33,8 @@ class Played(NamedTuple):
 
 
 def play_cell(cell: Cell, row: Row, scenario: Scenario, watch: Callable[[State], None] = unwatched) -> Run:
-    """Play a cell here and now; the engine is closed again, whatever happens."""
-    try:
-        engine = row.make()
-    except ImportError as missing:
-        reason = f"{missing.name or missing} cannot be imported: {missing}"
-        return Run(*cell.names, scenario.name, scenario.dt(cell.substeps), "unsupported", reason)
-    try:
-        return play(engine, cell.engine, scenario, scenario.dt(cell.substeps), watch)
-    finally:
-        engine.close()
+    """Play a cell here and now."""
+    return play_once(row.make, cell.engine, scenario, scenario.dt(cell.substeps), watch)
 
 
 class Begun:
@@ -76,10 +68,8 @@ def time_here(cell: Cell, row: Row, scenario: Scenario) -> float:
 def conform_here(name: str, row: Row) -> list[Finding]:
     """In the worker: what the probes find; before their clock starts the engine is loaded once, and so compiled."""
     allow(LOADING)
-    with suppress(Exception):  # which the probes will meet again, and say
-        engine = row.make()
-        engine.load(plain(), DT)
-        engine.close()
+    with suppress(Exception), loaded(row, plain()):  # which the probes will meet again, and say
+        pass
     allow()
     return conform(name, row)
 

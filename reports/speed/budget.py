@@ -5,8 +5,9 @@ As vectors, disk by disk and sample by sample, the parts close: engine - truth =
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from adapters.engine import Engine
 from adapters.engines import row_of
 from adapters.mechanisms.habits import FLIGHT, Habit, habits_of, with_habits
-from adapters.play import Run, play
+from adapters.play import Run, play_once
 from reports.compare import laws, scales
 from reports.compare.comparison import cut
 from reports.compare.view import View
@@ -82,7 +83,7 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
              "until_s": scenario.duration, "horizon_s": held(scene, seed).scenario.duration,
              "duration_s": open_scene(scene, seed).duration}  # fmt: skip
     try:
-        run = at.played(row_of(name).make())
+        run = at.played(row_of(name).make)
         budget = Budget(at, habits_of(name, run.settings, scenario.scene, dt), at.offset(run))
         parts, checks = budget.parts(), budget.switched_off()
     except NotPlayed as failure:
@@ -100,7 +101,7 @@ def followed(scene: str, seed: int, substeps: int) -> Followed:
     """The scene up to where late hits alone put a disk farther off than `LIMIT`."""
     scenario, truth = held(scene, seed)
     whole = Followed(scenario, truth, scenario.dt(substeps))
-    late = whole.played(with_habits([])).trajectory
+    late = whole.played(partial(with_habits, [])).trajectory
     assert late is not None
     off = (laws.deviation(late, truth, scenario.scene) / scenario.scene.radius).max(axis=1)
     last = max(int(np.append(np.flatnonzero(off > LIMIT), len(off))[0]) - 1, 1)
@@ -117,16 +118,13 @@ class Followed:
     truth: Trajectory
     dt: float
 
-    def played(self, engine: Engine) -> Run:
-        """What an engine, not needed any more, makes of it.
+    def played(self, make: Callable[[], Engine]) -> Run:
+        """What a new engine makes of it.
 
         Raises:
             NotPlayed: it has failed.
         """
-        try:
-            run = play(engine, "one:run", self.scenario, self.dt)
-        finally:
-            engine.close()
+        run = play_once(make, "one:run", self.scenario, self.dt)
         if run.status != "ok":
             raise NotPlayed(f"{run.status}: {run.reason}")
         return run
@@ -167,7 +165,7 @@ class Budget:
                 below = [each for each in self.habits if each.name in habit.on_top]
                 parts[habit.name] = self.reference([*below, habit]) - self.reference(below)
             elif habit.without is not None:
-                parts[habit.name] = self.total - self.at.offset(self.at.played(habit.without()))
+                parts[habit.name] = self.total - self.at.offset(self.at.played(habit.without))
         unswitched = [parts[habit.name] for habit in self.habits if not habit.switches]
         summed, reached = added(parts.values()), added([self.reference(self.habits), *unswitched])
         return parts | {
@@ -181,7 +179,7 @@ class Budget:
         for habit in self.habits:
             if habit.switches and habit.without is not None:
                 others = [each for each in self.habits if each is not habit]
-                in_engine = self.total - self.at.offset(self.at.played(habit.without()))
+                in_engine = self.total - self.at.offset(self.at.played(habit.without))
                 in_reference = self.reference(self.habits) - self.reference(others)
                 found[habit.name] = {
                     "off_engine_radii": in_engine.radii, "off_reference_radii": in_reference.radii,
@@ -193,7 +191,7 @@ class Budget:
         """How far the reference with these habits is from the truth."""
         names = tuple(habit.name for habit in self.habits if habit in habits)
         if names not in self.known:
-            self.known[names] = self.at.offset(self.at.played(with_habits(habits)))
+            self.known[names] = self.at.offset(self.at.played(partial(with_habits, habits)))
         return self.known[names]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, NamedTuple
@@ -10,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from adapters.engine import Engine
-from adapters.play import advance, play
+from adapters.play import advance, play_once
 from reports.compare import laws
 from reports.run.scenes import open_scene
 from reports.speed.timing import Sample, Spent, Timed, interleaved
@@ -63,11 +64,7 @@ def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int
     radius, before, rows = scenario.scene.radius, None, []
     engine_name, profile = name.split(":")
     for k in ladder:
-        engine = make()
-        try:
-            run = play(engine, name, scenario, scenario.dt(k))
-        finally:
-            engine.close()
+        run = play_once(make, name, scenario, scenario.dt(k))
         row = {
             "scenario": scenario.name, "seed": seed, "engine": engine_name, "profile": profile,
             "dt_s": scenario.dt(k), "substeps": k, "status": run.status, "reason": run.reason,
@@ -103,11 +100,8 @@ class Stepping:
     def __call__(self) -> Spent:
         """One run."""
         scenario, dt = self.scenario, self.scenario.dt(self.substeps)
-        engine = self.make()
-        engine.listening, engine.wrapping = False, 0.0
-        try:
+        with closing(self.make()) as engine:
+            engine.listening, engine.wrapping = False, 0.0
             engine.load(scenario.scene, dt)
             seconds = advance(engine, scenario, 0, scenario.samples * self.substeps, dt)
             return Spent(seconds, engine.wrapping)
-        finally:
-            engine.close()

@@ -8,13 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from reports.page import style
-from reports.page.charts import Drawing
-from reports.page.page import REPORTS, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
+from reports.page.charts import Drawing, packed_charts
+from reports.page.documents import CHARTED, render
 from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import TOTALS, UNEXPLAINED
 from reports.speed.order import ELSEWHERE, UNSTEADY
@@ -24,6 +21,7 @@ from reports.speed.results import Results
 from reports.speed.versus import OWN
 from reports.terminal.foreign_text import put_text
 
+GENERATOR = "crosscheck speed"
 FLAGGED = (ELSEWHERE, UNSTEADY)
 
 
@@ -41,19 +39,11 @@ class Section(NamedTuple):
 
 def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     """Write the page of `results`; `about` holds command, seed, machine, versions, started, seconds, load."""
-    plotly, scripts = get_plotlyjs(), [(REPORTS / script).read_text(encoding="utf-8") for script in SCRIPTS]
-    environment = Environment(
-        loader=FileSystemLoader(REPORTS / "speed"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    environment.filters["number"] = style.number
     names = (*results.names, *(dial.name for dial in results.plan.dials), style.TRUTH)
     looks = {name: style.look(*name.split(":", 1)) for name in names}
-    html = environment.get_template("speed.html.j2").render(
-        names=results.names, looks=looks, about=about, pooled=pooled_section(results), sizes=sizes_section(results),
+    html = render(
+        "speed/speed.html.j2", generator=GENERATOR, scripts=CHARTED, styles=["speed/speed.css"], looks=looks,
+        plotly=True, names=results.names, about=about, pooled=pooled_section(results), sizes=sizes_section(results),
         features=features_section(results), dials=dial_sections(results), dial_rows=charts.records(results.dials),
         sections=[section_of(results, name) for name in results.scenes],
         noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
@@ -62,8 +52,6 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
         feature_scenes=results.plan.feature_scenes, budget=budget_section(results),
         totals=(*TOTALS, UNEXPLAINED),
-        css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
-        library=deflated(plotly), policy=content_policy([plotly, *scripts]),
     )  # fmt: skip
     put_text(path, html)
 

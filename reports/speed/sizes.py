@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -125,13 +125,11 @@ class _Idle:
         self.make, self.scene, self.singly = make, scene, singly
 
     def __call__(self) -> Spent:
-        engine: Any = self.make()
-        engine.listening = False
-        engine.load(self.scene, DT)
-        calls, count = (IDLE_STEPS, 1) if self.singly else (1, IDLE_STEPS)
-        started = perf_counter()
-        for _ in range(calls):
-            engine.step(count)
-        seconds = perf_counter() - started
-        engine.close()
-        return Spent(seconds)
+        with closing(self.make()) as engine:
+            engine.listening = False
+            engine.load(self.scene, DT)
+            calls, count = (IDLE_STEPS, 1) if self.singly else (1, IDLE_STEPS)
+            started = perf_counter()
+            for _ in range(calls):
+                engine.step(count)
+            return Spent(perf_counter() - started)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from math import sqrt
 
 import numpy as np
@@ -10,7 +11,7 @@ from adapters.engine import Unsupported
 from adapters.play import Run, fault_of, gather
 from reports.stability.limits import Case
 from reports.stability.phases import EDGE, drawn, phase
-from reports.stability.players import Player
+from reports.stability.players import Player, with_variant
 from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_APART, SPRING_GROWS, STRAYS
 from scenarios.families.placing import lay_out
 from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
@@ -106,24 +107,22 @@ def oscillator(x: float, _run: int) -> Scenario:
 
 def on_spring(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
     """Play a disk whose push -x N is read off its position before every step, as a user of an engine writes it."""
-    engine = player.make()
     states: list[State] = []
     status, reason, settings = "ok", "", {}
-    try:
-        engine.load(scenario.scene, scenario.sample_interval)
-        settings = engine.settings()
-        states.append(engine.read())
-        for _ in range(scenario.samples):
-            engine.push(0, -states[-1].position[0], 0.0)
-            engine.step()
+    with closing(player.make()) as engine:
+        try:
+            engine.load(scenario.scene, scenario.sample_interval)
+            settings = engine.settings()
             states.append(engine.read())
-            if reason := fault_of(states[-1], 1e6):
-                status = "diverged"
-                break
-    except Unsupported as refusal:
-        status, reason = "unsupported", str(refusal)
-    finally:
-        engine.close()
+            for _ in range(scenario.samples):
+                engine.push(0, -states[-1].position[0], 0.0)
+                engine.step()
+                states.append(engine.read())
+                if reason := fault_of(states[-1], 1e6):
+                    status = "diverged"
+                    break
+        except Unsupported as refusal:
+            status, reason = "unsupported", str(refusal)
     name, profile = player.name.split(":")
     trajectory = gather(scenario, states, NO_COLLISIONS) if states else None
     return scenario, Run(
@@ -138,7 +137,7 @@ ALONE = (
         "bounce_drift", FAMILY, "Up to which dt does a ball at e = 1 come back to its height?",
         "dt / fall time", "1", (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2),
         ball, BOUNCES_OFF, runs=16,
-        also=("box2d_v3:matched+16_substeps", "pymunk:matched+push_out"),
+        also=(*with_variant("16_substeps"), *with_variant("push_out")),
     ),
     Case(
         "scale_up", FAMILY, "How much larger may a scene be made and stay the same?",
@@ -155,7 +154,7 @@ ALONE = (
     Case(
         "spin", FAMILY, "How fast may a disk spin?",
         "w dt", "rad", (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0), spinning, ANGLE_OFF,
-        also=("box2d_v3:matched+16_substeps",),
+        also=with_variant("16_substeps"),
     ),
     Case(
         "stiff_push", FAMILY, "How stiff may a spring be whose push is read off the positions before each step?",

@@ -9,7 +9,7 @@ from numpy.random import Generator, default_rng
 
 from adapters.play import Run
 from reports.stability.limits import RARELY, Case
-from reports.stability.players import Player, played
+from reports.stability.players import Player, played, with_variant
 from reports.stability.predicates_gas import ENERGY_DRIFTS, GAS_PARTS, MOMENTUM_DRIFTS, TEMPERATURES_PART, WRONG_GAS
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
@@ -169,7 +169,7 @@ GAS = (
     Case(
         "dense_gas", FAMILY, "Up to which packing does a gas of 100 disks keep its energy over 200 steps?",
         "packing", "1", PACKINGS, dense, ENERGY_DRIFTS, runs=SEEDS, by_chance=RARELY,
-        also=("pymunk:matched+fifty_iterations",), quick_values=PACKINGS[:-1], ratio=1.25,
+        also=with_variant("fifty_iterations"), quick_values=PACKINGS[:-1], ratio=1.25,
     ),
     Case(
         "fast_gas", FAMILY, "How far may the disks of a gas of packing 0.3 fly in a step, over 300 steps?",
@@ -178,7 +178,7 @@ GAS = (
     Case(
         "long_gas", FAMILY, "For how many steps does a gas of 20 disks keep its energy?",
         "steps", "1", LONG, long_run, ENERGY_DRIFTS, runs=2,
-        whole=True, quick_values=(1e3, 1e4), refines=False, also=("pymunk:matched+fifty_iterations",),
+        whole=True, quick_values=(1e3, 1e4), refines=False, also=with_variant("fifty_iterations"),
     ),
     Case(
         "long_wrapped_gas", FAMILY, "For how many steps does a gas without walls keep its momentum?",

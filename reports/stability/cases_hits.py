@@ -9,6 +9,7 @@ import numpy as np
 
 from reports.stability.limits import Case
 from reports.stability.phases import phase
+from reports.stability.players import with_variant
 from reports.stability.predicates import HITS_INVENTED, HITS_MISSED, RESTITUTION_OFF, VELOCITY_OFF
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
@@ -20,7 +21,7 @@ LEAD, AFTER = 3, 6  # whole steps before the step of the hit, and after it
 PHASES = 32  # runs at a value, each with the collision elsewhere in its step: a run is a millisecond
 SOURCE = "momentum, and Newton's restitution along the line of centres (Landau & Lifshitz, Mechanics, 17)"
 FAST = (0.125, 0.25, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0, 5.66, 8.0, 11.3, 16.0, 22.6, 32.0)
-BULLETS = ("box2d:matched+bullets", "box2d_v3:matched+bullets")
+BULLETS = with_variant("bullets")
 
 
 def flyby(

@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from adapters.engines import ENGINES
+from reports.stability.cases_hits import BULLETS
 from reports.stability.limits import NOT_KNOWN, Limit
 from reports.stability.players import play_as
 from reports.stability.predicates import judge
@@ -101,14 +103,15 @@ CURES = {
     "in_order": Cure("reference:[el]*", "*", HITS_WAIT, "as reference:ordered", player="reference:ordered"),
     "finer": Cure("*", "[!d]*", f"{HITS_WAIT}, and the step is too coarse for that", "in steps of an eighth", finer),
     **{
-        f"{box}_swept": Cure(f"{box}:matched", "*", "disks are not swept against each other",
-                             f"as {box}:matched+bullets", player=f"{box}:matched+bullets")
-        for box in ("box2d", "box2d_v3")
+        f"{bullets.partition(':')[0]}_swept": Cure(bullets.removesuffix("+bullets"), "*",
+            "disks are not swept against each other", f"as {bullets}", player=bullets)
+        for bullets in BULLETS
     },
     **{
         f"{engine}_matched": Cure(f"{engine}:shipped", "*", "a default of the engine that the matched profile changes",
                                   f"as {engine}:matched", player=f"{engine}:matched")
-        for engine in ("pymunk", "box2d", "box2d_v3")
+        for engine in dict.fromkeys(name.partition(":")[0] for name in ENGINES)
+        if f"{engine}:shipped" in ENGINES and f"{engine}:matched" in ENGINES
     },
 }  # fmt: skip
 """In the order in which they are tried: what shows one thing alone comes first, a finer step where nothing finer does.

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engines import ENGINES
-from adapters.play import Run, play
+from adapters.engines import ENGINES, changed
+from adapters.play import Run, play_once
 from reports.stability.cases_gas import gas
 from reports.stability.cases_hits import flyby
 from reports.stability.cases_stacks import column
-from reports.stability.players import Switched, play_as
+from reports.stability.players import play_as
 from reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
 from reports.stability.predicates_crowds import STANDS
 from reports.stability.predicates_gas import ENERGY_DRIFTS
@@ -83,23 +83,11 @@ def map_of(name: str, player: str) -> MapOf:
     return MapOf(name, player, tuple(cells))
 
 
-def set_iterations(count: int, engine: Any) -> None:
-    """Give an engine so many iterations, or substeps, whichever it has."""
-    if hasattr(engine, "space"):
-        engine.space.iterations = count
-    elif hasattr(engine, "velocity_iterations"):
-        engine.velocity_iterations = count
-    else:
-        engine.substeps = count
-
-
 def with_iterations(player: str, scenario: Scenario, _ratio: float, count: float) -> Run:
-    """Play with so many iterations."""
-    engine = Switched(ENGINES[player].make(), partial(set_iterations, int(count)))
-    try:
-        return play(engine, player, scenario, scenario.dt(1))
-    finally:
-        engine.close()
+    """Play with so many iterations, or substeps, whichever the engine has."""
+    work = ENGINES[player].work
+    assert work is not None
+    return play_once(partial(changed, player, **{work.setting: int(count)}), player, scenario, scenario.dt(1))
 
 
 def hit_at(x: float, y: float, run: int) -> Scenario:
@@ -122,7 +110,7 @@ MAPS = {
             "m2 / m1", "iterations (Box2D 3.1: substeps)", (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4),
             (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0),
             lambda x, _y, _run: column(2, np.array([1.0, x])), STANDS, runs=1,
-            only=tuple(name for name in ENGINES if name.split(":")[0] in ("pymunk", "box2d", "box2d_v3")),
+            only=tuple(name for name, row in ENGINES.items() if row.work),
             play=with_iterations,
         ),
         Map(

@@ -94,7 +94,8 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     for limit in failing:
         fails.setdefault(limit.player, []).append(limit.case)
     if fails:
-        order = sorted({limit.player for limit in mine}, key=lambda player: len(fails.get(player, [])))
+        players = dict.fromkeys(limit.player for limit in mine)  # in reading order, which decides between equals
+        order = sorted(players, key=lambda player: len(fails.get(player, [])))
         found.append(f"Of these {len(cases)} cases {order[0]} fails in the fewest, {len(fails.get(order[0], []))}, and "
                      f"{order[-1]} in the most, {len(fails[order[-1]])}. Each fails somewhere else.")  # fmt: skip
     tested = [limit for limit in failing if limit.tested]

@@ -9,14 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from adapters.play import Run
 from reports.page import style
-from reports.page.charts import Drawing, Line, figure_of, shortened
-from reports.page.page import REPORTS, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
+from reports.page.charts import Drawing, Line, figure_of, packed_charts, shortened
+from reports.page.documents import CHARTED, render
 from reports.page.replay import pack_layers, ratio_of
 from reports.stability import overview
 from reports.stability.atlas import Atlas, case_named
@@ -27,6 +24,7 @@ from reports.stability.touching import GAPS, TOUCHING
 from reports.terminal.foreign_text import put_text
 from scenarios.model import Scenario, Trajectory
 
+GENERATOR = "crosscheck stability"
 SECONDS = 5.0  # a replay lasts
 
 
@@ -75,22 +73,12 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
     names = [limit.player for limit in limits] + [one.player for one in maps] + [one.player for one in laws]
     names = list(dict.fromkeys(names))
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
-    plotly, scripts = get_plotlyjs(), [(REPORTS / script).read_text(encoding="utf-8") for script in SCRIPTS]
-    scripts.append((REPORTS / "stability" / "stability.js").read_text(encoding="utf-8"))
-    sheet = (REPORTS / "stability" / "stability.css").read_text(encoding="utf-8")
-    environment = Environment(
-        loader=FileSystemLoader(REPORTS / "stability"), autoescape=True, trim_blocks=True, lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )  # fmt: skip
-    environment.filters["number"] = style.number
-    html = environment.get_template("stability.html.j2").render(
+    html = render(
+        "stability/stability.html.j2", generator=GENERATOR, scripts=(*CHARTED, "stability/stability.js"),
+        styles=["stability/stability.css"], looks=looks, plotly=True,
         sections=sections, families=families_of(sections), findings=overview.findings(limits), about=atlas.header,
-        players=[name for name in names if "+" not in name], looks=looks,
-        maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, gaps=GAPS,
-        words=overview, exact=EXACT,
-        form=FORMS[atlas.header["form"]], css=Markup(css() + sheet),
-        looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
-        library=deflated(plotly), policy=content_policy([plotly, *scripts]),
+        players=[name for name in names if "+" not in name], maps=overview.map_tables(maps), all_maps=MAPS, laws=laws,
+        touching=TOUCHING, gaps=GAPS, words=overview, exact=EXACT, form=FORMS[atlas.header["form"]],
     )  # fmt: skip
     put_text(path, html)
 

@@ -7,9 +7,8 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from adapters.engine import Engine
-from adapters.engines import ENGINES
-from adapters.mechanisms.features import changed_box2d, changed_box2d_v3, changed_pymunk
-from adapters.play import Run, play
+from adapters.engines import ENGINES, changed
+from adapters.play import Run, play_once
 from scenarios.model import Scenario, Scene
 
 
@@ -36,45 +35,31 @@ class Switched:
         return getattr(self.engine, name)
 
 
-def fly(engine: Any) -> None:
-    """Make bullets of the disks that move: a bullet sees no other bullet in Box2D 3.1."""
-    for body, velocity in zip(engine.bodies, engine.scene.velocity):
-        body.bullet = bool(velocity.any())
+def varied(name: str, variant: str) -> Any:
+    """The engine of a row of `ENGINES` as one of the row's variants."""
+    settings, _, loaded = ENGINES[name].variants[variant]
+    engine = changed(name, **settings)
+    return Switched(engine, loaded) if loaded else engine
 
 
-def with_bullets(make: Callable[..., Engine]) -> Callable[[], Any]:
-    """What makes an engine with continuous collision in which the disks that move at the start are bullets."""
-    return lambda: Switched(make(continuous=True), fly)
+def with_variant(variant: str) -> tuple[str, ...]:
+    """The keys of `PLAYERS` of all engines that have this variant."""
+    return tuple(f"{name}+{variant}" for name, row in ENGINES.items() if variant in row.variants)
 
 
-BULLETS = "continuous collision, what moves is a bullet"
-SWITCHED = (
-    Player("pymunk:matched+fifty_iterations", partial(changed_pymunk, iterations=50), "50 iterations for 10"),
-    Player(
-        "pymunk:matched+push_out", partial(changed_pymunk, collision_bias=(1 - 0.1) ** 60),
-        "overlaps pushed out as shipped",
-    ),
-    Player("box2d:matched+bullets", with_bullets(partial(changed_box2d, elastic_continuous=True)), BULLETS),
-    Player("box2d_v3:matched+bullets", with_bullets(changed_box2d_v3), BULLETS),
-    Player("box2d_v3:matched+16_substeps", partial(changed_box2d_v3, substeps=16), "16 substeps for 4"),
-)  # fmt: skip
+SWITCHED = tuple(
+    Player(f"{name}+{variant}", partial(varied, name, variant), what)
+    for name, row in ENGINES.items()
+    for variant, (_, what, _) in row.variants.items()
+)
 PLAYERS: dict[str, Player] = {
     player.name: player for player in (*(Player(name, row.make) for name, row in ENGINES.items()), *SWITCHED)
 }
 
 
 def played(player: Player, scenario: Scenario) -> Run:
-    """Play a scenario at its only step size; the engine is closed again. A library that is missing is a refusal."""
-    dt = scenario.dt(scenario.substeps[0])
-    try:
-        engine = player.make()
-    except ImportError as missing:
-        name, profile = player.name.split(":")
-        return Run(name, profile, scenario.name, dt, "unsupported", f"{missing.name or missing} cannot be imported")
-    try:
-        return play(engine, player.name, scenario, dt)
-    finally:
-        engine.close()
+    """Play a scenario at its only step size."""
+    return play_once(player.make, player.name, scenario, scenario.dt(scenario.substeps[0]))
 
 
 def play_as(player: str, scenario: Scenario) -> Run:

@@ -18,8 +18,7 @@ from reports.terminal.console import Console
 from reports.terminal.exits import DONE, broken_off, refuse
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
-from reports.tune.grid import MAKES
-from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, Search
+from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, TUNED, Search
 
 NAME = "matched.csv"
 TUNE = Kind("crosscheck tune")
@@ -31,7 +30,7 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
     The table of an engine is written as soon as its search has ended. Exits 2 on a name that is no engine with
     settings, or where `out` may not be written, 130 and 143 when broken off.
     """
-    if faults := [unknown("engine", name, MAKES) for name in engines if name not in MAKES]:
+    if faults := [unknown("engine", name, TUNED) for name in engines if name not in TUNED]:
         refuse(faults)
     with opening(out):
         out = place_of(out)
@@ -44,7 +43,7 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
         broken_off(out, lambda: f"What had ended is in {out / NAME}." if tables else "No search had ended."),
         Progress() as bar,
     ):
-        for engine in dict.fromkeys(engines or MAKES):
+        for engine in dict.fromkeys(engines or TUNED):
             bar.say(f"{engine}: the exact answers, and what is matched now")
             search = Search(engine, say=bar.note)
             bar.say(f"{engine}: setting by setting")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from functools import cache
 from time import thread_time
 from typing import NamedTuple
@@ -10,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adapters.engine import Engine
-from adapters.play import advance, play
+from adapters.play import advance, play_once
 from reports.compare import laws, scales
 from reports.compare.collisions import match
 from scenarios.families.tuning import FAMILIES, LADDER, one_of
@@ -74,11 +75,7 @@ def measured(make: Make, scenes: Sequence[Asked]) -> Played:
 def of_run(make: Make, scenario: Scenario, truth: Trajectory | None, substeps: int) -> tuple[float, float, int, int]:
     """Error, energy gained, collisions missed and invented; see `Played`."""
     dt, scene = scenario.dt(substeps), scenario.scene
-    engine = make()
-    try:
-        run = play(engine, "tuned:engine", scenario, dt)
-    finally:
-        engine.close()
+    run = play_once(make, "tuned:engine", scenario, dt)
     if run.status != "ok" or run.trajectory is None:
         return np.inf, 0.0, 0, 0
     played, moving = run.trajectory, ~scene.static
@@ -152,12 +149,9 @@ def cost_of(make: Make, than: Make, scenes: Sequence[Asked]) -> float:
 
 def spent(make: Make, scenario: Scenario) -> float:
     """s inside `step`, through the scene."""
-    engine = make()
-    engine.listening = False
-    try:
+    with closing(make()) as engine:
+        engine.listening = False
         engine.load(scenario.scene, scenario.dt(TIMED_SUBSTEPS))
         started = thread_time()
         advance(engine, scenario, 0, scenario.samples * TIMED_SUBSTEPS, scenario.dt(TIMED_SUBSTEPS))
         return thread_time() - started
-    finally:
-        engine.close()

@@ -13,7 +13,7 @@ import pandas as pd
 from adapters.conformance.conform import conform
 from adapters.engine import Row
 from adapters.engines import ENGINES
-from reports.tune.grid import MAKES, NOT_SEARCHED, PAIRS, matched_of, settings_of
+from adapters.matched import Searched
 from reports.tune.score import Against, Make, Played, against, cost_of, measured, posed
 from scenarios.families.tuning import FAMILIES
 
@@ -24,8 +24,22 @@ COLUMNS = [
     "engine", "setting", "value", "chosen", "same_dt", "cost", "equal_cost", "again", "better", "worse", "of",
     "verdict", "why",
 ]  # fmt: skip
+MATCHED = ":matched"
 CHOSEN, BETTER, NO_BETTER, BREAKS = "chosen", "better", "no better", "breaks"
 NO_SEARCH = "not searched"
+TUNED: dict[str, Row] = {
+    name.removesuffix(MATCHED): row
+    for name, row in ENGINES.items()
+    if name.endswith(MATCHED) and row.searched is not None
+}
+"""Engine -> the row of its matched profile, of all that have settings to search."""
+
+
+def searched_of(engine: str) -> Searched:
+    """What is searched of an engine of `TUNED`; imports its library."""
+    searched = TUNED[engine].searched
+    assert searched is not None
+    return searched()
 
 
 class Trial(NamedTuple):
@@ -61,18 +75,19 @@ class Search:
     known: dict[tuple[Any, ...], tuple[Played, Played]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.chosen = matched_of(self.engine)
+        self.searched = searched_of(self.engine)
+        self.chosen = dict(self.searched.chosen)
         self.scenes = tuple(posed(self.families, seeds) for seeds in self.seeds)
         self.kept = self.keeps(self.chosen)
 
     def make(self, settings: dict[str, Any]) -> Make:
         """What makes the engine with these settings."""
-        return partial(MAKES[self.engine], **settings)
+        return partial(TUNED[self.engine].make, **settings)
 
     def keeps(self, settings: dict[str, Any]) -> set[str]:
         """The probes of the conformance suite that it keeps."""
-        row: Row = replace(ENGINES[f"{self.engine}:matched"], make=self.make(settings))
-        return {finding.probe for finding in conform(f"{self.engine}:matched", row) if finding.verdict == "keeps"}
+        row = replace(TUNED[self.engine], make=self.make(settings))
+        return {finding.probe for finding in conform(self.engine + MATCHED, row) if finding.verdict == "keeps"}
 
     def played(self, settings: dict[str, Any]) -> tuple[Played, Played]:
         """What the settings make of both halves; measured once."""
@@ -96,12 +111,11 @@ class Search:
 
     def groups(self) -> Iterator[list[dict[str, Any]]]:
         """The changes of each setting, and then of each pair that differ in both."""
-        for one in settings_of(self.engine):
-            yield [{one.name: value} for value in one.values if value != self.chosen[one.name]]
-        for pair in PAIRS:
-            if pair.engine == self.engine:
-                changes = [dict(zip(pair.names, values)) for values in product(*pair.values)]
-                yield [each for each in changes if all(each[name] != self.chosen[name] for name in each)]
+        for name, (values, _) in self.searched.settings.items():
+            yield [{name: value} for value in values if value != self.chosen[name]]
+        for names, *tried in self.searched.pairs:
+            changes = [dict(zip(names, values)) for values in product(*tried)]
+            yield [each for each in changes if all(each[name] != self.chosen[name] for name in each)]
 
     def sweep(self) -> tuple[list[Trial], bool]:
         """All trials, taking the best of each setting at once; and whether anything was taken."""
@@ -123,27 +137,25 @@ class Search:
             trials, taken = self.sweep()
             if not taken:
                 break
-        return table(self.engine, self.chosen, trials)
+        return table(self.engine, self.searched, self.chosen, trials)
 
 
-def table(engine: str, chosen: dict[str, Any], trials: Sequence[Trial]) -> pd.DataFrame:
+def table(engine: str, searched: Searched, chosen: dict[str, Any], trials: Sequence[Trial]) -> pd.DataFrame:
     """Columns `COLUMNS`: what is chosen of each setting, every change tried, and what was not searched and why.
 
     same_dt, equal_cost and again (equal cost, on the other seeds) are error over the chosen settings' error, cost a
     step's over theirs; better and worse count scenes and steps, of both halves, that differ by 20 %.
     """
     rows: list[dict[str, Any]] = []
-    for one in settings_of(engine):
-        of_it = [each for each in trials if list(each.change) == [one.name]]
-        rows.append(
-            {"setting": one.name, "value": shown(chosen[one.name]), "chosen": True, "verdict": CHOSEN, "why": one.what}
-        )
+    for name, (_, what) in searched.settings.items():
+        of_it = [each for each in trials if list(each.change) == [name]]
+        rows.append({"setting": name, "value": shown(chosen[name]), "chosen": True, "verdict": CHOSEN, "why": what})
         rows += [row_of(each) for each in of_it]
     rows += [row_of(each) for each in trials if len(each.change) > 1]
     rows += [
-        {"setting": each.name, "chosen": False, "verdict": NO_SEARCH, "why": each.why}
-        for each in NOT_SEARCHED if each.engine == engine
-    ]  # fmt: skip
+        {"setting": name, "chosen": False, "verdict": NO_SEARCH, "why": why}
+        for name, why in searched.left_alone.items()
+    ]
     return with_reasons(pd.DataFrame([{"engine": engine} | row for row in rows], columns=COLUMNS)).round(4)
 
 

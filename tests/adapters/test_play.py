@@ -1,13 +1,89 @@
-"""Where a collision begins in the pushes that an engine tells of, step by step."""
+"""An engine is played once and closed; where a collision begins in the pushes that it tells of, step by step."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any, cast
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.engine import Hit
-from adapters.play import first_hits
+from adapters.engine import Engine, Hit, NotStarted, Unsupported
+from adapters.engines import ENGINES
+from adapters.play import first_hits, play, play_once
+from scenarios.catalogue import scenario
+
+NAME, SCENE = "reference:exercise", scenario("slow_hit")
+DT = SCENE.dt(SCENE.substeps[0])
+
+
+class Closing:
+    """The reference, which counts how often it is closed; `load` raises what it is given."""
+
+    def __init__(self, raises: Exception | None = None) -> None:
+        self.inner, self.raises, self.closed = ENGINES[NAME].make(), raises, 0
+
+    def load(self, scene: Any, dt: float) -> None:
+        """As the reference, unless it is to fail."""
+        if self.raises:
+            raise self.raises
+        self.inner.load(scene, dt)
+
+    def close(self) -> None:
+        """Count."""
+        self.closed += 1
+        self.inner.close()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+
+def once(engine: Closing) -> str:
+    """The status of a run on that engine, made anew."""
+    return play_once(lambda: cast(Engine, engine), NAME, SCENE, DT).status
+
+
+def test_an_engine_that_is_played_once_is_closed_once_whatever_it_does():
+    """Played to the end, refused, failed, or with an error that is not its own and goes on to the caller."""
+    for raises, status in ((None, "ok"), (Unsupported("no"), "unsupported"), (ValueError("no"), "error")):
+        engine = Closing(raises)
+        assert once(engine) == status
+        assert engine.closed == 1
+    for outside in (MemoryError(), NotStarted("no")):
+        engine = Closing(outside)
+        with pytest.raises(type(outside)):
+            once(engine)
+        assert engine.closed == 1
+    engine = Closing()
+    assert play(cast(Engine, engine), NAME, SCENE, DT).status == "ok"
+    assert engine.closed == 0  # negative control: `play` leaves that to who made the engine
+
+
+def test_an_engine_whose_library_is_missing_refuses_by_its_name():
+    """A run that says so, and no traceback."""
+
+    def missing() -> Engine:
+        raise ModuleNotFoundError("No module named 'toyland'", name="toyland")
+
+    run = play_once(missing, "toy:plain", SCENE, DT)
+
+    assert (run.engine, run.profile, run.status, run.trajectory) == ("toy", "plain", "unsupported", None)
+    assert run.reason == "toyland cannot be imported: No module named 'toyland'"
+
+
+def test_no_source_file_closes_an_engine_by_hand():
+    """But the game and the gases, whose engines outlive a function: all else is `play_once` or `closing`."""
+    root = Path(__file__).parents[2]
+    found = {
+        path.relative_to(root).as_posix()
+        for folder in ("adapters", "reports", "scenarios")
+        for path in [*(root / folder).rglob("*.py"), *(root / folder).rglob("*.md")]
+        if "out" not in path.parts and "engine.close()" in path.read_text(encoding="utf-8")
+    }
+
+    assert found == {"reports/game/flight.py", "reports/speed/sizes.py"}
 
 
 def test_weight_in_consecutive_steps_is_one_collision_and_hits_are_each_their_own():

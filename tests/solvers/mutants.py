@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
 HERE = Path(__file__).parent
-CORRECT = sorted(path for path in (HERE / "correct").iterdir() if path.suffix in (".js", ".py"))
+GL_MATRIX = HERE / "correct" / "gl-matrix.js"  # lies beside those that call it, and is no solver
+CORRECT = sorted(path for path in GL_MATRIX.parent.iterdir() if path.suffix in (".js", ".py") and path != GL_MATRIX)
 
 
 class Mutant(NamedTuple):
@@ -26,6 +28,7 @@ class Mutant(NamedTuple):
         assert self.old in text, f"{self.name}: the patch does not fit {self.base}"
         path = folder / self.name
         path.write_text(text.replace(self.old, self.new))
+        shutil.copy(GL_MATRIX, folder)
         return path
 
 

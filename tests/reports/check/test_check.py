@@ -4,15 +4,13 @@ table."""
 from __future__ import annotations
 
 import csv
-import hashlib
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.javascript import GL_MATRIX
+from adapters.own_solver.file import SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.questions import QUESTIONS, Ball, ask
 from reports.check.rows import TASKS
@@ -171,25 +169,91 @@ def test_a_contact_is_judged_by_the_formula():
     assert "react at a distance" in contact_fault(far, scene, 0, 1)
 
 
-def test_gl_matrix_is_the_file_of_its_package_with_its_licence():
-    """Version 2.8.1 as npm has it (integrity sha512-0YCjVpE3pS5XWlN3J4X7AiAx65+nqAI54LndtVFnQZB6G/FVLkZH8y8V6R3cIoOQR4p
-    UdfwQGd1iwyoXHJ4Qfw==), dist/gl-matrix-min.js, unchanged."""
-    data = GL_MATRIX.read_bytes()
+READS_IT = """function integrate(sphere, dt) {
+  sphere.alpha = typeof globalThis['ve' + 'c2'] === 'object' ? globalThis['ve' + 'c2'].mark : 0;
+}
+"""
 
-    assert hashlib.sha256(data).hexdigest() == "fb4f71b2df9dd73212e35780bd10c25ce7f4307f7ddc4e1c4b8d212812098fc4"
-    assert b"Permission is hereby granted, free of charge" in data[:2000]
+
+def library(mark: int) -> str:
+    """A library of that name, which can be told from others."""
+    return f"var vec2 = {{ mark: {mark} }};"
+
+
+def library_read(path: Path) -> float:
+    """The mark of the gl-matrix that a solver finds; 0 if it finds none."""
+    with SolverProcess(read_solver(path)) as process:
+        return ask(process, {"push": QUESTIONS["push"]})["push"].last[0].alpha
 
 
 def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path):
-    """A name of its own in the text loads it; a file without one has no such globals."""
-    code = "function integrate(sphere, dt) { sphere.alpha = typeof globalThis['ve' + 'c2'] === 'object' ? 1 : 2; }\n"
-    seen = {}
-    for name, text in {"with.js": code + "// vec2\n", "without.js": code}.items():
+    """A name of its own in the text loads it; a file without one has no such globals, and no other text of it."""
+    (tmp_path / "gl-matrix.js").write_text(library(1))
+    for name, text in {"with.js": READS_IT + "// vec2\n", "without.js": READS_IT}.items():
         (tmp_path / name).write_text(text)
-        with SolverProcess(read_solver(tmp_path / name)) as process:
-            seen[name] = ask(process, {"push": QUESTIONS["push"]})["push"].last[0].alpha
 
-    assert seen == {"with.js": 1.0, "without.js": 2.0}
+    assert library_read(tmp_path / "with.js") == 1.0
+    assert library_read(tmp_path / "without.js") == 0.0
+    assert read_solver(tmp_path / "without.js").beside == ()
+
+
+def test_the_gl_matrix_beside_the_file_comes_before_that_of_npm_and_the_nearest_package_first(tmp_path: Path):
+    """One after the other is put there, each before all that were there."""
+    solver = tmp_path / "class" / "anna" / "Exercise.js"
+    solver.parent.mkdir(parents=True)
+    solver.write_text(READS_IT + "// vec2\n")
+    nearer = [
+        tmp_path / "node_modules" / "gl-matrix" / "main.js",
+        tmp_path / "node_modules" / "gl-matrix" / "gl-matrix-min.js",
+        tmp_path / "node_modules" / "gl-matrix" / "dist" / "gl-matrix.js",
+        tmp_path / "class" / "node_modules" / "gl-matrix" / "dist" / "gl-matrix-min.js",
+        solver.parent / "gl-matrix-2.8.1.min.js",
+        solver.parent / "gl-matrix-min.js",
+        solver.parent / "gl-matrix.js",
+    ]
+    (tmp_path / "node_modules" / "gl-matrix").mkdir(parents=True)
+    (tmp_path / "node_modules" / "gl-matrix" / "package.json").write_text('{"main": "main.js"}')
+    assert library_read(solver) == 0.0
+    for mark, path in enumerate(nearer, 1):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(library(mark))
+        assert library_read(solver) == mark
+
+
+def test_from_version_3_on_the_names_are_taken_out_of_gl_matrix(tmp_path: Path):
+    """Unless the file has such a name of its own, which stays as it is."""
+    (tmp_path / "gl-matrix.js").write_text("var glMatrix = { vec2: { mark: 5 } };")
+    (tmp_path / "plain.js").write_text(READS_IT + "// vec2\n")
+    (tmp_path / "named.js").write_text("const { vec2 } = glMatrix;\n" + READS_IT)
+    (tmp_path / "own.js").write_text("var vec2 = { mark: 6 };\n" + READS_IT)
+
+    assert [library_read(tmp_path / f"{name}.js") for name in ("plain", "named", "own")] == [5.0, 5.0, 6.0]
+
+
+def test_gl_matrix_is_read_once_and_decides_what_the_solver_is(tmp_path: Path):
+    """As a module beside a solver.py: what is saved later is not played, and another library is another solver."""
+    path = tmp_path / "Exercise.js"
+    path.write_text(READS_IT + "// vec2\n")
+    (tmp_path / "gl-matrix.js").write_text(library(1))
+    before = read_solver(path)
+    (tmp_path / "gl-matrix.js").write_text(library(2))
+    after = read_solver(path)
+    with SolverProcess(before) as process:
+        assert ask(process, {"push": QUESTIONS["push"]})["push"].last[0].alpha == 1.0
+
+    assert (before.digest, [name for name, _ in before.beside]) == (after.digest, ["gl-matrix.js"])
+    assert before.source != after.source
+
+
+def test_who_calls_gl_matrix_where_there_is_none_is_told_where_to_put_it(tmp_path: Path):
+    """One sentence, where it is called and where what lies there is no library; nothing where the name is his own."""
+    path = tmp_path / "Exercise.js"
+    path.write_text((CORRECT[0].parent / "gl_vec3.js").read_text())
+    with pytest.raises(SolverFailed, match=r"mat4 is not defined: put the gl-matrix\.js that the exercise hands out"):
+        SolverProcess(read_solver(path))
+    (tmp_path / "gl-matrix.js").write_text("import { vec2 } from 'elsewhere';")
+    with pytest.raises(SolverFailed, match=r"calls gl-matrix\.js, which cannot be loaded .*; put the gl-matrix\.js"):
+        SolverProcess(read_solver(path))
 
 
 def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():

@@ -18,7 +18,7 @@ from reports.game.server import Game
 from reports.lessons import pages
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
-from reports.lessons.lesson import Lesson, play_once
+from reports.lessons.lesson import Lesson, run_of
 from reports.lessons.mechanisms import SWITCHED
 from reports.lessons.meeting import hit_of_the_reference, two
 from reports.page.style import TRUTH
@@ -34,7 +34,7 @@ EVERY = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for
 def test_with_nothing_switched_on_the_switches_give_the_reference(name: str):
     """To the bit."""
     scene = scenario(name)
-    plain = play_once("reference:exercise", scene, 2).trajectory
+    plain = run_of("reference:exercise", scene, 2).trajectory
     switched = play(Switched(), SWITCHED, scene, scene.dt(2)).trajectory
 
     assert plain is not None

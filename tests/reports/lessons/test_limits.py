@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.features import changed_box2d
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.limits import HARSHNESS, SEEN, limits_of
 from reports.page.style import TRUTH
@@ -44,7 +43,7 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
     place = at("slow_hit", "box2d:shipped", 5)
     limits_of.cache_clear()
     with monkeypatch.context() as patch:
-        patch.setitem(players.PLAYERS, "box2d:shipped", Player("box2d:shipped", changed_box2d))
+        patch.setitem(players.PLAYERS, "box2d:shipped", Player("box2d:shipped", ENGINES["box2d:matched"].make))
         without = dict(LESSON.at(place).facts)["box2d:shipped"]
     limits_of.cache_clear()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ def planted(habits: list[Habit]) -> Drifting:
 def taken_apart(scene: str, known: list[Habit], substeps: int = 4) -> tuple[dict[str, Offset], Budget]:
     """The budget of the planted engine for somebody who knows only of `known`."""
     at = followed(scene, 0, substeps)
-    made = Budget(at, known, at.offset(at.played(planted(KNOWN))))
+    made = Budget(at, known, at.offset(at.played(partial(planted, KNOWN))))
     return made.parts(), made
 
 

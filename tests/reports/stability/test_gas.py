@@ -8,7 +8,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from adapters.mechanisms.features import changed_pymunk
+from adapters.engines import changed
 from adapters.play import play
 from adapters.pymunk import Pymunk
 from reports.compare import laws
@@ -178,7 +178,7 @@ def test_pymunk_loses_energy_by_impulses_that_a_contact_inherits():
     scenario = CASES["fast_gas"].scene(0.6, 0)
     lost = {}
     for steps in (3, 1):
-        engine = changed_pymunk(collision_persistence=steps, iterations=50)
+        engine = changed("pymunk:matched", collision_persistence=steps, iterations=50)
         run = play(engine, "pymunk:changed", scenario, scenario.dt(10))
         assert run.trajectory is not None
         energy = laws.energy(run.trajectory, scenario.scene)

@@ -9,7 +9,7 @@ from math import atan, pi, sqrt
 import numpy as np
 import pytest
 
-from adapters.mechanisms.features import changed_box2d, changed_box2d_v3
+from adapters.engines import changed
 from reports.stability.cases import CASES
 from reports.stability.cases_alone import ball, far, on_spring, oscillator
 from reports.stability.limits import QUICK, Limit
@@ -112,12 +112,12 @@ def test_a_bounce_gains_what_the_order_of_operations_says():
     """Closed forms: pymunk 0, Box2D 2.3 +|v| dt; Box2D 3.1 with soft contacts about -|v| dt / substeps."""
     assert abs(drift("pymunk:matched", 0.02)) < 1e-9  # rounding of 1000 steps
     # Higher orders in dt: a tenth at this step. Continuous collision takes the ball at the wall, and the gain with it.
-    no_ccd = Player("box2d:matched+no_ccd", partial(changed_box2d, continuous=False, bullet=False))
+    no_ccd = Player("box2d:matched+no_ccd", partial(changed, "box2d:matched", continuous=False, bullet=False))
     assert drift(no_ccd, 0.01) == pytest.approx(1.0, rel=0.1)
     assert abs(drift("box2d:matched", 0.01)) < 0.01
     assert drift("reference:lesson", 0.01) == pytest.approx(1.0, rel=0.1)
     # A soft contact gives back more or less with the phase of the collision in its step.
-    soft = Player("box2d_v3:matched+soft", partial(changed_box2d_v3, length_unit=0.02, hertz=30.0))
+    soft = Player("box2d_v3:matched+soft", partial(changed, "box2d_v3:matched", length_unit=0.02, hertz=30.0))
     assert drift(soft, 0.005, runs=6) == pytest.approx(-1 / 4, rel=0.25)
     # The stiffest contacts, and a wider margin, take back a part of it; four times the substeps, all of it.
     assert -1 / 4 < drift("box2d_v3:matched", 0.01, runs=6) < -1 / 16

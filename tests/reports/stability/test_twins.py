@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from adapters.mechanisms.features import changed_pymunk
+from adapters.engines import ENGINES
 from adapters.mechanisms.habits import FLIGHT, FRICTION, HABITS, PUSH_OUT, RESTITUTION, habits_of
 from reports.stability.cases import CASES
 from reports.stability.explain import explained
@@ -65,7 +65,7 @@ def test_a_cause_that_no_habit_names_gives_no_twin(monkeypatch: pytest.MonkeyPat
     """pymunk with a bug of its own, half of every elasticity, under the name of one that has none."""
 
     def halved() -> Any:
-        engine = changed_pymunk()
+        engine = ENGINES["pymunk:matched"].make()
         load = engine.load
         engine.load = lambda scene, dt: load(replace(scene, restitution=scene.restitution / 2), dt)
         return engine

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
+from adapters.engines import changed
 from adapters.matched import chosen, searched
-from adapters.mechanisms.features import changed_box2d_v3, changed_pymunk
 from adapters.pymunk import MATCHED as PYMUNK
-from reports.tune.grid import GRID, MAKES, NOT_SEARCHED, PAIRS, matched_of, settings_of
 from reports.tune.score import FLOOR, Played, against, at_cost, faults_of, measured, posed
-from reports.tune.search import BETTER, CHOSEN, COLUMNS, NO_SEARCH, Search, shown
+from reports.tune.search import BETTER, CHOSEN, COLUMNS, NO_SEARCH, TUNED, Search, searched_of, shown
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.families.tuning import FAMILIES, LADDER, LEAST_GAP, one_of, tuning
 from scenarios.model import Array, Scenario
@@ -23,13 +23,13 @@ def start(one: Scenario) -> Array:
     return np.column_stack([one.scene.position, one.scene.velocity, one.scene.radius])
 
 
-@pytest.mark.parametrize("engine", MAKES)
+@pytest.mark.parametrize("engine", TUNED)
 def test_what_an_adapter_matches_is_what_the_table_chose(engine: str):
     """Setting by setting; what is in the adapter alone is not searched, and says why."""
-    table, adapter = chosen(engine), matched_of(engine)
+    table, adapter = chosen(engine), searched_of(engine).chosen
 
     assert table == {name: shown(adapter[name]) for name in table}
-    assert set(table) == {one.name for one in settings_of(engine)}
+    assert set(table) == set(searched_of(engine).settings)
     assert {name for name in adapter if name not in table} <= {"skin", "restitution_threshold"}
 
 
@@ -39,12 +39,14 @@ def test_every_value_of_the_grid_is_in_the_table_and_every_reason_is_given():
     kept = {(row["engine"], row["setting"], row["value"]) for row in rows}
 
     assert list(rows[0]) == COLUMNS
-    for one in GRID:
-        assert {(one.engine, one.name, shown(value)) for value in one.values} <= kept
-    assert {(each.engine, each.name, "") for each in NOT_SEARCHED} <= kept
+    for engine in TUNED:
+        what = searched_of(engine)
+        for name, (values, _) in what.settings.items():
+            assert {(engine, name, shown(value)) for value in values} <= kept
+        assert {(engine, name, "") for name in what.left_alone} <= kept
+        assert all(set(names) <= set(what.settings) for names, *_ in what.pairs)
     assert all(row["why"] for row in rows if row["verdict"] in (CHOSEN, NO_SEARCH))
     assert not [row for row in rows if row["verdict"] == BETTER]  # the last sweep took nothing
-    assert all(set(pair.names) <= {one.name for one in settings_of(pair.engine)} for pair in PAIRS)
 
 
 def test_the_tuning_scenes_are_not_those_of_the_suite():
@@ -136,7 +138,7 @@ def test_a_run_that_fails_breaks_and_one_that_failed_before_does_not():
 def test_a_length_unit_of_two_radii_invents_collisions_in_near_misses_and_a_small_one_none():
     """Why Box2D 3.1 may not have the length unit of the smallest error: its margin is 2 % of it."""
     scenes = posed(("near_miss",), (0, 1))
-    small, large = (measured(partial(changed_box2d_v3, length_unit=unit), scenes) for unit in (0.5, 2.0))
+    small, large = (measured(partial(changed, "box2d_v3:matched", length_unit=unit), scenes) for unit in (0.5, 2.0))
 
     assert small.invented.sum() == 0
     assert large.invented.sum() > 0
@@ -146,7 +148,9 @@ def test_a_length_unit_of_two_radii_invents_collisions_in_near_misses_and_a_smal
 def test_a_smaller_slop_brings_a_column_in_pymunk_nearer():
     """At 1e-6 radii for 1e-2, with the position correction as it comes: less than half of the error."""
     scenes = posed(("column",), (0, 1))
-    before, now = (measured(partial(changed_pymunk, slop=slop, bias=0.9**60), scenes) for slop in (1e-2, 1e-6))
+    before, now = (
+        measured(partial(changed, "pymunk:matched", slop=slop, bias=0.9**60), scenes) for slop in (1e-2, 1e-6)
+    )
 
     assert against(now, before, 1.0, scenes).same_dt < 0.5
     assert (before.error > FLOOR).all()
@@ -155,8 +159,9 @@ def test_a_smaller_slop_brings_a_column_in_pymunk_nearer():
 @pytest.mark.slow
 def test_a_search_finds_its_way_back_from_a_bad_setting(monkeypatch: pytest.MonkeyPatch):
     """On two families: from a slop of 1 % it takes a smaller one, and from what is matched nothing."""
-    monkeypatch.setattr("reports.tune.grid.GRID", tuple(one for one in GRID if one.name == "slop"))
-    monkeypatch.setattr("reports.tune.search.PAIRS", ())
+    whole = searched_of("pymunk")
+    slop = replace(whole, settings={"slop": whole.settings["slop"]}, pairs=())
+    monkeypatch.setattr("reports.tune.search.searched_of", lambda _: slop)
     search = Search("pymunk", ("column", "landing"), ((0, 1), (2, 3)), say=lambda _: None)
     table = search.run()
 

@@ -1,0 +1,268 @@
+"""Adding is one file and one row: a copy of the source gets one of everything, which then appears everywhere."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+import pytest
+
+ROOT = Path(__file__).parent.parent
+SOURCE = ("adapters", "reference_impl", "reports", "scenarios")
+TOY = """
+import numpy as np
+
+from scenarios.model import State
+
+
+class Toy:
+    listening, wrapping = True, 0.0
+
+    def load(self, scene, dt):
+        self.scene, self.dt = scene, dt
+        self.state = [np.array(scene.position), np.array(scene.velocity), np.array(scene.angle)]
+        self.acting = np.zeros_like(scene.position)
+
+    def push(self, disk, force, torque):
+        self.acting[disk] += force / self.scene.mass[disk]
+
+    def step(self, count=1):
+        moving = ~self.scene.static[:, None]
+        for _ in range(count):
+            a = (self.scene.gravity + self.acting) * moving
+            self.state[0] += self.state[1] * self.dt + a * self.dt**2 / 2
+            self.state[1] += a * self.dt
+            self.state[2] += self.scene.angular_velocity * self.dt
+            self.acting[:] = 0.0
+
+    def read(self):
+        return State(*(each.copy() for each in self.state), np.array(self.scene.angular_velocity))
+
+    def hits(self):
+        return []
+
+    def settings(self):
+        return {"collisions": (None, "none")}
+
+    def versions(self):
+        return {"toyland": "1.5"}
+
+    def close(self):
+        pass
+"""
+
+
+class Added(NamedTuple):
+    """What is written into a file, and in front of what; at its end if that is ""."""
+
+    file: str
+    text: str
+    before: str = ""
+
+
+ADDED: dict[str, list[Added]] = {
+    "an engine": [
+        Added("adapters/toy.py", TOY),
+        Added(
+            "adapters/engines.py",
+            "def _toy():\n    from adapters.toy import Toy\n\n    return Toy()\n\n\n",
+            "# What all profiles of an engine",
+        ),
+        Added(
+            "adapters/engines.py",
+            '    "toy:plain": Row(_toy, "flies through everything", 0.5, FLOAT64, distributions=("typer",),\n'
+            '                     features={"as it is": {}}, variants={"as_it_is": Variant({}, "nothing")}),\n',
+            "}  # fmt: skip\n\nOWN",
+        ),
+    ],
+    "a scenario": [
+        Added(
+            "scenarios/families/pairs.py",
+            "def toy_scene() -> Scenario:\n    from dataclasses import replace\n\n"
+            '    return replace(near_miss(), name="toy_scene", asks="Is a toy scene here?")\n\n\n',
+            "PAIRS",
+        ),
+        Added("scenarios/families/pairs.py", "    toy_scene,\n", "    near_miss,\n)"),
+    ],
+    "a metric": [
+        Added(
+            "reports/compare/metrics.py",
+            "def toy_metric(view: View) -> Value | None:\n"
+            '    """42, whatever was played."""\n    return Value(42.0)\n\n\n',
+            "TRUTH, ITSELF, ENGINE =",
+        ),
+        Added(
+            "reports/compare/metrics.py",
+            '    "toy_metric": Metric(toy_metric, "1", (ITSELF,)),\n',
+            '    "position_max_radii"',
+        ),
+    ],
+    "a chart": [
+        Added(
+            "reports/page/charts.py",
+            "def toy_chart(comparison: Comparison) -> Drawing:\n"
+            '    return Drawing("A toy chart", "There is nothing to draw.", None)\n\n\n',
+            "CHARTS: dict",
+        ),
+        Added("reports/page/charts.py", '    "toy_chart": Chart("a toy", toy_chart),\n', "}\n\n\ndef packed"),
+    ],
+    "a lesson": [
+        Added(
+            "reports/lessons/toy.py",
+            "from reports.lessons.lesson import Chart, Curve, Lesson, Shown\n\n\n"
+            "def show(settings):\n"
+            '    curve = Curve("toy:plain", np.arange(2.0), np.arange(2.0))\n'
+            '    return Shown([Chart("a toy", "x", "y", [curve])], None, [])\n'
+            '\n\nTOY = Lesson("toy", "9", "A toy lesson", "Is it here?", ["It is."], [], ["toy:plain"], show)\n',
+        ),
+        Added("reports/lessons/toy.py", "import numpy as np\n\n", "from reports.lessons.lesson"),
+        Added("reports/lessons/catalogue.py", "from reports.lessons.toy import TOY\n", "\nALL"),
+        Added("reports/lessons/catalogue.py", ", TOY", ")\nLESSONS"),
+    ],
+    "a mechanism": [
+        Added(
+            "adapters/mechanisms/habits.py",
+            '    "toy:plain": lambda told, scene, dt: [Habit(FRICTION, {"friction": 0.0})],\n',
+            '}\n"""The players whose',
+        ),
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the source, compiled kernels included, with one of everything added."""
+    folder = tmp_path_factory.mktemp("grown")
+    for name in SOURCE:
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("out", "*.png"))
+    for additions in ADDED.values():
+        for added in additions:
+            path = folder / added.file
+            text = path.read_text(encoding="utf-8") if path.exists() else ""
+            assert text.count(added.before) == 1 or not added.before, added
+            at = text.index(added.before) if added.before else len(text)
+            path.write_text(text[:at] + added.text + text[at:], encoding="utf-8")
+    return folder
+
+
+def python(grown: Path, *words: str | Path) -> str:
+    """What Python prints that finds the copy first, run in an empty folder beside it."""
+    environment = os.environ | {"PYTHONPATH": str(grown), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(
+        [sys.executable, *words], cwd=grown, env=environment, capture_output=True, text=True, timeout=500
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_the_table_of_contributing_names_what_is_added_here_and_where():
+    """A row each, and every file of it is one that an addition is written to."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = {
+        what: set(re.findall(r"`((?:adapters|reports|scenarios)/[^`]*)`", rest))
+        for what, rest in re.findall(r"^\| (an? \w+) \|(.*)$", text, re.MULTILINE)
+    }
+
+    assert rows.keys() == ADDED.keys()
+    for what, files in rows.items():
+        written = {added.file for added in ADDED[what]}
+        assert all(any(file.startswith(name) for file in written) for name in files), what
+
+
+def test_nothing_of_it_is_in_the_source_itself():
+    """Negative control: what is looked for below comes from what was added."""
+    assert [path for folder in SOURCE for path in (ROOT / folder).rglob("*.py") if "toy" in path.read_text()] == []
+
+
+def test_all_that_is_added_is_known_everywhere(grown: Path):
+    """Tables, colour, version, feature, variant, error budget and lesson; and nothing else has changed its look."""
+    code = """
+import json
+from adapters.conformance.conform import conform
+from adapters.engines import ENGINES
+from adapters.mechanisms.features import FEATURES
+from reports.compare.metrics import METRICS
+from reports.lessons.catalogue import LESSONS
+from reports.lessons.pages import lesson_page
+from reports.page.charts import CHARTS
+from reports.page.style import PALETTE, look
+from reports.run.cells import versions
+from reports.speed.budget import budget_of
+from reports.stability.players import PLAYERS
+from scenarios.catalogue import SCENARIOS
+found = conform("toy:plain", ENGINES["toy:plain"])
+print(json.dumps({
+    "names": ["toy:plain" in ENGINES, "toy_scene" in SCENARIOS, "toy_metric" in METRICS, "toy_chart" in CHARTS],
+    "look": look("toy", "plain")[:2] + look("toy", "plain")[3:4] == PALETTE[0], "version": versions()["typer"],
+    "alike": [name for name in ENGINES if look(*name.split(":"))[:2] == look("toy")[:2]],
+    "feature": [each.change for each in FEATURES if each.engine == "toy:plain"],
+    "variant": PLAYERS["toy:plain+as_it_is"].switch,
+    "parts": [row["part"] for row in budget_of("free_fall", 0, "toy:plain", 4)],
+    "verdicts": {each.probe: each.verdict for each in found},
+    "lesson": lesson_page(LESSONS["toy"], LESSONS["toy"].at([]).told()),
+}))
+"""
+    found = json.loads(python(grown, "-c", code).splitlines()[-1])
+
+    assert found["names"] == [True] * 4
+    assert found["look"]
+    assert found["alike"] == ["toy:plain"]
+    assert found["version"] == version("typer")
+    assert found["feature"] == ["as it is"]
+    assert found["variant"] == "nothing"
+    assert "friction" in found["parts"]
+    assert found["verdicts"]["free_flight"] == "keeps"
+    assert found["verdicts"]["restitution_0.5"] == "departs"  # it has no collisions
+    assert "A toy lesson" in found["lesson"]
+
+
+@pytest.mark.slow
+def test_a_run_has_them_in_its_tables_and_on_its_page(grown: Path):
+    """One cell: the toy engine on the toy scene, with probes, metric, chart, version and colour."""
+    words = ("run", "toy_scene", "--engine", "toy", "--dt", "0.0166666666666666", "--workers", "1", "--out", "out")
+    python(grown, "-m", "reports", *words)
+    table = pd.read_csv(grown / "out" / "deviations.csv")
+    page = (grown / "out" / "report.html").read_text(encoding="utf-8")
+    runs = pd.read_csv(grown / "out" / "runs.csv")
+
+    assert table[table.metric == "toy_metric"].value.tolist() == [42.0]
+    assert set(table.scenario) == {"toy_scene"}
+    assert "toyland" in runs.versions[0]
+    shown = ("toy<i>:<wbr>plain", "A toy chart", "toy_metric", "#5b6b7a", "toyland 1.5", "restitution_", "typer")
+    for text in shown:
+        assert text in page, text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("command", "names"), [("speed", ["free_fall"]), ("stability", ["slow_hit"])])
+def test_speed_and_stability_have_the_engine_on_their_pages(grown: Path, command: str, names: list[str]):
+    """In the tables and the charts."""
+    python(grown, "-m", "reports", command, *names, "--engine", "toy", "--out", command)
+    page = (grown / command / f"{command}.html").read_text(encoding="utf-8")
+
+    assert "toy<i>:<wbr>plain" in page
+    assert "#5b6b7a" in page
+    assert 'class="plot"' in page
+
+
+def test_an_engine_is_named_in_its_files_and_its_row_and_else_only_in_texts_about_it():
+    """The youngest engine, for all: what holds for it holds for the next one."""
+    about_it = {"reports/lessons/mechanisms.py", "reports/lessons/motion.py"}  # which engines a lesson shows
+    about_it |= {"reports/stability/reasons.py", "reports/stability/twins.py"}  # why an engine fails, with the source
+    named = {
+        path.relative_to(ROOT).as_posix()
+        for folder in SOURCE
+        for path in (ROOT / folder).rglob("*")
+        if path.suffix in (".py", ".js", ".j2", ".css") and "out" not in path.parts
+        and re.search(r"\bbox2d_v3\b", path.read_text(encoding="utf-8"))
+    }  # fmt: skip
+
+    assert named - about_it == {"adapters/engines.py", "adapters/mechanisms/habits.py"}
