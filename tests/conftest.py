@@ -7,7 +7,23 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser
 
+from reports.run import worker
+from tests.forks import FRESH, Forked
 from tests.reports.page.browsing import chromium
+
+
+@pytest.fixture(autouse=True, scope="session")
+def forked_workers() -> Iterator[None]:
+    """A run that is played in the process of the tests forks its workers: each start anew would take seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(worker, "start", Forked)
+        yield
+
+
+@pytest.fixture
+def fresh_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For what is said of the workers themselves: each an interpreter of its own, as users have it."""
+    monkeypatch.setattr(worker, "start", FRESH)
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,7 @@ LINES = list(dict.fromkeys(
 ))  # fmt: skip
 CLUSTER = [line for line in LINES if "--extra cluster" in line]
 MINUTES = {"uv run crosscheck speed"}  # and the tests themselves
-SLOW = (" stability ", " speed ")  # ten seconds each
+SLOW = (" stability ", " speed ", " --solver ")  # ten seconds each, or pytest in a process of its own
 COMMANDS = [
     pytest.param(line, marks=[pytest.mark.slow] if any(word in line for word in SLOW) else [])
     for line in LINES

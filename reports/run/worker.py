@@ -12,7 +12,7 @@ import tempfile
 import threading
 from collections.abc import Callable
 from multiprocessing import Pipe
-from multiprocessing.connection import wait
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -43,12 +43,7 @@ class Worker:
         self.connection, theirs = Pipe()
         self.output, printing = os.pipe()
         self.trail = nameless_file()
-        # As here, so that it finds what a task is made of, but nothing that only lies where this command was started.
-        self.process = subprocess.Popen(
-            [*python(WORK), *map(str, (theirs.fileno(), self.trail, memory))],
-            stdin=subprocess.DEVNULL, stdout=printing, stderr=printing, pass_fds=(theirs.fileno(), self.trail),
-            env=os.environ | {"PYTHONPATH": path_of_this()},
-        )  # fmt: skip
+        self.process = start(theirs, self.trail, printing, memory)
         theirs.close()
         os.close(printing)
 
@@ -139,6 +134,16 @@ class Worker:
     def __del__(self) -> None:
         for line in (self.output, self.trail):
             os.close(line)
+
+
+def start(theirs: Connection, trail: int, printing: int, memory: int) -> subprocess.Popen[bytes]:
+    """A fresh interpreter that serves the other end of a worker's lines."""
+    # As here, so that it finds what a task is made of, but nothing that only lies where this command was started.
+    return subprocess.Popen(
+        [*python(WORK), *map(str, (theirs.fileno(), trail, memory))],
+        stdin=subprocess.DEVNULL, stdout=printing, stderr=printing, pass_fds=(theirs.fileno(), trail),
+        env=os.environ | {"PYTHONPATH": path_of_this()},
+    )  # fmt: skip
 
 
 def nameless_file() -> int:

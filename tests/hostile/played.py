@@ -7,7 +7,6 @@ Where the interpreter itself is asked something (its locale, its streams), it is
 from __future__ import annotations
 
 import hashlib
-import multiprocessing
 import os
 import re
 import signal
@@ -20,6 +19,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tests.forks import crosscheck_in, start
 from tests.hostile.talks import NOT_ANY_MORE, free_port, hear
 
 SENTENCE, DONE, FINDINGS, STOPPED = "clear sentence", "done", "done, with findings", "stopped when told"
@@ -30,10 +30,6 @@ BY_CODE = {0: DONE, 1: FINDINGS, 2: SENTENCE, 130: STOPPED, 143: STOPPED}
 SECONDS = 90.0  # that an input may take on a busy machine; what is bounded by its own --timeout takes a fraction of it
 LINES = 101  # of a refusal: one sentence a fault, as many as the reader of scenes lists, and one that there are more
 GRACE = 3.0  # s in which a process that has been told to end is gone
-LOADED = ["reports.cli", "reports.run.arguments", "reports.commands.run", "reports.commands.truth", 
-          "reports.commands.diff",
-          "reports.commands.replay", "reports.check.command", "reports.speed.command", "reports.stability.command",
-          "reports.lessons.command", "reports.tune.command"]  # fmt: skip
 CROSSCHECK = Path(sys.executable).parent / "crosscheck"
 WIDE = {"COLUMNS": "400"}  # so that no sentence is broken where a line ends
 # What Python says by itself: an exception that nobody caught, or one in a destructor; a warning; a crash in C.
@@ -163,17 +159,9 @@ def ended(tried: Input, user: Path, folder: Path) -> tuple[int | None, str]:
                 return None, ""
     port = free_port() if tried.talk is not None else 0
     words = tuple(word.replace("PORT", str(port)) for word in tried.words) if port else tried.words
-    forked = context().Process(target=child, args=(words, user, folder))
-    forked.start()
+    forked = start(crosscheck_in, words, user, folder, WIDE)
     heard = "" if tried.talk is None else hear(tried.talk, forked, folder / "stdout")
     return code_of(forked), heard
-
-
-def context() -> multiprocessing.context.ForkServerContext:
-    """Where processes are forked from: one that has imported everything, and has no thread."""
-    forks = multiprocessing.get_context("forkserver")
-    forks.set_forkserver_preload(LOADED)
-    return forks
 
 
 def code_of(process: BaseProcess) -> int | None:
@@ -185,19 +173,6 @@ def code_of(process: BaseProcess) -> int | None:
         process.join()
         return None
     return process.exitcode
-
-
-def child(words: tuple[str, ...], user: Path, folder: Path) -> None:
-    """The command in a forked process, which leads a group of its own."""
-    from reports.__main__ import main
-
-    os.setsid()
-    for number, name in ((1, "stdout"), (2, "stderr")):
-        os.dup2(os.open(folder / name, os.O_WRONLY | os.O_CREAT, 0o644), number)
-    os.chdir(user)
-    os.environ |= WIDE
-    sys.argv = ["crosscheck", *words]
-    sys.exit(main())
 
 
 def left_behind(user: Path) -> bool:

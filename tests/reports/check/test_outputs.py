@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from unittest import mock
 from xml.etree import ElementTree
 
@@ -42,16 +44,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
-def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(folder: Path):
+# A process of its own loads for seconds what this one has; that it ends the same is for the long test.
+@pytest.mark.parametrize("call", [crosscheck, pytest.param(process, marks=pytest.mark.slow)])
+def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(
+    folder: Path, tmp_path: Path, call: Callable[..., Any]
+):
     """The first line is the sentence to begin with; the page, and it alone, is where the command was given."""
-    cwd = folder / ".desk"
-    cwd.mkdir()
-    right, wrong = (process("check", folder / who / "Exercise.js", cwd=cwd) for who in ("anna", "ben"))
+    right, wrong = (call("check", folder / who / "Exercise.js", cwd=tmp_path) for who in ("anna", "ben"))
 
     assert (right.returncode, wrong.returncode) == (0, 1)
     assert right.stdout.startswith("No fault found")
     assert wrong.stdout.replace("\n", " ").startswith("1. Task 2c impulse, impulse: it divides by (mA + mB)")
-    assert [path.name for path in cwd.iterdir()] == ["check.html"]
+    assert [path.name for path in tmp_path.iterdir()] == ["check.html"]
 
 
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):

@@ -41,6 +41,7 @@ def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
     assert held["1,0"]["charts"] == json.loads(json.dumps(lesson.at((1, 0)).told()["charts"]))
 
 
+@pytest.mark.slow
 def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A page each and their list, with the conventions in it; nothing asks for a server. Two of them, for the time."""
     few = {name: LESSONS[name] for name in ("order", "mixing")}

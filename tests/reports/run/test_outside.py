@@ -90,6 +90,7 @@ def test_a_failure_says_whether_it_lies_outside_what_was_done(task: Any, outside
     assert (ended.outside, ended.reason) == (outside, said)
 
 
+@pytest.mark.usefixtures("fresh_workers")
 def test_a_worker_that_cannot_start_is_not_the_fault_of_its_task(monkeypatch: pytest.MonkeyPatch):
     """A Python that ends at once."""
     monkeypatch.setattr(worker.sys, "executable", shutil.which("false"))
@@ -98,6 +99,7 @@ def test_a_worker_that_cannot_start_is_not_the_fault_of_its_task(monkeypatch: py
     assert ended == Failure("crashed", "its worker could not start: exit status 1", outside=True)
 
 
+@pytest.mark.usefixtures("fresh_workers")
 def test_a_worker_that_does_not_come_up_is_not_the_fault_of_its_task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A Python that says nothing."""
     (tmp_path / "python").write_text("#!/bin/sh\nexec sleep 1000\n")

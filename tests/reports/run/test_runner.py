@@ -5,18 +5,20 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
 from adapters.engine import Row
 from adapters.engines import ENGINES
-from reports.run import playing
+from reports.run import playing, worker
 from reports.run.archive import from_trail, load_trajectory, packed
 from reports.run.cells import Cell
 from reports.run.playing import Played, play_cell, play_here
 from reports.run.runner import NoScheduler, cluster, run_all
 from reports.run.worker_process import Failure
 from scenarios.catalogue import scenario
+from tests.forks import FRESH
 from tests.reports.run.control_engines import (
     CONTROLS,
     FATAL,
@@ -46,7 +48,8 @@ def ended() -> dict[str, Played | Failure]:
     mixed = {**dict(list(GOOD.items())[:12]), **CONTROLS, **dict(list(GOOD.items())[12:])}
     tasks = cells(mixed)
     hang = {"hangs:control": tasks.pop("hangs:control")}  # by itself, for the others may need long on a busy machine
-    results = [*run_all(tasks, workers=2, memory=500_000_000), *run_all(hang, workers=1, timeout=3.0)]
+    with mock.patch.object(worker, "start", FRESH):  # as users have it: how it ends is what is asked
+        results = [*run_all(tasks, workers=2, memory=500_000_000), *run_all(hang, workers=1, timeout=3.0)]
 
     assert sorted(key for key, _ in results) == sorted(mixed)  # each once
     return dict(results)

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 from unittest import mock
 
@@ -14,6 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from reports.cli import app
+from tests.forks import crosscheck_in, start
 
 CROSSCHECK = Path(sys.executable).parent / "crosscheck"
 
@@ -37,6 +39,18 @@ def crosscheck(*words: str | Path, cwd: Path) -> Done:
     with contextlib.chdir(cwd), mock.patch.object(sys, "argv", argv):
         done = CliRunner().invoke(app, argv[1:], catch_exceptions=False)
     return Done(done.exit_code, done.stdout, done.stderr)
+
+
+def forked(*words: str | Path, cwd: Path) -> Done:
+    """The command in a process of its own that loads nothing, and is killed if it hangs."""
+    with TemporaryDirectory() as folder:
+        process = start(crosscheck_in, [*map(os.fspath, words)], cwd, Path(folder), {"COLUMNS": "400"})
+        process.join(120.0)
+        if process.exitcode is None:
+            process.kill()
+            pytest.fail(f"crosscheck {words} hangs")
+        stdout, stderr = ((Path(folder) / name).read_text("utf-8") for name in ("stdout", "stderr"))
+    return Done(process.exitcode, stdout, stderr)
 
 
 def wait_for(done: Callable[[], bool]) -> None:

@@ -15,7 +15,7 @@ from reports.commands.truth import waiting
 from reports.compare.comparison import COLUMNS
 from reports.compare.metrics import METRICS
 from scenarios.catalogue import SCENARIOS
-from tests.reports.terminal.command_line import crosscheck, process
+from tests.reports.terminal.command_line import crosscheck, forked, process
 
 SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference", "--engine", "pymunk:matched", "--dt", str(1 / 60)]
@@ -25,7 +25,7 @@ SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference", "--engine", "p
 def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a finished run of two scenarios and three players."""
     cwd = tmp_path_factory.mktemp("small")
-    done = process(*SMALL, "--out", "here", cwd=cwd)
+    done = crosscheck(*SMALL, "--out", "here", cwd=cwd)
 
     assert done.returncode == 0, done.stderr
     assert str(cwd / "here" / "report.html") in done.stdout
@@ -81,8 +81,8 @@ def test_tables_are_made_again_from_the_journal(small_run: Path):
 
 @pytest.mark.slow
 def test_the_same_command_gives_the_same_numbers_whatever_the_workers(small_run: Path, tmp_path: Path):
-    """deviations.csv is byte for byte the same with one worker as with all."""
-    assert crosscheck(*SMALL, "--workers", "1", "--out", "again", cwd=tmp_path).returncode == 0
+    """deviations.csv is byte for byte the same with one worker as with all, and in a process of its own."""
+    assert process(*SMALL, "--workers", "1", "--out", "again", cwd=tmp_path).returncode == 0
     assert (tmp_path / "again" / "deviations.csv").read_bytes() == (small_run / "deviations.csv").read_bytes()
 
 
@@ -166,7 +166,7 @@ def test_who_waits_for_an_exact_answer_is_told_so_on_a_terminal_only(
 def test_a_pipe_for_a_scene_hangs_no_command(words: list[str], tmp_path: Path):
     """Nobody writes into it."""
     os.mkfifo(tmp_path / "pipe.toml")
-    done = process(words[0], "pipe.toml", *words[1:], cwd=tmp_path)
+    done = forked(words[0], "pipe.toml", *words[1:], cwd=tmp_path)
     assert done.returncode == 2
     assert "pipe.toml: is a pipe or a device; must be a readable TOML file" in done.stderr
     assert "Traceback" not in done.stderr

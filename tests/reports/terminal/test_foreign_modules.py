@@ -27,6 +27,7 @@ from tests.reports.run.control_engines import Controlled, row
 from tests.reports.terminal.command_line import CROSSCHECK
 from tests.solvers.mutants import CORRECT
 
+pytestmark = pytest.mark.usefixtures("fresh_workers")  # what they import as they start is asked here
 ROOT = Path(__file__).parents[3]
 OURS = ("adapters", "reference_impl", "reports", "scenarios", "tests")
 LIBRARIES = ("Box2D", "flint", "gmpy2", "numba", "numpy", "pandas", "pyb2d3", "pydantic", "pymunk", "rich", "typer")

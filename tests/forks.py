@@ -1,0 +1,111 @@
+"""Processes that are forked from one in which everything is imported: a start takes 0.05 s of work, not some three.
+
+For tests in which it makes no difference how a process has started.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from unittest import mock
+
+from reports.run import worker
+
+FRESH = worker.start  # as users have it, an interpreter of its own
+ROOT = Path(__file__).parent.parent
+LOADED = ["tests.loaded", "reports.cli", "reports.run.arguments", "reports.commands.truth", "reports.commands.diff",
+          "reports.commands.replay", "reports.check.command", "reports.speed.command", "reports.stability.command",
+          "reports.lessons.command", "reports.tune.command"]  # fmt: skip
+# multiprocessing polls all of its processes whenever it starts one; what one thread has read, another waits for.
+LOCK = threading.Lock()
+
+
+def context() -> multiprocessing.context.ForkServerContext:
+    """Where processes are forked from: one that has imported everything, and has no thread."""
+    forks = multiprocessing.get_context("forkserver")
+    forks.set_forkserver_preload(LOADED)
+    return forks
+
+
+def start(target: Callable[..., object], *args: object) -> BaseProcess:
+    """A process in which `target` is called, which `pickle` must be able to name."""
+    process = context().Process(target=target, args=args)
+    with LOCK:
+        start_server()
+        process.start()
+    return process
+
+
+@cache
+def start_server() -> None:
+    """It starts with its first process, wherever that is; it imports from here, and is waited for."""
+    with mock.patch.dict(os.environ, {"PYTHONPATH": str(ROOT)}):
+        first = context().Process(target=os.getpid)
+        first.start()
+    first.join()
+
+
+def crosscheck_in(words: Sequence[str], cwd: Path, folder: Path, environment: Mapping[str, str]) -> None:
+    """In a fork: the command in `cwd`, which leads a group of its own and prints into files in `folder`."""
+    from reports.__main__ import main
+
+    os.setsid()
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        os.dup2(os.open(folder / name, os.O_WRONLY | os.O_CREAT, 0o644), number)
+    os.chdir(cwd)
+    os.environ |= environment
+    sys.argv = ["crosscheck", *words]
+    sys.exit(main())
+
+
+class Forked:
+    """A worker process as `subprocess.Popen` would show it, of which it has what `Worker` asks for."""
+
+    def __init__(self, theirs: Connection, trail: int, printing: int, memory: int) -> None:
+        """Serve `theirs` in a fork; in place of `reports.run.worker.start`."""
+        lines = [Connection(os.dup(line)) for line in (theirs.fileno(), trail, printing)]
+        self.process = start(serve, lines, memory, dict(os.environ))
+
+    def poll(self) -> int | None:
+        """How it has ended: exit code or -signal; None if it has not."""
+        with LOCK:
+            return self.process.exitcode
+
+    def wait(self) -> int:
+        """How it has ended, once it has."""
+        wait([self.process.sentinel])
+        code = self.poll()
+        assert code is not None
+        return code
+
+    def send_signal(self, number: int) -> None:
+        """Unless it has ended."""
+        if self.poll() is None and self.process.pid is not None:
+            os.kill(self.process.pid, number)
+
+    def kill(self) -> None:
+        """End it, unless it has."""
+        self.send_signal(signal.SIGKILL)
+
+
+def serve(lines: list[Connection], memory: int, environment: Mapping[str, str]) -> None:
+    """In the fork: what `python -m reports.run.worker_process` does."""
+    from reports.run import worker_process
+
+    os.environ.clear()
+    os.environ |= environment
+    connection, trail, printing = lines
+    with open(os.devnull) as nothing:
+        os.dup2(nothing.fileno(), 0)
+    for number in (1, 2):
+        os.dup2(printing.fileno(), number)
+    printing.close()
+    worker_process.main([os.dup(connection.fileno()), os.dup(trail.fileno()), memory])

@@ -1,0 +1,19 @@
+"""Imported once, in the process that others are forked from: all that a run takes, with its kernels loaded."""
+
+from __future__ import annotations
+
+import reports.commands.run
+import reports.run.known_answers
+import reports.run.playing
+import reports.run.tables  # noqa: F401
+from adapters.engines import ENGINES
+from adapters.play import play
+from reports.compare.comparison import compare
+from scenarios.catalogue import scenario
+
+scene = scenario("slow_hit")
+compare(scene, [
+    play(ENGINES[name].make(), name, scene, scene.dt(scene.substeps[0]))
+    for name in ("reference:exercise", "reference:ordered", "event_driven:float64", "pymunk:matched", "box2d:matched",
+                 "box2d_v3:matched")
+])  # fmt: skip
