@@ -1,4 +1,5 @@
-"""box2d-py 2.3.8 (Box2D 2.3), float32: collide at the old position, then one velocity solve, then push-out."""
+"""box2d-py 2.3.8 (Box2D 2.3), float32: collide at the old position, then one velocity solve, then position
+correction."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from typing import Any
 import Box2D
 import numpy as np
 
-from adapters.engine import KEPT, PASSED, Hit
+from adapters.engine import KEPT, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
@@ -81,7 +82,7 @@ SEARCHED = Searched(
 class Box2DEngine:
     """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
 
-    `matched`: the scene in other units. Box2D treats hits below 1 unit of length per unit of time as
+    `matched`: the scene in other units. Box2D treats collisions below 1 unit of length per unit of time as
     inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The length unit
     is a quarter of the smallest radius, which shrinks slop and the tolerance of continuous collision; or twice what
     the fastest disk moves in a step where that is more, because nothing moves by more than 2 units a step; a scene that
@@ -89,7 +90,7 @@ class Box2DEngine:
     within a step; without gravity at e = 1 there is none, because it creates energy in a gas. No friction, sleep or
     wall skin; at e = 1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
 
-    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `sleeping` (None: the profile's),
+    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the profile's),
     `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.
     """
 
@@ -184,7 +185,7 @@ class Box2DEngine:
         body.CreateFixture(Box2D.b2FixtureDef(shape=shape, **self._surface()))
         return body
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Apply force and torque; `Step` clears both."""
         per_time2 = self.time**2
         self.bodies[disk].ApplyForceToCenter(vector(force * self.length * per_time2), True)
@@ -222,9 +223,9 @@ class Box2DEngine:
             must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
         return State(position, velocity, angle, angular_velocity)
 
-    def hits(self) -> list[Hit]:
+    def collisions(self) -> list[ContactImpulse]:
         """From `PostSolve`, impulses back in N s."""
-        return [Hit(step, i, j, impulse / self.speed) for step, i, j, impulse in self.listener.log]
+        return [ContactImpulse(step, i, j, impulse / self.speed) for step, i, j, impulse in self.listener.log]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """Resolved values are read back from the world, a fixture and the engine's constants."""
@@ -275,7 +276,7 @@ def fastest(scene: Scene) -> float:
 
 
 class Listener(Box2D.b2ContactListener):
-    """Logs (step, i, j, impulse in the engine's units) of every contact that pushed."""
+    """Logs (step, i, j, impulse in the engine's units) of every contact with an impulse."""
 
     def __init__(self, engine: Box2DEngine) -> None:
         super().__init__()
@@ -283,7 +284,7 @@ class Listener(Box2D.b2ContactListener):
         self.log: list[tuple[int, int, int, float]] = []
 
     def PostSolve(self, contact: Any, impulse: Any) -> None:
-        """Called once a step for every touching pair, whether it pushed or not."""
+        """Called once a step for every touching pair, with an impulse or not."""
         J = impulse.normalImpulses[0]
         if J > 0.0:
             i, j = contact.fixtureA.body.userData, contact.fixtureB.body.userData

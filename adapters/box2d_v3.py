@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
-from adapters.engine import PASSED, UNREAD, Hit
+from adapters.engine import NOT_READABLE, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from adapters.matched import Searched
 from scenarios.model import Array, Scene, State
@@ -93,11 +93,11 @@ class Box2DV3:
 
     `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap. The length unit is half of
     the smallest radius: slop and speculative margin are shares of it, and a larger margin foresees more collisions, but
-    this is the largest that invents none where two disks pass at 1 % of a radius. Contacts are as stiff as the engine
-    lets them be, an eighth of the substeps a second. The values are `MATCHED`, by `crosscheck tune`. The cap on spins
-    cannot be lifted: a scene that reaches it is refused.
+    this is the largest without a spurious collision where two disks pass at 1 % of a radius. Contacts are as stiff as
+    the engine lets them be, an eighth of the substeps a second. The values are `MATCHED`, by `crosscheck tune`. The cap
+    on spins cannot be lifted: a scene that reaches it is refused.
 
-    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `sleeping` (None: the profile's),
+    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the profile's),
     `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.
     """
 
@@ -127,7 +127,7 @@ class Box2DV3:
             walls=scene.walls, gravity=scene.gravity,
         )  # fmt: skip
         self.scene, self.dt, self.steps = scene, dt, 0
-        self.log: list[Hit] = []
+        self.log: list[ContactImpulse] = []
         self.unit = float(self.chosen["length_unit"] * scene.radius.min()) if self.matched else 1.0
         pyb2d3.set_length_units_per_meter(self.unit)
         # The binding has no way to ask for the unit, but the default of this limit is 400 of it.
@@ -139,7 +139,7 @@ class Box2DV3:
         self.world.sleeping_enabled = self.sleeping
         if self.matched:
             self.world.set_contact_tuning(*self._tuning())
-        self.world.hit_event_threshold = 0.0  # listening only: report every hit
+        self.world.hit_event_threshold = 0.0  # listening only: report every collision
         self.bodies = [self._disk(i) for i in range(scene.n)]
         self.every = pyb2d3.Bodies()
         for body in self.bodies:
@@ -191,14 +191,14 @@ class Box2DV3:
         start, end = self.scene.walls[w]
         body.create_segment_shape(self._shape(), pyb2d3.segment(vector(start), vector(end)))
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Apply force and torque; `step` clears both."""
         self.bodies[disk].apply_force_to_center(vector(force))
         self.bodies[disk].apply_torque(float(torque))
 
     @in_its_unit
     def step(self, count: int = 1) -> None:
-        """`count` calls of `step`; hit events live for one step, so they are collected after each."""
+        """`count` calls of `step`; collision events live for one step, so they are collected after each."""
         pyb2d3.set_length_units_per_meter(self.unit)  # another world may have set its own since
         for _ in range(count):
             self.world.step(self.dt, self.substeps)
@@ -211,9 +211,9 @@ class Box2DV3:
                 self.wrapping += perf_counter() - started
 
     def _listen(self) -> None:
-        for hit in self.world.get_contact_events().hit_events():
-            i, j = hit.shape_a.body.user_data, hit.shape_b.body.user_data
-            self.log.append(Hit(self.steps, self._index(i), self._index(j), np.nan))
+        for collision in self.world.get_contact_events().hit_events():
+            i, j = collision.shape_a.body.user_data, collision.shape_b.body.user_data
+            self.log.append(ContactImpulse(self.steps, self._index(i), self._index(j), np.nan))
 
     def _index(self, user_data: int) -> int:
         return user_data if user_data < self.scene.n else self.scene.n - 1 - user_data
@@ -245,8 +245,8 @@ class Box2DV3:
         self.spin, self.seen = spin, self.steps
         return self.angle.copy()
 
-    def hits(self) -> list[Hit]:
-        """From the hit events, which tell the approach speed but no impulse."""
+    def collisions(self) -> list[ContactImpulse]:
+        """From the collision events, which tell the approach speed but no impulse."""
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
@@ -255,13 +255,13 @@ class Box2DV3:
         return {
             "length unit in m": (self.unit if matched else None, self.unit_found),
             "restitution threshold in m/s": (options.get("restitution_threshold"), world.restitution_threshold),
-            "speed cap in m/s": (options.get("maximum_linear_speed"), UNREAD),
-            "spin cap in rad/s": (None, UNREAD),
-            "linear slop in m": (None, UNREAD),
-            "speculative margin in m": (None, UNREAD),
+            "speed cap in m/s": (options.get("maximum_linear_speed"), NOT_READABLE),
+            "spin cap in rad/s": (None, NOT_READABLE),
+            "linear slop in m": (None, NOT_READABLE),
+            "speculative margin in m": (None, NOT_READABLE),
             "contact tuning (hertz, damping ratio, push speed in m/s)": (
                 "{:g}, {:g}, {:g}".format(*self._tuning()) if matched else None,
-                UNREAD,
+                NOT_READABLE,
             ),
             "friction": (self.friction, self.bodies[0].shapes[0].friction),
             "restitution": (self.scene.restitution, self.bodies[0].shapes[0].restitution),

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple, Protocol
 from adapters.matched import Searched
 from scenarios.model import Array, Scene, State
 
-# What stands in place of what an engine resolved a setting to, where its binding does not tell.
-UNREAD = "not readable"
+# What stands in place of what an engine resolved a setting to, where its binding does not report it.
+NOT_READABLE = "not readable"
 PASSED = "passed with every step"  # the engine keeps no such setting
 KEPT = "kept by the adapter"  # the engine knows no such setting
-NOT_TOLD = (UNREAD, PASSED, KEPT)
+NOT_REPORTED = (NOT_READABLE, PASSED, KEPT)
 
 
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53  # the relative rounding of a number
@@ -29,10 +29,10 @@ class NotStarted(Exception):
     outside = True
 
 
-class Hit(NamedTuple):
-    """One contact that pushed during step `step` (from 0): i and j in either order, wall w as -1 - w; N s.
+class ContactImpulse(NamedTuple):
+    """One contact with an impulse during step `step` (from 0): i and j in either order, wall w as -1 - w; N s.
 
-    A contact that lasts gives a hit in every step; `play` keeps where each one begins.
+    A contact that lasts gives a collision in every step; `play` keeps where each one begins.
     """
 
     step: int
@@ -45,8 +45,8 @@ class Engine(Protocol):
     """The protocol. `read` gives all four arrays at the same instant, in the scene's order, static disks included.
 
     Attributes:
-        listening: whether hits are logged; set before `load`. Off where speed is measured: hearing of every hit in
-            Python costs more than some engines' whole step.
+        listening: whether collisions are logged; set before `load`. Off where speed is measured: hearing of every
+            collision in Python costs more than some engines' whole step.
         wrapping: s spent since it was set to 0 on setting disks onto the opposite edge in Python, for an engine that
             knows no such edge; part of what `step` takes, and no fault of the engine's.
     """
@@ -57,8 +57,8 @@ class Engine(Protocol):
     def load(self, scene: Scene, dt: float) -> None:
         """Forget everything and build the scene for steps of `dt` s; raise `Unsupported` rather than approximate."""
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
-        """Act on one disk during the next step only; N (world frame), N m; pushes add up."""
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
+        """Act on one disk during the next step only; N (world frame), N m; forces add up."""
 
     def step(self, count: int = 1) -> None:
         """Advance `count` steps; the only call that is timed."""
@@ -66,8 +66,8 @@ class Engine(Protocol):
     def read(self) -> State:
         """The present state, as float64 copies."""
 
-    def hits(self) -> list[Hit]:
-        """Every push of a contact since `load`, in order of steps."""
+    def collisions(self) -> list[ContactImpulse]:
+        """Every impulse of a contact since `load`, in order of steps."""
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """Setting -> (asked for, resolved by the engine), after `load`; asked None: the engine's own default."""
@@ -84,7 +84,7 @@ class Mark(NamedTuple):
 
     Against the page each colour has more than 3 : 1, which WCAG 2 asks of graphics, and any two engines' colours are
     0.06 or more apart in OKLab, also as seen with protan-, deuteran- and tritanopia (matrices of Machado et al., IEEE
-    TVCG 15, 1291, 2009). Where colour is not seen at all, the shape tells them apart.
+    TVCG 15, 1291, 2009). Where colour is not seen at all, the shape reports them apart.
     """
 
     light: str
@@ -97,7 +97,7 @@ class Work(NamedTuple):
 
     Attributes:
         what: iterations or substeps.
-        setting: the parameter of `Row.make` that holds their number.
+        setting: the parameter of `EngineRow.make` that holds their number.
         values: those that are measured, from cheap to dear.
     """
 
@@ -107,7 +107,8 @@ class Work(NamedTuple):
 
 
 class Variant(NamedTuple):
-    """An engine with something changed, to test a reason by: parameters of `Row.make`, what that is, in a few words.
+    """An engine with something changed, to test a reason by: parameters of `EngineRow.make`, what that is, in a few
+    words.
 
     loaded: changes the engine once a scene is in it.
     """
@@ -118,7 +119,7 @@ class Variant(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Row:
+class EngineRow:
     """How to make an engine and all that the rest of the program needs to know of it.
 
     Attributes:
@@ -137,7 +138,8 @@ class Row:
             and breaks is measured by `crosscheck speed`.
         variants: name, which goes behind a "+" -> what `crosscheck stability` plays besides to test a reason.
         searched: reads what `crosscheck tune` searches; None: nothing.
-        source: what tells a solver's file that was saved from what it was; "" for an engine of this program.
+        source: what distinguishes a solver's file that was saved from its earlier text; "" for an engine of this
+            program.
     """
 
     make: Callable[..., Engine]

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import FLOAT32, FLOAT64, Engine, Mark, Row, Variant, Work
+from adapters.engine import FLOAT32, FLOAT64, Engine, EngineRow, Mark, Variant, Work
 from adapters.matched import Searched
 
 
 def _exercise(**settings: Any) -> Engine:
     from adapters.reference import Reference
-    from reference_impl import crowd
+    from reference_impl import verlet_list
 
-    return Reference(crowd, **settings)
+    return Reference(verlet_list, **settings)
 
 
 def _lesson() -> Engine:
@@ -82,22 +82,22 @@ def _what_moves_is_a_bullet(engine: Any) -> None:
 
 
 # What all profiles of an engine have in common.
-_Reference = partial(Row, mark=Mark("#0a4f9e", "#6cb8ff", "circle"))
+_Reference = partial(EngineRow, mark=Mark("#0a4f9e", "#6cb8ff", "circle"))
 _Pymunk = partial(
-    Row, distributions=("pymunk",), mark=Mark("#d1540a", "#ff9a4d", "triangle-up"), searched=_pymunk_searched,
+    EngineRow, distributions=("pymunk",), mark=Mark("#d1540a", "#ff9a4d", "triangle-up"), searched=_pymunk_searched,
     work=Work("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
 )  # fmt: skip
 _Box2D = partial(
-    Row, distributions=("box2d-py",), mark=Mark("#00876c", "#5be0b5", "square"), searched=_box2d_searched,
+    EngineRow, distributions=("box2d-py",), mark=Mark("#00876c", "#5be0b5", "square"), searched=_box2d_searched,
     work=Work("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
 )  # fmt: skip
 _Box2DV3 = partial(
-    Row, distributions=("pyb2d3",), mark=Mark("#b84fb0", "#c46bd8", "diamond"), searched=_box2d_v3_searched,
+    EngineRow, distributions=("pyb2d3",), mark=Mark("#b84fb0", "#c46bd8", "diamond"), searched=_box2d_v3_searched,
     work=Work("substeps", "substeps", (1, 2, 4, 8, 16)),
 )  # fmt: skip
 _BULLETS = "continuous collision, what moves is a bullet"
 
-ENGINES: dict[str, Row] = {
+ENGINES: dict[str, EngineRow] = {
     "reference:exercise": _Reference(
         _exercise, "hand-written solver of exercise 11: symplectic Euler, project, impulse", 1.0, FLOAT64,
         features={"kept in float32": {"precision": np.float32}},
@@ -106,7 +106,7 @@ ENGINES: dict[str, Row] = {
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
     ),
     "reference:ordered": _Reference(
-        _ordered, "hand-written: exact flight, hits in the order in which they happen within a step", 0.5, FLOAT64
+        _ordered, "hand-written: exact flight, collisions in the order in which they happen within a step", 0.5, FLOAT64
     ),
     "pymunk:shipped": _Pymunk(
         partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64
@@ -122,7 +122,7 @@ ENGINES: dict[str, Row] = {
         },
         variants={
             "fifty_iterations": Variant({"iterations": 50}, "50 iterations for 10"),
-            "push_out": Variant({"collision_bias": (1 - 0.1) ** 60}, "overlaps pushed out as shipped"),
+            "position_correction": Variant({"collision_bias": (1 - 0.1) ** 60}, "position correction as shipped"),
         },
     ),
     "box2d:shipped": _Box2D(
@@ -134,7 +134,7 @@ ENGINES: dict[str, Row] = {
         features={
             "1 iteration, not 8": {"velocity_iterations": 1},
             "30 iterations, not 8": {"velocity_iterations": 30},
-            "no push-out": {"position_iterations": 0},
+            "no position correction": {"position_iterations": 0},
             "no CCD": {"continuous": False, "bullet": False},
             "CCD at e = 1, too": {"elastic_continuous": True, "elastic_bullet": True},
             "sleeping": {"sleeping": True},
@@ -165,8 +165,8 @@ ENGINES: dict[str, Row] = {
             "16_substeps": Variant({"substeps": 16}, "16 substeps for 4"),
         },
     ),
-    "event_driven:float64": Row(
-        _event_driven, "from hit to hit without steps: parabolas and contact times, in float64", 0.5, FLOAT64,
+    "event_driven:float64": EngineRow(
+        _event_driven, "event by event without steps: parabolas and contact times, in float64", 0.5, FLOAT64,
         mark=Mark("#6b5f00", "#d9c84a", "star"),
     ),
 }  # fmt: skip
@@ -174,10 +174,10 @@ ENGINES: dict[str, Row] = {
 OWN = ":own"  # the profile of a solver's file, whose path is its engine
 
 
-_read: dict[str, Row] = {}  # the rows of solvers' files, as they were when the command began
+_read: dict[str, EngineRow] = {}  # the rows of solvers' files, as they were when the command began
 
 
-def row_of(name: str) -> Row:
+def row_of(name: str) -> EngineRow:
     """The row of an engine: of `ENGINES`, or of a solver's file as `PATH:own`, which is read once.
 
     Raises:
@@ -189,7 +189,7 @@ def row_of(name: str) -> Row:
     return _read.get(name) or read_row(name)
 
 
-def read_row(name: str) -> Row:
+def read_row(name: str) -> EngineRow:
     """The row of a solver's file, `PATH:own`, as it is now; `row_of` gives it from now on. Raises `NotASolver`."""
     from adapters.own_solver.engine import engine_file
 

@@ -9,7 +9,7 @@ import numpy as np
 import pymunk
 from pymunk import batch
 
-from adapters.engine import Hit
+from adapters.engine import ContactImpulse
 from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
 
@@ -61,10 +61,10 @@ class Pymunk:
     `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; and `MATCHED`, by `crosscheck tune`: ten
     iterations, because more cost time and are no nearer; hardly any slop, because the default 0.1 is a length in the
     scene's units; contacts are forgotten as soon as they part, because one that touches again within three steps
-    inherits an impulse that it is not given again, but that is told, and may be taken back; at e = 1 no position
+    inherits an impulse that it is not given again, but that is reported, and may be taken back; at e = 1 no position
     correction, because it adds energy.
 
-    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `turning` False gives every disk an
+    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `turning` False gives every disk an
     infinite inertia, `spatial_hash` (cell in m, count) replaces the tree of the broad phase; a key of `MATCHED` is the
     matched profile's choice, any other of `settings` an attribute of the space.
     """
@@ -82,7 +82,7 @@ class Pymunk:
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new space; static disks and walls are shapes on its static body."""
         self.scene, self.dt, self.steps = scene, dt, 0
-        self.log: list[Hit] = []
+        self.log: list[ContactImpulse] = []
         self.space = pymunk.Space()
         self.space.gravity = tuple(scene.gravity)
         self.asked = self._asked()
@@ -140,9 +140,9 @@ class Pymunk:
         impulse = arbiter.total_impulse.length
         if impulse > 0.0:
             a, b = arbiter.shapes
-            self.log.append(Hit(self.steps, self.index[a], self.index[b], impulse))
+            self.log.append(ContactImpulse(self.steps, self.index[a], self.index[b], impulse))
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to the body's force and torque; pymunk clears both after a step."""
         if (body := self.bodies[disk]) is not None:
             body.force += tuple(force)
@@ -178,7 +178,7 @@ class Pymunk:
         rows[self.moving] = self._rows()
         return State(rows[:, :2], rows[:, 3:5], rows[:, 2], rows[:, 5])
 
-    def hits(self) -> list[Hit]:
+    def collisions(self) -> list[ContactImpulse]:
         """From `post_solve`."""
         return self.log
 

@@ -1,4 +1,4 @@
-"""The hand-written solver of `reference_impl` as a player."""
+"""The hand-written solver of `reference_impl` as an engine."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Hit
+from adapters.engine import ContactImpulse
 from reference_impl import exercise
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, Disks, World, make_disks
 from scenarios.model import Array, Scene, State
@@ -16,9 +16,13 @@ from scenarios.model import Array, Scene, State
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
 METHODS = {  # of the variants by their module
     "exercise": {"integrator": "symplectic Euler"},
-    "crowd": {"integrator": "symplectic Euler"},
+    "verlet_list": {"integrator": "symplectic Euler"},
     "lesson": {"integrator": "explicit Euler"},
-    "ordered": {"integrator": "parabolas", "hits": "in order, each where and when it happens", "projection": "none"},
+    "ordered": {
+        "integrator": "parabolas",
+        "collisions": "in order, each where and when it happens",
+        "projection": "none",
+    },
 }
 
 
@@ -37,7 +41,7 @@ class Reference:
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
         self.dt, self.steps = dt, 0
-        self.log: list[Hit] = []
+        self.log: list[ContactImpulse] = []
         disks = make_disks(
             scene.position, scene.velocity, scene.radius, scene.mass,
             scene.inertia, scene.angle, scene.angular_velocity,
@@ -48,30 +52,30 @@ class Reference:
             restitution=float(scene.restitution), gravity=np.array(scene.gravity),
             walls=np.array(scene.walls), low=np.array(low), high=np.array(high), **self.options,
         )  # fmt: skip
-        self.pushed = False
+        self.forced = False
         self._advance(0)  # compiles, if nobody has yet
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to the disk's force and torque; `step` clears both."""
         self.disks.force[disk] += force
         self.disks.torque[disk] += torque
-        self.pushed = True
+        self.forced = True
 
     def step(self, count: int = 1) -> None:
-        """One call into the compiled solver; a push lasts for the first step only."""
-        if self.pushed:
+        """One call into the compiled solver; a force lasts for the first step only."""
+        if self.forced:
             self._advance(1)
             self.disks.force.fill(0.0)
             self.disks.torque.fill(0.0)
-            self.pushed = False
+            self.forced = False
             count -= 1
         self._advance(count)
 
     def _advance(self, count: int) -> None:
         done = self.steps
-        hits = self.variant.advance(self.disks, self.world, self.dt, count)
+        collisions = self.variant.advance(self.disks, self.world, self.dt, count)
         if self.listening:
-            self.log += [Hit(done + k, i, j, impulse) for k, i, j, impulse in hits]
+            self.log += [ContactImpulse(done + k, i, j, impulse) for k, i, j, impulse in collisions]
         self.steps += count
 
     def read(self) -> State:
@@ -80,7 +84,7 @@ class Reference:
         kept = disks.position, disks.velocity, disks.angle, disks.angular_velocity
         return State(*(array.astype(np.float64) for array in kept))
 
-    def hits(self) -> list[Hit]:
+    def collisions(self) -> list[ContactImpulse]:
         """As the solver returned them."""
         return self.log
 

@@ -1,9 +1,9 @@
 """Keeps modules that only lie about from being imported: of the current folder, and of the one that this program is in.
 
 What lies where a command is started is no part of it: a student's random.py would be run in the place of Python's own.
-Nor is a scipy.py beside README.md, where people are told to stand: an installation that can be edited puts that folder
-on the path, for the sake of four packages. Those alone are found there. A sitecustomize.py there is run all the same:
-Python does that by itself, before anything of this program.
+Nor is a scipy.py beside README.md, where people are reported to stand: an installation that can be edited puts that
+folder on the path, for the sake of four packages. Those alone are found there. A sitecustomize.py there is run all the
+same: Python does that by itself, before anything of this program.
 """
 
 import os  # and nothing else than what Python has imported before such a folder was on its path, not even typing

@@ -12,15 +12,15 @@ from reference_impl.state import BY_INVERSE_MASS, EQUAL, Disks, World
 
 @compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
-    """Advance `count` steps of `dt` s; return the hits as (step, i, j, impulse in N s), wall w as j = -1 - w."""
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall w as j = -1 - w."""
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
-        step(disks, world, dt, k, hits)
-    return hits
+        step(disks, world, dt, k, collisions)
+    return collisions
 
 
 @compiled
-def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
+def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> None:
     """One step, as `performSimStep`: integrate all, collide every pair i < j in order, then the edges of the world."""
     integrate(disks, world, dt)
     n = len(disks.radius)
@@ -28,8 +28,8 @@ def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
         for j in range(i + 1, n):
             impulse = collide(disks, i, j, world)
             if impulse != 0.0:
-                hits.append((k, i, j, impulse))
-    collide_walls(disks, world, k, hits)
+                collisions.append((k, i, j, impulse))
+    collide_walls(disks, world, k, collisions)
     wrap(disks.position, world)
 
 
@@ -51,7 +51,7 @@ def integrate(disks: Disks, world: World, dt: float) -> None:
 
 @kernel
 def collide(disks: Disks, a: int, b: int, world: World) -> float:
-    """Task 2, one pair; returns the impulse J in N s (positive: pushes apart), 0 where there is none."""
+    """Task 2, one pair; returns the impulse J in N s (positive: repulsive), 0 where there is none."""
     x, v, mass = disks.position, disks.velocity, disks.mass
 
     # (a) Detect: closer than the sum of the radii? Two static disks never move.
@@ -78,13 +78,13 @@ def collide(disks: Disks, a: int, b: int, world: World) -> float:
 
 
 @compiled
-def collide_walls(disks: Disks, world: World, k: int, hits: list) -> None:
+def collide_walls(disks: Disks, world: World, k: int, collisions: list) -> None:
     """Every disk against every wall, in order."""
     for i in range(len(disks.radius)):
         for w in range(len(world.walls)):
             impulse = collide_wall(disks, i, w, world)
             if impulse != 0.0:
-                hits.append((k, i, -1 - w, impulse))
+                collisions.append((k, i, -1 - w, impulse))
 
 
 @kernel
@@ -122,7 +122,7 @@ def touching_wall(x, radius, i: int, walls, w: int) -> bool:  # type: ignore[no-
 
 @kernel
 def direction(dx: float, dy: float) -> tuple[float, float, float]:
-    """Length and unit vector of (dx, dy); equal centres have no direction, so they are parted along x."""
+    """Length and unit vector of (dx, dy); equal centres have no direction, so they are separated along x."""
     distance = sqrt(dx * dx + dy * dy)
     if distance == 0.0:
         return 0.0, 1.0, 0.0

@@ -1,4 +1,5 @@
-"""The command `crosscheck`, or `python -m reports`: it can be told to stop before it has imported what it needs."""
+"""The command `crosscheck`, or `python -m reports`: it can be stopped by a signal before it has imported what it
+needs."""
 
 import os
 import sys
@@ -10,10 +11,10 @@ def main() -> None:
     from adapters.safe_path import keep_path_safe  # and no adapters.py of the current folder
 
     keep_path_safe()  # before anything else is imported
-    from reports.terminal.exits import ends_when_told, refuse
+    from reports.terminal.exits import ends_on_signals, refuse
     from reports.terminal.streams import printing
 
-    with ends_when_told(), printing():
+    with ends_on_signals(), printing():
         if sys.flags.optimize > 1:
             refuse(
                 ["PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are explained by; unset it"]

@@ -32,11 +32,11 @@ class Scene:
         velocity: (n, 2) m/s.
         radius: (n,) m, positive.
         mass: (n,) kg, positive; `inf` makes the disk static (it must be at rest).
-        restitution: normal speed after a hit over normal speed before it, 0 to 1, the same for all.
+        restitution: normal speed after a collision over normal speed before it, 0 to 1, the same for all.
         angle: (n,) rad, default 0.
         angular_velocity: (n,) rad/s, default 0.
         inertia: (n,) kg m2, default m r2 / 2 of a solid disk.
-        walls: (w, 2, 2) m, segments from walls[:, 0] to walls[:, 1]; static, hit from both sides.
+        walls: (w, 2, 2) m, segments from walls[:, 0] to walls[:, 1]; static, struck from both sides.
         gravity: (2,) m/s2, default none; acts on every disk that is not static.
         wrap: None, or (2, 2) m, low and high corner of the exercise's box: a disk whose centre is
             beyond an edge is set onto the opposite edge; disks do not see each other across it.
@@ -133,11 +133,11 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Thrust:
-    """A constant push on one disk from `start` to `stop`.
+    """A constant thrust on one disk from `start` to `stop`.
 
     Attributes:
         disk: index into the scene.
-        start, stop: s; the push acts for start <= t < stop. Inside a step every engine is off (`thrust_grid.py`).
+        start, stop: s; the thrust acts for start <= t < stop. Inside a step every engine is off (`thrust_grid.py`).
         force: (2,) N.
         torque: N m.
         frame: "world", or "body": the force turns with the disk's angle.
@@ -171,12 +171,12 @@ class Scenario:
         source: where the scene or its formula comes from.
         scene: the initial state and the physics.
         duration: s, a whole number of sample intervals.
-        sample_interval: s; every player is sampled at i * sample_interval.
+        sample_interval: s; every engine is sampled at i * sample_interval.
         substeps: the dt ladder, dt = sample_interval / k, coarse to fine; the middle one is the page's.
-        thrusts: piecewise-constant pushes.
+        thrusts: piecewise-constant thrusts.
         truth: times (k,) s -> the exact `Trajectory` there, up to its horizon, or `NoTruth` (see `truth_at`); or None.
         without_truth: why there is no exact answer, in one sentence, where `truth` is None.
-        seed: what the scene was drawn from, or None.
+        seed: seed of a random scene, or None.
     """
 
     name: str
@@ -237,13 +237,13 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Collisions:
-    """Hits in order of time; one entry where a contact begins to push, however long it lasts.
+    """Collisions in order of time; one entry where the impulses of a contact begin, however long they last.
 
     Attributes:
-        t: (h,) s; for a stepping engine the end of the step that resolved the hit.
+        t: (h,) s; for a stepping engine the end of the step that resolved the collision.
         i: (h,) index of the first disk.
         j: (h,) index of the other disk, i < j; or -1 - w for wall w.
-        impulse: (h,) N s along the normal; NaN where an engine does not tell.
+        impulse: (h,) N s along the normal; NaN where an engine does not report it.
     """
 
     t: Array
@@ -259,7 +259,7 @@ class Collisions:
         return Collisions(frozen(t), frozen(i, np.int64), frozen(j, np.int64), frozen(impulse))
 
     def __len__(self) -> int:
-        """Number of hits."""
+        """Number of collisions."""
         return len(self.t)
 
 
@@ -268,7 +268,7 @@ NO_COLLISIONS = Collisions.of([])
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """States at k instants, from a player or from the truth.
+    """States at k instants, from an engine or from the truth.
 
     Attributes:
         t: (k,) s.
@@ -276,8 +276,8 @@ class Trajectory:
         velocity: (k, n, 2) m/s.
         angle: (k, n) rad, unwrapped.
         angular_velocity: (k, n) rad/s.
-        collisions: the hits up to t[-1].
-        valid_until: s, the horizon up to which players are held to a truth: no sample lies beyond it.
+        collisions: the collisions up to t[-1].
+        horizon: s, the horizon up to which engines are held to a truth: no sample lies beyond it.
         reason: why the truth ends there; "" if it does not.
         error_bound: m, how far a truth may be off before it; 0: a closed form, right to a few roundings.
     """
@@ -288,7 +288,7 @@ class Trajectory:
     angle: Array
     angular_velocity: Array
     collisions: Collisions = field(default_factory=lambda: NO_COLLISIONS)
-    valid_until: float = np.inf
+    horizon: float = np.inf
     error_bound: float = 0.0
     reason: str = ""
 

@@ -11,7 +11,7 @@ from adapters.play import play
 from reports.compare.comparison import compare
 from scenarios.catalogue import scenario
 
-scene = scenario("slow_hit")
+scene = scenario("slow_collision")
 compare(scene, [
     play(ENGINES[name].make(), name, scene, scene.dt(scene.substeps[0]))
     for name in ("reference:exercise", "reference:ordered", "event_driven:float64", "pymunk:matched", "box2d:matched",

@@ -31,7 +31,7 @@ class Toy:
         self.state = [np.array(scene.position), np.array(scene.velocity), np.array(scene.angle)]
         self.acting = np.zeros_like(scene.position)
 
-    def push(self, disk, force, torque):
+    def apply_force(self, disk, force, torque):
         self.acting[disk] += force / self.scene.mass[disk]
 
     def step(self, count=1):
@@ -46,7 +46,7 @@ class Toy:
     def read(self):
         return State(*(each.copy() for each in self.state), np.array(self.scene.angular_velocity))
 
-    def hits(self):
+    def collisions(self):
         return []
 
     def settings(self):
@@ -129,9 +129,9 @@ ADDED: dict[str, list[Added]] = {
     ],
     "a mechanism": [
         Added(
-            "adapters/mechanisms/habits.py",
-            '    "toy:plain": lambda told, scene, dt: [Habit(FRICTION, {"friction": 0.0})],\n',
-            '}\n"""The players whose',
+            "adapters/mechanisms/table.py",
+            '    "toy:plain": lambda reported, scene, dt: [Mechanism(FRICTION, {"friction": 0.0})],\n',
+            '}\n"""The engines whose',
         ),
     ],
 }
@@ -188,7 +188,7 @@ def test_all_that_is_added_is_known_everywhere(grown: Path):
 import json
 from adapters.conformance.conform import conform
 from adapters.engines import ENGINES
-from adapters.mechanisms.features import FEATURES
+from adapters.mechanisms.options import FEATURES
 from reports.compare.metrics import METRICS
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.pages import lesson_page
@@ -196,7 +196,7 @@ from reports.page.charts import CHARTS
 from reports.page.style import PALETTE, look
 from reports.run.cells import versions
 from reports.speed.budget import budget_of
-from reports.stability.players import PLAYERS
+from reports.stability.engines import PLAYED
 from scenarios.catalogue import SCENARIOS
 found = conform("toy:plain", ENGINES["toy:plain"])
 print(json.dumps({
@@ -204,10 +204,10 @@ print(json.dumps({
     "look": look("toy", "plain")[:2] + look("toy", "plain")[3:4] == PALETTE[0], "version": versions()["typer"],
     "alike": [name for name in ENGINES if look(*name.split(":"))[:2] == look("toy")[:2]],
     "feature": [each.change for each in FEATURES if each.engine == "toy:plain"],
-    "variant": PLAYERS["toy:plain+as_it_is"].switch,
+    "variant": PLAYED["toy:plain+as_it_is"].switch,
     "parts": [row["part"] for row in budget_of("free_fall", 0, "toy:plain", 4)],
     "verdicts": {each.probe: each.verdict for each in found},
-    "lesson": lesson_page(LESSONS["toy"], LESSONS["toy"].at([]).told()),
+    "lesson": lesson_page(LESSONS["toy"], LESSONS["toy"].at([]).reported()),
 }))
 """
     found = json.loads(python(grown, "-c", code).splitlines()[-1])
@@ -242,7 +242,7 @@ def test_a_run_has_them_in_its_tables_and_on_its_page(grown: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("command", "names"), [("speed", ["free_fall"]), ("stability", ["slow_hit"])])
+@pytest.mark.parametrize(("command", "names"), [("speed", ["free_fall"]), ("stability", ["slow_collision"])])
 def test_speed_and_stability_have_the_engine_on_their_pages(grown: Path, command: str, names: list[str]):
     """In the tables and the charts."""
     python(grown, "-m", "reports", command, *names, "--engine", "toy", "--out", command)
@@ -256,7 +256,10 @@ def test_speed_and_stability_have_the_engine_on_their_pages(grown: Path, command
 def test_an_engine_is_named_in_its_files_and_its_row_and_else_only_in_texts_about_it():
     """The youngest engine, for all: what holds for it holds for the next one."""
     about_it = {"reports/lessons/mechanisms.py", "reports/lessons/motion.py"}  # which engines a lesson shows
-    about_it |= {"reports/stability/reasons.py", "reports/stability/twins.py"}  # why an engine fails, with the source
+    about_it |= {
+        "reports/stability/reasons.py",
+        "reports/stability/ablations.py",
+    }  # why an engine fails, with the source
     named = {
         path.relative_to(ROOT).as_posix()
         for folder in SOURCE
@@ -265,4 +268,4 @@ def test_an_engine_is_named_in_its_files_and_its_row_and_else_only_in_texts_abou
         and re.search(r"\bbox2d_v3\b", path.read_text(encoding="utf-8"))
     }  # fmt: skip
 
-    assert named - about_it == {"adapters/engines.py", "adapters/mechanisms/habits.py"}
+    assert named - about_it == {"adapters/engines.py", "adapters/mechanisms/table.py"}

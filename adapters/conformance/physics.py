@@ -6,14 +6,16 @@ from functools import partial
 
 import numpy as np
 
-from adapters.conformance.probe import DT, Probe, Reading, head_on, largest, loaded, one_disk, scene_of
-from adapters.engine import Row
+from adapters.conformance.probe import DT, Probe, ProbeReading, head_on, largest, loaded, one_disk, scene_of
+from adapters.engine import EngineRow
 
 SPEEDS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)  # m/s, on both sides of Box2D's threshold of 1
-ROUNDINGS = 8  # a relative velocity, an effective mass, a target, an impulse, two updates: a hit rounds no more often
+ROUNDINGS = (
+    8  # a relative velocity, an effective mass, a target, an impulse, two updates: a collision rounds no more often
+)
 
 
-def free_flight(row: Row) -> Reading:
+def free_flight(row: EngineRow) -> ProbeReading:
     """The offset of a thrown disk from x0 + v0 t + a t2 / 2 after 1 s, in m; x' = x + v dt + alpha a dt2 gives
     (alpha - 1/2) a dt t. Every step rounds a position and a velocity, whose error flies on."""
     steps, gravity, speed = 256, 9.81, 4.1
@@ -23,45 +25,46 @@ def free_flight(row: Row) -> Reading:
         engine.step(steps)
         moved = float(engine.read().position[0, 1]) - start
     bound = row.rounding * steps * (1.0 + gravity * t * t)
-    return Reading(moved - (speed * t - gravity * t * t / 2), -(row.alpha - 0.5) * gravity * DT * t, bound)
+    return ProbeReading(moved - (speed * t - gravity * t * t / 2), -(row.alpha - 0.5) * gravity * DT * t, bound)
 
 
-def slow_flight(row: Row) -> Reading:
+def slow_flight(row: EngineRow) -> ProbeReading:
     """Speed in m/s of a free disk after 2 s: nothing acts on it, so it is not even rounded."""
     speed = 2.0**-8
     with loaded(row, one_disk(velocity=(speed, 0.0))) as engine:
         engine.step(512)
-        return Reading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
+        return ProbeReading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
 
 
-def fast_flight(row: Row) -> Reading:
+def fast_flight(row: EngineRow) -> ProbeReading:
     """Speed in m/s of a free disk after 4 steps of 1/64 s, 16 radii each."""
     speed = 512.0
     with loaded(row, one_disk(velocity=(speed, 0.0)), 1 / 64) as engine:
         engine.step(4)
-        return Reading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
+        return ProbeReading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
 
 
-def fast_spin(row: Row) -> Reading:
+def fast_spin(row: EngineRow) -> ProbeReading:
     """Spin in rad/s of a free disk after 4 steps of 1/64 s, three quarters of a turn each."""
     spin = 300.0
     with loaded(row, one_disk(spin=spin), 1 / 64) as engine:
         engine.step(4)
-        return Reading(float(engine.read().angular_velocity[0]), spin, 2 * row.rounding * spin)
+        return ProbeReading(float(engine.read().angular_velocity[0]), spin, 2 * row.rounding * spin)
 
 
-def spins_freely(row: Row) -> Reading:
+def spins_freely(row: EngineRow) -> ProbeReading:
     """Angle in rad after 1 s at 20 rad/s; an angle rounds once a step."""
     steps, spin = 256, 20.0
     with loaded(row, one_disk(spin=spin)) as engine:
         for _ in range(8):
             engine.step(steps // 8)
             angle = float(engine.read().angle[0])  # read often: an engine may keep only cos and sin
-    return Reading(angle, spin * steps * DT, row.rounding * steps * spin)
+    return ProbeReading(angle, spin * steps * DT, row.rounding * steps * spin)
 
 
-def pair_momentum(row: Row) -> Reading:
-    """Change of momentum over sum m |v|, in an oblique hit of 1 kg and 7 kg; both velocities round once or twice."""
+def pair_momentum(row: EngineRow) -> ProbeReading:
+    """Change of momentum over sum m |v|, in an oblique collision of 1 kg and 7 kg; both velocities round once or
+    twice."""
     scene = scene_of(
         position=[[-0.52, 0.2], [0.5, -0.1]], velocity=[[2.0, 0.3], [-1.0, 0.1]], radius=[0.5, 0.5], mass=[1.0, 7.0],
         angular_velocity=[3.0, -2.0],
@@ -71,39 +74,39 @@ def pair_momentum(row: Row) -> Reading:
         engine.step(24)
         after = engine.read().velocity
     if np.abs(after - before).max() < 0.1:
-        return Reading("no hit", 0.0)
+        return ProbeReading("no collision", 0.0)
     change = largest(scene.mass @ (after - before)) / float(scene.mass @ np.hypot(*before.T))
-    return Reading(change, 0.0, ROUNDINGS * row.rounding)
+    return ProbeReading(change, 0.0, ROUNDINGS * row.rounding)
 
 
-def restitution(row: Row, closing: float) -> Reading:
-    """Parting over closing speed of two equal disks that meet head-on, e = 0.5."""
+def restitution(row: EngineRow, closing: float) -> ProbeReading:
+    """Separation over approach speed of two equal disks that meet head-on, e = 0.5."""
     with loaded(row, head_on(closing)) as engine:
         before = engine.read().velocity
         engine.step(24)
         after = engine.read().velocity
-    return Reading(float((after[2] - after[1])[0] / (before[1] - before[2])[0]), 0.5, ROUNDINGS * row.rounding)
+    return ProbeReading(float((after[2] - after[1])[0] / (before[1] - before[2])[0]), 0.5, ROUNDINGS * row.rounding)
 
 
-def wall_restitution(row: Row) -> Reading:
-    """Speed after over speed before a hit of 2 m/s on a wall, e = 0.5."""
+def wall_restitution(row: EngineRow) -> ProbeReading:
+    """Speed after over speed before a collision of 2 m/s on a wall, e = 0.5."""
     scene = scene_of(
         position=[[0.0, 0.0]], velocity=[[2.0, 0.0]], radius=[0.5], mass=[7.3],
         walls=[[[0.53, -2.0], [0.53, 2.0]]],
     )  # fmt: skip
     with loaded(row, scene) as engine:
         engine.step(24)
-        return Reading(-float(engine.read().velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.rounding)
+        return ProbeReading(-float(engine.read().velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.rounding)
 
 
-def friction(row: Row) -> Reading:
-    """Sideways over normal momentum taken up by a disk in a head-on hit of two that spin fast: the effective
+def friction(row: EngineRow) -> ProbeReading:
+    """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin fast: the effective
     coefficient of friction while they slide. Frictionless, the sideways part is 0 and is not even rounded."""
     with loaded(row, head_on(2.0, spin=40.0)) as engine:
         before = engine.read().velocity[1]
         engine.step(24)
         taken = engine.read().velocity[1] - before
-    return Reading(float(abs(taken[1] / taken[0])) if taken[0] else np.nan, 0.0, row.rounding)
+    return ProbeReading(float(abs(taken[1] / taken[0])) if taken[0] else np.nan, 0.0, row.rounding)
 
 
 PHYSICS: dict[str, Probe] = {
@@ -112,7 +115,9 @@ PHYSICS: dict[str, Probe] = {
     "fast_flight": Probe("How fast is a free disk of 512 m/s after 4 steps? (m/s)", fast_flight, "departs"),
     "fast_spin": Probe("How fast does a free disk of 300 rad/s spin after 4 steps? (rad/s)", fast_spin, "departs"),
     "spins_freely": Probe("What angle has a free disk after 1 s at 20 rad/s? (rad)", spins_freely, "departs"),
-    "pair_momentum": Probe("How much momentum does a hit of two disks make? (of sum m v)", pair_momentum, "departs"),
+    "pair_momentum": Probe(
+        "How much momentum does a collision of two disks make? (of sum m v)", pair_momentum, "departs"
+    ),
     **{
         f"restitution_{speed:g}": Probe(
             f"What is e of a pair that closes at {speed:g} m/s, where 0.5 is stated?",
@@ -121,6 +126,8 @@ PHYSICS: dict[str, Probe] = {
         )
         for speed in SPEEDS
     },
-    "restitution_wall": Probe("What is e of a wall hit at 2 m/s, where 0.5 is stated?", wall_restitution, "departs"),
+    "restitution_wall": Probe(
+        "What is e of a wall collision at 2 m/s, where 0.5 is stated?", wall_restitution, "departs"
+    ),
     "friction": Probe("What coefficient of friction acts between two disks?", friction, "departs"),
 }

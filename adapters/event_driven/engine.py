@@ -1,4 +1,5 @@
-"""The float64 event engine of `scenarios` as a player: from hit to hit, and asked at the end of each step."""
+"""The float64 event engine of `scenarios` as an engine: event by event, and asked at the end of each
+step."""
 
 from __future__ import annotations
 
@@ -7,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Hit, Unsupported
+from adapters.engine import ContactImpulse, Unsupported
 from adapters.event_driven.events import EventEngine
 from scenarios.model import Array, Scene, State
 from scenarios.no_truth import NoTruth
 
 
 class EventDriven:
-    """Plays exactly but for rounding; dt says when it is looked at, and for how long a push lasts."""
+    """Plays exactly but for rounding; dt says when it is looked at, and for how long a force acts."""
 
     listening, wrapping = (
         True,
         0.0,
-    )  # its own list of hits is what it works with: not hearing of them would save nothing
+    )  # its own list of collisions is what it works with: not hearing of them would save nothing
 
     def load(self, scene: Scene, dt: float) -> None:
         """Find every disk's first event; a start without a single continuation is refused."""
@@ -31,18 +32,18 @@ class EventDriven:
         self.scene, self.dt, self.steps = scene, dt, 0
         self.angle, self.spin, self.turned_at = scene.angle.copy(), scene.angular_velocity.copy(), 0
         self.force, self.torque = np.zeros((scene.n, 2)), np.zeros(scene.n)
-        self.pushed: set[int] = set()
+        self.forced: set[int] = set()
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to what accelerates the disk during the next step; a static one stays."""
         if not self.scene.static[disk]:
             self.force[disk] += force
             self.torque[disk] += torque
-            self.pushed.add(disk)
+            self.forced.add(disk)
 
     def step(self, count: int = 1) -> None:
-        """Let the events of `count` steps happen; a push is an acceleration from the first one's start to its end."""
-        if self.pushed and count:
+        """Let the events of `count` steps happen; a force is an acceleration from the first one's start to its end."""
+        if self.forced and count:
             turning = self.torque / self.scene.inertia
             self.settle()  # it turned freely up to here
             self.accelerate(self.scene.gravity + self.force / self.scene.mass[:, None])
@@ -50,14 +51,14 @@ class EventDriven:
             self.accelerate(np.broadcast_to(self.scene.gravity, (self.scene.n, 2)))
             self.settle(turning)
             self.force[:], self.torque[:] = 0.0, 0.0
-            self.pushed.clear()
+            self.forced.clear()
             count -= 1
         self.advance(count)
 
     def accelerate(self, acceleration: Array) -> None:
-        """Give each pushed disk its row of acceleration (n, 2) m/s2 from now on."""
-        for disk in sorted(self.pushed):
-            self.engine.pull(disk, self.steps * self.dt, acceleration[disk])
+        """Give each disk with a force its row of acceleration (n, 2) m/s2 from now on."""
+        for disk in sorted(self.forced):
+            self.engine.accelerate(disk, self.steps * self.dt, acceleration[disk])
 
     def advance(self, count: int) -> None:
         """Let the events of `count` steps happen."""
@@ -81,17 +82,17 @@ class EventDriven:
         """Every disk flown from its own last event to now."""
         return State(*self.engine.look(self.steps * self.dt), *self.turn())
 
-    def hits(self) -> list[Hit]:
-        """Every hit in the step at whose end it had happened."""
+    def collisions(self) -> list[ContactImpulse]:
+        """Every collision in the step at whose end it had happened."""
         found = []
-        for t, i, j, impulse in self.engine.hits.tolist():
+        for t, i, j, impulse in self.engine.collisions.tolist():
             step = int(t / self.dt)
-            found.append(Hit(step - (step * self.dt >= t and step > 0), int(i), int(j), impulse))
+            found.append(ContactImpulse(step - (step * self.dt >= t and step > 0), int(i), int(j), impulse))
         return found
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """There is nothing to set: the scene is all."""
-        return {"contact times": (None, "roots of the gap"), "a push within a step": (None, "constant acceleration")}
+        return {"contact times": (None, "roots of the gap"), "a force within a step": (None, "constant acceleration")}
 
     def versions(self) -> dict[str, str]:
         """The compiler decides the last bit."""

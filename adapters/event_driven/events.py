@@ -1,4 +1,5 @@
-"""The float64 event engine: disks, walls, a torus or the exercise's wrap, from hit to hit without time steps.
+"""The float64 event engine: disks, walls, a torus or the exercise's wrap, event by event without time
+steps.
 
 It has no step size and no tolerance: contact times are roots, flights are parabolas. Where the motion has no single
 continuation it says so (`NoTruth`) rather than go on.
@@ -65,7 +66,7 @@ class EventEngine:
         self.arena = Arena(
             disks_of(scene, position, low), empty_queue(scene.n), head=np.full(np.prod(grid.shape), NONE),
             near=np.full(scene.n + 9, NONE), grid=grid, rules=rules, walls=walls_of(scene, grid, low),
-            clock=np.zeros(2), log=np.zeros((LOG_ROWS, 5)), told=np.zeros(4, np.int64),
+            clock=np.zeros(2), log=np.zeros((LOG_ROWS, 5)), counters=np.zeros(4, np.int64),
             runs=np.zeros(scene.n, RUN).view(np.recarray),
         )  # fmt: skip
         self.kept: list[Array] = []
@@ -76,15 +77,15 @@ class EventEngine:
 
     def advance(self, until: float) -> None:
         """Let all events up to `until` s happen; `NoTruth` if the answer ends before."""
-        status, told = GOES_ON, self.arena.told
+        status, counters = GOES_ON, self.arena.counters
         while status in (GOES_ON, LOG_FULL):
-            told[LEFT] = EVENTS
+            counters[LEFT] = EVENTS
             status = event_loop.advance(self.arena, self.scenery, until)
-            self.spent += EVENTS - int(told[LEFT])
+            self.spent += EVENTS - int(counters[LEFT])
             self.drain()
             if self.spent >= MOST:
                 self.refuse_crawl(until)
-        at, i, j = float(self.arena.clock[STOP]), int(told[WHO]), int(told[WHOM])
+        at, i, j = float(self.arena.clock[STOP]), int(counters[WHO]), int(counters[WHOM])
         if status == ACCUMULATION:
             raise NoTruth(f"the collisions of disk {i} on {self.partners(i, j, at)} accumulate at {at:.9g} s", at)
         if status == REENTRY:
@@ -101,8 +102,11 @@ class EventEngine:
         disks, radius = self.arena.disks, float(self.scene.radius.min())
         now = min(until, float(self.arena.clock[BASE] + self.arena.tree[1].time))
         speed = np.hypot(disks["vx"], disks["vy"]).max()
-        pull = np.hypot(disks["pull_x"], disks["pull_y"]).max()
-        rate, took = (NARROW + CROWDED * self.scene.n) * (speed / radius + np.sqrt(pull / radius)), now - self.since
+        acceleration = np.hypot(disks["free_ax"], disks["free_ay"]).max()
+        rate, took = (
+            (NARROW + CROWDED * self.scene.n) * (speed / radius + np.sqrt(acceleration / radius)),
+            now - self.since,
+        )
         # What is no number is no progress either.
         if not (self.spent <= rate * took and self.spent * (until - now) <= MOST_AHEAD * took):
             span = f"{self.spent} events from {self.since:.9g} s to {now:.9g} s"
@@ -110,7 +114,7 @@ class EventEngine:
         self.spent, self.since = 0, now
 
     def partners(self, i: int, last: int, since: float) -> str:
-        """What disk `i` has hit since a time, in words; `last` was the last of it."""
+        """What disk `i` has struck since a time, in words; `last` was the last of it."""
         log = np.concatenate([np.empty((0, 5)), *self.kept[-2:]])
         log = log[log[:, 0] >= since * (1 - 1e-12)]
         found = {last, *log[log[:, 1] == i, 2].astype(int).tolist(), *log[log[:, 2] == i, 1].astype(int).tolist()}
@@ -119,16 +123,16 @@ class EventEngine:
 
     def drain(self) -> None:
         """Keep what is in the log and empty it."""
-        told = self.arena.told
-        if told[LOGGED]:
-            self.kept.append(self.arena.log[: told[LOGGED]].copy())
-            told[LOGGED] = 0
+        counters = self.arena.counters
+        if counters[LOGGED]:
+            self.kept.append(self.arena.log[: counters[LOGGED]].copy())
+            counters[LOGGED] = 0
 
-    def pull(self, disk: int, at: float, acceleration: Array) -> None:
+    def accelerate(self, disk: int, at: float, acceleration: Array) -> None:
         """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so, (2,) m/s2."""
         self.arena = self.arena._replace(rules=self.arena.rules._replace(falling=True, mixed=True))
         self.scenery = (True,)
-        event_loop.pull(self.arena, self.scenery, disk, at, acceleration[0], acceleration[1])
+        event_loop.accelerate(self.arena, self.scenery, disk, at, acceleration[0], acceleration[1])
 
     def look(self, at: float) -> tuple[Array, Array]:
         """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; nothing changes by looking."""
@@ -137,13 +141,14 @@ class EventEngine:
         return out[:, :2], out[:, 2:]
 
     @property
-    def hits(self) -> Array:
-        """(h, 4): t s, disk, other disk or -1 - wall, impulse N s, of all hits so far."""
+    def collisions(self) -> Array:
+        """(h, 4): t s, disk, other disk or -1 - wall, impulse N s, of all collisions so far."""
         return np.concatenate([np.empty((0, 5)), *self.kept])[:, :4]
 
     @property
     def cosines(self) -> Array:
-        """(h,) of the impact angle of each of the hits, normal over whole speed: the smaller, the more a graze."""
+        """(h,) of the impact angle of each of the collisions, normal over whole speed: the smaller, the more a
+        graze."""
         return np.concatenate([np.empty((0, 5)), *self.kept])[:, 4]
 
     def refuse_pairs(self) -> None:
@@ -276,8 +281,8 @@ def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:
     disks["x"], disks["y"] = position.T
     disks["vx"], disks["vy"] = scene.velocity.T
     disks["ox"], disks["oy"] = low
-    pull = np.where(scene.static[:, None], 0.0, scene.gravity)
-    disks["ax"], disks["ay"] = disks["pull_x"], disks["pull_y"] = pull.T
+    acceleration = np.where(scene.static[:, None], 0.0, scene.gravity)
+    disks["ax"], disks["ay"] = disks["free_ax"], disks["free_ay"] = acceleration.T
     disks["radius"], disks["weight"] = scene.radius, 1 / scene.mass
     disks["pair_time"] = disks["own_time"] = np.inf
     disks["last"], disks["wall"], disks["corner"] = NOBODY, -1, -1

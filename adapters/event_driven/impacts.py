@@ -1,6 +1,7 @@
-"""What a hit does in the event engine: Newton's restitution along the line of centres, without friction; and its note.
+"""What a collision does in the event engine: Newton's restitution along the line of centres, without friction; and its
+note.
 
-A collision is logged and counted, so that those without an end are noticed: between which float64 tells no time, or
+A collision is logged and counted, so that those without an end are noticed: between which float64 resolves no time, or
 between which nothing flies.
 """
 
@@ -13,16 +14,16 @@ import numpy as np
 
 from adapters.event_driven.compiled import inlined, kernel
 from adapters.event_driven.disks import ACCUMULATION, BASE, GOES_ON, LOGGED, NOBODY, STOP, WHO, WHOM, Arena, Walls
-from adapters.event_driven.rest import HITS, hold, jolt, rattles, rests, second_wall, slow
+from adapters.event_driven.rest import COLLISIONS, hold, jolt, rattles, rests, second_wall, slow
 from adapters.event_driven.search import ROUNDING, image
 
 
 @inlined
 def collide(a: Any, b: Any, i: int, j: int, shift: tuple[float, float], restitution: float) -> tuple[float, float]:
-    """Hit of disks i and j that are in contact; impulse N s, 0 if they do not close in, and cosine of the angle.
+    """Collision of disks i and j that are in contact; impulse N s, 0 if they do not close in, and cosine of the angle.
 
     v_i -= q w_i dr, v_j += q w_j dr, q = -(1 + e) b / (dr.dr (w_i + w_j)): a normal that is made a unit vector by a
-    square root would let the energy drift by 1.5e-17 a hit.
+    square root would let the energy drift by 1.5e-17 a collision.
     """
     dx, dy = b.x - a.x + image(b.cx - a.cx, shift[0]), b.y - a.y + image(b.cy - a.cy, shift[1])
     ux, uy = b.vx - a.vx, b.vy - a.vy
@@ -42,7 +43,7 @@ def collide(a: Any, b: Any, i: int, j: int, shift: tuple[float, float], restitut
 
 @kernel
 def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) -> tuple[float, float]:
-    """Hit of a disk on a wall it touches, set exactly beside the face; as `collide`."""
+    """Collision of a disk on a wall it touches, set exactly beside the face; as `collide`."""
     ux, uy, speed2 = walls.segment[w, 2], walls.segment[w, 3], a.vx * a.vx + a.vy * a.vy
     dx, dy = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
     a.bounces = 0 if part else (a.bounces + 1 if a.last == -1 - w else 1)
@@ -67,28 +68,29 @@ def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) ->
 
 @inlined
 def tell(arena: Arena, now: float, i: int, j: int, impulse: float, cosine: float) -> None:
-    """Write a hit into the log."""
-    log, k = arena.log, arena.told[LOGGED]
+    """Write a collision into the log."""
+    log, k = arena.log, arena.counters[LOGGED]
     log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = arena.clock[BASE] + now, i, j, impulse, cosine
-    arena.told[LOGGED] += 1
+    arena.counters[LOGGED] += 1
 
 
 @inlined
 def stop(arena: Arena, now: float, i: int, j: int) -> None:
     """Tell when and for whom the answer ends, should it."""
-    arena.clock[STOP], arena.told[WHO], arena.told[WHOM] = arena.clock[BASE] + now, i, j
+    arena.clock[STOP], arena.counters[WHO], arena.counters[WHOM] = arena.clock[BASE] + now, i, j
 
 
 @inlined
 def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) -> bool:
-    """Count and log a hit; True if hits of disk `i` follow each other faster than float64 tells times apart."""
+    """Count and log a collision; True if collisions of disk `i` follow each other faster than float64 resolves times
+    apart."""
     a.count += 1
     if impulse > 0.0:
         tell(arena, a.t, i, j, impulse, cosine)
-    a.mark_hits += 1
-    if a.mark_hits < HITS:
+    a.mark_collisions += 1
+    if a.mark_collisions < COLLISIONS:
         return False
-    since, a.mark_hits, a.mark_time = a.t - a.mark_time, 0, a.t
+    since, a.mark_collisions, a.mark_time = a.t - a.mark_time, 0, a.t
     if since > arena.rules.crowd * np.spacing(arena.clock[BASE] + a.t):
         return False
     stop(arena, a.t - since, i, j)
@@ -97,7 +99,7 @@ def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) ->
 
 @inlined
 def change(a: Any) -> None:
-    """Make void what others know of a disk, and forget what it hit last."""
+    """Make void what others know of a disk, and forget what it struck last."""
     a.count += 1
     a.last = NOBODY
 
@@ -108,12 +110,12 @@ def rattles_on_disk(run: Any, a: Any, b: Any, restitution: float, impulse: float
     if a.weight == 0.0:
         return False
     run.walls = 0
-    pull2 = max(a.pull_x * a.pull_x + a.pull_y * a.pull_y, b.pull_x * b.pull_x + b.pull_y * b.pull_y)
-    return rattles(run, a, impulse * (a.weight + b.weight) / (1.0 + restitution), sqrt(pull2), counts)
+    acceleration2 = max(a.free_ax * a.free_ax + a.free_ay * a.free_ay, b.free_ax * b.free_ax + b.free_ay * b.free_ay)
+    return rattles(run, a, impulse * (a.weight + b.weight) / (1.0 + restitution), sqrt(acceleration2), counts)
 
 
 @kernel
-def hit_wall(arena: Arena, i: int, w: int, part: int) -> int:
+def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
     """Disk `i` bounces off a wall, or comes to rest on its face or in a corner with another one.
 
     Bounces to and fro in a corner go on, however many there are at one instant, until they have made it slow.
@@ -124,23 +126,23 @@ def hit_wall(arena: Arena, i: int, w: int, part: int) -> int:
     jolt(walls, a)
     crowded = note(arena, a, i, -1 - w, impulse, cosine)
     run.walls += 1
-    walls_only = run.walls >= HITS  # no other disk has a part in it
+    walls_only = run.walls >= COLLISIONS  # no other disk has a part in it
     trapped = False
     if arena.rules.falling or arena.rules.restitution < 1.0:
         closing = impulse * a.weight / (1.0 + arena.rules.restitution)
-        pull = sqrt(a.pull_x * a.pull_x + a.pull_y * a.pull_y)
-        trapped = rattles(run, a, closing, pull, changed or arena.rules.lasting)
+        acceleration = sqrt(a.free_ax * a.free_ax + a.free_ay * a.free_ay)
+        trapped = rattles(run, a, closing, acceleration, changed or arena.rules.lasting)
     mixed, corner = arena.rules.mixed, -1
     if part == 0 and (crowded or trapped or (mixed and slow(a))):
         corner = second_wall(walls, arena.grid, a, w)
     may_rest = part == 0 and mixed and (walls_only or not trapped)
     if may_rest and rests(walls, a, w, corner, crowded, trapped):
-        if impulse == 0.0:  # a contact that begins to push without a collision
+        if impulse == 0.0:  # a contact whose impulses begin without a collision
             tell(arena, a.t, i, -1 - w, 0.0, 1.0)
         return GOES_ON
     if trapped:
         stop(arena, run.start, i, -1 - w)
     to_and_fro = False
-    if corner >= 0 and walls_only and (a.pull_x != 0.0 or a.pull_y != 0.0):
+    if corner >= 0 and walls_only and (a.free_ax != 0.0 or a.free_ay != 0.0):
         to_and_fro = not slow(a) or hold(walls, a, w, corner) > 0.0
     return ACCUMULATION if trapped or (crowded and not to_and_fro) else GOES_ON

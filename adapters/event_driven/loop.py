@@ -36,7 +36,7 @@ from adapters.event_driven.disks import (
     settle,
     unlink,
 )
-from adapters.event_driven.impacts import change, collide, hit_wall, note, rattles_on_disk, stop
+from adapters.event_driven.impacts import change, collide, collision_wall, note, rattles_on_disk, stop
 from adapters.event_driven.queue import Tree, put
 from adapters.event_driven.rest import across, bear, jolt, take_off
 from adapters.event_driven.search import ALL, ROUNDING, find_own, find_pair
@@ -49,17 +49,18 @@ EPOCH = 256.0  # s; the clock starts again after as many, so that its last place
 def advance(arena: Arena, scenery: Scenery, until: float) -> int:
     """Let everything up to `until` s happen.
 
-    Returns DONE; GOES_ON after told[LEFT] events, or LOG_FULL, to be called again with told[LOGGED] = 0; or
-    ACCUMULATION, REENTRY or ROUND_END, with clock[STOP], told[WHO] and told[WHOM] when and for whom the answer ends.
+    Returns DONE; GOES_ON after counters[LEFT] events, or LOG_FULL, to be called again with counters[LOGGED] = 0; or
+    ACCUMULATION, REENTRY or ROUND_END, with clock[STOP], counters[WHO] and counters[WHOM] when and for whom the answer
+    ends.
     """
     disks, clock = arena.disks, arena.clock
-    while arena.told[LEFT] > 0:
-        arena.told[LEFT] -= 1
+    while arena.counters[LEFT] > 0:
+        arena.counters[LEFT] -= 1
         now = arena.tree[1].time
         i: Any = np.int64(arena.tree[1].who)
         if clock[BASE] + now > until:
             return DONE
-        if arena.told[LOGGED] == len(arena.log):
+        if arena.counters[LOGGED] == len(arena.log):
             return LOG_FULL
         if now > EPOCH:
             begin_epoch(disks, arena.tree, arena.runs, clock)
@@ -74,7 +75,7 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
             if b.count == a.partner_count:
                 j = np.int64(a.partner)
                 fly(b, now, scenery)
-                status = hit(arena, scenery, i, j)
+                status = collision(arena, scenery, i, j)
         elif a.own_code < WRAP:
             side = a.own_code - EDGE
             cross(disks, arena.head, arena.grid, i, side)
@@ -103,8 +104,8 @@ def renew(arena: Arena, scenery: Scenery, i: int, fresh: bool, beyond: int) -> N
 
 
 @pasted
-def hit(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
-    """Disks i and j hit each other."""
+def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
+    """Disks i and j collide."""
     a, b = arena.disks[i], arena.disks[j]
     new_to_a, new_to_b = a.last != j, b.last != i
     impulse, cosine = collide(a, b, i, j, arena.grid.shift, arena.rules.restitution)
@@ -130,7 +131,7 @@ def alone(arena: Arena, i: int) -> int:
     """What disk `i` does by itself but for changing its cell: it meets a wall, the wrap, the end of its wall."""
     code = arena.disks[i].own_code
     if code >= WALL:
-        return hit_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
+        return collision_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
     return leave(arena, i) if code == END else wrap(arena, i, code - WRAP)
 
 
@@ -138,7 +139,7 @@ def alone(arena: Arena, i: int) -> int:
 def leave(arena: Arena, i: int) -> int:
     """Disk `i` reaches the end of the wall it lies on: it flies off, unless it is too slow and would turn about it."""
     a, w = arena.disks[i], int(arena.disks[i].wall)
-    speed2, press = a.vx * a.vx + a.vy * a.vy, -across(arena.walls, a, w, a.pull_x, a.pull_y)
+    speed2, press = a.vx * a.vx + a.vy * a.vy, -across(arena.walls, a, w, a.free_ax, a.free_ay)
     take_off(a)
     a.wall, a.count = -2 - w, a.count + 1
     a.last, a.noise = -1 - w, ROUNDING * (abs(a.vx) + abs(a.vy))
@@ -158,7 +159,7 @@ def wrap(arena: Arena, i: int, side: int) -> int:
     unlink(arena.disks, arena.head, arena.grid, i)
     settle(arena.disks, arena.head, arena.grid, i)
     stop(arena, a.t, i, covered(arena.disks, i))
-    return REENTRY if arena.told[WHOM] >= 0 else GOES_ON
+    return REENTRY if arena.counters[WHOM] >= 0 else GOES_ON
 
 
 @kernel
@@ -208,11 +209,11 @@ def ask_again(a: Any, tree: Tree, i: int, now: float) -> None:
 
 
 @kernel
-def pull(arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float) -> None:
+def accelerate(arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float) -> None:
     """From `at` s on, which must not lie before the last event, let disk `i` accelerate by (ax, ay)."""
     a, now = arena.disks[i], at - arena.clock[BASE]
     fly(a, now, scenery)
-    a.pull_x, a.pull_y = ax, ay
+    a.free_ax, a.free_ay = ax, ay
     bear(arena.walls, a)
     change(a)
     ask_again(a, arena.tree, i, now)

@@ -1,6 +1,6 @@
-"""The exercise's solver with a switch for everything that engines do otherwise: an engine is an order of stages.
+"""The exercise's solver with every mechanism by which engines differ: an engine is an order of stages.
 
-Every stage is a function below, and `Switches` holds the numbers they take. Accelerate, move, pairs, walls is the
+Every stage is a function below, and `Parameters` holds the numbers they take. Accelerate, move, pairs, walls is the
 exercise, to the bit. It asks all pairs and is for some hundred disks. Compiled by numba, as `exercise` is.
 """
 
@@ -11,15 +11,15 @@ import numpy as np
 
 from adapters.mechanisms.contacts import (
     Contacts,
+    apply_pair,
     by_colour,
     by_island,
     closing,
     detect,
+    drive_to_target,
     gap_along,
     gap_of,
     inverse_mass,
-    push_apart,
-    push_to_target,
     rub,
     turn,
 )
@@ -29,27 +29,27 @@ from reference_impl.state import Disks, World
 
 STAGES = (
     "accelerate", "move", "pairs", "walls", "detect", "by_island", "by_colour", "aim", "warm_start", "bounce", "cap",
-    "push_out", "nudge", "soften", "relax", "restitute",
+    "position_correction", "nudge", "soften", "relax", "restitute",
 )  # fmt: skip
 (
     ACCELERATE, MOVE, PAIRS, WALLS, DETECT, BY_ISLAND, BY_COLOUR, AIM, WARM_START, BOUNCE, CAP,
-    PUSH_OUT, NUDGE, SOFTEN, RELAX, RESTITUTE,
+    POSITION_CORRECTION, NUDGE, SOFTEN, RELAX, RESTITUTE,
 ) = range(len(STAGES))  # fmt: skip
 
 
-class Switches(NamedTuple):
+class Parameters(NamedTuple):
     """What may be other than in the exercise; the defaults are the exercise's."""
 
     order: np.ndarray  # the stages of a step, as places in STAGES
     drift: float = 0.0  # of a h2, by which `move` goes farther than v h
-    threshold: float = 0.0  # m/s: closing speeds up to which a hit is inelastic
+    threshold: float = 0.0  # m/s: closing speeds up to which a collision is inelastic
     project: bool = True  # of `pairs`: an overlap is undone at once
     project_walls: bool = True  # of `walls`
     iterations: int = 8  # of `bounce`
     friction: float = 0.0  # of `bounce`, `soften` and `relax`
-    push_share: float = 0.0  # of the overlap beyond the slop: undone by each of push_iterations, or by `nudge`
-    push_iterations: int = 3
-    push_most: float = inf  # m, that one of them moves at most
+    correction_share: float = 0.0  # of the overlap beyond the slop, each iteration or `nudge`
+    correction_iterations: int = 3
+    correction_most: float = inf  # m, that one of them moves at most
     slop: float = 0.0  # m, of overlap that is left
     cap: float = inf  # m, by which a disk moves at most; its velocity is cut
     margin: float = 0.0  # m, from which on two are a contact
@@ -58,35 +58,37 @@ class Switches(NamedTuple):
     skin: float = 0.0  # m, by which walls are thicker than they are
     hertz: float = 30.0  # of `soften`: the stiffness of a contact
     damping: float = 10.0  # its damping ratio
-    push_speed: float = 0.0  # m/s, at which it pushes out at most
+    push_speed: float = 0.0  # m/s, of position correction, at most
 
 
 @compiled
-def advance(disks: Disks, world: World, on: Switches, kept: Contacts, h: float, count: int) -> list:
-    """Advance `count` steps, each move by `h` s; return the hits as `exercise.advance` does."""
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+def advance(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, count: int) -> list:
+    """Advance `count` steps, each move by `h` s; return the collisions as `exercise.advance` does."""
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
         kept.start[:], kept.moved[:] = disks.position, 0.0
         for stage in on.order:
-            act(stage, disks, world, on, kept, h, k, hits)
+            act(stage, disks, world, on, kept, h, k, collisions)
         for c in range(kept.found[0]):
             if kept.rows[c].impulse > 0.0:
-                hits.append((k, kept.rows[c].i, kept.rows[c].j, kept.rows[c].impulse))
+                collisions.append((k, kept.rows[c].i, kept.rows[c].j, kept.rows[c].impulse))
         wrap(disks.position, world)
-    return hits
+    return collisions
 
 
 @compiled
-def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h: float, k: int, hits: list) -> None:
+def act(
+    stage: int, disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, k: int, collisions: list
+) -> None:
     """One stage."""
     if stage == ACCELERATE:
         accelerate(disks, world, h)
     elif stage == MOVE:
         move(disks, world, on, kept, h)
     elif stage == PAIRS:
-        pairs(disks, world, on, k, hits)
+        pairs(disks, world, on, k, collisions)
     elif stage == WALLS:
-        walls(disks, world, on, k, hits)
+        walls(disks, world, on, k, collisions)
     elif stage == DETECT:
         detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
     elif stage == BY_ISLAND:
@@ -101,8 +103,8 @@ def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h:
         bounce(disks, on, kept)
     elif stage == CAP:
         cap(disks.velocity, on.cap, h)
-    elif stage == PUSH_OUT:
-        push_out(disks, world, on, kept)
+    elif stage == POSITION_CORRECTION:
+        position_correction(disks, world, on, kept)
     elif stage == NUDGE:
         nudge(disks.mass, on, kept, h)
     elif stage == SOFTEN:
@@ -124,7 +126,7 @@ def accelerate(disks: Disks, world: World, h: float) -> None:
 
 
 @compiled
-def move(disks: Disks, world: World, on: Switches, kept: Contacts, h: float) -> None:
+def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -> None:
     """x += v h + drift a h2, and what a nudge adds; the turning alike.
 
     The moves of a step are added up first, as Box2D 3.1 does: it is them that are rounded, not the place.
@@ -133,35 +135,35 @@ def move(disks: Disks, world: World, on: Switches, kept: Contacts, h: float) -> 
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
             for axis in range(2):
-                pull = world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
-                moved[i, axis] += (v[i, axis] + kept.nudge[i, axis]) * h + more * pull
+                acceleration = world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
+                moved[i, axis] += (v[i, axis] + kept.nudge[i, axis]) * h + more * acceleration
                 disks.position[i, axis] = kept.start[i, axis] + moved[i, axis]
                 kept.nudge[i, axis] = 0.0
             disks.angle[i] += disks.angular_velocity[i] * h + more * disks.torque[i] / disks.inertia[i]
 
 
 @compiled
-def pairs(disks: Disks, world: World, on: Switches, k: int, hits: list) -> None:
+def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list) -> None:
     """Task 2 of the exercise for one pair of disks after the other."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for j in range(i + 1, len(radius)):
             if touching(x, radius, i, j):
-                meet(disks, world, on, i, j, k, hits)
+                meet(disks, world, on, i, j, k, collisions)
 
 
 @compiled
-def walls(disks: Disks, world: World, on: Switches, k: int, hits: list) -> None:
+def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list) -> None:
     """The same for one disk and wall after the other."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for w in range(len(world.walls)):
             if touching_wall(x, radius, i, world.walls, w):
-                meet(disks, world, on, i, -1 - w, k, hits)
+                meet(disks, world, on, i, -1 - w, k, collisions)
 
 
 @compiled
-def meet(disks: Disks, world: World, on: Switches, i: int, j: int, k: int, hits: list) -> None:
+def meet(disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, collisions: list) -> None:
     """One pair, by the exercise; where nothing is to be projected, both are set back to where they met."""
     x, other = disks.position, max(j, 0)
     xi, yi, xj, yj = x[i, 0], x[i, 1], x[other, 0], x[other, 1]
@@ -175,12 +177,12 @@ def meet(disks: Disks, world: World, on: Switches, i: int, j: int, k: int, hits:
         if j >= 0:
             x[j, 0], x[j, 1] = xj, yj
     if impulse != 0.0:
-        hits.append((k, i, j, impulse))
+        collisions.append((k, i, j, impulse))
 
 
 @compiled
 def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
-    """Fix, for every contact at once, the velocity it shall have: e times the closing speed; 0 for slow hits."""
+    """Fix, for every contact at once, the velocity it shall have: e times the closing speed; 0 for slow collisions."""
     for c in range(kept.found[0]):
         contact = kept.rows[c]
         speed = closing(v, contact.i, contact.j, contact.nx, contact.ny)
@@ -198,17 +200,17 @@ def warm_start(disks: Disks, kept: Contacts) -> None:
         if contact.late:
             continue
         i, j, nx, ny = contact.i, contact.j, contact.nx, contact.ny
-        push_apart(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse)
+        apply_pair(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse)
         turn(disks, contact, contact.slide)
 
 
 @compiled
-def bounce(disks: Disks, on: Switches, kept: Contacts) -> None:
-    """Sequential impulses: go through all contacts again and again; what was pushed may be taken back."""
+def bounce(disks: Disks, on: Parameters, kept: Contacts) -> None:
+    """Sequential impulses: go through all contacts again and again; an impulse may be taken back."""
     for _ in range(on.iterations):
         for c in range(kept.found[0]):
             rub(disks, kept.rows[c], on.friction)
-            push_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)
+            drive_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)
 
 
 @compiled
@@ -222,22 +224,22 @@ def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
 
 
 @compiled
-def push_out(disks: Disks, world: World, on: Switches, kept: Contacts) -> None:
+def position_correction(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
     """Undo a share of every overlap beyond the slop, some times in every island."""
     first = 0
-    while on.push_share > 0.0 and first < kept.found[0]:
+    while on.correction_share > 0.0 and first < kept.found[0]:
         end = first
         while end < kept.found[0] and kept.rows[end].island == kept.rows[first].island:
             end += 1
         worst = -inf
-        for _ in range(on.push_iterations):
+        for _ in range(on.correction_iterations):
             if worst < -3.0 * on.slop:  # else all are within three slops
-                worst = push_out_island(disks, world, on, kept, first, end)
+                worst = correct_island(disks, world, on, kept, first, end)
         first = end
 
 
 @compiled
-def push_out_island(disks: Disks, world: World, on: Switches, kept: Contacts, first: int, end: int) -> float:
+def correct_island(disks: Disks, world: World, on: Parameters, kept: Contacts, first: int, end: int) -> float:
     """Once through the contacts from `first` to before `end`; returns the smallest gap in m there was, at most 0."""
     worst = 0.0
     for c in range(first, end):
@@ -245,13 +247,13 @@ def push_out_island(disks: Disks, world: World, on: Switches, kept: Contacts, fi
         gap, nx, ny = gap_of(disks, world, i, j)
         gap -= on.skin if j < 0 else 0.0
         worst = min(worst, gap)
-        by = min(max(-on.push_share * (gap + on.slop), 0.0), on.push_most)
-        push_apart(disks.position, disks.mass, i, j, nx, ny, by / inverse_mass(disks.mass, i, j))
+        by = min(max(-on.correction_share * (gap + on.slop), 0.0), on.correction_most)
+        apply_pair(disks.position, disks.mass, i, j, nx, ny, by / inverse_mass(disks.mass, i, j))
     return worst
 
 
 @compiled
-def nudge(mass, on: Switches, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
+def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
     """Give overlaps a velocity that lasts for the next move only, and undoes a share of what is beyond the slop."""
     for c in range(kept.found[0]):
         kept.rows[c].nudged = 0.0
@@ -259,17 +261,17 @@ def nudge(mass, on: Switches, kept: Contacts, h: float) -> None:  # type: ignore
         for c in range(kept.found[0]):
             contact = kept.rows[c]
             i, j, nx, ny, before = contact.i, contact.j, contact.nx, contact.ny, contact.nudged
-            wanted = on.push_share * max(-(contact.gap + on.slop), 0.0) / h
+            wanted = on.correction_share * max(-(contact.gap + on.slop), 0.0) / h
             more = (wanted - closing(kept.nudge, i, j, nx, ny)) / inverse_mass(mass, i, j)
             contact.nudged = max(before + more, 0.0)
-            push_apart(kept.nudge, mass, i, j, nx, ny, contact.nudged - before)
+            apply_pair(kept.nudge, mass, i, j, nx, ny, contact.nudged - before)
 
 
 @compiled
-def soften(disks: Disks, on: Switches, kept: Contacts, h: float, pushing: bool) -> None:
+def soften(disks: Disks, on: Parameters, kept: Contacts, h: float, biased: bool) -> None:
     """A damped spring a contact, solved for the end of the substep (E. Catto, Solver2D, 2024: soft step).
 
-    Not `pushing` is its second pass, which takes the push out of the velocities again. What is not yet touching may
+    Not `biased` is its second pass, which takes the bias out of the velocities again. What is not yet touching may
     come together, but no farther.
     """
     for c in range(kept.found[0]):
@@ -278,14 +280,14 @@ def soften(disks: Disks, on: Switches, kept: Contacts, h: float, pushing: bool) 
         target, share, memory = 0.0, 1.0, 0.0
         if gap > 0.0:
             target = -gap / h
-        elif pushing and on.push_speed > 0.0:
+        elif biased and on.push_speed > 0.0:
             rigid = contact.j < 0 or disks.mass[contact.i] == inf or disks.mass[contact.j] == inf
             omega = 2.0 * pi * min(on.hertz, 0.125 / h) * (2.0 if rigid else 1.0)
             stiff = 2.0 * on.damping + h * omega
             memory = 1.0 / (1.0 + h * omega * stiff)
             share = 1.0 - memory
             target = min(-omega / stiff * gap, on.push_speed)
-        push_to_target(disks, contact, target, share, memory)
+        drive_to_target(disks, contact, target, share, memory)
         rub(disks, contact, on.friction)
 
 
@@ -294,4 +296,4 @@ def restitute(disks: Disks, kept: Contacts) -> None:
     """One sweep that gives every contact which was pressed the velocity it was aimed at."""
     for c in range(kept.found[0]):
         if kept.rows[c].target != 0.0 and kept.rows[c].strongest > 0.0:
-            push_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)
+            drive_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)

@@ -53,10 +53,10 @@ class Whole:
         self.engine.load(Scene(**argument["scene"] | {"walls": walls}), argument["dt"])
 
     def whole_step(self, argument: dict[str, Any]) -> None:
-        """`count` steps; pushes act in the first."""
-        for disk, (x, y, torque) in enumerate(argument["pushes"] or ()):
+        """`count` steps; forces act in the first."""
+        for disk, (x, y, torque) in enumerate(argument["forces"] or ()):
             if x or y or torque:
-                self.engine.push(disk, np.array([x, y]), torque)
+                self.engine.apply_force(disk, np.array([x, y]), torque)
         self.engine.step(argument["count"])
 
     def whole_read(self, _argument: Any) -> list[list[float]]:
@@ -64,9 +64,9 @@ class Whole:
         state = self.engine.read()
         return np.column_stack([state.position, state.velocity, state.angle, state.angular_velocity]).tolist()
 
-    def whole_hits(self, _argument: Any) -> list[list[float]]:
-        """(step, i, j, impulse), as `advance` told them."""
-        return [[int(step), int(i), int(j), float(impulse)] for step, i, j, impulse in self.engine.hits()]
+    def whole_collisions(self, _argument: Any) -> list[list[float]]:
+        """(step, i, j, impulse), as `advance` reported them."""
+        return [[int(step), int(i), int(j), float(impulse)] for step, i, j, impulse in self.engine.collisions()]
 
 
 def begin(module: ModuleType) -> None:

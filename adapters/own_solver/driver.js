@@ -168,21 +168,21 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   }
 
   function load(scene) {
-    world = { dt: scene.dt, gravity: scene.gravity, wrap: scene.wrap, steps: 0, hits: empty(), log: empty(),
+    world = { dt: scene.dt, gravity: scene.gravity, wrap: scene.wrap, steps: 0, collisions: empty(), log: empty(),
       spheres: empty() };
     for (let i = 0; i < scene.spheres.length; i++) world.spheres[i] = sphere(scene.spheres[i]);
     return "null";
   }
 
-  function step({ count, pushes, held }) {
+  function step({ count, forces, held }) {
     const { spheres, gravity } = world;
     const n = spheres.length;
     for (let k = 0; k < count; k++) {
       for (let i = 0; i < n; i++) {
-        const s = spheres[i], push = pushes && (held || k === 0) ? pushes[i] : null;
-        s.force.x = s.mass * gravity[0] + (push ? push[0] : 0);
-        s.force.y = s.mass * gravity[1] + (push ? push[1] : 0);
-        s.torque = push ? push[2] : 0;
+        const s = spheres[i], force = forces && (held || k === 0) ? forces[i] : null;
+        s.force.x = s.mass * gravity[0] + (force ? force[0] : 0);
+        s.force.y = s.mass * gravity[1] + (force ? force[1] : 0);
+        s.torque = force ? force[2] : 0;
         file.integrate(s, world.dt);
       }
       for (let i = 0; i < n; i++) for (let j = i + 1; j < n; j++) pair(i, j);
@@ -203,7 +203,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     const moved = a.position.x !== ax || a.position.y !== ay || b.position.x !== bx || b.position.y !== by;
     if (kicked) {
       const sign = du * (ax - bx) + dv * (ay - by) < 0 ? -1 : 1;
-      world.hits[world.hits.length] = `[${world.steps},${i},${j},${text(sign * a.mass * sqrt(du * du + dv * dv))}]`;
+      world.collisions[world.collisions.length] = `[${world.steps},${i},${j},${text(sign * a.mass * sqrt(du * du + dv * dv))}]`;
     }
     if ((kicked || moved || overlaps) && world.log.length < 400) {
       world.log[world.log.length] = `[${world.steps},${i},${j},${text(ax)},${text(ay)},${text(au)},${text(av)},`
@@ -220,14 +220,14 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     p.y = p.y < bottom ? top : p.y > top ? bottom : p.y;
   }
 
-  function told(lines) {
+  function reported(lines) {
     let all = "";
     for (let k = 0; k < lines.length; k++) all += (k ? "," : "") + lines[k];
     return "[" + all + "]";
   }
 
   const commands = {
-    ask, load, step, read: () => rows(world.spheres), hits: () => told(world.hits), contacts: () => told(world.log),
+    ask, load, step, read: () => rows(world.spheres), collisions: () => reported(world.collisions), contacts: () => reported(world.log),
     begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
   };
 

@@ -1,4 +1,4 @@
-"""Somebody's own solver file as a player: an Exercise.js or a solver.py, driven step by step in its own process."""
+"""Somebody's own solver file as an engine: an Exercise.js or a solver.py, driven step by step in its own process."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import FLOAT64, Hit, Row, Unsupported
+from adapters.engine import FLOAT64, ContactImpulse, EngineRow, Unsupported
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
 from scenarios.model import Array, Scene, State
@@ -48,7 +48,7 @@ class Student:
     def load(self, scene: Scene, dt: float) -> None:
         """Make the scene's spheres; raises `Unsupported` for what the exercise has not."""
         self.whole = self.process.surface == "advance"
-        self.pushes = np.zeros((scene.n, 3))
+        self.forces = np.zeros((scene.n, 3))
         if self.whole:
             fields = {
                 name: None if value is None else np.asarray(value).tolist() for name, value in vars(scene).items()
@@ -75,16 +75,16 @@ class Student:
         if scene.n > 1 and not abs(self.restitution - scene.restitution) <= REST:
             raise Unsupported(f"the file has e = {self.restitution:.3g}, the scene needs {scene.restitution:g}")
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to what acts during the next step."""
-        self.pushes[disk] += [*force, torque]
+        self.forces[disk] += [*force, torque]
 
     def step(self, count: int = 1) -> None:
         """One request for all the steps."""
-        pushes = self.pushes.tolist() if self.pushes.any() else None
-        self.process.do("whole_step" if self.whole else "step", {"count": count, "pushes": pushes}, self.limit)
+        forces = self.forces.tolist() if self.forces.any() else None
+        self.process.do("whole_step" if self.whole else "step", {"count": count, "forces": forces}, self.limit)
         self.limit = self.patience
-        self.pushes[:] = 0.0
+        self.forces[:] = 0.0
 
     def read(self) -> State:
         """From the arrays, or from the spheres' fields."""
@@ -92,10 +92,10 @@ class Student:
         angle, spin = (4, 5) if self.whole else (6, 7)
         return State(*(np.ascontiguousarray(rows[:, part]) for part in (slice(0, 2), slice(2, 4), angle, spin)))
 
-    def hits(self) -> list[Hit]:
-        """What `advance` told, or every call of the collision function that changed a velocity."""
-        rows = self.process.do("whole_hits" if self.whole else "hits")
-        return [Hit(int(step), int(i), int(j), impulse) for step, i, j, impulse in rows]
+    def collisions(self) -> list[ContactImpulse]:
+        """What `advance` reported, or every call of the collision function that changed a velocity."""
+        rows = self.process.do("whole_collisions" if self.whole else "collisions")
+        return [ContactImpulse(int(step), int(i), int(j), impulse) for step, i, j, impulse in rows]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """What the file decides."""
@@ -130,7 +130,7 @@ def spheres_of(scene: Scene) -> list[list[float]]:
 
 
 def read_restitution(process: SolverProcess) -> float:
-    """The e of a file, from two equal spheres that meet head-on at 2 m/s; NaN where no hit comes out of it."""
+    """The e of a file, from two equal spheres that meet head-on at 2 m/s; NaN where no collision comes out of it."""
     pair = [[-0.45, 0.0, 1.0, *[0.0] * 6, 1.0, 1.0, 0.5], [0.45, 0.0, -1.0, *[0.0] * 6, 1.0, 1.0, 0.5]]
     try:
         answer = process.do("ask", {"spheres": pair, "calls": [["collide", 0, 1]], "world": False}, 1.0)
@@ -142,7 +142,7 @@ def read_restitution(process: SolverProcess) -> float:
     return float(b[2] - a[2]) / 2.0
 
 
-def engine_file(path: Path, patience: float = STEP_LIMIT) -> Row:
+def engine_file(path: Path, patience: float = STEP_LIMIT) -> EngineRow:
     """The row of `ENGINES` that a solver's file, as it is now, stands for; raises `NotASolver` if the path is none."""
     solver = read_solver(path)
-    return Row(partial(Student, solver, patience), f"your own solver, {path}", 1.0, FLOAT64, source=solver.source)
+    return EngineRow(partial(Student, solver, patience), f"your own solver, {path}", 1.0, FLOAT64, source=solver.source)

@@ -105,7 +105,7 @@ class PythonSolver:
         if "for ^" in what:
             what += "; a power is written **"
         elif isinstance(error, EOFError):
-            what += "; nobody is there to answer input()"
+            what += "; input() is not available"
         if isinstance(error, SyntaxError) and error.filename == self.name:
             return SolverFailed("error", what, error.lineno or 0, error.offset or 0)
         mine = [f for f in traceback.TracebackException.from_exception(error).stack if f.filename == self.name]
@@ -170,16 +170,16 @@ class PythonSolver:
         """Begin a scene."""
         self.scene, self.steps = scene, 0
         self.log: list[list[float]] = []
-        self.hit_rows: list[list[float]] = []
+        self.collision_rows: list[list[float]] = []
         self.spheres: list[Any] = [sphere_of(r) for r in scene["spheres"]]
 
     def step(self, argument: dict[str, Any]) -> None:
-        """Integrate all, collide every pair i < j, wrap; `count` times; pushes act in the first, or in all if held."""
+        """Integrate all, collide every pair i < j, wrap; `count` times; forces act in the first, or in all if held."""
         gx, gy = self.scene["gravity"]
-        pushes, held = argument["pushes"], argument.get("held", False)
+        forces, held = argument["forces"], argument.get("held", False)
         for k in range(argument["count"]):
             for i, s in enumerate(self.spheres):
-                px, py, turn = pushes[i] if pushes and (held or k == 0) else (0.0, 0.0, 0.0)
+                px, py, turn = forces[i] if forces and (held or k == 0) else (0.0, 0.0, 0.0)
                 s.force.x, s.force.y, s.torque = s.mass * gx + px, s.mass * gy + py, turn
                 self.file["integrate"](s, self.scene["dt"])
             for i in range(len(self.spheres)):
@@ -201,7 +201,7 @@ class PythonSolver:
         if before[2:4] != after[2:4] or before[6:] != after[6:]:
             du, dv = after[2] - before[2], after[3] - before[3]
             sign = -1.0 if du * x + dv * y < 0 else 1.0
-            self.hit_rows.append([self.steps, i, j, number(sign * a.mass * (du * du + dv * dv) ** 0.5)])
+            self.collision_rows.append([self.steps, i, j, number(sign * a.mass * (du * du + dv * dv) ** 0.5)])
         if (before != after or x * x + y * y < reach * reach) and len(self.log) < LOGGED:
             self.log.append([self.steps, i, j, *map(number, before), *map(number, after)])
 
@@ -209,9 +209,9 @@ class PythonSolver:
         """The scene's spheres as they are."""
         return [row_of(s) for s in self.spheres]
 
-    def hits(self, _argument: Any = None) -> list[list[float]]:
+    def collisions(self, _argument: Any = None) -> list[list[float]]:
         """(step, i, j, impulse) of every pair whose velocities a call changed."""
-        return self.hit_rows
+        return self.collision_rows
 
     def contacts(self, _argument: Any = None) -> list[list[float]]:
         """What `pair` logged."""

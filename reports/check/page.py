@@ -10,7 +10,7 @@ from reports.check.rows import TASKS, shown
 from reports.check.smallest import DT, Smallest
 from reports.check.verdict import FileCheck
 from reports.page import style
-from reports.page.documents import PLAYER, render
+from reports.page.documents import ENGINE, render
 from reports.page.replay import pack_layers, ratio_of
 from reports.run.made import sealed
 from reports.terminal.foreign_text import put_text
@@ -18,7 +18,7 @@ from scenarios.model import Scenario, Trajectory
 
 GENERATOR = "crosscheck check"
 YOURS = style.Look("#a3123a", "#ff7a93", (), "diamond", True)  # apart from the truth in any light, by style.py
-SCRIPTS = (*PLAYER, "check/check.js")
+SCRIPTS = (*ENGINE, "check/check.js")
 
 
 def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
@@ -55,7 +55,7 @@ def scene_lines(scenario: Scenario) -> list[str]:
             f"at {shown(scene.position[k])} m, {shown(scene.velocity[k])} m/s, size {shown(scene.radius[k])} m, "
             f"mass {shown(scene.mass[k])} kg"
         )
-        for push in (push for push in scenario.thrusts if push.disk == k):
-            lines[-1] += f", force {shown(push.force)} N, torque {shown(push.torque)} N m"
+        for thrust in (thrust for thrust in scenario.thrusts if thrust.disk == k):
+            lines[-1] += f", force {shown(thrust.force)} N, torque {shown(thrust.torque)} N m"
             lines[-1] += f", MoI {shown(scene.inertia[k])} kg m²"
     return lines

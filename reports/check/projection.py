@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from reports.check.impacts import BACKWARDS, Finding
-from reports.check.questions import HITS, QUESTIONS, Answer, Ball, direction, finite
-from reports.check.rows import Row, judged, near, not_asked, shown
+from reports.check.questions import COLLISIONS, QUESTIONS, Answer, Ball, direction, finite
+from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
 
 
@@ -24,11 +24,11 @@ class Shift(NamedTuple):
     sizes: float
 
 
-PULLED = "the sign is wrong: they are pulled into each other"
+WRONG_SIGN = "the sign is wrong: they are moved into each other"
 # (shift) -> the displacement of both together that a mistake would give, m
 TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "the positions are never changed: not implemented": lambda s, a, b: 0.0,
-    PULLED: lambda s, a, b: -s.overlap,
+    WRONG_SIGN: lambda s, a, b: -s.overlap,
     "only half of the overlap is taken out: it is halved twice": lambda s, a, b: s.overlap / 2,
     "the overlap is counted twice: each is moved by all of it": lambda s, a, b: 2 * s.overlap,
     "the sign is wrong, and the overlap is counted twice": lambda s, a, b: -2 * s.overlap,
@@ -53,9 +53,9 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
 }
 
 
-def pulled(answers: dict[str, Answer]) -> bool:
-    """Whether pairs that hit are displaced the wrong way."""
-    shifts = [shift_of(question.balls, answers[name].last) for name, question in HITS.items()]
+def moved_together(answers: dict[str, Answer]) -> bool:
+    """Whether pairs that collide are displaced the wrong way."""
+    shifts = [shift_of(question.balls, answers[name].last) for name, question in COLLISIONS.items()]
     return all(s.a + s.b < 0 and near(s.across, 0.0, 0.1) for s in shifts)
 
 
@@ -69,9 +69,9 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
     return Shift(float(da @ n), float(-(db @ n)), across, a.r + b.r - distance, distance, a.r + b.r)
 
 
-def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[Row]:
+def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[CheckRow]:
     """The rows of (b); `found`: what the velocities say."""
-    seen = [(q.balls, shift_of(q.balls, answers[name].last), answers[name].last) for name, q in HITS.items()]
+    seen = [(q.balls, shift_of(q.balls, answers[name].last), answers[name].last) for name, q in COLLISIONS.items()]
     balls, shift, after = seen[0]
     distance = float(np.hypot(*np.subtract(after[0].x, after[1].x)))
     right = all(near(s.a + s.b, s.overlap, 0.1) for _, s, _ in seen)
@@ -86,10 +86,10 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[R
                f"{shown(shift.across)} m across it", "0 m across it", along, across_cause(seen)),
         split(balls, shift) if right and along else not_asked("split", "2b", "they do not meet in one point"),
     ]  # fmt: skip
-    return [*rows, *at_rest(answers, explained), parting(answers["part"])]
+    return [*rows, *at_rest(answers, explained), separation(answers["separate"])]
 
 
-def at_rest(answers: dict[str, Answer], explained: bool) -> list[Row]:
+def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
     """What a pair at relative rest says of the displacement; nothing if the impulse explains it or is no number."""
     still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
     kept = all(near(x.v, y.v) for x, y in zip(still, after))
@@ -182,7 +182,7 @@ def was_set(which: str, seen: list[tuple[Ball, Ball, Ball]]) -> bool:
     return near(crosses, 0.0, 0.01)
 
 
-def split(balls: tuple[Ball, ...], shift: Shift) -> Row:
+def split(balls: tuple[Ball, ...], shift: Shift) -> CheckRow:
     """Who is moved how far: free; said with what it does to the centre of mass."""
     a, b = balls
     share = shift.a / shift.overlap
@@ -194,13 +194,13 @@ def split(balls: tuple[Ball, ...], shift: Shift) -> Row:
     centre = (a.m * shift.a - b.m * shift.b) / (a.m + b.m)
     aside = "stays" if abs(centre) < 1e-9 else f"is moved by {shown(abs(centre))} m"
     asked = f"How is the overlap shared, for masses of {shown(a.m)} and {shown(b.m)} kg?"
-    return Row("split", "2b", asked, how, "any", "note", f"{how}; their centre of mass {aside}")
+    return CheckRow("split", "2b", asked, how, "any", "note", f"{how}; their centre of mass {aside}")
 
 
-def parting(answer: Answer) -> Row:
+def separation(answer: Answer) -> CheckRow:
     """A pair that overlaps and moves apart: displaced or left; free, as nothing is lost by it."""
-    shift = shift_of(QUESTIONS["part"].balls, answer.last)
+    shift = shift_of(QUESTIONS["separate"].balls, answer.last)
     moved = abs(shift.a) + abs(shift.b) > 1e-9
     said = "displaced as any other" if moved else "left as it is: an early return for pairs that part"
-    return Row("parting pair", "2b", "Is a pair displaced that overlaps and moves apart?", "yes" if moved else "no",
+    return CheckRow("separating pair", "2b", "Is a pair displaced that overlaps and moves apart?", "yes" if moved else "no",
                "yes, or no if it returns early", "note", said)  # fmt: skip

@@ -1,4 +1,4 @@
-"""The restitution of a file: what is written into it, and what comes out of its hits."""
+"""The restitution of a file: what is written into it, and what comes out of its collisions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.check.questions import QUESTIONS, Answer
-from reports.check.rows import Row, judged, near, shown
+from reports.check.rows import CheckRow, judged, near, shown
 
 EXERCISE = 0.9
 COMMENTS = re.compile(r"/\*.*?\*/|//[^\n]*|#[^\n]*", re.DOTALL)
@@ -33,7 +33,7 @@ class Restitution:
         own: the value written into it, or the exercise's if none is found.
         named: whether it is written in, by a name or as a number.
         absurd: whether what came is no number from 0 to 1, and a name such as e or restitution gets it.
-        came: parting over closing speed of two equal spheres that meet head-on at 2 m/s.
+        came: separation over approach speed of two equal spheres that meet head-on at 2 m/s.
         slow, fast: the same at 2 mm/s and at 200 m/s.
     """
 
@@ -46,7 +46,7 @@ class Restitution:
 
     @property
     def candidates(self) -> list[float]:
-        """The values a hit is explained by: the file's own first, then what came, if nothing contradicts it."""
+        """The values a collision is explained by: the file's own first, then what came, if nothing contradicts it."""
         free = 0 <= self.came <= 1 and not self.named
         return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
 
@@ -60,22 +60,22 @@ class Restitution:
         """What is wrong with the number that is written in, "" if nothing is."""
         return f"e = {shown(self.came)} is written into the file; it must be from 0 to 1" if self.absurd else ""
 
-    def row(self, mistake: str) -> Row:
+    def row(self, mistake: str) -> CheckRow:
         """0.9 is right, another number is a note if the file says so, and a fault if it says something else.
 
-        `mistake`: what is known to be wrong with the hits, if anything.
+        `mistake`: what is known to be wrong with the collisions, if anything.
         """
         asked = "What part of its closing speed has a pair when it parts?"
         if near(self.came, EXERCISE):
-            return Row("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
+            return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
         if near(self.came, self.own) or len(self.candidates) > 1:
             note = f"e = {shown(self.came)} is written into the file; the exercise has 0.9. It is judged by its own"
-            return Row("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "note", note)
+            return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "note", note)
         cause = mistake if np.isfinite(self.came) else "the velocities become no numbers"
-        cause = cause or f"e = {shown(self.own)} is written into the file, but it is not what comes out"
+        cause = cause or f"e = {shown(self.own)} is written into the file, but its collisions have another"
         return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
 
-    def speeds(self, mistake: str) -> Row:
+    def speeds(self, mistake: str) -> CheckRow:
         """The same at any speed; `mistake` as above."""
         return judged(
             "any speed", "2c", "Is it the same for pairs that close at 2 mm/s and at 200 m/s?",
@@ -85,8 +85,8 @@ class Restitution:
 
 
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
-    """What the file's text says and what its hits give."""
-    came, slow, fast = (parting(answers[name], name) for name in ("even", "slow", "fast"))
+    """What the file's text says and what its collisions give."""
+    came, slow, fast = (separation(answers[name], name) for name in ("even", "slow", "fast"))
     named, found = named_in(text), written(text)
     absurd = not 0 <= came <= 1 and any(near(e, came) for e in named)
     # A file may hold several such numbers, and use one of them.
@@ -105,8 +105,8 @@ def written(text: str) -> list[float]:
     return [e for e in named_in(text) if 0 <= e <= 1] + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
 
 
-def parting(answer: Answer, name: str) -> float:
-    """Parting over closing speed; NaN if the call failed."""
+def separation(answer: Answer, name: str) -> float:
+    """Separation over approach speed; NaN if the call failed."""
     if answer.failed or not answer.balls:
         return float("nan")
     a, b = QUESTIONS[name].balls

@@ -1,4 +1,4 @@
-"""Whole scenes: a solver's motion against the exact one, within what dt explains, and its first wrong hit."""
+"""Whole scenes: a solver's motion against the exact one, within what dt explains, and its first wrong collision."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from adapters.own_solver.engine import spheres_of
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
-from reports.check.rows import FOLLOWS, TOLERANCE, Row, judged, near, not_asked, shown
+from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
-from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.closed_forms import world_thrusts
 from scenarios.truth.exact import TruthRecord, computed
 
 DT = 1e-3  # s, the exercise's
@@ -24,7 +24,7 @@ LIMIT = 2.0  # s that a sample interval may take
 SCENE_LIMIT = 10.0  # s by the clock that all of a scene may take: it needs a tenth of a second
 
 
-class Played(NamedTuple):
+class SceneAnswer(NamedTuple):
     """A scene by a solver: position and velocity (k, n, 2) m, m/s, and its contacts (c, 19).
 
     A contact is: step, i, j, then x, y, vx, vy of i and of j before the call, and of both after it.
@@ -42,13 +42,13 @@ def step_of(process: SolverProcess) -> float:
     return DT if process.surface == "exercise" else 5 * DT
 
 
-def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> Played:
-    """Play it by the file's own functions; its pushes last as long as it does. Raises `SolverFailed`."""
+def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> SceneAnswer:
+    """Play it by the file's own functions; its forces last as long as it does. Raises `SolverFailed`."""
     scene, count = scenario.scene, round(scenario.sample_interval / dt)
-    pushes = np.zeros((scene.n, 3))
-    for push in scenario.thrusts:
-        pushes[push.disk] += [*push.force, push.torque]
-    step = {"count": count, "pushes": pushes.tolist() if pushes.any() else None, "held": True}
+    forces = np.zeros((scene.n, 3))
+    for thrust in scenario.thrusts:
+        forces[thrust.disk] += [*thrust.force, thrust.torque]
+    step = {"count": count, "forces": forces.tolist() if forces.any() else None, "held": True}
     start: dict[str, Any] = {"spheres": spheres_of(scene), "dt": dt, "gravity": [0.0, 0.0], "wrap": None}
     requests = [("load", start, LIMIT), ("read", None, LIMIT)]
     for _ in range(scenario.samples):
@@ -58,11 +58,13 @@ def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> Played:
     if failed:
         raise failed
     rows = np.array(answers[1::2], float)
-    return Played(rows[..., 0:2], rows[..., 2:4], rows[..., 6], rows[..., 7], np.array(contacts, float).reshape(-1, 19))
+    return SceneAnswer(
+        rows[..., 0:2], rows[..., 2:4], rows[..., 6], rows[..., 7], np.array(contacts, float).reshape(-1, 19)
+    )
 
 
-def scene_rows(process: SolverProcess, rows: Sequence[Row], e: float | None) -> list[Row]:
-    """The rows on whole scenes with restitution `e`, and the one on the first wrong hit in any of them."""
+def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None) -> list[CheckRow]:
+    """The rows on whole scenes with restitution `e`, and the one on the first wrong collision in any of them."""
     if any(row.name == "implemented" for row in rows):
         return [not_asked("scenes", "scenes", "a function of the file cannot be used")]
     blamed = any(row.verdict == "fault" for row in rows)
@@ -79,11 +81,11 @@ def scene_rows(process: SolverProcess, rows: Sequence[Row], e: float | None) -> 
     except SolverFailed as failure:
         return [judged("scenes", "scenes", "Does it play whole scenes?", "it fails", "yes", False,
                        FOLLOWS if blamed else str(failure))]  # fmt: skip
-    return [*found, judged("first wrong hit", "scenes", "Is every hit in these scenes right by itself?",
+    return [*found, judged("first wrong collision", "scenes", "Is every collision in these scenes right by itself?",
                            wrong or "yes", "yes", not wrong, FOLLOWS if blamed else "")]  # fmt: skip
 
 
-def scene_row(scenario: Scenario, record: TruthRecord | None, played: Played, dt: float, cause: str) -> Row:
+def scene_row(scenario: Scenario, record: TruthRecord | None, played: SceneAnswer, dt: float, cause: str) -> CheckRow:
     """The largest distance from the exact positions, beside what the step size explains."""
     truth = truth_of(scenario, record)
     k = len(truth)
@@ -105,7 +107,7 @@ def scene_row(scenario: Scenario, record: TruthRecord | None, played: Played, dt
 def truth_of(scenario: Scenario, record: TruthRecord | None) -> Trajectory:
     """The exact motion, up to where it is known."""
     if record is None:
-        return world_pushes(scenario.scene, scenario.thrusts, scenario.times)
+        return world_thrusts(scenario.scene, scenario.thrusts, scenario.times)
     return record.sampled(scenario.scene, scenario.thrusts, scenario.times)
 
 
@@ -115,7 +117,7 @@ def rounding(place: Array, rate: Array, t: Array, dt: float) -> Array:
 
 
 def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
-    """(k,) rad, how far an angle may be off: symplectic Euler is w' dt t / 2 ahead, and a hit turns nothing."""
+    """(k,) rad, how far an angle may be off: symplectic Euler is w' dt t / 2 ahead, and a collision turns nothing."""
     spin_up = max((abs(p.torque) / scenario.scene.inertia[p.disk] for p in scenario.thrusts), default=0.0)
     return 1.001 * spin_up * dt * t / 2
 
@@ -123,15 +125,15 @@ def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
 def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) -> Array:
     """(k,) m, how far a right solver in steps of `dt` s may be off at the times t (k,) s.
 
-    Free flight under a push: symplectic Euler is a dt t / 2 ahead. A hit is found up to dt late, so that each disk
-    goes on for u dt; its normal is turned by that and by what the disks were off before, over (rA + rB) cos, which
+    Free flight under a thrust: symplectic Euler is a dt t / 2 ahead. A collision is found up to dt late, so that each
+    disk goes on for u dt; its normal is turned by that and by what the disks were off before, over (rA + rB) cos, which
     sends them off by as much of their change of velocity. Errors add up and grow with time, so that
-    after several hits it is generous: there the row on the first wrong hit is the one that sees.
+    after several strikes it is generous: there the row on the first wrong collision is the one that sees.
     """
     scene = scenario.scene
-    push = max((float(np.hypot(*p.force)) / scene.mass[p.disk] for p in scenario.thrusts), default=0.0)
+    fastest = max((float(np.hypot(*p.force)) / scene.mass[p.disk] for p in scenario.thrusts), default=0.0)
     if record is None:
-        return 1.001 * push * dt * t / 2
+        return 1.001 * fastest * dt * t / 2
     place, speed, before = 0.0, 0.0, 0.0
     steps = [(0.0, 0.0, 0.0)]
     for at, i, j, kick, cosine in record.events:
@@ -145,7 +147,7 @@ def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) 
         steps.append((at, place, speed))
         before = at
     known = np.array(steps)
-    # A solver may be a step late, so that what a hit adds is allowed from a step before it on.
+    # A solver may be a step late, so that what a collision adds is allowed from a step before it on.
     leg = np.searchsorted(known[:, 0] - dt, t, side="right") - 1
     return SLACK * (known[leg, 1] + known[leg, 2] * np.abs(t - known[leg, 0]))
 
@@ -197,15 +199,15 @@ MET: dict[str, tuple] = {
         [[-0.6, 0.0, 0.9, 0.0], [0.5, 0.0, -0.7, 0.0]], [0.25, 0.3], [1.0, 2.5],
     ),
     "oblique": (
-        "Where are two unequal spheres after an oblique hit?", 1.0,
+        "Where are two unequal spheres after an oblique collision?", 1.0,
         [[-0.7, 0.1, 1.1, 0.1], [0.5, -0.05, -0.5, 0.0]], [0.3, 0.25], [2.0, 0.8],
     ),
     "row": (
-        "Where are three spheres in a row after the first has hit the second, and that the third?", 1.2,
+        "Where are three spheres in a row after the first has struck the second, and that the third?", 1.2,
         [[-1.0, 0.0, 1.3, 0.0], [0.0, 0.0, 0.0, 0.0], [0.9, 0.0, 0.0, 0.0]], [0.25, 0.25, 0.25], [1.0, 1.5, 0.7],
     ),
     "crowd": (
-        "Where are five spheres after they have hit each other?", 1.0,
+        "Where are five spheres after they have collided?", 1.0,
         [[-1.1, 0.0, 1.4, 0.1], [-0.2, 0.1, 0.0, 0.0], [0.8, 0.3, -0.7, 0.0], [0.1, 1.0, 0.0, -0.8],
          [0.2, -1.1, 0.1, 0.7]],
         [0.3, 0.25, 0.2, 0.25, 0.3], [1.0, 2.0, 0.5, 1.2, 0.8],
@@ -216,12 +218,12 @@ MET: dict[str, tuple] = {
 @lru_cache(maxsize=8)
 def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
     """The scenes of a check with restitution `e`, each with its exact motion: a closed form, or many digits."""
-    pushed = Scenario(
-        name="pushed", asks="Where is a sphere that a force pushes and a torque turns for a second?", source="F = m a",
+    forced = Scenario(
+        name="forced", asks="Where is a sphere that a force forces and a torque turns for a second?", source="F = m a",
         scene=scene_of([[-1.0, 0.5, 0.6, -0.2]], [0.3], [1.4], e),
         duration=1.0, sample_interval=INTERVAL, thrusts=[Thrust(0, 0.0, 1.0, np.array([0.5, 0.9]), 0.02)],
     )  # fmt: skip
-    found: list[tuple[Scenario, TruthRecord | None]] = [(pushed, None)]
+    found: list[tuple[Scenario, TruthRecord | None]] = [(forced, None)]
     for name, (asks, duration, rows, radius, mass) in MET.items():
         scenario = Scenario(name=name, asks=asks, source="drawn for this check", scene=scene_of(rows, radius, mass, e),
                             duration=duration, sample_interval=INTERVAL)  # fmt: skip

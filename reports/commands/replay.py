@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES, OWN, read_row, row_of
 from reports.run.archive import STATE, Archive, from_trail, load_trajectory, stored_trajectory
 from reports.run.arguments import go_where_files_are
@@ -27,18 +27,18 @@ from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import legible
 from scenarios.model import Scenario, Trajectory
 
-REMEMBERED = ", the last good state (what the engine remembers beside it begins anew)"
+REMEMBERED = ", the last good state (the engine's internal state begins anew)"
 
 
-def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = ENGINES) -> NoReturn:
+def replay(name: str, out: Path, timeout: float, engines: Mapping[str, EngineRow] = ENGINES) -> NoReturn:
     """Play the cell of the run in `out` whose key begins with `name`; exits 0, 1 (it failed again) or 2."""
     try:
         archive = Archive.read(found(Path(os.path.abspath(out))))
         record = record_of(archive, name)
         scenario = played_scenario(archive.folder, record)
-        player = f"{record['engine']}:{record['profile']}"
-        go_where_files_are(archive.header, [player])
-        row = engines.get(player) or (read_row if player.endswith(OWN) else row_of)(player)
+        engine = f"{record['engine']}:{record['profile']}"
+        go_where_files_are(archive.header, [engine])
+        row = engines.get(engine) or (read_row if engine.endswith(OWN) else row_of)(engine)
         before = recorded(archive, record)
     except FolderTaken as fault:
         refuse([str(fault)])
@@ -46,9 +46,9 @@ def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = EN
         refuse([f"{gone.args[0]} was played, but is not known to this version"])
     except (OSError, ValueError) as fault:
         refuse([str(fault)])
-    cell = Cell(record["scene"], record["seed"], player, record["substeps"])
+    cell = Cell(record["scene"], record["seed"], engine, record["substeps"])
     if row.source and record["cell"] != cell.key(record["scene_hash"], row.source):
-        say(f"{player.removesuffix(OWN)} or a version has changed since: what is played is what is there now")
+        say(f"{engine.removesuffix(OWN)} or a version has changed since: what is played is what is there now")
     k = len(before) - 1 if before is not None and record["status"] != "ok" else 0
     substeps = record["substeps"]
     show(f"{record['scenario']}  {record['engine']}:{record['profile']}  dt {record['dt_s']:.4g} s")
@@ -108,7 +108,9 @@ def continued(scenario: Scenario, substeps: int, before: Trajectory | None, k: i
     )
 
 
-def again(record: dict[str, Any], row: Row, scenario: Scenario, timeout: float) -> tuple[str, str, Trajectory | None]:
+def again(
+    record: dict[str, Any], row: EngineRow, scenario: Scenario, timeout: float
+) -> tuple[str, str, Trajectory | None]:
     """Status, reason and trajectory, from a process of its own that prints where the user sees it."""
     cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", 1)
     worker = Worker(memory=0, show=True)

@@ -1,4 +1,4 @@
-"""The metrics of collisions: restitution, and which collisions a player found, missed, invented, and how late.
+"""The metrics of collisions: restitution, and which collisions an engine found, missed, spurious, and how late.
 
 Each is a row of `METRICS` (metrics.py).
 """
@@ -30,43 +30,44 @@ def restitution_error(view: View) -> Value | None:
 
 
 def collision_count_error(view: View) -> Value | None:
-    """Hits of the player less hits of the other, whenever they come; pairs at rest from the start are not counted."""
-    resting = pair_keys(view.hits[1])[view.hits[1].impulse == 0]
-    counted = (by_pair(hits, resting, view.end - SAME * view.dt) for hits in view.hits)
-    played, true = (len(hits.t) for hits in counted)
+    """Collisions of the engine less collisions of the other, whenever they come; pairs at rest from the start are not
+    counted."""
+    resting = pair_keys(view.collisions[1])[view.collisions[1].impulse == 0]
+    counted = (by_pair(collisions, resting, view.end - SAME * view.dt) for collisions in view.collisions)
+    played, true = (len(collisions.t) for collisions in counted)
     return Value(played - true, note=f"{played} of {true}")
 
 
 def collisions_missed(view: View) -> Value | None:
-    """Hits of the other, of those that a step can tell apart, that the player does not have at their time."""
-    if not view.hits[1].t.size:
+    """Collisions of the other, of those that a step can tell apart, that the engine does not have at their time."""
+    if not view.collisions[1].t.size:
         return not_judged("no collision to miss")
     return _unjudged(view) or Value(len(view.matched.missed), note=_carried(view))
 
 
-def collisions_invented(view: View) -> Value | None:
-    """Hits of the player that the other does not have at their time."""
-    return _unjudged(view) or Value(len(view.matched.invented), note=_carried(view))
+def collisions_spurious(view: View) -> Value | None:
+    """Collisions of the engine that the other does not have at their time."""
+    return _unjudged(view) or Value(len(view.matched.spurious), note=_carried(view))
 
 
 def first_wrong_collision_s(view: View) -> Value | None:
-    """When the first hit is missed or invented, and whose; `inf` if none is."""
+    """When the first collision is missed or spurious, and whose; `inf` if none is."""
     if (unjudged := _unjudged(view)) is not None:
         return unjudged
     at, what = view.matched.first_wrong or (np.nan, "none")
     return Value(np.inf if np.isnan(at) else at, at=at, note=f"{what}, {_carried(view)}")
 
 
-def hit_delay_dt(view: View) -> Value | None:
-    """Median over the hits of played time less true time, in dt; a hit is dated to the end of its step."""
+def collision_delay_dt(view: View) -> Value | None:
+    """Median over the collisions of played time less true time, in dt; a collision is dated to the end of its step."""
     delay = view.matched.delay
-    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} collisions") if len(delay) else None
 
 
-def hit_delay_max_dt(view: View) -> Value | None:
-    """Largest difference in time of any hit from the true one, in dt."""
+def collision_delay_max_dt(view: View) -> Value | None:
+    """Largest difference in time of any collision from the true one, in dt."""
     delay = view.matched.delay
-    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} collisions") if len(delay) else None
 
 
 def _read(value: float, read: Restitutions) -> Value:
@@ -85,15 +86,16 @@ def _unread_ones(read: Restitutions) -> str:
 
 
 def _carried(view: View) -> str:
-    """Of how many of the other's collisions an engine can be told that it has missed them (collisions.py: `match`)."""
-    return f"{view.matched.judged} of {len(view.hits[1])} collisions judged"
+    """Of how many of the other's collisions an engine can be reported that it has missed them (collisions.py:
+    `match`)."""
+    return f"{view.matched.judged} of {len(view.collisions[1])} collisions judged"
 
 
 def _unjudged(view: View) -> Value | None:
-    """None where enough is judged, or where the other has no collision: then every collision of a player is invented.
+    """None where enough is judged, or where the other has no collision: then every collision of an engine is spurious.
 
-    Where most collisions are too close together for a step, or lie on contacts that rest, most of what a player
+    Where most collisions are too close together for a step, or lie on contacts that rest, most of what an engine
     reports is excused: that it misses and invents nothing says nothing.
     """
-    few = view.matched.judged < LEAST_SHARE * len(view.hits[1])
+    few = view.matched.judged < LEAST_SHARE * len(view.collisions[1])
     return not_judged(f"only {_carried(view)}") if few else None

@@ -20,7 +20,7 @@ Law = TypeVar("Law", bound=Callable[..., Any])
 def once(law: Law) -> Law:
     """The law, worked out once for the same objects (or equal floats) and forgotten with the first of them.
 
-    A run is set against each other player at its dt: without this its energy would be added up some forty times.
+    A run is set against each other engine at its dt: without this its energy would be added up some forty times.
     """
     known: WeakKeyDictionary[Any, dict[tuple[float, ...], tuple[Any, Any]]] = WeakKeyDictionary()
 
@@ -140,10 +140,10 @@ def cross(u: Array, v: Array) -> Array:
 
 def deviation(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
     """(k, n) m between the positions in the samples both have; across the nearer edge where the scene wraps."""
-    return lengths(apart(a, b, scene))
+    return lengths(difference(a, b, scene))
 
 
-def apart(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
+def difference(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
     """(k, n, 2) m from b to a, as `deviation`."""
     k = min(len(a), len(b))
     return nearer_way(a.position[:k] - b.position[:k], scene)

@@ -51,26 +51,26 @@ def energy_error(view: View) -> Value | None:
 
 
 def energy_created(view: View) -> Value | None:
-    """Largest rise of the energy above an earlier sample, over the energy at hand; no hit can give any."""
+    """Largest rise of the energy above an earlier sample, over the energy at hand; no collision can give any."""
     return _largest(violations.energy_rise(view), view)
 
 
 @over_judged
-def energy_apart(view: View) -> Value | None:
+def energy_deviation(view: View) -> Value | None:
     """Root mean square distance of the energy from the truth's range within three steps, over the energy at hand.
 
     Beside an engine: difference of the energies of all disks that are away from their collisions in both (view.py).
     """
-    return Value(_rms(view.energy_apart[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0))
+    return Value(_rms(view.energy_deviation[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0))
 
 
 @over_judged
-def momentum_apart(view: View) -> Value | None:
+def momentum_deviation(view: View) -> Value | None:
     """Root mean square distance of the momentum from the truth's range within three steps, over the sum of m|v|.
 
     Beside an engine: distance of the momenta of all disks that are away from their collisions in both (view.py).
     """
-    return Value(_rms(view.momentum_apart[view.judged.any(axis=1)]) / (scales.momentum(view.scenario) or 1.0))
+    return Value(_rms(view.momentum_deviation[view.judged.any(axis=1)]) / (scales.momentum(view.scenario) or 1.0))
 
 
 @over_judged
@@ -86,7 +86,7 @@ def energy_loss_error(view: View) -> Value | None:
     last, scale = int(np.flatnonzero(view.judged.any(axis=1))[-1]), scales.energy(scenario, view.other) or 1.0
     low, high = view.energy_range
     start = laws.energy(view.played, scenario.scene)[0] - laws.energy(view.other, scenario.scene)[0]
-    excess, width = float(start - view.energy_apart[last]) / scale, (high[last] - low[last]) / scale
+    excess, width = float(start - view.energy_deviation[last]) / scale, (high[last] - low[last]) / scale
     return Value(excess, at=float(view.played.t[last]), note=f"the delay explains {width:.2g}" if width else "")
 
 
@@ -98,7 +98,7 @@ def penetration_radii(view: View) -> Value | None:
 
 
 def disks_through_walls(view: View) -> Value | None:
-    """Disks whose centre has crossed a wall: they are where no hit can bring them back from."""
+    """Disks whose centre has crossed a wall: they are where no collision can bring them back from."""
     if not len(view.scenario.scene.walls):
         return None
     through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))
@@ -107,28 +107,28 @@ def disks_through_walls(view: View) -> Value | None:
 
 def position_rms(view: View) -> Value | None:
     """Root mean square distance over disks and samples."""
-    return Value(_rms(view.apart))
+    return Value(_rms(view.deviation))
 
 
 def position_rms_radii(view: View) -> Value | None:
     """Root mean square distance over disks and samples, each in radii of its disk."""
-    return Value(_rms(view.apart / view.scenario.scene.radius))
+    return Value(_rms(view.deviation / view.scenario.scene.radius))
 
 
 def position_max(view: View) -> Value | None:
     """Largest distance of any disk in any sample."""
-    return _largest_of_disks(view.apart, view)
+    return _largest_of_disks(view.deviation, view)
 
 
 def position_max_radii(view: View) -> Value | None:
     """Largest distance of any disk in any sample, in radii of that disk; over an edge of the wrap if that is nearer."""
-    return _largest_of_disks(view.apart / view.scenario.scene.radius, view)
+    return _largest_of_disks(view.deviation / view.scenario.scene.radius, view)
 
 
 @over_judged
 def velocity_rms(view: View) -> Value | None:
     """Root mean square over disks and samples of what `velocity_max` is the largest of."""
-    return Value(_rms(view.velocity_apart[view.judged]))
+    return Value(_rms(view.velocity_deviation[view.judged]))
 
 
 @over_judged
@@ -137,7 +137,7 @@ def velocity_max(view: View) -> Value | None:
 
     Beside an engine: from the other's, where the disk has no collision within three steps in either (view.py).
     """
-    return _largest_of_disks(np.where(view.judged, view.velocity_apart, 0.0), view)
+    return _largest_of_disks(np.where(view.judged, view.velocity_deviation, 0.0), view)
 
 
 @over_judged
@@ -148,17 +148,17 @@ def angular_velocity_max(view: View) -> Value | None:
 
 def angle_rms(view: View) -> Value | None:
     """Root mean square difference of angle over disks and samples."""
-    return Value(_rms(view.angle_apart))
+    return Value(_rms(view.angle_deviation))
 
 
 def angle_max(view: View) -> Value | None:
     """Largest difference of angle of any disk in any sample."""
-    return _largest_of_disks(view.angle_apart, view)
+    return _largest_of_disks(view.angle_deviation, view)
 
 
 def time_to_1pct_s(view: View) -> Value | None:
     """First sample at which some disk is off by more than 1 % of its radius; `inf` if none ever is."""
-    off = view.apart / view.scenario.scene.radius > 0.01
+    off = view.deviation / view.scenario.scene.radius > 0.01
     if not off.any():
         return Value(np.inf, note=f"never within {view.played.t[-1]:g} s")
     k = int(np.argmax(off.any(axis=1)))
@@ -218,20 +218,20 @@ METRICS: dict[str, Metric] = {
     "angle_rms": Metric(angle_rms, "rad", (TRUTH, ENGINE)),
     "time_to_1pct_s": Metric(time_to_1pct_s, "s", (TRUTH, ENGINE), "higher"),
     "momentum_error": Metric(momentum_error, "1", (ITSELF,)),
-    "momentum_apart": Metric(momentum_apart, "1", (TRUTH, ENGINE)),
+    "momentum_deviation": Metric(momentum_deviation, "1", (TRUTH, ENGINE)),
     "angular_momentum_error": Metric(angular_momentum_error, "1", (ITSELF,)),
     "energy_error": Metric(energy_error, "1", (ITSELF, TRUTH)),
-    "energy_apart": Metric(energy_apart, "1", (TRUTH, ENGINE)),
+    "energy_deviation": Metric(energy_deviation, "1", (TRUTH, ENGINE)),
     "energy_created": Metric(energy_created, "1", (ITSELF,)),
     "energy_loss_error": Metric(energy_loss_error, "1", (TRUTH,), "zero"),
     "restitution": Metric(collisions.restitution, "1", (ITSELF,), "as stated"),
     "restitution_error": Metric(collisions.restitution_error, "1", (ITSELF,)),
     "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,)),
     "disks_through_walls": Metric(disks_through_walls, "disks", (ITSELF,)),
-    "collision_count_error": Metric(collisions.collision_count_error, "hits", (TRUTH, ENGINE), "zero"),
-    "collisions_missed": Metric(collisions.collisions_missed, "hits", (TRUTH, ENGINE)),
-    "collisions_invented": Metric(collisions.collisions_invented, "hits", (TRUTH, ENGINE)),
+    "collision_count_error": Metric(collisions.collision_count_error, "collisions", (TRUTH, ENGINE), "zero"),
+    "collisions_missed": Metric(collisions.collisions_missed, "collisions", (TRUTH, ENGINE)),
+    "collisions_spurious": Metric(collisions.collisions_spurious, "collisions", (TRUTH, ENGINE)),
     "first_wrong_collision_s": Metric(collisions.first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"),
-    "hit_delay_dt": Metric(collisions.hit_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
-    "hit_delay_max_dt": Metric(collisions.hit_delay_max_dt, "dt", (TRUTH, ENGINE)),
+    "collision_delay_dt": Metric(collisions.collision_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
+    "collision_delay_max_dt": Metric(collisions.collision_delay_max_dt, "dt", (TRUTH, ENGINE)),
 }

@@ -26,7 +26,7 @@ class Restitutions(NamedTuple):
     unfinished: int
 
 
-CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold hit far more
+CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold collision far more
 FLOOR = 100  # times the rounding of the velocities that a change must have: e is then read to a hundredth or so
 
 
@@ -36,12 +36,12 @@ def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, 
     One can be read if neither disk has another in the same sample interval or the next, and none of them
     changes its spin (friction): then the change of velocity points along the normal n, and e = -(dv'.n) / (dv.n).
     Two disks must also change their momenta by as much, and a disk at a wall along the wall's normal: else
-    something was hit of which the player did not tell. Those closing slower than `slowest` m/s are left out.
+    something was struck of which the engine did not tell. Those closing slower than `slowest` m/s are left out.
 
     An engine with soft contacts takes several steps for a collision: it is read at the first sample at which the two
     no longer approach. Two that a law leaves approaching pass through each other, and then move apart, so that such a
     law is read too: with e < 0, as they still have some of the velocity they came with. A collision is counted as
-    unfinished if it is never over, not before another of either disk, or so late that gravity tells: those that take
+    unfinished if it is never over, not before another of either disk, or so late that gravity reports: those that take
     m sample intervals must close m times as fast.
 
     Those that change the velocities by no more than `FLOOR` times their rounding, which is relative, are below the
@@ -50,7 +50,7 @@ def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, 
     that slides along a wall whenever it comes nearer at any speed at all.
     """
     t, spin, collisions = trajectory.t, trajectory.angular_velocity, on_faces(trajectory, scene)
-    # A hit at the instant of a sample, at the end of its step, belongs to the interval that ends there.
+    # A collision at the instant of a sample, at the end of its step, belongs to the interval that ends there.
     before = np.searchsorted(t, collisions.t - SAME * interval(trajectory), side="left") - 1
     busy: dict[tuple[int, int], int] = {}
     for k, i, j in zip(before, collisions.i, collisions.j):

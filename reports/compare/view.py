@@ -44,11 +44,11 @@ class View:
 
     Attributes:
         scenario: what was played.
-        dt: s, of the player.
-        played: the player's trajectory, cut to the samples the other has.
+        dt: s, of the engine.
+        played: the engine's trajectory, cut to the samples the other has.
         other: the truth, another engine's trajectory, or None: only the laws of physics.
         jumps: of `other` (delays.py) if it is the truth; None for an engine.
-        rounding: the relative rounding of the numbers that the player keeps.
+        rounding: the relative rounding of the numbers that the engine keeps.
     """
 
     scenario: Scenario
@@ -59,7 +59,7 @@ class View:
     rounding: float = FLOAT64
 
     @cached_property
-    def apart(self) -> Array:
+    def deviation(self) -> Array:
         """(k, n) m between the two."""
         assert self.other is not None
         return laws.deviation(self.played, self.other, self.scenario.scene)
@@ -96,7 +96,7 @@ class View:
         return f"{self.judged.sum()} of {samples * (~self.scenario.scene.static).sum()} samples of a disk"
 
     @cached_property
-    def velocity_apart(self) -> Array:
+    def velocity_deviation(self) -> Array:
         """(k, n) m/s between the two, of the truth within the detection delay; nan where it is not judged."""
         assert self.other is not None
         expected = self.other.velocity
@@ -105,13 +105,13 @@ class View:
         return np.where(self.judged, laws.lengths(self.played.velocity - expected), np.nan)
 
     @cached_property
-    def angular_velocity_apart(self) -> Array:
+    def angular_velocity_difference(self) -> Array:
         """(k, n) rad/s between the two; no collision changes a spin, so that none is late or early."""
         assert self.other is not None
         return np.abs(self.played.angular_velocity - self.other.angular_velocity)
 
     @cached_property
-    def momentum_apart(self) -> Array:
+    def momentum_deviation(self) -> Array:
         """(k,) kg m/s between the momenta of the two, of the truth within the detection delay; nan if not judged.
 
         Beside an engine only those of the disks that are judged are added up.
@@ -131,8 +131,8 @@ class View:
         return energy_range(self.played, self.other, self.jumps, self.dt, self.scenario.scene)
 
     @cached_property
-    def energy_apart(self) -> Array:
-        """(k,) J that the player has more than the other, as `momentum_apart`."""
+    def energy_deviation(self) -> Array:
+        """(k,) J that the engine has more than the other, as `momentum_deviation`."""
         assert self.other is not None
         if self.jumps is not None:
             energy, (low, high) = laws.energy(self.played, self.scenario.scene), self.energy_range
@@ -146,25 +146,25 @@ class View:
         return np.where(judged.any(axis=1), np.where(judged, apart, 0.0).sum(axis=1), np.nan)
 
     @cached_property
-    def angle_apart(self) -> Array:
+    def angle_deviation(self) -> Array:
         """(k, n) rad between the two."""
         assert self.other is not None
         return np.abs(self.played.angle - self.other.angle)
 
     @cached_property
-    def calm(self) -> np.ndarray:
-        """(k,) False at samples within `WINDOW` dt of a hit of the other; sample 0 always counts.
+    def collision_free_samples(self) -> np.ndarray:
+        """(k,) False at samples within `WINDOW` dt of a collision of the other; sample 0 always counts.
 
         For the error budget, which takes runs from each other: no metric, as in a crowd nothing but the start is left.
         """
-        calm = np.ones(len(self.played), bool)
-        if self.other is not None and len(hits := self.other.collisions.t):
-            nearest = np.searchsorted(hits, self.played.t)
-            before = self.played.t - hits[np.maximum(nearest - 1, 0)]
-            after = hits[np.minimum(nearest, len(hits) - 1)] - self.played.t
-            calm = np.minimum(np.abs(before), np.abs(after)) > WINDOW * self.dt
-            calm[0] = True
-        return calm
+        free = np.ones(len(self.played), bool)
+        if self.other is not None and len(collisions := self.other.collisions.t):
+            nearest = np.searchsorted(collisions, self.played.t)
+            before = self.played.t - collisions[np.maximum(nearest - 1, 0)]
+            after = collisions[np.minimum(nearest, len(collisions) - 1)] - self.played.t
+            free = np.minimum(np.abs(before), np.abs(after)) > WINDOW * self.dt
+            free[0] = True
+        return free
 
     @cached_property
     def restitutions(self) -> Restitutions:
@@ -179,8 +179,8 @@ class View:
         return effective_restitution(self.played, scene, slowest, self.rounding)
 
     @cached_property
-    def hits(self) -> tuple[Collisions, Collisions]:
-        """Of the player and of the other, by what a disk can tell apart (faces.py)."""
+    def collisions(self) -> tuple[Collisions, Collisions]:
+        """Of the engine and of the other, by what a disk can tell apart (faces.py)."""
         assert self.other is not None
         return on_faces(self.played, self.scenario.scene), on_faces(self.other, self.scenario.scene)
 
@@ -192,5 +192,5 @@ class View:
 
     @cached_property
     def matched(self) -> Matched:
-        """The hits of the two."""
-        return match(*self.hits, self.end, self.dt)
+        """The collisions of the two."""
+        return match(*self.collisions, self.end, self.dt)

@@ -17,7 +17,7 @@ def momentum(view: View) -> Array | None:
     """|P(t) - P(0) - impulse from outside| over the sum of m|v| at hand (scales.py).
 
     From outside come weight and world-frame thrust. Where walls, static disks or a turning thrust act, nobody
-    knows the impulse without asking the player.
+    knows the impulse without asking the engine.
     """
     if view.other is not None or not knows_impulses(view.scenario):
         return None
@@ -33,7 +33,7 @@ def angular_momentum(view: View) -> Array | None:
     """|L(t) - L(0) - angular impulse from outside| over the sum of m|x||v| + I|w| at hand, about the centre of mass.
 
     About that of the start, so that it does not matter where the origin is. The weight of the whole, at the centre of
-    mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts where its disk is, which only the player knows,
+    mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts where its disk is, which only the engine knows,
     and a wrap moves disks: there the law says nothing.
     """
     scene, played = view.scenario.scene, view.played
@@ -59,11 +59,11 @@ def energy(view: View) -> Array | None:
     if view.other is None:
         actual = laws.energy(view.played, scenario.scene)
         return np.abs(actual - actual[0]) / (scales.energy(scenario) or 1.0)
-    return np.abs(view.energy_apart) / (scales.energy(scenario, view.other) or 1.0)
+    return np.abs(view.energy_deviation) / (scales.energy(scenario, view.other) or 1.0)
 
 
 def energy_rise(view: View) -> Array | None:
-    """E(t) less the smallest E before t, over the energy at hand: no hit can give any, only thrust can."""
+    """E(t) less the smallest E before t, over the energy at hand: no collision can give any, only thrust can."""
     if view.scenario.thrusts or lifts(view.scenario):
         return None
     actual = laws.energy(view.played, view.scenario.scene)
@@ -82,7 +82,7 @@ def knows_impulses(scenario: Scenario) -> bool:
 
 
 def keeps_energy(scenario: Scenario) -> bool:
-    """Whether no hit takes energy and no thrust brings any."""
+    """Whether no collision takes energy and no thrust brings any."""
     return scenario.scene.restitution == 1 and not scenario.thrusts
 
 

@@ -8,7 +8,7 @@ from contextlib import closing
 from math import inf
 from pathlib import Path
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES, OWN
 from adapters.own_solver.engine import engine_file
 from adapters.own_solver.file import KINDS
@@ -32,12 +32,12 @@ def game_of(flight: Path | None, engines: Sequence[str]) -> Game:
     if len(chosen) > MOST_ENGINES:
         refuse([f"--engine: {len(chosen)} engines; at most {MOST_ENGINES} fly at once: name fewer"])
     file = read_flight(flight) if flight else None
-    # A solver's file is a row like any other while it flies; one that cannot fly at all is told before.
+    # A solver's file is a row like any other while it flies; one that cannot fly at all is reported before.
     ENGINES.update(own_rows([name for name in chosen if name.endswith(OWN)]))
     return Game(chosen, file)
 
 
-def own_rows(names: Sequence[str]) -> dict[str, Row]:
+def own_rows(names: Sequence[str]) -> dict[str, EngineRow]:
     """The rows of solvers' files, `PATH:own`, each tried on a lone ship; exits 2 with a line for each that fails."""
     rows, faults = {}, []
     for name in names:
@@ -50,7 +50,7 @@ def own_rows(names: Sequence[str]) -> dict[str, Row]:
     return rows
 
 
-def grounded(row: Row) -> str:
+def grounded(row: EngineRow) -> str:
     """Why an engine cannot take a lone ship through a step; "" if it can."""
     with closing(row.make()) as engine:
         try:

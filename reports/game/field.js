@@ -119,16 +119,16 @@ class Field {
     return { outline, craters, colour: `rgb(${grey + 10} ${grey} ${grey - 10})`, dark: `rgb(${grey - 34} ${grey - 42} ${grey - 50})` };
   }
 
-  // `flyers`: [{name, at: [[x, y, angle], ...], gone}], the solid one first named by `solid`; `mark`: where one parted.
-  draw(flyers, solid, push, marks) {
-    this.last = [flyers, solid, push, marks];
+  // `flyers`: [{name, at: [[x, y, angle], ...], gone}], the solid one first named by `solid`; `mark`: where one diverged.
+  draw(flyers, solid, force, marks) {
+    this.last = [flyers, solid, force, marks];
     const pen = this.canvas.getContext("2d");
     pen.setTransform(1, 0, 0, 1, 0, 0);
     pen.drawImage(this.sky, 0, 0);
     pen.setTransform(this.size[2], 0, 0, this.size[2], 0, 0);
     const leader = flyers[solid];
     leader.at.forEach(([x, y, angle], disk) => disk !== SHIP && this.drawRock(pen, disk, x, y, angle));
-    this.drawShip(pen, ...leader.at[SHIP], push);
+    this.drawShip(pen, ...leader.at[SHIP], force);
     flyers.forEach((flyer, k) => k !== solid && !flyer.gone && this.drawGhost(pen, flyer, leader));
     marks.forEach((mark) => this.drawMark(pen, mark));
   }
@@ -187,7 +187,7 @@ class Field {
     });
   }
 
-  // Faint where it is still with the solid one, so that what has parted stands out.
+  // Faint where it is still with the solid one, so that what has diverged stands out.
   drawGhost(pen, flyer, leader) {
     const look = looks[flyer.name];
     pen.strokeStyle = look.dark;  // the sky is dark on any page

@@ -1,4 +1,4 @@
-"""One flight of the exercise's game: the same pushes through several engines, frame by frame; no server in here."""
+"""One flight of the exercise's game: the same thrusts through several engines, frame by frame; no server in here."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from adapters.engine import Engine
 from adapters.engines import ENGINES
-from adapters.play import RUNAWAY, advance, fault_of, first_hits, reach, weight_impulse
-from reports.game.parting import Parting, Touches, parting
+from adapters.play import RUNAWAY, advance, fault_of, first_collisions, reach, weight_impulse
+from reports.game.divergence import Divergence, Touches, divergence
 from reports.game.pilot import SHIP, Pilot
 from scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
 from scenarios.model import Array, Scenario, State
@@ -20,7 +20,7 @@ FRAME = 1 / 64  # s; a power of two, so that every instant of a saved flight is 
 SUBSTEPS = (2, 4, 8, 16, 32)  # steps in a frame; 16 is the nearest to the exercise's 0.001 s
 LONGEST = 600.0  # s, of a flight
 EARTH, EARTH_SIZE = (3.5, 1.5), 0.5
-CALM, SLOW_SPIN = 0.1, 0.1  # squared speed and angular velocity below which the exercise says "You won"
+SLOW, SLOW_SPIN = 0.1, 0.1  # squared speed and angular velocity below which the exercise says "You won"
 
 
 def field_scenario(seed: int = 0, asteroids: int = 20, restitution: float = 0.9, substeps: int = 16) -> Scenario:
@@ -45,12 +45,12 @@ class Flyer:
         name: `engine:profile`.
         state: at the end of the last frame.
         left: why it flies no more, or "".
-        touches: the latest hit of every disk.
+        touches: the latest collision of every disk.
         set_backs: how often its ship was set back to the start.
-        seen: how many of its hits since then are in `touches`.
+        seen: how many of its collisions since then are in `touches`.
         earlier: how many collisions there were before.
         collisions: how many there were since.
-        parting: where it parted from the solid one.
+        divergence: where it diverged from the solid one.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Flyer:
     seen: int = 0
     earlier: int = 0
     collisions: int = 0
-    parting: Parting | None = None
+    divergence: Divergence | None = None
 
 
 class Flight:
@@ -116,20 +116,20 @@ class Flight:
         for _ in range(count):
             if self.over:
                 return
-            pushed = self.scenario if self.replayed else replace(self.scenario, thrusts=self.pilot.now)
+            steered = self.scenario if self.replayed else replace(self.scenario, thrusts=self.pilot.now)
             for flyer in self.flyers:
                 if not flyer.left:
-                    self.fly(flyer, pushed)
+                    self.fly(flyer, steered)
             self.frame += 1
             self.compare()
 
-    def fly(self, flyer: Flyer, pushed: Scenario) -> None:
+    def fly(self, flyer: Flyer, steered: Scenario) -> None:
         """One frame of one engine, by the same steps as `play` makes them, looked at once or, near an edge, at each."""
         stride = 1 if self.may_leave(flyer.state) else self.substeps
         first = self.frame * self.substeps
         for step in range(first, first + self.substeps, stride):
             if not flyer.left:
-                self.fly_on(flyer, pushed, step, stride)
+                self.fly_on(flyer, steered, step, stride)
 
     def may_leave(self, state: State) -> bool:
         """Whether the ship is so near an edge that a frame may carry it beyond."""
@@ -139,23 +139,23 @@ class Flight:
         room = self.scenario.scene.radius[SHIP] + 2 * np.abs(state.velocity[SHIP]) * self.scenario.sample_interval
         return bool(((state.position[SHIP] < low + room) | (state.position[SHIP] > high - room)).any())
 
-    def fly_on(self, flyer: Flyer, pushed: Scenario, step: int, count: int) -> None:
+    def fly_on(self, flyer: Flyer, steered: Scenario, step: int, count: int) -> None:
         """`count` steps of one engine from step number `step` on; what it raises or does wrong makes it leave."""
         before = flyer.state
         try:
-            advance(flyer.engine, pushed, step, count, self.dt)
+            advance(flyer.engine, steered, step, count, self.dt)
             flyer.state = flyer.engine.read()
-            hits = flyer.engine.hits()
+            collisions = flyer.engine.collisions()
         except Exception as error:  # a refusal, or whatever an engine raises
             flyer.left = str(error) or type(error).__name__
             return
         if fault := fault_of(flyer.state, self.farthest):
             flyer.state, flyer.left = before, fault
             return
-        if len(hits) > flyer.seen:
-            flyer.touches.note(hits[flyer.seen :], self.frame, flyer.state)
-            flyer.seen = len(hits)
-            flyer.collisions = len(first_hits(hits, self.dt, weight_impulse(self.scenario.scene, self.dt)))
+        if len(collisions) > flyer.seen:
+            flyer.touches.note(collisions[flyer.seen :], self.frame, flyer.state)
+            flyer.seen = len(collisions)
+            flyer.collisions = len(first_collisions(collisions, self.dt, weight_impulse(self.scenario.scene, self.dt)))
         if self.ship_left(before, flyer.state):
             self.set_back(flyer)
 
@@ -183,10 +183,10 @@ class Flight:
         """Note who parts from the solid one at the end of this frame, and whether the game is won."""
         solid = self.solid
         for ghost in self.flyers:
-            watched = not (ghost is solid or ghost.left or ghost.parting or solid.set_backs or ghost.set_backs)
+            watched = not (ghost is solid or ghost.left or ghost.divergence or solid.set_backs or ghost.set_backs)
             if watched:
                 velocities = solid.state.velocity, ghost.state.velocity
-                ghost.parting = parting(solid.touches, ghost.touches, *velocities, self.frame)
+                ghost.divergence = divergence(solid.touches, ghost.touches, *velocities, self.frame)
         if self.won and self.won_at < 0:
             self.won_at = self.frame
 
@@ -195,11 +195,12 @@ class Flight:
         """The exercise's rule as written: a squared distance below a size, no absolute value of the spin."""
         ship = self.solid.state
         apart, speed = ship.position[SHIP] - np.array(EARTH), ship.velocity[SHIP]
-        near = float(apart @ apart) < EARTH_SIZE and float(speed @ speed) < CALM
+        near = float(apart @ apart) < EARTH_SIZE and float(speed @ speed) < SLOW
         return self.is_game and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
 
     def measures(self, flyer: Flyer) -> dict[str, Any]:
-        """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid one's m, hits."""
+        """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid one's m,
+        collisions."""
         scene, state = self.scenario.scene, flyer.state
         apart = self.distances(self.solid.state.position, state.position)
         moving = ~scene.static
@@ -208,9 +209,9 @@ class Flight:
         return {
             "momentum": (mass @ state.velocity[moving]).tolist(),
             "energy": float(mass @ speed2 + inertia @ state.angular_velocity[moving] ** 2) / 2,
-            "ship_apart": float(apart[SHIP]),
-            "apart": float(apart.max()),
-            "hits": flyer.earlier + flyer.collisions,
+            "ship_deviation": float(apart[SHIP]),
+            "deviation": float(apart.max()),
+            "collisions": flyer.earlier + flyer.collisions,
         }
 
     def distances(self, here: Array, there: Array) -> Array:

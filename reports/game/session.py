@@ -74,13 +74,13 @@ class Session:
         ship = flight.solid.state
         return {
             "kind": "frame", "frame": flight.frame, "t": flight.frame * flight.scenario.sample_interval,
-            "solid": flight.flyers.index(flight.solid), "flyers": [self.told(flyer) for flyer in flight.flyers],
+            "solid": flight.flyers.index(flight.solid), "flyers": [self.to_json(flyer) for flyer in flight.flyers],
             "ship": [*ship.position[SHIP].tolist(), *ship.velocity[SHIP].tolist(),
                      float(ship.angle[SHIP]), float(ship.angular_velocity[SHIP])],
-            "push": self.push(), "won": flight.won, "over": flight.over, "left_at": flight.left_at,
+            "force": self.force(), "won": flight.won, "over": flight.over, "left_at": flight.left_at,
         }  # fmt: skip
 
-    def push(self) -> list[float]:
+    def force(self) -> list[float]:
         """What drives the ship: force N in the world frame, torque N m."""
         flight = self.flight
         time = flight.frame * flight.scenario.sample_interval
@@ -91,18 +91,18 @@ class Session:
         force = sum(forces, np.zeros(2))
         return [*force.tolist(), float(sum(thrust.torque for thrust in on))]
 
-    def told(self, flyer: Flyer) -> dict[str, Any]:
-        """One engine's disks, its measures, and where it parted or why it left."""
-        parted = None
-        if flyer.parting is not None:
-            hit = flyer.parting.hit
-            parted = hit._asdict() | {
-                "t": (hit.frame + 1) * self.flight.scenario.sample_interval,
-                "shared": flyer.parting.shared, "solid_only": flyer.parting.solid_only,
+    def to_json(self, flyer: Flyer) -> dict[str, Any]:
+        """One engine's disks, its measures, and where it diverged or why it left."""
+        diverged = None
+        if flyer.divergence is not None:
+            collision = flyer.divergence.collision
+            diverged = collision._asdict() | {
+                "t": (collision.frame + 1) * self.flight.scenario.sample_interval,
+                "shared": flyer.divergence.shared, "solid_only": flyer.divergence.solid_only,
             }  # fmt: skip
         return self.flight.measures(flyer) | {
             "x": rounded(flyer.state.position.ravel()), "angle": rounded(flyer.state.angle),
-            "left": flyer.left, "parted": parted, "set_backs": flyer.set_backs,
+            "left": flyer.left, "diverged": diverged, "set_backs": flyer.set_backs,
         }  # fmt: skip
 
     def close(self) -> None:

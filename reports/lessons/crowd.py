@@ -9,7 +9,7 @@ import numpy as np
 from adapters.engines import ENGINES
 from adapters.play import play_once
 from adapters.reference import every_pair
-from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider
+from reports.lessons.lesson import Curve, Lesson, LessonChart, Settings, Shown, Simulation, Slider
 from reports.page.style import TRUTH, number
 from scenarios.families.exercise import asteroid_field
 from scenarios.families.placing import box, lay_out, scatter
@@ -55,9 +55,9 @@ def show_cost(settings: Settings) -> Shown:
         x, y = np.log(sizes[-3:]), np.log(np.asarray(curve.y)[-3:])
         facts.append((f"{curve.name}: cost grows as number to the power", number(float(np.polyfit(x, y, 1)[0]), 2)))
     largest = scenes[-1] if last > MOST_DISKS else with_oracle(scenes[-1])
-    film = Played.by(largest, ("reference:exercise", "event_driven:float64"), SUBSTEPS).film
+    film = Simulation.by(largest, ("reference:exercise", "event_driven:float64"), SUBSTEPS).film
     pace = {"pace": largest.duration / SECONDS}
-    return Shown([Chart("Cost of a step", "disks", "µs a step", curves, "xy")], film, facts, opening=pace)
+    return Shown([LessonChart("Cost of a step", "disks", "µs a step", curves, "xy")], film, facts, opening=pace)
 
 
 COST = Lesson(
@@ -68,7 +68,7 @@ COST = Lesson(
         "step: ten times the disks, a hundred times the work. Whoever sorts the disks into cells or a tree first asks "
         "only neighbours: the cost grows about as the number does. <code>reference:exercise</code> does so where "
         "there are many, and gives the same bits as with every pair. For few disks a step is mostly the call itself.",
-        "The event-driven player has no steps to take: it uses cells, too, and its time goes with the number of hits. "
+        "The event-driven engine has no steps to take: it uses cells, too, and its time goes with the number of collisions. "
         "Times are the least of five runs on this machine and as noisy as it is busy.",
     ),
     sliders=(
@@ -84,13 +84,13 @@ COST = Lesson(
 def field(seed: int, restitution: float) -> Scenario:
     """The exercise's asteroids for 20 s."""
     scene = asteroid_field(seed, 20, restitution)
-    return with_oracle(Scenario("field", "How long can it be followed?", "", scene, 20.0, 1 / 32))
+    return with_oracle(Scenario("field", "How long is it comparable?", "", scene, 20.0, 1 / 32))
 
 
 def show_horizon(settings: Settings) -> Shown:
     """The distance from the exact answer as long as there is one, and the energy, which stays comparable."""
     scenario = field(settings["seed"], settings["e"])
-    shown = Played.by(scenario, HORIZON_NAMES, settings["k"])
+    shown = Simulation.by(scenario, HORIZON_NAMES, settings["k"])
     scene = scenario.scene
 
     def energy(each: Trajectory) -> np.ndarray:
@@ -98,43 +98,43 @@ def show_horizon(settings: Settings) -> Shown:
             (scene.mass * (scene.velocity**2).sum(axis=1)).sum() / 2
         )
 
-    charts = [Chart("Energy of motion, of what it was", "time in s", "", shown.curves(energy))]
-    facts = [("hits of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
+    charts = [LessonChart("Energy of motion, of what it was", "time in s", "", shown.curves(energy))]
+    facts = [("collisions of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
     if shown.truth is not None:
         errors = shown.errors()
-        charts.insert(0, Chart("Farthest disk from the exact answer", "time in s", "m", errors, "y"))
+        charts.insert(0, LessonChart("Farthest disk from the exact answer", "time in s", "m", errors, "y"))
         facts += [
-            ("the exact answer is followed until", f"{number(float(shown.truth.t[-1]))} s"),
+            ("the exact answer ends at its horizon", f"{number(float(shown.truth.t[-1]))} s"),
             *growth(shown, errors),
         ]
     return Shown(charts, shown.film, facts)
 
 
-def growth(shown: Played, errors: list[Curve]) -> list[tuple[str, str]]:
-    """By what factor a hit makes a distance grow, fitted to the player whose errors begin at rounding."""
+def growth(shown: Simulation, errors: list[Curve]) -> list[tuple[str, str]]:
+    """By what factor a collision makes a distance grow, fitted to the engine whose errors begin at rounding."""
     assert shown.truth is not None
     found = next((curve for curve in errors if curve.name == "event_driven:float64"), None)
     if found is None:
         return []
     t, y = np.asarray(found.x), np.asarray(found.y)
     used = (y > 1e-15) & (y < 1e-2)
-    hits = np.searchsorted(shown.truth.collisions.t, t[used])
-    if used.sum() < 10 or np.ptp(hits) < 5:
+    collisions = np.searchsorted(shown.truth.collisions.t, t[used])
+    if used.sum() < 10 or np.ptp(collisions) < 5:
         return []
-    slope = float(np.polyfit(hits, np.log(y[used]), 1)[0])
-    return [("a hit makes a distance grow, on average, by a factor of", number(float(np.exp(slope))))]
+    slope = float(np.polyfit(collisions, np.log(y[used]), 1)[0])
+    return [("a collision makes a distance grow, on average, by a factor of", number(float(np.exp(slope))))]
 
 
 HORIZON = Lesson(
     name="horizon", number="7", title="Why trajectories stop being comparable",
     asks="How long do two right solvers agree?",
     text=(
-        "Two disks that meet a hair further to the side fly off in another direction: every hit multiplies a small "
+        "Two disks that meet a hair further to the side fly off in another direction: every collision multiplies a small "
         "distance by some factor, so that it grows exponentially and reaches the size of a disk, however small "
         "it was. A "
-        "rounding of 10⁻¹⁶ lasts some ten seconds here; a step that finds its hits late begins a dozen decades higher.",
+        "rounding of 10⁻¹⁶ lasts some ten seconds here; a step that finds its collisions late begins a dozen decades higher.",
         "After this horizon no trajectory is right or wrong by its places. What stays comparable are momentum, energy, "
-        "the number of hits, and whatever else does not care which disk is where.",
+        "the number of collisions, and whatever else does not care which disk is where.",
     ),
     sliders=(
         Slider("seed", "Seed of the field", (0, 1, 2), 0), Slider("e", "Restitution", (0.9, 1.0), 0),

@@ -42,7 +42,7 @@ class Slider:
 
 @dataclass(frozen=True)
 class Curve:
-    """name: whose (a player, `truth`, or `reference:switched` for the reference with a mechanism on); x, y: (k,).
+    """name: whose (an engine, `truth`, or `reference:ablated` for the reference with a mechanism on); x, y: (k,).
 
     dots: whether its points are marked; faint: whether it stands back behind the others.
     """
@@ -53,7 +53,7 @@ class Curve:
     dots: bool = False
     faint: bool = False
 
-    def told(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """For JSON: thinned out and rounded to what can be seen; what is not finite is left out."""
         x, y = np.asarray(self.x, float), np.asarray(self.y, float)
         kept = np.linspace(0, len(x) - 1, min(POINTS, len(x))).round().astype(int)
@@ -62,7 +62,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Chart:
+class LessonChart:
     """Curves over one pair of axes.
 
     Attributes:
@@ -80,11 +80,11 @@ class Chart:
     guides: Sequence[tuple[str, float, str]] = ()
     reverse: bool = False
 
-    def told(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "title": self.title, "x": self.x, "y": self.y, "log": self.log, "guides": list(self.guides),
-            "reverse": self.reverse, "curves": [curve.told() for curve in self.curves],
+            "reverse": self.reverse, "curves": [curve.to_json() for curve in self.curves],
         }  # fmt: skip
 
 
@@ -101,14 +101,14 @@ class Shown:
         said: slider -> what it means here, where that depends on the others.
     """
 
-    charts: Sequence[Chart]
+    charts: Sequence[LessonChart]
     film: Comparison | None = None
     facts: Sequence[tuple[str, str]] = ()
     steps: Sequence[tuple[str, str]] = ()
     opening: Mapping[str, Any] = field(default_factory=dict)
     said: Mapping[str, str] = field(default_factory=dict)
 
-    def told(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """For JSON."""
         film = None
         if self.film is not None:
@@ -116,7 +116,7 @@ class Shown:
             pack = pack_layers(self.film.scenario, layers, more=self.opening)
             film = {"pack": pack, "ratio": ratio_of(self.film.scenario, layers)}
         return {
-            "charts": [chart.told() for chart in self.charts], "film": film,
+            "charts": [chart.to_json() for chart in self.charts], "film": film,
             "facts": list(self.facts), "steps": list(self.steps), "said": dict(self.said),
         }  # fmt: skip
 
@@ -169,7 +169,7 @@ class Lesson:
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class Simulation:
     """A scenario played by some engines in one step size, and its truth where it has one."""
 
     scenario: Scenario
@@ -177,14 +177,14 @@ class Played:
     truth: Trajectory | None
 
     @staticmethod
-    def by(scenario: Scenario, names: Sequence[str], substeps: int) -> Played:
+    def by(scenario: Scenario, names: Sequence[str], substeps: int) -> Simulation:
         """Play it; the ladder of the scenario that is kept has this step only."""
         scenario, truth = answered(replace(scenario, substeps=(substeps,)))
-        return Played(scenario, [run_of(name, scenario, substeps) for name in names], truth)
+        return Simulation(scenario, [run_of(name, scenario, substeps) for name in names], truth)
 
     @cached_property
     def film(self) -> Comparison:
-        """For the player of the page."""
+        """For the engine of the page."""
         return Comparison(self.scenario, self.truth, self.runs, pd.DataFrame())
 
     def curves(self, read: Callable[[Trajectory], Array]) -> list[Curve]:

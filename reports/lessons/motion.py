@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from adapters.engines import ENGINES
-from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, run_of
+from reports.lessons.lesson import Curve, Lesson, LessonChart, Settings, Shown, Simulation, Slider, run_of
 from reports.page.style import TRUTH, number
 from scenarios.families.exercise import ship_thrust
 from scenarios.families.lesson import falling_box, ping_pong
 from scenarios.model import Scenario, Thrust, Trajectory
-from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.closed_forms import world_thrusts
 from scenarios.truth.exact import with_oracle
 
 LADDER = (1, 2, 4, 8, 16, 32)
@@ -29,17 +29,17 @@ def show_particle(settings: Settings) -> Shown:
     """Height over time, and the error against the step."""
     names = ("reference:lesson", "reference:exercise")
     scenario = bouncing(settings["gravity"])
-    shown = Played.by(scenario, names, settings["k"])
+    shown = Simulation.by(scenario, names, settings["k"])
     steps = np.array([scenario.dt(k) for k in LADDER])
     errors = []
     for name in names:
-        runs = [Played(scenario, [run_of(name, scenario, k)], shown.truth) for k in LADDER]
+        runs = [Simulation(scenario, [run_of(name, scenario, k)], shown.truth) for k in LADDER]
         errors.append(Curve(name, steps, [run.errors()[0].y.max() for run in runs], dots=True))  # type: ignore[union-attr]
     now = [(f"{curve.name}, largest error", f"{number(curve.y.max())} m") for curve in shown.errors()]  # type: ignore[union-attr]
     return Shown(
         [
-            Chart("Height", "time in s", "y in m", shown.curves(lambda each: each.position[:, 0, 1])),
-            Chart("Largest error in 20 s, against the step", "step in s", "m", errors, log="xy"),
+            LessonChart("Height", "time in s", "y in m", shown.curves(lambda each: each.position[:, 0, 1])),
+            LessonChart("Largest error in 20 s, against the step", "step in s", "m", errors, log="xy"),
         ],
         shown.film,
         [("step", f"{number(shown.scenario.dt(settings['k']))} s"), *now],
@@ -69,13 +69,13 @@ PARTICLE = Lesson(
 )  # fmt: skip
 
 
-def pushed_ship(acceleration: float) -> Scenario:
-    """The exercise's ship, pushed along x for 2 s and coasting for 2 s."""
+def thrust_ship(acceleration: float) -> Scenario:
+    """The exercise's ship, accelerated along x for 2 s and coasting for 2 s."""
     base = ship_thrust()
     scene = base.scene
     thrusts = [Thrust(0, 0.5, 2.5, np.array([acceleration * float(scene.mass[0]), 0.0]))]
     return replace(
-        base, duration=4.0, sample_interval=1 / 16, thrusts=thrusts, truth=lambda t: world_pushes(scene, thrusts, t)
+        base, duration=4.0, sample_interval=1 / 16, thrusts=thrusts, truth=lambda t: world_thrusts(scene, thrusts, t)
     )
 
 
@@ -88,25 +88,25 @@ THRUST_NAMES = (
 def show_thrust(settings: Settings) -> Shown:
     """Who is ahead of the parabola and who is behind, and the formula for it."""
     acceleration = settings["a"]
-    scenario = pushed_ship(acceleration)
-    shown = Played.by(scenario, THRUST_NAMES, settings["k"])
+    scenario = thrust_ship(acceleration)
+    shown = Simulation.by(scenario, THRUST_NAMES, settings["k"])
     assert shown.truth is not None
     exact, dt = shown.truth, shown.scenario.dt(settings["k"])
 
     def ahead(each: Trajectory) -> np.ndarray:
         return 1e3 * (each.position[:, 0, 0] - exact.position[: len(each), 0, 0])
 
-    pushed = np.clip(exact.t - 0.5, 0, 2.0)
+    acted = np.clip(exact.t - 0.5, 0, 2.0)
     facts = []
     for run in shown.runs:
         row = ENGINES[run.name]
-        law = 1e3 * (row.alpha - 0.5) * acceleration * dt * pushed[-1]
+        law = 1e3 * (row.alpha - 0.5) * acceleration * dt * acted[-1]
         got = ahead(run.trajectory)[-1] if run.trajectory else np.nan
         facts.append((f"{run.name}, α = {number(row.alpha)}", f"{number(got)} mm, (α − ½) a dt T = {number(law)} mm"))
     return Shown(
         [
-            Chart("Ahead of the exact answer", "time in s", "mm", shown.curves(ahead)),
-            Chart("Velocity", "time in s", "m/s", shown.curves(lambda each: each.velocity[:, 0, 0])),
+            LessonChart("Ahead of the exact answer", "time in s", "mm", shown.curves(ahead)),
+            LessonChart("Velocity", "time in s", "m/s", shown.curves(lambda each: each.velocity[:, 0, 0])),
         ],
         shown.film,
         facts,
@@ -115,13 +115,13 @@ def show_thrust(settings: Settings) -> Shown:
 
 THRUST = Lesson(
     name="thrust", number="2", title="Force and thrust",
-    asks="Does a push carry every engine equally far?",
+    asks="Does a force carry every engine equally far?",
     text=(
         "A force changes the velocity by <code>F/m dt</code> a step, and everybody agrees on the velocity. Where the "
-        "ship is depends on the order: with <code>x' = x + v dt + α a dt²</code> a push of T seconds ends "
+        "ship is depends on the order: with <code>x' = x + v dt + α a dt²</code> a thrust of T seconds ends "
         "<code>(α − ½) a T dt</code> away from the parabola. Velocity first is <code>α = 1</code>, position first "
         "<code>α = 0</code>, four substeps <code>α = 0.625</code>.",
-        "The ship is pushed from 0.5 s to 2.5 s and then coasts: the offset grows while the force is on, and stays.",
+        "The ship is accelerated from 0.5 s to 2.5 s and then coasts: the offset grows while the force is on, and stays.",
     ),
     sliders=(
         Slider("k", "Steps in 1/16 s", (1, 2, 4, 8, 16), 1),
@@ -147,17 +147,17 @@ BOX_NAMES = ("reference:lesson", "reference:exercise", "pymunk:matched", "event_
 def show_box(settings: Settings) -> Shown:
     """Energy over time, and how far from the exact answer as long as there is one."""
     scenario = small_box(settings["e"], settings["n"])
-    shown = Played.by(scenario, BOX_NAMES, settings["k"])
+    shown = Simulation.by(scenario, BOX_NAMES, settings["k"])
     scene = scenario.scene
 
     def energy(each: Trajectory) -> np.ndarray:
         moving = (scene.mass * (each.velocity**2).sum(axis=2) / 2).sum(axis=1)
         return moving + (scene.mass * each.position[:, :, 1]).sum(axis=1) * 9.81
 
-    facts = [("hits of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
-    charts = [Chart("Energy of motion and height", "time in s", "J", shown.curves(energy))]
+    facts = [("collisions of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
+    charts = [LessonChart("Energy of motion and height", "time in s", "J", shown.curves(energy))]
     if shown.truth is not None:
-        charts.append(Chart("Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"))
+        charts.append(LessonChart("Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"))
         facts.append(("the exact answer ends at", f"{number(float(shown.truth.t[-1]))} s"))
     return Shown(charts, shown.film, facts)
 
@@ -167,10 +167,10 @@ BOX = Lesson(
     asks="Where does the energy go?",
     text=(
         "Small disks from random places, with random velocities, under gravity. At a wall the normal velocity becomes "
-        "<code>v' = −c_r v</code>: each hit keeps <code>c_r²</code> of that part of the energy, and nothing "
+        "<code>v' = −c_r v</code>: each collision keeps <code>c_r²</code> of that part of the energy, and nothing "
         "else may take "
-        "any. Between two hits the sum of <code>m v²/2 + m g y</code> must be level.",
-        "With <code>c_r = 1</code> the exact line is flat: what a player gains or loses is its own. The exact answer "
+        "any. Between two collisions the sum of <code>m v²/2 + m g y</code> must be level.",
+        "With <code>c_r = 1</code> the exact line is flat: what an engine gains or loses is its own. The exact answer "
         "ends where the motion is no longer knowable in float64, or where a disk comes to rest.",
     ),
     sliders=(

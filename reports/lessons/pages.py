@@ -19,8 +19,8 @@ from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
 from reports.lessons.crowd import EVERY_PAIR
 from reports.lessons.lesson import Lesson
-from reports.lessons.mechanisms import SWITCHED
-from reports.page.documents import PLAYER, deflated, fragment, render
+from reports.lessons.mechanisms import ABLATED
+from reports.page.documents import ENGINE, deflated, fragment, render
 from reports.page.server import in_thread
 from reports.page.style import Look, look
 from reports.run.cells import versions
@@ -30,7 +30,7 @@ STYLES = ["lessons/lesson.css"]
 GROUPS = {"A solver, piece by piece": "12345", "How engines differ": "6", "What can be compared, and how far": "78"}
 MEASURING = Lock()  # two pages that ask at once get one measurement
 OWN = {  # who plays in lessons only
-    SWITCHED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
+    ABLATED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
     EVERY_PAIR: look("reference")._replace(dash=(7, 5)),
 }
 
@@ -56,9 +56,9 @@ def about() -> dict[str, str]:
     return {"made": datetime.now(UTC).isoformat(timespec="seconds")[:16].replace("T", " ") + " UTC"} | versions()
 
 
-def told(name: str, places: Sequence[int]) -> dict[str, Any]:
+def answer_json(name: str, places: Sequence[int]) -> dict[str, Any]:
     """What the lesson of that name shows with its sliders at these indices, for JSON; as what a worker does."""
-    return LESSONS[name].at(places).told()
+    return LESSONS[name].at(places).to_json()
 
 
 def lesson_page(lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, grid: str = "") -> str:
@@ -67,7 +67,7 @@ def lesson_page(lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, g
     k = names.index(lesson.name)
     around = [LESSONS[names[each]] if 0 <= each < len(names) else None for each in (k - 1, k + 1)]
     return render(
-        "lessons/lesson.html.j2", generator=GENERATOR, scripts=[*PLAYER, "lessons/chart.js", "lessons/lesson.js"],
+        "lessons/lesson.html.j2", generator=GENERATOR, scripts=[*ENGINE, "lessons/chart.js", "lessons/lesson.js"],
         styles=STYLES, looks=looks_of(lesson), connects=not grid,
         lesson=lesson, text=[Markup(paragraph) for paragraph in lesson.text], grid=grid, around=around,
         links=links, about=about(), first=first,
@@ -75,7 +75,7 @@ def lesson_page(lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, g
 
 
 def offline(lesson: Lesson, answers: Mapping[tuple[int, ...], Any], links: Links = ALONE) -> str:
-    """One page with the answer, as of `told`, to every setting of the sliders."""
+    """One page with the answer, as of `answer_json`, to every setting of the sliders."""
     grid = {",".join(map(str, places)): answers[places] for places in lesson.grid}
     return lesson_page(lesson, answers[lesson.start], links, deflated(json.dumps(grid, separators=(",", ":"))))
 
@@ -123,7 +123,7 @@ async def page(request: Request) -> Response:
     lesson = LESSONS.get(request.path_params["name"])
     if lesson is None:
         return PlainTextResponse(f"There is no such lesson; there are {', '.join(LESSONS)}.", 404)
-    return HTMLResponse(await in_thread(lambda: lesson_page(lesson, told(lesson.name, lesson.start))))
+    return HTMLResponse(await in_thread(lambda: lesson_page(lesson, answer_json(lesson.name, lesson.start))))
 
 
 async def shown(request: Request) -> Response:
@@ -136,7 +136,7 @@ async def shown(request: Request) -> Response:
         found = await in_thread(lesson.at, places)
     except ValueError as fault:
         return JSONResponse({"fault": str(fault)}, 400)
-    return JSONResponse(found.told())
+    return JSONResponse(found.to_json())
 
 
 ROUTES: list[BaseRoute] = [

@@ -34,7 +34,7 @@ class Drawing(NamedTuple):
     figure: go.Figure | None
 
 
-class Line(NamedTuple):
+class ChartLine(NamedTuple):
     """One run's numbers: x (k,), y (k,); y may hold nan."""
 
     run: Run
@@ -62,34 +62,36 @@ def views(comparison: Comparison, other: Trajectory | None) -> list[tuple[Run, V
     return played
 
 
-def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None]) -> list[Line]:
+def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None]) -> list[ChartLine]:
     """A line a run of what `series` gives for it, over time."""
-    return [Line(run, view.played.t, y) for run, view in played if (y := series(view)) is not None]
+    return [ChartLine(run, view.played.t, y) for run, view in played if (y := series(view)) is not None]
 
 
 def momentum(comparison: Comparison) -> Drawing:
-    """Momentum that should not be there; where walls take some up, momentum apart from the truth's."""
+    """Momentum that should not be there; where walls take some up, the deviation of the momentum from the truth's."""
     if violations.knows_impulses(comparison.scenario):
         caption = (
-            "Distance of the momentum from P(0) and what weight and pushes have added since, over the Σ m|v| at hand. "
+            "Distance of the momentum from P(0) and what weight and thrusts have added since, over the Σ m|v| at hand. "
             "Lower is better."
         )
         lines = over(views(comparison, None), violations.momentum)
         return Drawing("Momentum error", caption, over_time(comparison, lines, "error / Σ m|v| at hand"))
     if comparison.truth is None:
-        why = "Walls, static disks or turning pushes take up momentum, and no exact answer says how much."
+        why = "Walls, static disks or turning thrusts take up momentum, and no exact answer says how much."
         return Drawing("Momentum", why, None)
     scale, lines = scales.momentum(comparison.scenario) or 1.0, []
     for run, view in views(comparison, comparison.truth):
-        lines.append(Line(run, view.played.t, view.momentum_apart / scale))
+        lines.append(ChartLine(run, view.played.t, view.momentum_deviation / scale))
     caption = (
         "Walls and static disks take up momentum, so no law is broken here: how far the momentum is from the truth's, "
         f"over the Σ m|v| at hand{DELAY}."
     )
-    return Drawing("Momentum apart from the truth's", caption, over_time(comparison, lines, "apart / Σ m|v| at hand"))
+    return Drawing(
+        "Momentum deviation from the truth", caption, over_time(comparison, lines, "deviation / Σ m|v| at hand")
+    )
 
 
-DELAY = ", where a collision up to three steps late or early costs nothing: that is measured by itself"
+DELAY = ", where a collision up to three steps late or early costs nothing; its delay is a metric of its own"
 
 
 def energy(comparison: Comparison) -> Drawing:
@@ -98,7 +100,7 @@ def energy(comparison: Comparison) -> Drawing:
     if not conserved and comparison.truth is None:
         return energy_course(comparison)
     lines = over(views(comparison, None if conserved else comparison.truth), violations.energy)
-    against = "what it was at the start, as no hit takes any (e = 1)," if conserved else "the truth's,"
+    against = "what it was at the start, as no collision takes any (e = 1)," if conserved else "the truth's,"
     caption = (
         f"Distance of the energy from {against} over the energy at hand{'' if conserved else DELAY}. Lower is better."
     )
@@ -111,10 +113,10 @@ def energy_course(comparison: Comparison) -> Drawing:
     lines = []
     for run, view in views(comparison, None):
         scale = scales.energy(comparison.scenario) or 1.0
-        lines.append(Line(run, view.played.t, laws.energy(view.played, scene) / scale))
+        lines.append(ChartLine(run, view.played.t, laws.energy(view.played, scene) / scale))
     caption = (
-        "No exact answer says how much energy the hits should take, so this is no error: the energy over that "
-        "at hand. Without pushes it must never rise."
+        "No exact answer says how much energy the collisions should take, so this is no error: the energy over that "
+        "at hand. Without thrusts it must never rise."
     )
     return Drawing("Energy", caption, over_time(comparison, lines, "energy / energy at hand", log=False))
 
@@ -129,7 +131,7 @@ def deviation(comparison: Comparison) -> Drawing:
         if held is None:
             return Drawing("Trajectories", "No engine played this scene.", None)
     lines = [
-        Line(run, view.played.t, (view.apart / scene.radius).max(axis=1))
+        ChartLine(run, view.played.t, (view.deviation / scene.radius).max(axis=1))
         for run, view in views(comparison, held.trajectory if held else truth)
         if run is not held
     ]
@@ -137,8 +139,8 @@ def deviation(comparison: Comparison) -> Drawing:
         caption = "Largest distance of any disk from where it truly is, in radii of that disk. Lower is better."
         return Drawing("Trajectory deviation", caption, over_time(comparison, lines, "off the truth (radii)"))
     caption = f"No truth to be off from: how far the disks are from those of {held.name}; neither is the right one."
-    apart = f"apart from {held.name}"
-    return Drawing(apart.capitalize(), caption, over_time(comparison, lines, f"{apart} (radii)"))
+    deviation = f"deviation from {held.name}"
+    return Drawing(deviation.capitalize(), caption, over_time(comparison, lines, f"{deviation} (radii)"))
 
 
 def convergence(comparison: Comparison) -> Drawing:
@@ -152,7 +154,7 @@ def convergence(comparison: Comparison) -> Drawing:
     for (engine, profile), group in rows.groupby(["engine", "profile"], sort=False):
         ladder = group.sort_values("dt_s")
         run = Run(str(engine), str(profile), comparison.scenario.name, 0.0)
-        lines.append(Line(run, ladder.dt_s.to_numpy(float), ladder.value.to_numpy(float)))
+        lines.append(ChartLine(run, ladder.dt_s.to_numpy(float), ladder.value.to_numpy(float)))
     if not lines:
         return Drawing(title, "No run has a position error to show.", None)
     steps = sorted({float(x) for line in lines for x in line.x})
@@ -167,7 +169,7 @@ def convergence(comparison: Comparison) -> Drawing:
     return Drawing(title, caption, figure)
 
 
-def first_order(lines: Iterable[Line], steps: list[float]) -> list[dict[str, Any]]:
+def first_order(lines: Iterable[ChartLine], steps: list[float]) -> list[dict[str, Any]]:
     """A guide with slope 1 through the middle of what is shown; none where there is nothing to guide."""
     shown = np.concatenate([line.y for line in lines])
     shown = shown[np.isfinite(shown) & (shown > ZERO)]
@@ -179,25 +181,25 @@ def first_order(lines: Iterable[Line], steps: list[float]) -> list[dict[str, Any
     return [{"type": "scatter", "x": steps, "y": shortened(y)} | look]
 
 
-def over_time(comparison: Comparison, lines: list[Line], title: str, log: bool = True) -> go.Figure | None:
+def over_time(comparison: Comparison, lines: list[ChartLine], title: str, log: bool = True) -> go.Figure | None:
     """A figure of lines over time, with a mark where the truth ends; None if there is no line."""
     if not lines:
         return None
     duration, truth = comparison.scenario.duration, comparison.truth
     marks: dict[str, Any] = {}
-    if truth is not None and truth.valid_until < duration:
+    if truth is not None and truth.horizon < duration:
         ink = {"dash": "dot", "width": 1, "color": style.look(style.TRUTH).light}
-        at = {"x": truth.valid_until, "y": 1, "yref": "paper", "showarrow": False, "xanchor": "left", "yanchor": "top"}
+        at = {"x": truth.horizon, "y": 1, "yref": "paper", "showarrow": False, "xanchor": "left", "yanchor": "top"}
         marks["shapes"] = [{"x0": at["x"], "x1": at["x"], "y0": 0, "y1": 1, "yref": "paper", "line": ink}]
         marks["annotations"] = [at | {"text": "truth ends"}]
     if log:  # the start is given to all: its 0 would take up half of the axis and say nothing
-        lines = [Line(run, x[1:], y[1:]) for run, x, y in lines]
+        lines = [ChartLine(run, x[1:], y[1:]) for run, x, y in lines]
     figure = figure_of([thinned(line) for line in lines], {"title": TIME, "range": [0, duration]}, title, log=log)
     return figure.update_layout(marks)
 
 
 def figure_of(
-    lines: list[Line],
+    lines: list[ChartLine],
     x_axis: dict[str, Any],
     title: str,
     log: bool = True,
@@ -237,7 +239,7 @@ def decades(values: Array) -> dict[str, object]:
     return {"type": "log", "range": [low - 0.35, high + 0.25], "tickvals": [10.0**k for k in ticks], "ticktext": text}
 
 
-def thinned(line: Line) -> Line:
+def thinned(line: ChartLine) -> ChartLine:
     """At most `POINTS` points of a line: the smallest and the largest of each stretch stay, so no peak is hidden."""
     k = len(line.y)
     if k <= POINTS:
@@ -248,7 +250,7 @@ def thinned(line: Line) -> Line:
         if len(known):
             keep |= {int(known[np.argmin(line.y[known])]), int(known[np.argmax(line.y[known])])}
     order = sorted(keep)
-    return Line(line.run, line.x[order], line.y[order])
+    return ChartLine(line.run, line.x[order], line.y[order])
 
 
 def shortened(values: Iterable[float], digits: int = 4) -> list[float | None]:

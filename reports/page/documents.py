@@ -19,8 +19,8 @@ from reports.page import style
 from reports.terminal.foreign_text import encoded
 
 REPORTS = Path(__file__).parents[1]
-PLAYER = ("page/player.js", "page/player_canvas.js")  # the replay
-CHARTED = (*PLAYER, "page/page.js")  # replays, and charts that are drawn when they come into view
+ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay
+CHARTED = (*ENGINE, "page/page.js")  # replays, and charts that are drawn when they come into view
 
 
 def render(

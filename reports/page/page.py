@@ -31,7 +31,7 @@ FAMILIES = {
     "scenarios.families.pairs": "Two disks meet",
     "scenarios.families.walls": "Walls, floors and fixed disks",
     "scenarios.families.rows": "Disks in a row",
-    "scenarios.families.thrusts": "Pushes and spin",
+    "scenarios.families.thrusts": "Thrusts and spin",
     "scenarios.families.exercise": "The exercise",
     "scenarios.families.crowds": "Crowds",
 }
@@ -39,7 +39,7 @@ OWN = "Scenes of your own"
 
 
 @dataclass(frozen=True)
-class Section:
+class ScenarioSection:
     """One scenario as the page shows it."""
 
     comparison: Comparison
@@ -52,9 +52,9 @@ class Section:
     layers: list[tuple[str, Run | None]]
     frames: int
     ratio: float
-    table: list[tuple[str, str, str, list[overview.Cell]]]
+    table: list[tuple[str, str, str, list[overview.OverviewCell]]]
     settings: dict[str, list[tuple[str, str, str]]]
-    pairs: dict[str, list[overview.Cell]]
+    pairs: dict[str, list[overview.OverviewCell]]
 
 
 def write_page(
@@ -92,14 +92,14 @@ def write_page(
     put_text(path, html)
 
 
-def section_of(comparison: Comparison, names: Sequence[str], common: overview.Settings) -> Section:
+def section_of(comparison: Comparison, names: Sequence[str], common: overview.Settings) -> ScenarioSection:
     """All that the page shows of one scenario; of its settings those that are not `common`."""
     own = {key: pair for key, pair in overview.settings(comparison).items() if key not in common}
     drawings = {key: chart.draw(comparison) for key, chart in CHARTS.items()}
     builder = SCENARIOS.get(comparison.scenario.name)
     layers = played(comparison)
     module = getattr(getattr(builder, "func", builder), "__module__", "")
-    return Section(
+    return ScenarioSection(
         comparison=comparison,
         family=FAMILIES.get(module, OWN),
         dt=comparison.middle_dt,
@@ -116,9 +116,9 @@ def section_of(comparison: Comparison, names: Sequence[str], common: overview.Se
     )
 
 
-def by_family(sections: Sequence[Section]) -> dict[str, list[Section]]:
+def by_family(sections: Sequence[ScenarioSection]) -> dict[str, list[ScenarioSection]]:
     """The sections under their headings, both in the order of appearance."""
-    families: dict[str, list[Section]] = {}
+    families: dict[str, list[ScenarioSection]] = {}
     for section in sections:
         families.setdefault(section.family, []).append(section)
     return families
@@ -163,8 +163,8 @@ def truth_of(comparison: Comparison) -> str:
     if truth is None:
         return f"none: {scenario.without_truth or 'the scene comes without an exact answer'}"
     ends = "at every sample"
-    if truth.valid_until < scenario.duration:
-        ends = f"up to its horizon at {style.number(truth.valid_until)} s, and no further"
+    if truth.horizon < scenario.duration:
+        ends = f"up to its horizon at {style.number(truth.horizon)} s, and no further"
         ends += f": {truth.reason}" if truth.reason else ""
     return f"exact {ends}" + (f"; off by at most {style.number(truth.error_bound)} m" if truth.error_bound else "")
 

@@ -14,7 +14,7 @@ TRUTH = "truth"
 
 
 class Look(NamedTuple):
-    """How an engine and profile are drawn; the shape tells the engine and the dash the profile without colour.
+    """How an engine and profile are drawn; the shape shows the engine and the dash the profile without colour.
 
     Attributes:
         light, dark: hex colour on a light and on a dark page.
@@ -65,7 +65,7 @@ PALETTE = (
     Mark("#7a4a21", "#e0a878", "bowtie"),
 )  # fmt: skip
 DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3)}
-SWITCHED = (1, 2)  # a profile with one thing switched, `matched+...`
+CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep to pale on dark.
 HEAT_BOUNDS = (1e-12, 1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
@@ -80,7 +80,7 @@ HEAT_DARK = (
 def look(engine: str, profile: str = "") -> Look:
     """How `engine:profile`, or the truth, is drawn."""
     light, dark, shape = OF_TRUTH if engine == TRUTH else mark_of(engine)
-    dash = SWITCHED if "+" in profile else DASHED.get(profile, ())
+    dash = CHANGED if "+" in profile else DASHED.get(profile, ())
     return Look(light, dark, dash, shape, not dash)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from reports.compare.comparison import Comparison
 from reports.page.style import number
-from scenarios.truth.exact import CLOSED_FORM, HIT_BY_HIT, answered_by
+from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN, answered_by
 from scenarios.truth.oracle.numbers import has_balls
 
 
@@ -22,7 +22,7 @@ def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
         "Checked from outside": (
             "A simulation of all pairs in 420 bits, plain scripts for each engine, and metrics computed again from the "
             "trajectories share no code with what they check: uv run pytest -m independent repeats them, and "
-            "tests/independent/README.md lists what nobody has checked."
+            "tests/independent/README.md lists what has not been checked."
         ),
         "Our own engines": (
             "reference and event_driven are this project's, and it also judges them. So the exact answers import none "
@@ -36,31 +36,34 @@ def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
 def exact_answers(comparisons: Sequence[Comparison]) -> str:
     """How the exact answers of these scenes were found, and how far off they may be."""
     models = [answered_by(each.scenario) if each.truth is not None else "" for each in comparisons]
-    closed, followed, none = models.count(CLOSED_FORM), models.count(HIT_BY_HIT), models.count("")
+    closed, event_driven, none = models.count(CLOSED_FORM), models.count(EVENT_DRIVEN), models.count("")
     parts = [f"{closed} of {len(models)} scenes have a closed form"] if closed else []
-    if followed:
-        bound = max(c.truth.error_bound for c, m in zip(comparisons, models) if m == HIT_BY_HIT and c.truth is not None)
+    if event_driven:
+        bound = max(
+            c.truth.error_bound for c, m in zip(comparisons, models) if m == EVENT_DRIVEN and c.truth is not None
+        )
         how = "proven by interval arithmetic" if has_balls() else "computed at two precisions that agree"
         parts.append(
-            f"{followed} are followed from collision to collision in many digits, {how}, and off by at most "
-            f"{number(bound)} m"
+            f"{event_driven} are computed event by event in many digits, {how}, and off by at most {number(bound)} m"
         )
     if none:
-        parts.append(f"{none} have no exact answer and no score: only the laws of physics are held against them")
+        parts.append(
+            f"{none} have no exact answer and no score: engines are checked there against the laws of physics only"
+        )
     return "; ".join(parts) + "."
 
 
 def how_far_they_hold(comparisons: Sequence[Comparison]) -> str:
     """Up to when engines are held to the exact answers of these scenes."""
     ends = {
-        each.scenario.name: (each.truth.valid_until, each.scenario.duration)
+        each.scenario.name: (each.truth.horizon, each.scenario.duration)
         for each in comparisons
-        if each.truth is not None and each.truth.valid_until < each.scenario.duration
+        if each.truth is not None and each.truth.horizon < each.scenario.duration
     }
     if not ends:
         return "Every exact answer holds to the end of its scene."
     listed = ", ".join(f"{name} to {number(until)} s of {number(whole)} s" for name, (until, whole) in ends.items())
     return (
-        f"{listed}: no score speaks of what comes later. There a rounding of the start has grown to a billionth of a "
+        f"{listed}: later samples have no score. There a rounding of the start has grown to a billionth of a "
         "radius, or the motion has no single answer; the scene says which. All others hold to their end."
     )

@@ -24,7 +24,7 @@ from scenarios.truth.exact import CLOSED_FORM, OracleTruth, TruthRecord
 from scenarios.truth.oracle.work import Clock
 
 OK, NONE = "ok", "none"
-FOLLOWED = 0.5  # of the time for an answer: its horizon takes up to three quarters as long as its events
+FOR_EVENTS = 0.5  # of the time for an answer: its horizon takes up to three quarters as long as its events
 SAID = "answer.json"  # in the file of an answer, beside the arrays of its record
 
 
@@ -91,7 +91,7 @@ def digest_of(file: ZipFile, name: str, said: list[Any]) -> str:
 
 
 def read_answer(path: Path) -> Answer | None:
-    """What `put_answer` wrote; None if it is not there or not that any more, as the digest in the file tells."""
+    """What `put_answer` wrote; None if it is not there or not that any more, as the digest in the file reports."""
     try:
         with opened(path) as there, ZipFile(there) as file:
             *said, written = json.loads(file.read(SAID))
@@ -111,7 +111,7 @@ def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
     """
     reason = f"the limit of {timeout:g} s was reached (a longer --timeout gives more)"
     try:
-        return record_of(open_scene(scene, seed), Clock(FOLLOWED * timeout, reason))
+        return record_of(open_scene(scene, seed), Clock(FOR_EVENTS * timeout, reason))
     except NoTruth as refusal:
         return str(refusal)
 
@@ -120,18 +120,18 @@ def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
     """The oracle's record, as far as a `clock` lets it, or a record of what a closed form says. Raises `NoTruth`."""
     if isinstance(scenario.truth, OracleTruth):
         record = scenario.truth.record(clock)
-        if record.valid_until < scenario.sample_interval:
+        if record.horizon < scenario.sample_interval:
             raise NoTruth(record.reason)
         return record
     if scenario.truth is None:
         raise NoTruth(scenario.without_truth)
     truth = scenario.truth(scenario.times)
-    hits = truth.collisions
-    angles = np.full(len(hits), np.nan)  # a closed form does not need them
+    collisions = truth.collisions
+    angles = np.full(len(collisions), np.nan)  # a closed form does not need them
     return TruthRecord(
         legs=np.zeros((0, 12)),
-        events=np.stack([hits.t, hits.i, hits.j, hits.impulse, angles], axis=-1),
-        valid_until=truth.valid_until,
+        events=np.stack([collisions.t, collisions.i, collisions.j, collisions.impulse, angles], axis=-1),
+        horizon=truth.horizon,
         error_bound=truth.error_bound,
         bits=53,
         method=CLOSED_FORM,

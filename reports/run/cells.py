@@ -14,7 +14,7 @@ import numpy as np
 from adapters.engines import ENGINES
 from scenarios.model import Scenario
 
-PLAYERS = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")  # wherever in these folders a file lies
+ENGINES = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")  # wherever in these folders a file lies
 ROOT = Path(__file__).parents[2]
 DECIDING = ("mini-racer", "numba", "numpy", "crosscheck2d")  # besides the distributions of the engines
 
@@ -25,7 +25,7 @@ class Cell:
 
     Attributes:
         scene: a name of the catalogue, or the path of a scene file (ends in .toml).
-        seed: what a drawn scene is drawn from.
+        seed: seed of a random scene.
         engine: `engine:profile`, or a solver's file as `PATH:own`.
         substeps: steps in a sample interval.
     """
@@ -47,7 +47,7 @@ class Cell:
 
 
 def content_key(*what: Hashable) -> str:
-    """16 hex digits of a hash over what decides a result: `what`, the versions, the players' source.
+    """16 hex digits of a hash over what decides a result: `what`, the versions, the engines' source.
 
     No file but of this program is read here: what was read when the command began is in `what`, as `Row.source`.
     """
@@ -82,6 +82,6 @@ def versions() -> dict[str, str]:
 
 @cache
 def source_hash(root: Path = ROOT) -> str:
-    """A hash over the players' source, so that a changed adapter is a changed cell."""
-    files = sorted(path for pattern in PLAYERS for path in root.glob(pattern))
+    """A hash over the engines' source, so that a changed adapter is a changed cell."""
+    files = sorted(path for pattern in ENGINES for path in root.glob(pattern))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]

@@ -24,7 +24,7 @@ def path(text: str) -> str:
     return text
 
 
-def player(text: str) -> str:
+def engine_profile(text: str) -> str:
     """`engine:profile`; raises `ValueError`."""
     if path(text).count(":") != 1 or text.startswith(":") or text.endswith(":"):
         raise ValueError("must be ENGINE:PROFILE")
@@ -33,7 +33,7 @@ def player(text: str) -> str:
 
 def engine(text: str) -> str:
     """What stands before the colon; raises `ValueError`."""
-    return player(f"{text}:any").removesuffix(":any")
+    return engine_profile(f"{text}:any").removesuffix(":any")
 
 
 def number(value: Any) -> Any:
@@ -67,7 +67,7 @@ def finite(value: Any) -> bool:
 
 Words = InstanceOf[str]  # not `str`, as pydantic takes no bytes of a path that are not UTF-8
 File = Annotated[Words, AfterValidator(path)]
-Player = Annotated[Words, AfterValidator(player)]
+EngineProfile = Annotated[Words, AfterValidator(engine_profile)]
 Engine = Annotated[Words, AfterValidator(engine)]
 Profile = Annotated[str, Field(pattern=r"\A[A-Za-z0-9_.-]{1,100}\z")]
 Name = Annotated[str, Field(pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z")]  # it becomes the name of a file
@@ -107,7 +107,7 @@ class Kinds(NamedTuple):
 
     models: Mapping[str, type[Line]]
     missed: str
-    asked: str = "without it nobody knows what was asked for: name another --out"
+    asked: str = "without it the request is not known: name another --out"
 
 
 def checked_lines(folder: Path, kinds: Kinds) -> Iterator[tuple[int, str, dict[str, Any]]]:
@@ -125,9 +125,9 @@ def checked_lines(folder: Path, kinds: Kinds) -> Iterator[tuple[int, str, dict[s
         yield number, kind, line
 
 
-def no_use(folder: Path, number: int, fault: str, cure: str) -> str:
+def no_use(folder: Path, number: int, fault: str, remedy: str) -> str:
     """A sentence on a line that cannot be used, and what to do."""
-    return f"{folder / JOURNAL}: line {number}: {fault}; {cure}"
+    return f"{folder / JOURNAL}: line {number}: {fault}; {remedy}"
 
 
 def kind_of(line: Any, models: Mapping[str, type[Line]]) -> str:

@@ -1,6 +1,7 @@
-"""Where an engine's error comes from: its habits switched on in the reference one at a time, and what is left over.
+"""Where an engine's error comes from: its mechanisms switched on in the reference one at a time, and what is left over.
 
-As vectors, disk by disk and sample by sample, the parts close: engine - truth = parts + interplay + unexplained.
+As vectors, disk by disk and sample by sample, the contributions close: engine - truth = contributions + interplay +
+residual.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from adapters.engine import Engine
 from adapters.engines import row_of
-from adapters.mechanisms.habits import FLIGHT, Habit, habits_of, with_habits
+from adapters.mechanisms.table import FLIGHT, Mechanism, mechanisms_of, with_mechanisms
 from adapters.play import Run, play_once
 from reports.compare import laws, scales
 from reports.compare.comparison import cut
@@ -23,15 +24,15 @@ from reports.run.scenes import open_scene
 from reports.speed.ladder import held
 from scenarios.model import Array, Scenario, Trajectory
 
-TIME, INTERPLAY, SUM, ALL, TOTAL, UNEXPLAINED = (
-    "time of hits", "interplay", "sum", "all", "engine", "unexplained",
+TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (
+    "time of collisions", "interplay", "sum", "all", "engine", "residual",
 )  # fmt: skip
 TOTALS = (SUM, ALL, TOTAL)
 COLUMNS = [
-    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "part", "position_radii",
-    "energy", "share", "off_engine_radii", "off_reference_radii", "off_apart_radii", "closed_apart_radii", "note",
+    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "contribution", "position_radii",
+    "energy", "share", "off_engine_radii", "off_reference_radii", "off_deviation_radii", "closed_deviation_radii", "note",
 ]  # fmt: skip
-LIMIT = 0.5  # radii by which late hits alone may put a disk off: where all is far off, no part adds up to anything
+LIMIT = 0.5  # radii by which end-of-step detection alone may put a disk off: where all is far off, no contribution adds up to anything
 
 
 class NotPlayed(Exception):
@@ -67,16 +68,18 @@ class Offset(NamedTuple):
 
 
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
-    """A row a part of what puts player `name` of `HABITS` off in a scene, at this many steps a sample interval.
+    """A row a contribution of what puts engine `name` of `MECHANISMS` off in a scene, at this many steps a sample
+    interval.
 
-    Of `COLUMNS`: until_s, how far the scene was followed, horizon_s, how far its exact answer goes, and duration_s, the
-    scene itself; position_radii and energy, the root mean square of what the
-    part changes, the energy in parts of that at hand; share, by which it makes up the position's total (1 in all;
-    negative: it makes up for others); off_engine_radii, off_reference_radii and off_apart_radii: what switching it off
-    changes in the engine, in the reference with all the rest, and how far these two are apart; closed_apart_radii: how
-    far the flight's part is from its closed form up to the first hit; note: why there are no numbers.
+    Of `COLUMNS`: until_s, how far the scene was evaluated, horizon_s, how far its exact answer goes, and duration_s,
+    the scene itself; position_radii and energy, the root mean square of what the
+    contribution changes, the energy in contributions of that at hand; share, by which it makes up the position's total
+    (1 in all;
+    negative: it makes up for others); off_engine_radii, off_reference_radii and off_deviation_radii: what switching it
+    off changes in the engine, in the reference with all the rest, and their deviation; closed_deviation_radii: how
+    far the flight's contribution is from its closed form up to the first collision; note: why there are no numbers.
     """
-    at = followed(scene, seed, substeps)
+    at = window_of(scene, seed, substeps)
     scenario, dt = at.scenario, at.dt
     engine, profile = name.split(":")
     known = {"scenario": scenario.name, "seed": seed, "engine": engine, "profile": profile, "dt_s": dt,
@@ -84,34 +87,38 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
              "duration_s": open_scene(scene, seed).duration}  # fmt: skip
     try:
         run = at.played(row_of(name).make)
-        budget = Budget(at, habits_of(name, run.settings, scenario.scene, dt), at.offset(run))
-        parts, checks = budget.parts(), budget.switched_off()
+        budget = Budget(at, mechanisms_of(name, run.settings, scenario.scene, dt), at.offset(run))
+        contributions, checks = budget.contributions(), budget.ablated_in_both()
     except NotPlayed as failure:
-        return [known | {"part": TOTAL, "note": str(failure)}]
-    checks[FLIGHT] = {"closed_apart_radii": at.flight_apart(parts[FLIGHT], row_of(name).alpha)}
-    shares = {part: {"share": each.share_of(parts[TOTAL])} for part, each in parts.items() if part not in TOTALS}
+        return [known | {"contribution": TOTAL, "note": str(failure)}]
+    checks[FLIGHT] = {"closed_deviation_radii": at.flight_deviation(contributions[FLIGHT], row_of(name).alpha)}
+    shares = {
+        contribution: {"share": each.share_of(contributions[TOTAL])}
+        for contribution, each in contributions.items()
+        if contribution not in TOTALS
+    }
     return [
-        known | {"part": part, "position_radii": each.radii, "energy": each.of_energy, "note": ""}
-        | shares.get(part, {}) | checks.get(part, {})
-        for part, each in parts.items()
+        known | {"contribution": contribution, "position_radii": each.radii, "energy": each.of_energy, "note": ""}
+        | shares.get(contribution, {}) | checks.get(contribution, {})
+        for contribution, each in contributions.items()
     ]  # fmt: skip
 
 
-def followed(scene: str, seed: int, substeps: int) -> Followed:
-    """The scene up to where late hits alone put a disk farther off than `LIMIT`."""
+def window_of(scene: str, seed: int, substeps: int) -> Window:
+    """The scene up to where end-of-step detection alone puts a disk farther off than `LIMIT`."""
     scenario, truth = held(scene, seed)
-    whole = Followed(scenario, truth, scenario.dt(substeps))
-    late = whole.played(partial(with_habits, [])).trajectory
+    whole = Window(scenario, truth, scenario.dt(substeps))
+    late = whole.played(partial(with_mechanisms, [])).trajectory
     assert late is not None
     off = (laws.deviation(late, truth, scenario.scene) / scenario.scene.radius).max(axis=1)
     last = max(int(np.append(np.flatnonzero(off > LIMIT), len(off))[0]) - 1, 1)
     shorter = replace(scenario, duration=last * scenario.sample_interval)
-    # All hits are kept: one just after the end is near to the last samples, too.
-    return Followed(shorter, replace(cut(truth, last + 1), collisions=truth.collisions), whole.dt)
+    # All collisions are kept: one just after the end is near to the last samples, too.
+    return Window(shorter, replace(cut(truth, last + 1), collisions=truth.collisions), whole.dt)
 
 
 @dataclass(frozen=True)
-class Followed:
+class Window:
     """A scenario, its truth in all of it, and a dt in s."""
 
     scenario: Scenario
@@ -130,68 +137,71 @@ class Followed:
         return run
 
     def offset(self, run: Run) -> Offset:
-        """How far it is from the truth; energies where no hit is near, as a step late is a whole hit late."""
+        """How far it is from the truth; energies where no collision is near, as a step late is a whole collision
+        late."""
         scene, truth, played = self.scenario.scene, self.truth, run.trajectory
         assert played is not None
-        apart = laws.apart(played, truth, scene)[:, ~scene.static] / scene.radius[~scene.static, None]
+        position = laws.difference(played, truth, scene)[:, ~scene.static] / scene.radius[~scene.static, None]
         energy = laws.energy(played, scene) - laws.energy(truth, scene)
-        calm = View(self.scenario, self.dt, played, truth).calm
-        return Offset(apart, energy[calm] / (scales.energy(self.scenario) or 1.0))
+        free = View(self.scenario, self.dt, played, truth).collision_free_samples
+        return Offset(position, energy[free] / (scales.energy(self.scenario) or 1.0))
 
-    def flight_apart(self, part: Offset, alpha: float) -> float:
-        """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first hit; see `Row.alpha` of the engines."""
+    def flight_deviation(self, contribution: Offset, alpha: float) -> float:
+        """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first collision; see `Row.alpha` of the
+        engines."""
         truth, scene = self.truth, self.scenario.scene
-        calm = truth.t < truth.collisions.t.min(initial=np.inf)
-        gained = (truth.velocity - truth.velocity[0])[calm][:, ~scene.static] / scene.radius[~scene.static, None]
-        return float(np.abs(part.position[calm] - (alpha - 0.5) * self.dt * gained).max(initial=0.0))
+        free = truth.t < truth.collisions.t.min(initial=np.inf)
+        gained = (truth.velocity - truth.velocity[0])[free][:, ~scene.static] / scene.radius[~scene.static, None]
+        return float(np.abs(contribution.position[free] - (alpha - 0.5) * self.dt * gained).max(initial=0.0))
 
 
 class Budget:
-    """The offset of one player, and its habits, each of which is played once with the same others."""
+    """The offset of one engine, and its mechanisms, each of which is played once with the same others."""
 
-    def __init__(self, at: Followed, habits: Sequence[Habit], total: Offset) -> None:
-        self.at, self.habits, self.total = at, habits, total
+    def __init__(self, at: Window, mechanisms: Sequence[Mechanism], total: Offset) -> None:
+        self.at, self.mechanisms, self.total = at, mechanisms, total
         self.known: dict[tuple[str, ...], Offset] = {}
 
-    def parts(self) -> dict[str, Offset]:
-        """What each habit changes, then interplay, what is unexplained, the sum, all at once, and the engine.
+    def contributions(self) -> dict[str, Offset]:
+        """What each mechanism changes, then interplay, the residual, the sum, all together, and the engine.
 
-        Each is switched on by itself in the reference with late hits, or on top of those it acts on; for what the
-        reference has no switch for, the engine is set against itself without it.
+        Each is switched on by itself in the reference with end-of-step detection, or on top of those it acts on; for a
+        mechanism that the reference does not have, the engine is compared with itself without it.
         """
-        parts = {TIME: self.reference([])}
-        for habit in self.habits:
-            if habit.switches:
-                below = [each for each in self.habits if each.name in habit.on_top]
-                parts[habit.name] = self.reference([*below, habit]) - self.reference(below)
-            elif habit.without is not None:
-                parts[habit.name] = self.total - self.at.offset(self.at.played(habit.without))
-        unswitched = [parts[habit.name] for habit in self.habits if not habit.switches]
-        summed, reached = added(parts.values()), added([self.reference(self.habits), *unswitched])
-        return parts | {
-            INTERPLAY: reached - summed, UNEXPLAINED: self.total - reached, SUM: summed, ALL: reached,
+        contributions = {TIME: self.reference([])}
+        for mechanism in self.mechanisms:
+            if mechanism.parameters:
+                below = [each for each in self.mechanisms if each.name in mechanism.on_top]
+                contributions[mechanism.name] = self.reference([*below, mechanism]) - self.reference(below)
+            elif mechanism.without is not None:
+                contributions[mechanism.name] = self.total - self.at.offset(self.at.played(mechanism.without))
+        outside = [contributions[mechanism.name] for mechanism in self.mechanisms if not mechanism.parameters]
+        summed, reached = added(contributions.values()), added([self.reference(self.mechanisms), *outside])
+        return contributions | {
+            INTERPLAY: reached - summed, RESIDUAL: self.total - reached, SUM: summed, ALL: reached,
             TOTAL: self.total,
         }  # fmt: skip
 
-    def switched_off(self) -> dict[str, dict[str, float]]:
-        """part -> what switching it off changes in the engine, and in the reference with all the rest switched on."""
+    def ablated_in_both(self) -> dict[str, dict[str, float]]:
+        """contribution -> what switching it off changes in the engine, and in the reference with all the rest switched
+        on."""
         found = {}
-        for habit in self.habits:
-            if habit.switches and habit.without is not None:
-                others = [each for each in self.habits if each is not habit]
-                in_engine = self.total - self.at.offset(self.at.played(habit.without))
-                in_reference = self.reference(self.habits) - self.reference(others)
-                found[habit.name] = {
+        for mechanism in self.mechanisms:
+            if mechanism.parameters and mechanism.without is not None:
+                others = [each for each in self.mechanisms if each is not mechanism]
+                in_engine = self.total - self.at.offset(self.at.played(mechanism.without))
+                in_reference = self.reference(self.mechanisms) - self.reference(others)
+                found[mechanism.name] = {
                     "off_engine_radii": in_engine.radii, "off_reference_radii": in_reference.radii,
-                    "off_apart_radii": (in_engine - in_reference).radii,
+                    "off_deviation_radii": (in_engine - in_reference).radii,
                 }  # fmt: skip
         return found
 
-    def reference(self, habits: Sequence[Habit]) -> Offset:
-        """How far the reference with these habits is from the truth."""
-        names = tuple(habit.name for habit in self.habits if habit in habits)
+    def reference(self, mechanisms: Sequence[Mechanism]) -> Offset:
+        """How far the reference with these mechanisms is from the truth."""
+        names = tuple(mechanism.name for mechanism in self.mechanisms if mechanism in mechanisms)
         if names not in self.known:
-            self.known[names] = self.at.offset(self.at.played(partial(with_habits, habits)))
+            self.known[names] = self.at.offset(self.at.played(partial(with_mechanisms, mechanisms)))
         return self.known[names]
 
 

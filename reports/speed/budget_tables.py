@@ -1,4 +1,5 @@
-"""The error budget as tables: in which scenes which part is the largest, and all parts of one scene side by side."""
+"""The error budget as tables: in which scenes which contribution is the largest, and all contributions of one scene
+side by side."""
 
 from __future__ import annotations
 
@@ -7,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.mechanisms.habits import NAMES
-from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED
+from adapters.mechanisms.table import NAMES
+from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
 from reports.speed.explained import LEAST, TO
 
 EXPLAINED = TO[0]  # of the engine's error: what is left over below it is said to be none
@@ -16,17 +17,17 @@ FULL, DECADES = 1.0, 6  # radii of a full bar; how many decades below it a bar i
 WHO = ["engine", "profile"]
 
 
-class Cell(NamedTuple):
-    """A number, and the length of its bar from 0 to 1; nan, and no bar, where an engine has no such habit."""
+class BudgetCell(NamedTuple):
+    """A number, and the length of its bar from 0 to 1; nan, and no bar, where an engine has no such mechanism."""
 
     value: float
     bar: float
 
 
-class Table(NamedTuple):
+class BudgetTable(NamedTuple):
     """Rows of cells by `engine:profile`, and the notes of those that could not be explained.
 
-    until, horizon, duration: s, up to where the scene was followed, its exact answer goes, and it lasts.
+    until, horizon, duration: s, up to where the scene was evaluated, its exact answer goes, and it lasts.
     """
 
     scenario: str
@@ -34,58 +35,67 @@ class Table(NamedTuple):
     horizon: float
     duration: float
     columns: list[str]
-    rows: dict[str, list[Cell]]
+    rows: dict[str, list[BudgetCell]]
     notes: dict[str, str]
 
 
-def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
-    """Root mean squares in radii, a row a player: engine, what is left unexplained, the parts, sum and all."""
+def of_scene(budget: pd.DataFrame, scenario: str) -> BudgetTable:
+    """Root mean squares in radii, a row an engine: engine, the residual, the contributions, sum and all."""
     here = budget[budget.scenario == scenario]
-    parts = [part for part in causes(budget) if here[here.part == part].position_radii.max() > LEAST]  # of anybody
-    columns = [TOTAL, UNEXPLAINED, *parts, INTERPLAY, SUM, ALL]
-    rows: dict[str, list[Cell]] = {}
+    contributions = [
+        contribution
+        for contribution in causes(budget)
+        if here[here.contribution == contribution].position_radii.max() > LEAST
+    ]  # of anybody
+    columns = [TOTAL, RESIDUAL, *contributions, INTERPLAY, SUM, ALL]
+    rows: dict[str, list[BudgetCell]] = {}
     notes: dict[str, str] = {}
     for (engine, profile), group in here.groupby(WHO, sort=False):
-        found = group.set_index("part").position_radii
+        found = group.set_index("contribution").position_radii
         rows[f"{engine}:{profile}"] = [cell(float(found.get(column, np.nan))) for column in columns]
         notes |= {f"{engine}:{profile}": note for note in group.note if note}
     until, horizon, duration = (float(here[name].iloc[0]) for name in ("until_s", "horizon_s", "duration_s"))
-    return Table(scenario, until, horizon, duration, columns, rows, notes)
+    return BudgetTable(scenario, until, horizon, duration, columns, rows, notes)
 
 
 def causes(budget: pd.DataFrame) -> list[str]:
-    """The parts that are causes, of any player."""
-    return [TIME, *(part for part in NAMES if part in set(budget.part))]
+    """The contributions that are causes, of any engine."""
+    return [TIME, *(contribution for contribution in NAMES if contribution in set(budget.contribution))]
 
 
-def cell(value: float) -> Cell:
+def cell(value: float) -> BudgetCell:
     """With a bar on a logarithmic scale."""
     if not value > 0:
-        return Cell(value, 0.0)
-    return Cell(value, float(np.clip(1 + np.log10(value / FULL) / DECADES, 0.0, 1.0)))
+        return BudgetCell(value, 0.0)
+    return BudgetCell(value, float(np.clip(1 + np.log10(value / FULL) / DECADES, 0.0, 1.0)))
 
 
-def overview(budget: pd.DataFrame) -> Table:
+def overview(budget: pd.DataFrame) -> BudgetTable:
     """In how many scenes an engine was played, has an error, has it explained but for `EXPLAINED`, and in how many
-    each part is the largest; bars of all scenes, and every engine has its row, also one that failed them all.
+    each contribution is the largest; bars of all scenes, and every engine has its row, also one that failed them all.
     """
     columns = ["played", "errors", "explained", *causes(budget)]
     count = budget.scenario.nunique()
     rows = {}
     for (engine, profile), group in budget.groupby(WHO, sort=False):
         played = group[group.note == ""]
-        scenes = played.pivot(index="scenario", columns="part", values="position_radii")
-        scenes = scenes.reindex(columns=[TOTAL, UNEXPLAINED, *causes(budget)]).fillna(0.0)
+        scenes = played.pivot(index="scenario", columns="contribution", values="position_radii")
+        scenes = scenes.reindex(columns=[TOTAL, RESIDUAL, *causes(budget)]).fillna(0.0)
         off = scenes[scenes[TOTAL] > LEAST]
         known = scenes[causes(budget)]
         largest = known[known.max(axis=1) > LEAST].idxmax(axis=1)
-        explained = int((off[UNEXPLAINED] <= EXPLAINED * off[TOTAL]).sum())
-        counts = [len(scenes), len(off), explained, *(int((largest == part).sum()) for part in known.columns)]
-        rows[f"{engine}:{profile}"] = [Cell(number, number / count) for number in counts]
-    return Table("", np.nan, np.nan, np.nan, columns, rows, {})
+        explained = int((off[RESIDUAL] <= EXPLAINED * off[TOTAL]).sum())
+        counts = [
+            len(scenes),
+            len(off),
+            explained,
+            *(int((largest == contribution).sum()) for contribution in known.columns),
+        ]
+        rows[f"{engine}:{profile}"] = [BudgetCell(number, number / count) for number in counts]
+    return BudgetTable("", np.nan, np.nan, np.nan, columns, rows, {})
 
 
-def switched_off(budget: pd.DataFrame) -> list[dict[str, Any]]:
-    """Every habit that the engine lets one switch off, where that changes anything: the change in both."""
+def ablated_in_both(budget: pd.DataFrame) -> list[dict[str, Any]]:
+    """Every mechanism that can be switched off in the engine, where that changes anything: the change in both."""
     rows = budget[budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST]
     return [{str(key): value for key, value in row.items()} for row in rows.to_dict("records")]

@@ -1,4 +1,4 @@
-"""The charts: error against cost, cost at matched accuracy, cost against the number of disks, features."""
+"""The charts: error against cost, cost at matched accuracy, cost against the number of disks, options."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ TALL, TALLEST, PER_ROW = 400, 520, 19  # px
 
 
 def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
-    """Error against cost, a line a player over its ladder; `points` of one scene, or pooled and then `tall`."""
+    """Error against cost, a line an engine over its ladder; `points` of one scene, or pooled and then `tall`."""
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis(COST, drawn.cost.to_numpy(float))
     y_axis = error_axis(drawn.error.to_numpy(float))
     traces = fronts(drawn, x_axis, y_axis)
-    for engine, profile, group in by_player(points):
+    for engine, profile, group in by_engine(points):
         fine = group[group.cost.notna() & np.isfinite(group.error)]
         spreads = {} if tall else {
             "error_x": bars(fine.cost, fine.low, fine.high),
             "error_y": bars(*(fine[name].clip(lower=LOWEST) for name in ("error", "error_low", "error_high"))),
         }  # fmt: skip
-        text = [told(row) for row in records(fine)]
+        text = [hover_text(row) for row in records(fine)]
         traces.append(line(engine, profile, fine.cost, fine.error.clip(lower=LOWEST), text, spreads))
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
     traces += at_the_edge(lost, drawn, x_axis, y_axis)
@@ -51,14 +51,14 @@ def at_the_edge(
         return []
     top = edge(y_axis, FAILED) if np.isinf(lost.error).any() else np.nan
     traces = []
-    for engine, profile, group in by_player(lost):
+    for engine, profile, group in by_engine(lost):
         others = drawn[(drawn.engine == engine) & (drawn.profile == profile)]
-        per_rung = float((others.cost / 2.0**others.rung).median()) if len(others) else np.nan
-        cost = group.cost.where(group.cost.notna(), per_rung * 2.0**group.rung)
+        per_step_size = float((others.cost / 2.0**others.step_size).median()) if len(others) else np.nan
+        cost = group.cost.where(group.cost.notna(), per_step_size * 2.0**group.step_size)
         corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside: what is outside is not drawn
         x = cost.fillna(corner).clip(upper=corner)
         y = group.error.clip(lower=LOWEST).where(np.isfinite(group.error), top)
-        trace = line(engine, profile, x, y, [told(row) for row in records(group)])
+        trace = line(engine, profile, x, y, [hover_text(row) for row in records(group)])
         traces.append(trace | {"mode": "markers", "cliponaxis": False})
     return traces
 
@@ -88,17 +88,17 @@ def front_of(drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any],
     }  # fmt: skip
 
 
-def dials(points: pd.DataFrame, relative: bool = False) -> go.Figure:
-    """Error against cost, a line a dial over its values, and one its engine over a ladder of dt.
+def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
+    """Error against cost, a line for each sweep over its values, and one its engine over a ladder of dt.
 
-    relative: both are over those of the engine as it is matched, at the dt at which the dial is turned.
+    relative: both are over those of the engine as it is matched, at the dt at which the parameter is swept.
     """
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis("time / time as matched" if relative else COST, drawn.cost.to_numpy(float))
     y_axis = (log_axis("error / error as matched", drawn.error.to_numpy(float)) if relative
               else error_axis(drawn.error.to_numpy(float)))  # fmt: skip
     traces = []
-    for engine, profile, group in by_player(drawn):
+    for engine, profile, group in by_engine(drawn):
         what = profile.partition("+")[2]
         text = [turned(what, row, relative) for row in records(group)]
         error = group.error if relative else group.error.clip(lower=LOWEST)
@@ -115,15 +115,15 @@ def dials(points: pd.DataFrame, relative: bool = False) -> go.Figure:
 
 
 def turned(what: str, row: dict[str, Any], relative: bool) -> str:
-    """What hovering over a point of a dial says."""
-    value = f"{what} {row['change']}<br>" if what else f"dt / {2.0 ** (row['rung'] - 2):g}<br>" if relative else ""
+    """What hovering over a point of a sweep says."""
+    value = f"{what} {row['change']}<br>" if what else f"dt / {2.0 ** (row['step_size'] - 2):g}<br>" if relative else ""
     if not relative:
-        return value + told(row)
+        return value + hover_text(row)
     return f"{value}{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
 
 
 def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
-    """What each accuracy costs, a mark a player; above, who never gets there."""
+    """What each accuracy costs, a mark an engine; above, who never gets there."""
     names = list(dict.fromkeys(zip(reached.engine, reached.profile)))
     y_axis = log_axis(COST, reached.cost.dropna().to_numpy(float))
     not_down = edge(y_axis, "not yet")
@@ -157,7 +157,7 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
     x_axis = log_axis("disks", np.append(costs.n.to_numpy(float), 10.0))
     traces = []
     stopped = edge(y_axis, "stopped") if (growth.stopped != "").any() else 0.0
-    for engine, profile, group in by_player(costs):
+    for engine, profile, group in by_engine(costs):
         text = [f"{row['n']:.0f} disks: {spread(row)} µs a step" for row in records(group)]
         traces.append(line(engine, profile, group.n, group.cost, text, {
             "error_y": bars(group.cost, group.low, group.high),
@@ -169,7 +169,7 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
     return figure(traces, x_axis, y_axis, TALL)
 
 
-def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
+def options(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
     """A row a change, a mark a scene: `ratio` ("cost_ratio", "error_ratio") to the unchanged engine, 1: the same; a
     change that failed the scene stands at the right edge.
     """
@@ -191,7 +191,7 @@ def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
         "type": "scatter", "x": [1, 1], "y": [-1, len(rows)], "mode": "lines", "hoverinfo": "skip", "name": "no change",
         "line": {"color": style.look(style.TRUTH).light, "width": 1.2, "dash": "dot"},
     }]  # fmt: skip
-    for engine, profile, group in by_player(table):
+    for engine, profile, group in by_engine(table):
         y = [rows.index((engine, profile, change)) for change in group.change]
         x = group[ratio].where(np.isfinite(group[ratio]) & (group[ratio] > 0))
         x = x.where(np.isfinite(group.error_radii), failed)
@@ -209,7 +209,7 @@ TICKS = [a * 10.0**b for b in range(-8, 9) for a in (1, 2, 5)]
 
 
 def line(engine: str, profile: str, x: Any, y: Any, text: Sequence[str], more: dict[str, Any] | None = None) -> dict:
-    """A trace in the look of its player, with what is said of each point."""
+    """A trace in the look of its engine, with what is said of each point."""
     look = style.look(engine, profile)
     return {
         "type": "scatter", "x": shortened(np.asarray(x, float), 5),
@@ -220,7 +220,7 @@ def line(engine: str, profile: str, x: Any, y: Any, text: Sequence[str], more: d
     } | (more or {})  # fmt: skip
 
 
-def by_player(table: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+def by_engine(table: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
     """(engine, profile, their rows), in the order of appearance."""
     for (engine, profile), group in table.groupby(["engine", "profile"], sort=False):
         yield str(engine), str(profile), group
@@ -237,14 +237,14 @@ def bars(middle: Any, low: Any, high: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def told(row: dict[str, Any]) -> str:
+def hover_text(row: dict[str, Any]) -> str:
     """What hovering over a point says."""
     if row["failed"] and not np.isfinite(row["error"]):
         why = f": {row['status']}, {row['reason']}" if row["reason"] else ""
         return f"{at(row)}failed in {row['failed']} of {row['seeds']}{why}"
     error = style.number(row["error"])
     if row["error_high"] != row["error_low"]:
-        error += f" ({style.number(row['error_low'])} to {style.number(row['error_high'])}, {row['seeds']} draws)"
+        error += f" ({style.number(row['error_low'])} to {style.number(row['error_high'])}, {row['seeds']} seeds)"
     lines = [f"{at(row)}error {error} radii".strip()]
     lines.append(f"{spread(row)} µs/s" if np.isfinite(row["cost"]) else "not timed")
     if np.isfinite(row["idle"]):

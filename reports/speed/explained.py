@@ -6,18 +6,18 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from reports.speed.budget import LIMIT, TOTAL, UNEXPLAINED
+from reports.speed.budget import LIMIT, RESIDUAL, TOTAL
 
 LEAST = 1e-9  # radii: a smaller error is rounding, and nothing to explain
 TO = (0.01, 0.001)  # of an error: what may be left over
 COLUMNS = [
     "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "error_radii",
-    "unexplained_radii", "note",
+    "residual_radii", "note",
 ]  # fmt: skip
 
 
 class Cut(NamedTuple):
-    """A scene that is not followed as far as its exact answer goes; both in s."""
+    """A scene that is not evaluated as far as its exact answer goes; both in s."""
 
     scenario: str
     until: float
@@ -25,15 +25,15 @@ class Cut(NamedTuple):
 
     @property
     def share(self) -> float:
-        """The part of the exact answer that is followed."""
+        """The part of the exact answer that is evaluated."""
         return self.until / self.horizon
 
 
 class Extent(NamedTuple):
-    """How many scenes, the simulated seconds followed and of their exact answers, and those that are cut."""
+    """How many scenes, the simulated seconds evaluated and of their exact answers, and those that are cut."""
 
     scenes: int
-    followed: float
+    evaluated: float
     horizon: float
     cuts: list[Cut]
 
@@ -54,19 +54,19 @@ class Share(NamedTuple):
 
 
 def explained(budget: pd.DataFrame) -> pd.DataFrame:
-    """A row a scene and engine, of `COLUMNS`: its error, what is left of it unexplained (root mean squares), and how
-    far the scene was followed, its exact answer goes, and the scene goes; note: why the engine has no error.
+    """A row a scene and engine, of `COLUMNS`: its error, its residual (root mean squares), and how
+    far the scene was evaluated, its exact answer goes, and the scene goes; note: why the engine has no error.
     """
     keys = COLUMNS[: COLUMNS.index("error_radii")]
-    wide = budget.pivot(index=keys, columns="part", values="position_radii").reindex(columns=[TOTAL, UNEXPLAINED])
-    notes = budget[budget.part == TOTAL].set_index(keys).note
-    table = wide.set_axis(["error_radii", "unexplained_radii"], axis=1).join(notes)
+    wide = budget.pivot(index=keys, columns="contribution", values="position_radii").reindex(columns=[TOTAL, RESIDUAL])
+    notes = budget[budget.contribution == TOTAL].set_index(keys).note
+    table = wide.set_axis(["error_radii", "residual_radii"], axis=1).join(notes)
     order = budget[keys].drop_duplicates()
     return order.merge(table.reset_index(), on=keys)[COLUMNS]
 
 
 def extent(table: pd.DataFrame) -> Extent:
-    """Over how much of the scenes errors are taken apart; `table` as `explained` gives it."""
+    """Over how much of the scenes errors have a budget; `table` as `explained` gives it."""
     scenes = table.drop_duplicates("scenario")
     rows = zip(scenes.scenario, scenes.until_s.astype(float), scenes.horizon_s.astype(float))
     cuts = [Cut(*row) for row in rows if row[1] < row[2] * (1 - 1e-9)]
@@ -77,7 +77,7 @@ def share(table: pd.DataFrame) -> Share:
     """How many errors are explained."""
     played = table[table.note == ""]
     errors = played[played.error_radii > LEAST]
-    left = errors.unexplained_radii / errors.error_radii
+    left = errors.residual_radii / errors.error_radii
     whole = ~errors.scenario.isin([cut.scenario for cut in extent(table).cuts])
     return Share(
         len(errors), tuple(int((left <= bound).sum()) for bound in TO), len(played) - len(errors),
@@ -94,7 +94,7 @@ def sentence(table: pd.DataFrame) -> str:
         + (f"; {known.exact} more are below {LEAST:g} radii" if known.exact else "")
         + (f"; {known.failed} were not played" if known.failed else "")
         + f") {known.within[0]} are explained to 1 %, {known.within[1]} to 0.1 %, "
-        f"over {over.followed:.0f} of {over.horizon:.0f} simulated seconds"
+        f"over {over.evaluated:.0f} of {over.horizon:.0f} simulated seconds"
     )
     if not over.cuts:
         return f"{said}: every scene as far as its exact answer goes"

@@ -40,7 +40,7 @@ def held(scene: str, seed: int) -> Held:
         raise NoTruth(scenario.without_truth or "the scene comes without an exact answer")
     truth = scenario.truth(scenario.times)
     if len(truth) < 2:
-        raise NoTruth(f"its exact answer ends at {truth.valid_until:.3g} s, before the first sample")
+        raise NoTruth(f"its exact answer ends at {truth.horizon:.3g} s, before the first sample")
     return Held(replace(scenario, duration=(len(truth) - 1) * scenario.sample_interval), truth)
 
 
@@ -53,11 +53,11 @@ def reach_of(scene: str, seed: int) -> tuple[int, str]:
 
 
 def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int]) -> list[dict[str, Any]]:
-    """A row a rung of `ladder` (coarse to fine) of what engine `name` makes of the scene, up to the horizon.
+    """A row a step size of `ladder` (coarse to fine) of what engine `name` makes of the scene, up to the horizon.
 
     until_s is how far the exact answer, and so the run, goes of the duration_s of the scene; error_radii the largest
-    distance of any disk from where it truly is, change_radii the largest from where the rung before had it; inf and
-    nan where it failed. A player that closes in on another motion changes less and less while its error stays.
+    distance of any disk from where it truly is, change_radii the largest from where the step size before had it; inf
+    and nan where it failed. An engine that closes in on another motion changes less and less while its error stays.
     """
     scenario, truth = held(scene, seed)
     whole = open_scene(scene, seed).duration
@@ -81,11 +81,11 @@ def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int
 
 
 def times_of(
-    scene: str, seed: int, players: Mapping[tuple[Any, int, int], Make], rounds: int, budget: float
+    scene: str, seed: int, engines: Mapping[tuple[Any, int, int], Make], rounds: int, budget: float
 ) -> list[Sample]:
-    """Samples, s per simulated second, of players by (who, substeps, copy) over the whole length of the scene."""
+    """Samples, s per simulated second, of engines by (who, substeps, copy) over the whole length of the scene."""
     scenario = held(scene, seed).scenario
-    what = [Timed(key, Stepping(make, scenario, key[1]), scenario.duration) for key, make in players.items()]
+    what = [Timed(key, Stepping(make, scenario, key[1]), scenario.duration) for key, make in engines.items()]
     return interleaved(what, rounds, budget, seed)
 
 

@@ -11,12 +11,12 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 from adapters.play import STATUSES
 from reports.run.journal_lines import (
     Count,
+    EngineProfile,
     File,
     Kinds,
     Line,
     Machine,
     Number,
-    Player,
     Seconds,
     Seed,
     Step,
@@ -45,7 +45,7 @@ class Header(Line):
 
     scenes: list[File]
     files: dict[File, Words]
-    engines: list[Player]
+    engines: list[EngineProfile]
     effort: dict[Words, Any]
     whole: bool
     seed: Seed
@@ -68,7 +68,7 @@ class Row(Line):
 
     @property
     def name(self) -> str:
-        """Of the player."""
+        """Of the engine."""
         return f"{self.engine}:{self.profile}"
 
 
@@ -94,15 +94,15 @@ class BudgetRow(Row):
     until_s: Seconds
     horizon_s: Seconds
     duration_s: Seconds
-    part: Words
+    contribution: Words
     note: Words
     position_radii: Length = 0.0
     energy: Length = 0.0
     share: Number = 0.0
     off_engine_radii: Length = 0.0
     off_reference_radii: Length = 0.0
-    off_apart_radii: Length = 0.0
-    closed_apart_radii: Length = 0.0
+    off_deviation_radii: Length = 0.0
+    closed_deviation_radii: Length = 0.0
 
 
 class SampleRow(Row):
@@ -128,7 +128,7 @@ class Errors(Line):
 
 
 class Budget(Line):
-    """What the parts of an error are."""
+    """What the contributions of an error are."""
 
     result: Annotated[list[BudgetRow], Field(min_length=1)]
 
@@ -163,7 +163,7 @@ class SizesOf(Line):
 
     @model_validator(mode="after")
     def known(self) -> SizesOf:
-        """As of `Samples`; and each that stopped is a player, a number of disks and why."""
+        """As of `Samples`; and each that stopped is an engine, a number of disks and why."""
         Samples(result=self.samples)
         for name, n, why in self.stopped:
             if not (isinstance(name, str) and name.count(":") == 1 and type(n) is int and isinstance(why, str)):
@@ -192,8 +192,8 @@ class Truth(Line):
 
 
 RESULTS: dict[tuple[str, ...], type[Line]] = {
-    ("error", "scene"): Errors, ("error", "feature"): Errors, ("error", "dial"): Errors, ("budget",): Budget,
-    ("time", "scene"): Samples, ("time", "feature"): Samples, ("time", "dial"): Samples, ("time", "idle"): Samples,
+    ("error", "scene"): Errors, ("error", "option"): Errors, ("error", "sweep"): Errors, ("budget",): Budget,
+    ("time", "scene"): Samples, ("time", "option"): Samples, ("time", "sweep"): Samples, ("time", "idle"): Samples,
     ("time", "size"): Sizes, ("time", "truth"): Truth,
 }  # fmt: skip
 """How a task begins -> what it gives."""
@@ -216,17 +216,17 @@ class TaskLine(Line):
             raise ValueError(f"task = {str(task)[:60]}: must begin as one of {', '.join(map(' '.join, RESULTS))}")
         low, high = PARTS[model]
         if not low <= len(task) <= high or (model is Samples and (len(task) == 2) != (begins[1] == "idle")):
-            raise ValueError(f"task = {str(task)[:60]}: must have as many parts as one of its kind")
+            raise ValueError(f"task = {str(task)[:60]}: must have as many contributions as one of its kind")
         try:
             found: Any = model.model_validate({"result": self.result})
         except ValidationError as error:
             raise ValueError(sentence(error.errors(include_url=False)[0])) from None
         if begins[0] == "error":
             here = [(row.seed, row.name, row.substeps) for row in found.result]
-            if here != [(task[3], task[4], rung) for rung in task[6:]]:
-                raise ValueError("result: must have a row for each step that the task names, of its seed and player")
+            if here != [(task[3], task[4], step_size) for step_size in task[6:]]:
+                raise ValueError("result: must have a row for each step that the task names, of its seed and engine")
         if begins[0] == "budget" and any(row.name != task[2] for row in found.result):
-            raise ValueError("result: must be of the player that the task names")
+            raise ValueError("result: must be of the engine that the task names")
         if model is Samples and any(row.kind != begins[1] for row in found.result):
             raise ValueError("result: must be of the kind that the task names")
         return self
@@ -235,7 +235,7 @@ class TaskLine(Line):
 KINDS = Kinds(
     {"header": HeaderLine, "task": TaskLine},
     "delete that line, and --resume measures again what it was of",
-    "without it nobody knows what was asked for: delete the folder, or name another --out",
+    "without it the request is not known: delete the folder, or name another --out",
 )
 
 

@@ -11,14 +11,14 @@ from typing import Any
 import pandas as pd
 
 from adapters.engines import row_of
-from adapters.mechanisms.habits import HABITS
+from adapters.mechanisms.table import MECHANISMS
 from reports.run.machine import busy_cores
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
 from reports.speed import budget, ladder, models, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept
-from reports.speed.plan import PLAIN, SCENE, Plan, Player, Reach, middle
+from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
 from reports.speed.timing import Sample
 from reports.terminal.progress import Progress
 
@@ -50,23 +50,23 @@ class Measured:
     busy: float = float("nan")
 
 
-def measure(plan: Plan, progress: Progress, kept: Kept | None = None) -> Measured:
+def measure(plan: SpeedPlan, progress: Progress, kept: Kept | None = None) -> Measured:
     """Both passes of all that is planned; what is `kept` of an interrupted measurement is not done again."""
     measured = Measured()
     reach = find_reach(plan, measured, progress)
-    players = list(plan.players(reach))
-    if any(player.kind == SCENE for player in players):
-        progress.note(estimate(plan, players, reach))
-        played = measure_errors(plan, players, measured, progress, kept)
+    measurements = list(plan.measurements(reach))
+    if any(measurement.kind == SCENE for measurement in measurements):
+        progress.note(estimate(plan, measurements, reach))
+        played = measure_errors(plan, measurements, measured, progress, kept)
         measure_budget(plan, reach, measured, progress, kept)
         measure_times(plan, played, measured, progress, kept)
     return measured
 
 
-def find_reach(plan: Plan, measured: Measured, progress: Progress) -> Reach:
-    """(scene, seed) -> how many sample intervals have an exact answer; those that have none are told of."""
+def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach:
+    """(scene, seed) -> how many sample intervals have an exact answer; those that have none are reported."""
     # In workers, which can be stopped whatever they are doing.
-    asked = {draw: partial(ladder.reach_of, *draw) for draw in plan.draws}
+    asked = {draw: partial(ladder.reach_of, *draw) for draw in plan.seeded_scenes}
     results = dict(done(asked, plan.workers, progress, "exact answer"))
     reach = {}
     for (scene, seed), result in results.items():
@@ -77,46 +77,48 @@ def find_reach(plan: Plan, measured: Measured, progress: Progress) -> Reach:
 
 
 def measure_errors(
-    plan: Plan, players: Sequence[Player], measured: Measured, progress: Progress, kept: Kept | None
-) -> list[Player]:
-    """How far off all players are; returns those of the first seed, at the steps that they played to their end."""
-    tasks = {player.task: player.errors for player in players}
+    plan: SpeedPlan, measurements: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
+) -> list[Measurement]:
+    """How far off all engines are; returns those of the first seed, at the steps that they played to their end."""
+    tasks = {measurement.task: measurement.errors for measurement in measurements}
     results = dict(done(tasks, plan.workers, progress, "error", kept=kept))
     rows: list[dict[str, Any]] = []
     played = []
-    for player in players:
-        result = results[player.task]
-        found = rung_by_rung(player, plan.workers) if isinstance(result, Failure) else result
-        rows += ({"kind": player.kind, "change": player.change} | row for row in found)
-        if player.seed == plan.seed:
+    for measurement in measurements:
+        result = results[measurement.task]
+        found = one_step_size_at_a_time(measurement, plan.workers) if isinstance(result, Failure) else result
+        rows += ({"kind": measurement.kind, "change": measurement.change} | row for row in found)
+        if measurement.seed == plan.seed:
             well = tuple(row["substeps"] for row in found if row["status"] == "ok")
-            played.append(player._replace(rungs=well))
+            played.append(measurement._replace(step_sizes=well))
     measured.errors = pd.DataFrame(rows)
     return played
 
 
-def rung_by_rung(player: Player, workers: int) -> list[dict]:
-    """A ladder whose worker died or hung once more, each rung by itself, so that the others are kept."""
+def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict]:
+    """A ladder whose worker died or hung once more, each step size by itself, so that the others are kept."""
     rows: list[dict[str, Any]] = []
-    for k, result in run_all({k: player._replace(rungs=(k,)).errors for k in player.rungs}, workers, HANGS):
+    for k, result in run_all(
+        {k: measurement._replace(step_sizes=(k,)).errors for k in measurement.step_sizes}, workers, HANGS
+    ):
         if isinstance(result, Failure):
-            engine, profile = player.name.split(":")
-            scenario = ladder.open_scene(player.scene, player.seed)
+            engine, profile = measurement.name.split(":")
+            scenario = ladder.open_scene(measurement.scene, measurement.seed)
             result = [{
-                "scenario": scenario.name, "seed": player.seed, "engine": engine, "profile": profile,
+                "scenario": scenario.name, "seed": measurement.seed, "engine": engine, "profile": profile,
                 "dt_s": scenario.dt(k), "substeps": k, "status": result.status, "reason": result.reason,
-                "until_s": ladder.held(player.scene, player.seed).scenario.duration, "duration_s": scenario.duration,
+                "until_s": ladder.held(measurement.scene, measurement.seed).scenario.duration, "duration_s": scenario.duration,
                 "error_radii": float("inf"), "change_radii": float("nan"),
             }]  # fmt: skip
         rows += result
     return sorted(rows, key=lambda row: row["substeps"])
 
 
-def measure_budget(plan: Plan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None) -> None:
-    """What the errors are made of, of the engines whose habits are known, at the middle dt."""
+def measure_budget(plan: SpeedPlan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None) -> None:
+    """What the errors are made of, of the engines whose mechanisms are known, at the middle dt."""
     tasks = {
         ("budget", scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
-        for scene in plan.budget_scenes for name in plan.engines if name in HABITS and reach[scene, plan.seed]
+        for scene in plan.budget_scenes for name in plan.engines if name in MECHANISMS and reach[scene, plan.seed]
     }  # fmt: skip
     results = dict(done(tasks, plan.workers, progress, "parts of the error", kept=kept))
     for task, result in results.items():
@@ -127,7 +129,7 @@ def measure_budget(plan: Plan, reach: Reach, measured: Measured, progress: Progr
 
 
 def measure_times(
-    plan: Plan, played: Sequence[Player], measured: Measured, progress: Progress, kept: Kept | None
+    plan: SpeedPlan, played: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
 ) -> None:
     """What everything costs that was played to its end: one process, one thing at a time."""
     measured.busy = busy_cores()
@@ -147,8 +149,8 @@ def measure_times(
     measured.samples, measured.truths = pd.DataFrame(rows), pd.DataFrame(truths)
 
 
-def timings(plan: Plan, played: Sequence[Player]) -> dict[tuple, Callable[[], Any]]:
-    """The tasks of the second pass: all players of a kind in a scene in one, as they are compared."""
+def timings(plan: SpeedPlan, played: Sequence[Measurement]) -> dict[tuple, Callable[[], Any]]:
+    """The tasks of the second pass: all measurements of a kind in a scene in one, as they are compared."""
     often: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
     makes = {name: row_of(name).make for name in plan.engines}
     tasks: dict[tuple, Callable[[], Any]] = {}
@@ -162,31 +164,33 @@ def timings(plan: Plan, played: Sequence[Player]) -> dict[tuple, Callable[[], An
     return tasks
 
 
-def in_turns(players: Sequence[Player]) -> dict[tuple[tuple[str, str], int, int], Callable]:
+def in_turns(measurements: Sequence[Measurement]) -> dict[tuple[tuple[str, str], int, int], Callable]:
     """((name, change), substeps, copy) -> engine.
 
     On a ladder of a scene each takes part twice at its middle dt, which gives the noise floor.
     """
     all_of_them = {}
-    for player in players:
-        for k in player.rungs:
-            twice = player.kind == SCENE and k == player.rungs[len(player.rungs) // 2]
+    for measurement in measurements:
+        for k in measurement.step_sizes:
+            twice = measurement.kind == SCENE and k == measurement.step_sizes[len(measurement.step_sizes) // 2]
             for copy in (0, 1) if twice else (0,):
-                all_of_them[(player.name, player.change), k, copy] = player.make
+                all_of_them[(measurement.name, measurement.change), k, copy] = measurement.make
     return all_of_them
 
 
-def scene_rows(kind: str, scene: str, seed: int, players: Mapping, often: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Rows of `Measured.samples` of players as `in_turns` gives them."""
+def scene_rows(
+    kind: str, scene: str, seed: int, measurements: Mapping, often: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """Rows of `Measured.samples` of measurements as `in_turns` gives them."""
     scenario, rows = ladder.open_scene(scene, seed), []
-    for sample in ladder.times_of(scene, seed, players, **often):
+    for sample in ladder.times_of(scene, seed, measurements, **often):
         (name, change), k, copy = sample.key
-        told = {"scenario": scenario.name, "change": change, "dt_s": scenario.dt(k), "copy_of": copy}
-        rows.append(sample_row(kind, name, sample, **told))
+        identity = {"scenario": scenario.name, "change": change, "dt_s": scenario.dt(k), "copy_of": copy}
+        rows.append(sample_row(kind, name, sample, **identity))
     return rows
 
 
-def size_rows(makes: Mapping[str, Callable], plan: Plan, often: Mapping[str, Any]) -> dict[str, list]:
+def size_rows(makes: Mapping[str, Callable], plan: SpeedPlan, often: Mapping[str, Any]) -> dict[str, list]:
     """samples: rows of `Measured.samples` for every number of disks; stopped: (name, disks, why)."""
     found, stopped = sizes.costs(makes, plan.effort.sizes, patience=plan.effort.patience, seed=plan.seed, **often)
     rows = [sample_row(SIZE, sample.key[0], sample, n=sample.key[1]) for sample in found]
@@ -199,11 +203,11 @@ def idle_rows(makes: Mapping[str, Callable], seed: int, often: Mapping[str, Any]
     return [sample_row(IDLE, sample.key[0], sample, singly=sample.key[1]) for sample in found]
 
 
-def sample_row(kind: str, name: str, sample: Sample, **told: Any) -> dict[str, Any]:
+def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[str, Any]:
     """A sample as a row of `Measured.samples`."""
     engine, profile = name.split(":")
     unknown = {"scenario": "", "change": PLAIN, "dt_s": float("nan"), "n": 0, "copy_of": 0, "singly": False}
-    return {"kind": kind, "engine": engine, "profile": profile} | unknown | told | {
+    return {"kind": kind, "engine": engine, "profile": profile} | unknown | identity | {
         "round": sample.round, "place": sample.place, "cost": sample.cost, "wrapping": sample.wrapping,
         "runs": sample.runs,
     }  # fmt: skip
@@ -223,6 +227,6 @@ def done(
         failed = isinstance(result, Failure)
         if kept is not None and not failed:
             kept.add(task, result)
-        told = " ".join(str(part) for part in task if part not in (what, PLAIN))
-        progress.done(f"{what}: {told}", *(result[:2] if failed else ("ok", "")))
+        label = " ".join(str(part) for part in task if part not in (what, PLAIN))
+        progress.done(f"{what}: {label}", *(result[:2] if failed else ("ok", "")))
         yield task, result

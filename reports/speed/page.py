@@ -13,7 +13,7 @@ from reports.page import style
 from reports.page.charts import Drawing, packed_charts
 from reports.page.documents import CHARTED, render
 from reports.speed import budget_tables, charts, explained, tables
-from reports.speed.budget import TOTALS, UNEXPLAINED
+from reports.speed.budget import RESIDUAL, TOTALS
 from reports.speed.order import ELSEWHERE, UNSTEADY
 from reports.speed.pareto import ACCURACIES
 from reports.speed.pooling import said_of_pool
@@ -25,7 +25,7 @@ GENERATOR = "crosscheck speed"
 FLAGGED = (ELSEWHERE, UNSTEADY)
 
 
-class Section(NamedTuple):
+class SpeedSection(NamedTuple):
     """A group of charts under one legend, and a table of what they say."""
 
     key: str
@@ -39,36 +39,36 @@ class Section(NamedTuple):
 
 def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     """Write the page of `results`; `about` holds command, seed, machine, versions, started, seconds, load."""
-    names = (*results.names, *(dial.name for dial in results.plan.dials), style.TRUTH)
+    names = (*results.names, *(sweep.name for sweep in results.plan.sweeps), style.TRUTH)
     looks = {name: style.look(*name.split(":", 1)) for name in names}
     html = render(
         "speed/speed.html.j2", generator=GENERATOR, scripts=CHARTED, styles=["speed/speed.css"], looks=looks,
         plotly=True, names=results.names, about=about, pooled=pooled_section(results), sizes=sizes_section(results),
-        features=features_section(results), dials=dial_sections(results), dial_rows=charts.records(results.dials),
+        options=options_section(results), sweeps=sweep_sections(results), sweep_rows=charts.records(results.sweeps),
         sections=[section_of(results, name) for name in results.scenes],
         noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
-        driving=charts.records(results.driving), feature_rows=charts.records(results.features), 
+        driving=charts.records(results.driving), option_rows=charts.records(results.options), 
         versus=charts.records(results.versus), own=OWN,
         left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
-        feature_scenes=results.plan.feature_scenes, budget=budget_section(results),
-        totals=(*TOTALS, UNEXPLAINED),
+        option_scenes=results.plan.option_scenes, budget=budget_section(results),
+        totals=(*TOTALS, RESIDUAL),
     )  # fmt: skip
     put_text(path, html)
 
 
 def section(
     key: str, title: str, text: str, drawings: dict[str, Drawing], orders: pd.DataFrame | None = None
-) -> Section:
-    """A `Section`, its figures packed."""
+) -> SpeedSection:
+    """A `SpeedSection`, its figures packed."""
     traces = [trace.name for each in drawings.values() if each.figure is not None for trace in each.figure.data]
     names = [name for name in dict.fromkeys(traces) if ":" in name]
     rows = [] if orders is None else charts.records(orders)
-    return Section(key, title, text, drawings, packed_charts(drawings), rows, names)
+    return SpeedSection(key, title, text, drawings, packed_charts(drawings), rows, names)
 
 
-def pooled_section(results: Results) -> Section:
+def pooled_section(results: Results) -> SpeedSection:
     """All scenarios at once."""
-    count, steps = len(results.scenes), results.pooled.rung.nunique()
+    count, steps = len(results.scenes), results.pooled.step_size.nunique()
     drawings = {
         "speed": Drawing(
             "Error against cost",
@@ -90,19 +90,19 @@ def pooled_section(results: Results) -> Section:
     return section("pooled", "All scenes pooled", "", drawings)
 
 
-def section_of(results: Results, scene: str) -> Section:
+def section_of(results: Results, scene: str) -> SpeedSection:
     """One scenario."""
     points = results.points[results.points.scenario == scene]
     reached = results.reached[results.reached.scenario == scene]
     seeds = int(points.seeds.max())
-    spread = f" The error is the median over {seeds} draws, its bar the 95 % bootstrap interval." if seeds > 1 else ""
+    spread = f" The error is the median over {seeds} seeds, its bar the 95 % bootstrap interval." if seeds > 1 else ""
     noise = results.noise_summary(scene)
     low, high = (style.number(noise.get(end, np.nan)) for end in ("low", "high"))
-    floor = f" Noise floor: half of the players read {low} to {high} against themselves." if noise["pairs"] else ""
+    floor = f" Noise floor: half of the engines read {low} to {high} against themselves." if noise["pairs"] else ""
     until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
     scored = f" Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends." if until < whole else ""
     wrapping = (points.wrapping > 0).any()
-    apart = (
+    budgets = (
         " Setting disks onto the opposite edge, which an engine without such an edge leaves to Python, is not in it: "
         "hover."
         if wrapping
@@ -112,7 +112,7 @@ def section_of(results: Results, scene: str) -> Section:
         "speed": Drawing(
             "Error against cost",
             f"A point is one dt; halving it goes right.{scored}{spread} Time: median of the rounds, bars the quartiles."
-            f"{floor}{apart}",
+            f"{floor}{budgets}",
             charts.speed(points),
         ),
         "matched": Drawing(
@@ -125,7 +125,7 @@ def section_of(results: Results, scene: str) -> Section:
     return section(scene, scene, results.asks[scene], drawings, results.order_table(scene))
 
 
-def sizes_section(results: Results) -> Section | None:
+def sizes_section(results: Results) -> SpeedSection | None:
     """Cost against the number of disks."""
     if results.sizes.empty:
         return None
@@ -143,54 +143,54 @@ def budget_section(results: Results) -> dict[str, Any] | None:
     if budget.empty:
         return None
     table = results.explained
-    parts = set(table.engine + ":" + table.profile)
+    contributions = set(table.engine + ":" + table.profile)
     return {
         "sentence": explained.sentence(table), "cuts": explained.extent(table).cuts,
-        "absent": [name for name in results.names if name not in parts],
+        "absent": [name for name in results.names if name not in contributions],
         "overview": budget_tables.overview(budget),
         "scenes": [budget_tables.of_scene(budget, scene) for scene in dict.fromkeys(budget.scenario)],
-        "off": budget_tables.switched_off(budget), "closed": float(budget.closed_apart_radii.max()),
+        "off": budget_tables.ablated_in_both(budget), "closed": float(budget.closed_deviation_radii.max()),
     }  # fmt: skip
 
 
-def features_section(results: Results) -> Section | None:
-    """What each unneeded feature costs and breaks."""
-    table = results.features
+def options_section(results: Results) -> SpeedSection | None:
+    """What each unneeded option costs and breaks."""
+    table = results.options
     if table.empty:
         return None
     many = np.isfinite(table.cost_ratio).any()
     drawings = {
         "cost": Drawing(
             "What it costs", "Time over that of the matched profile; right of the dotted line it costs more.",
-            charts.features(table, "cost_ratio", "time / time unchanged") if many else None,
+            charts.options(table, "cost_ratio", "time / time unchanged") if many else None,
         ),
         "error": Drawing(
             "What it breaks, or mends", "Error over that of the matched profile; right of the dotted line it is worse.",
-            charts.features(table, "error_ratio", "error / error unchanged"),
+            charts.options(table, "error_ratio", "error / error unchanged"),
         ),
     }  # fmt: skip
-    return section("features", "No more than a scene needs", "", drawings)
+    return section("options", "No more than a scene needs", "", drawings)
 
 
-def dial_sections(results: Results) -> list[Section]:
+def sweep_sections(results: Results) -> list[SpeedSection]:
     """What more iterations and substeps buy, and what smaller steps buy for the same time."""
-    if results.dials.empty:
+    if results.sweeps.empty:
         return []
-    count = results.dials.scenario.nunique()
-    without = ", ".join(f"{engine} in {scene}" for engine, scene in tables.without_ratio(results.dials))
+    count = results.sweeps.scenario.nunique()
+    without = ", ".join(f"{engine} in {scene}" for engine, scene in tables.without_ratio(results.sweeps))
     pooled = Drawing(
         "Pooled",
         "Dotted: one dt, and more iterations or substeps to the right, the first and the last named. Solid: the same "
         "engine as matched, from 4 times that dt to an eighth of it. Both over what it costs and how far it is off as "
         f"matched, at that dt, where all lines meet; geometric means of the middle half of {count} scenes."
         + (f" Without a ratio, as there is nothing to divide by: {without}." if without else ""),
-        charts.dials(results.pooled_dials, relative=True),
+        charts.sweeps(results.pooled_sweeps, relative=True),
     )
     each = {
-        str(scene): Drawing(str(scene), tables.asks_of(str(scene))[1], charts.dials(points))
-        for scene, points in results.dials.groupby("scenario", sort=False)
+        str(scene): Drawing(str(scene), tables.asks_of(str(scene))[1], charts.sweeps(points))
+        for scene, points in results.sweeps.groupby("scenario", sort=False)
     }
     return [
-        section("dials", "More work in a step, or more steps", "", {"dials": pooled}),
-        section("dials-each", "The same, scene by scene", "", each),
+        section("sweeps", "More work in a step, or more steps", "", {"sweeps": pooled}),
+        section("sweeps-each", "The same, scene by scene", "", each),
     ]

@@ -9,20 +9,20 @@ from typing import Any, NamedTuple
 
 from adapters.engine import Engine
 from adapters.engines import row_of
-from adapters.mechanisms.features import DIALS, FEATURES, Dial, Feature
+from adapters.mechanisms.options import OPTIONS, SWEEPS, Option, Sweep
 from reports.speed import ladder
 from reports.speed.effort import Effort
 
-SCENE, FEATURE, DIAL = "scene", "feature", "dial"
+SCENE, OPTION, SWEEP = "scene", "option", "sweep"
 PLAIN = ""  # the change of an engine that is not changed
 Reach = Mapping[tuple[str, int], int]  # (scene, seed) -> how many sample intervals have an exact answer
 
 
-class Player(NamedTuple):
-    """An engine in a scene, drawn from a seed, at some steps of the sample interval (coarse to fine).
+class Measurement(NamedTuple):
+    """An engine in a scene with a seed at some steps of the sample interval (coarse to fine).
 
-    kind: which question it is for: the ladders of all scenes, the features, or the dials. `change` is a row of
-    `FEATURES`, a value of a dial, or `PLAIN`.
+    kind: which question it is for: the ladders of all scenes, the options, or the sweeps. `change` is a row of
+    `OPTIONS`, a value of a sweep, or `PLAIN`.
     """
 
     kind: str
@@ -31,21 +31,21 @@ class Player(NamedTuple):
     name: str
     change: str
     make: Callable[[], Engine]
-    rungs: tuple[int, ...]
+    step_sizes: tuple[int, ...]
 
     @property
     def task(self) -> tuple:
         """What stands for it where results are kept."""
-        return ("error", *self[:5], *self.rungs)
+        return ("error", *self[:5], *self.step_sizes)
 
     @property
     def errors(self) -> Callable[[], list[dict[str, Any]]]:
         """How to find how far off it is."""
-        return partial(ladder.errors_of, self.scene, self.seed, self.name, self.make, self.rungs)
+        return partial(ladder.errors_of, self.scene, self.seed, self.name, self.make, self.step_sizes)
 
 
 @dataclass(frozen=True)
-class Plan:
+class SpeedPlan:
     """What is asked for: scenes and engines by name, how much, from which seed, with how many workers.
 
     whole: not only these scenes, but the changed engines and the numbers of disks, too.
@@ -59,64 +59,66 @@ class Plan:
     whole: bool = True
 
     @property
-    def features(self) -> list[Feature]:
-        """The rows of `FEATURES` for the engines that are asked for."""
-        return [feature for feature in FEATURES if self.whole and feature.engine in self.engines]
+    def options(self) -> list[Option]:
+        """The rows of `OPTIONS` for the engines that are asked for."""
+        return [option for option in OPTIONS if self.whole and option.engine in self.engines]
 
     @property
-    def dials(self) -> list[Dial]:
-        """The rows of `DIALS` for the engines that are asked for."""
-        return [dial for dial in DIALS if self.whole and dial.engine in self.engines]
+    def sweeps(self) -> list[Sweep]:
+        """The rows of `SWEEPS` for the engines that are asked for."""
+        return [sweep for sweep in SWEEPS if self.whole and sweep.engine in self.engines]
 
     @property
-    def feature_scenes(self) -> tuple[str, ...]:
+    def option_scenes(self) -> tuple[str, ...]:
         """Where the changed engines are measured, if any are."""
-        return self.effort.feature_scenes if self.features else ()
+        return self.effort.option_scenes if self.options else ()
 
     @property
-    def dial_scenes(self) -> tuple[str, ...]:
-        """Where the dials are turned, if any are."""
-        return self.effort.dial_scenes if self.dials else ()
+    def sweep_scenes(self) -> tuple[str, ...]:
+        """Where parameters are swept, if any are."""
+        return self.effort.sweep_scenes if self.sweeps else ()
 
     @property
     def budget_scenes(self) -> tuple[str, ...]:
-        """Where errors are taken apart: in the scenes asked for, if any are."""
+        """Where errors have a budget: in the scenes asked for, if any are."""
         return self.effort.budget_scenes if self.whole else tuple(self.scenes)
 
     @property
-    def draws(self) -> list[tuple[str, int]]:
+    def seeded_scenes(self) -> list[tuple[str, int]]:
         """(scene, seed) of all that an exact answer is needed for."""
-        scenes = dict.fromkeys((*self.scenes, *self.feature_scenes, *self.dial_scenes))
-        draws = [(scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)]
-        return draws + [(scene, self.seed) for scene in self.budget_scenes if scene not in scenes]
+        scenes = dict.fromkeys((*self.scenes, *self.option_scenes, *self.sweep_scenes))
+        seeded = [(scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)]
+        return seeded + [(scene, self.seed) for scene in self.budget_scenes if scene not in scenes]
 
-    def players(self, reach: Reach) -> Iterator[Player]:
+    def measurements(self, reach: Reach) -> Iterator[Measurement]:
         """Everybody, in every draw that has an exact answer."""
         drawn = {draw for draw, samples in reach.items() if samples}
-        for scene, seed in (draw for draw in self.draws if draw in drawn):
+        for scene, seed in (draw for draw in self.seeded_scenes if draw in drawn):
             if scene in self.scenes:
-                rungs = self.effort.ladder(ladder.open_scene(scene, seed))
-                yield from (Player(SCENE, scene, seed, name, PLAIN, row_of(name).make, rungs) for name in self.engines)
-            if scene in self.feature_scenes and seed == self.seed:
+                step_sizes = self.effort.ladder(ladder.open_scene(scene, seed))
+                yield from (
+                    Measurement(SCENE, scene, seed, name, PLAIN, row_of(name).make, step_sizes) for name in self.engines
+                )
+            if scene in self.option_scenes and seed == self.seed:
                 yield from self.changed(scene)
-            if scene in self.dial_scenes:
+            if scene in self.sweep_scenes:
                 yield from self.turned(scene, seed)
 
-    def changed(self, scene: str) -> Iterator[Player]:
+    def changed(self, scene: str) -> Iterator[Measurement]:
         """Every changed engine, after those they are set against, at the dt the report shows."""
-        rungs = (middle(scene),)
-        for name in dict.fromkeys(feature.engine for feature in self.features):
-            yield Player(FEATURE, scene, self.seed, name, PLAIN, row_of(name).make, rungs)
-        for one in self.features:
-            yield Player(FEATURE, scene, self.seed, one.engine, one.change, one.make, rungs)
+        step_sizes = (middle(scene),)
+        for name in dict.fromkeys(option.engine for option in self.options):
+            yield Measurement(OPTION, scene, self.seed, name, PLAIN, row_of(name).make, step_sizes)
+        for one in self.options:
+            yield Measurement(OPTION, scene, self.seed, one.engine, one.change, one.make, step_sizes)
 
-    def turned(self, scene: str, seed: int) -> Iterator[Player]:
-        """Every dial at every value at the dt the report shows, and its engine over a ladder of dt beside it."""
+    def turned(self, scene: str, seed: int) -> Iterator[Measurement]:
+        """Every sweep at every value at the dt the report shows, and its engine over a ladder of dt beside it."""
         here = middle(scene)
-        for dial in self.dials:
-            yield Player(DIAL, scene, seed, dial.engine, PLAIN, row_of(dial.engine).make, around(here))
-            for value in dial.values:
-                yield Player(DIAL, scene, seed, dial.name, str(value), dial.at(value), (here,))
+        for sweep in self.sweeps:
+            yield Measurement(SWEEP, scene, seed, sweep.engine, PLAIN, row_of(sweep.engine).make, around(here))
+            for value in sweep.values:
+                yield Measurement(SWEEP, scene, seed, sweep.name, str(value), sweep.at(value), (here,))
 
 
 def around(here: int) -> tuple[int, ...]:
@@ -126,5 +128,5 @@ def around(here: int) -> tuple[int, ...]:
 
 def middle(scene: str) -> int:
     """Steps in a sample interval at the dt the report shows."""
-    rungs = ladder.open_scene(scene, 0).substeps
-    return rungs[len(rungs) // 2]
+    step_sizes = ladder.open_scene(scene, 0).substeps
+    return step_sizes[len(step_sizes) // 2]

@@ -43,17 +43,19 @@ def moved(values: Array, floor: float = 0.0) -> Array:
 
 
 def pooled(found: pd.DataFrame) -> pd.DataFrame:
-    """A row a player and rung that all scenarios have: error and cost, each `middle_half` over the scenarios.
+    """A row an engine and step size that all scenarios have: error and cost, each `middle_half` over the scenarios.
 
     Columns besides: error_low, error_high, low, high (quartiles); bare, of the cost less that of as many idle steps;
     of (how many scenarios), failed (in how many it did), timed (how many carry the cost); moved and cost_moved (by
     which factor leaving out one scenario changes error and cost at most), moved_by and cost_moved_by (which one).
-    A scenario that a player failed counts as infinitely wrong and infinitely dear; one that it played but was not timed
-    in is left out of the cost, and `timed` says so.
+    A scenario that an engine failed counts as infinitely wrong and infinitely dear; one that it played but was not
+    timed in is left out of the cost, and `timed` says so.
     """
-    rungs = found.groupby("scenario").rung.max().min()
+    step_sizes = found.groupby("scenario").step_size.max().min()
     rows = []
-    for (engine, profile, rung), group in found[found.rung <= rungs].groupby([*WHO, "rung"], sort=False):
+    for (engine, profile, step_size), group in found[found.step_size <= step_sizes].groupby(
+        [*WHO, "step_size"], sort=False
+    ):
         scenes, error = group.scenario.to_numpy(str), group.error.to_numpy(float)
         priced = group[group.cost.notna() | (group.failed > 0)]
         cost = priced.cost.fillna(np.inf).to_numpy(float)
@@ -61,7 +63,7 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
         quartiles = np.percentile(error, [25, 75], method="nearest")
         prices = np.percentile(cost, [25, 75], method="nearest") if len(cost) else [np.nan] * 2
         rows.append({
-            "scenario": POOLED, "engine": engine, "profile": profile, "rung": rung, "dt_s": np.nan,
+            "scenario": POOLED, "engine": engine, "profile": profile, "step_size": step_size, "dt_s": np.nan,
             "error": middle_half(error), "error_low": quartiles[0], "error_high": quartiles[1],
             "cost": finite(middle_half(cost)), "low": finite(prices[0]), "high": finite(prices[1]),
             "bare": finite(middle_half(bare)) if not np.isnan(bare).any() else np.nan,
@@ -90,12 +92,12 @@ def said_of_pool(found: pd.DataFrame) -> str:
     """How much one scene can move a pooled point of `pooled`, and what failed; in words."""
     failed = found[found.failed > 0].groupby(WHO, sort=False).failed.max().reset_index()
     lost = ", ".join(f"{row.engine}:{row.profile} {row.failed}" for row in failed.itertuples())
-    told = f"Scenes failed: {lost}." if lost else "No engine failed a scene."
+    failures = f"Scenes failed: {lost}." if lost else "No engine failed a scene."
     if found.of.max() < 2:
-        return f"One scene, so nothing is pooled. {told}"
+        return f"One scene, so nothing is pooled. {failures}"
     worst, cost = found.iloc[int(found.moved.to_numpy(float).argmax())], found.cost_moved.max()
     said = (
         f"Leaving out any one of the {found.of.max()} scenes moves no pooled error by more than a factor of "
         f"{worst.moved:.2g} ({worst.engine}:{worst.profile} without {worst.moved_by})"
     )
-    return f"{said}{f' and no pooled cost by more than {cost:.2g}' if np.isfinite(cost) else ''}. {told}"
+    return f"{said}{f' and no pooled cost by more than {cost:.2g}' if np.isfinite(cost) else ''}. {failures}"

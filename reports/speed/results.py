@@ -12,7 +12,7 @@ import pandas as pd
 from reports.speed import explained, models, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.pareto import ACCURACIES, FAILED, NOT_TIMED, UNREACHABLE
-from reports.speed.plan import Plan
+from reports.speed.plan import SpeedPlan
 from reports.speed.pooling import POOLED, pooled
 from reports.terminal.foreign_text import put_text
 
@@ -23,12 +23,12 @@ QUIET = 0.05  # how far from 1 an engine against itself may read
 class Results:
     """What was measured, and the tables made from it on demand."""
 
-    plan: Plan
+    plan: SpeedPlan
     measured: Measured
 
     @property
     def names(self) -> list[str]:
-        """`engine:profile` of every player, in the order of `ENGINES`."""
+        """`engine:profile` of every engine, in the order of `ENGINES`."""
         return list(self.plan.engines)
 
     @property
@@ -71,20 +71,20 @@ class Results:
         return pooled(self.points)
 
     @cached_property
-    def dials(self) -> pd.DataFrame:
-        """See `tables.dials`."""
-        return tables.dials(self.measured, self.plan.seed)
+    def sweeps(self) -> pd.DataFrame:
+        """See `tables.sweeps`."""
+        return tables.sweeps(self.measured, self.plan.seed)
 
     @cached_property
-    def pooled_dials(self) -> pd.DataFrame:
-        """See `tables.pooled_dials`."""
-        return tables.pooled_dials(self.dials)
+    def pooled_sweeps(self) -> pd.DataFrame:
+        """See `tables.pooled_sweeps`."""
+        return tables.pooled_sweeps(self.sweeps)
 
     @cached_property
     def pooled_reached(self) -> pd.DataFrame:
         """As `reached`: the median over the scenarios where more than half get there, and how many do and do not.
 
-        A scenario in which a player does not get there is infinitely dear. Columns besides: of, how many scenarios;
+        A scenario in which an engine does not get there is infinitely dear. Columns besides: of, how many scenarios;
         got, in how many it gets there; never, at no dt; failed; untimed; in the others it does not down to the finest
         dt. lost: half or more are never or failed.
         """
@@ -96,11 +96,11 @@ class Results:
                 "untimed": int((group.why == NOT_TIMED).sum()),
             }  # fmt: skip
             median = float(np.median(group.cost.fillna(np.inf)))
-            told = [f"{what} in {counts[what]}" for what in ("never", "failed", "untimed") if counts[what]]
+            others = [f"{what} in {counts[what]}" for what in ("never", "failed", "untimed") if counts[what]]
             rows.append({
                 "scenario": POOLED, "engine": engine, "profile": profile, "accuracy": accuracy,
                 "cost": median if np.isfinite(median) else np.nan, "dt_s": np.nan,
-                "why": ", ".join([f"{counts['got']} of {len(group)}", *told]),
+                "why": ", ".join([f"{counts['got']} of {len(group)}", *others]),
                 "lost": 2 * int(group.lost.sum()) >= len(group), **counts,
             })  # fmt: skip
         return pd.DataFrame(rows)
@@ -142,9 +142,9 @@ class Results:
         return tables.grown(self.measured)
 
     @cached_property
-    def features(self) -> pd.DataFrame:
-        """See `tables.features`."""
-        return tables.features(self.measured)
+    def options(self) -> pd.DataFrame:
+        """See `tables.options`."""
+        return tables.options(self.measured)
 
     @cached_property
     def explained(self) -> pd.DataFrame:
@@ -155,7 +155,7 @@ class Results:
     @cached_property
     def versus(self) -> pd.DataFrame:
         """See `versus.against_own`."""
-        return versus.against_own(self.points, self.features)
+        return versus.against_own(self.points, self.options)
 
     @cached_property
     def models(self) -> pd.DataFrame:
@@ -163,7 +163,7 @@ class Results:
         return models.cheapest(self.measured.truths, self.points)
 
     def order_table(self, scene: str) -> pd.DataFrame:
-        """A row a player: order with interval and verdict, and for every accuracy (cost, dt, why) as columns."""
+        """A row an engine: order with interval and verdict, and for every accuracy (cost, dt, why) as columns."""
         orders = self.orders[self.orders.scenario == scene]
         reached = self.reached[self.reached.scenario == scene]
         wide = orders.assign(**{
@@ -182,8 +182,8 @@ class Results:
         tables = {
             "speed_samples": self.measured.samples, "speed_errors": self.measured.errors, "speed": self.points,
             "speed_pooled": self.pooled, "speed_orders": self.orders, "speed_reached": self.reached,
-            "speed_sizes": self.sizes, "speed_features": self.features, "speed_driving": self.driving,
-            "speed_noise": self.noise, "speed_models": self.models, "speed_dials": self.dials,
+            "speed_sizes": self.sizes, "speed_options": self.options, "speed_driving": self.driving,
+            "speed_noise": self.noise, "speed_models": self.models, "speed_sweeps": self.sweeps,
             "speed_budget": self.measured.budget, "speed_explained": self.explained, "speed_versus": self.versus,
         }  # fmt: skip
         return {f"{name}.csv": table for name, table in tables.items()}

@@ -1,4 +1,4 @@
-"""What the samples and errors come to: points, orders, what an accuracy costs, sizes, features, the noise floor."""
+"""What the samples and errors come to: points, orders, what an accuracy costs, sizes, options, the noise floor."""
 
 from __future__ import annotations
 
@@ -8,56 +8,56 @@ import numpy as np
 import pandas as pd
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.features import DIALS
+from adapters.mechanisms.options import SWEEPS
 from reports.speed.ladder import open_scene
 from reports.speed.measure import IDLE, SIZE, Measured
 from reports.speed.order import FINEST, NEARER, Order, median_interval, order_of
 from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
-from reports.speed.plan import DIAL, FEATURE, PLAIN, SCENE
+from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
 from reports.speed.pooling import WHO, pooled
 from reports.speed.sizes import exponent
 from reports.speed.timing import summed_up
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario, player and dt: the columns of `summed`, and rung (0: coarsest)."""
+    """A row a scenario, engine and dt: the columns of `summed`, and step_size (0: coarsest)."""
     found = summed(measured, SCENE, seed)
-    return found.assign(rung=doublings(found))
+    return found.assign(step_size=doublings(found))
 
 
-def dials(measured: Measured, seed: int) -> pd.DataFrame:
-    """The columns of `summed`, and rung: the dials over their values, and their engines over a ladder of dt."""
-    if not (measured.errors.kind == DIAL).any():
+def sweeps(measured: Measured, seed: int) -> pd.DataFrame:
+    """The columns of `summed`, and step_size: the sweeps over their values, and their engines over a ladder of dt."""
+    if not (measured.errors.kind == SWEEP).any():
         return pd.DataFrame()
-    found = summed(measured, DIAL, seed)
-    places = {(dial.name, str(value)): k for dial in DIALS for k, value in enumerate(dial.values)}
+    found = summed(measured, SWEEP, seed)
+    places = {(sweep.name, str(value)): k for sweep in SWEEPS for k, value in enumerate(sweep.values)}
     names = found.engine + ":" + found.profile
     turned = [places.get(who, -1) for who in zip(names, found.change)]
-    return found.assign(rung=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan)
+    return found.assign(step_size=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan)
 
 
-def pooled_dials(found: pd.DataFrame) -> pd.DataFrame:
-    """As `pooled`, of cost and error over those of the matched engine at the dt at which its dial is turned.
+def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
+    """As `pooled`, of cost and error over those of the matched engine at the dt at which its parameter is swept.
 
-    change is the value of the dial; a ladder of dt has none. Scenes of `without_ratio` have no part in it.
+    change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no part in it.
     """
     both = found.merge(beside(found), on=["scenario", "engine"], suffixes=("", "_here"))
     both = both[measurable(both)]
     for of in ("cost", "error"):
         both[of] /= both[f"{of}_here"]
     parts = [pooled(group).assign(change=str(change)) for (_, change), group in both.groupby(["profile", "change"])]
-    return pd.concat(parts).sort_values("rung", kind="stable") if parts else found.head(0)
+    return pd.concat(parts).sort_values("step_size", kind="stable") if parts else found.head(0)
 
 
 def without_ratio(found: pd.DataFrame) -> list[tuple[str, str]]:
-    """(engine, scenario) of the dials where the matched engine failed, was not timed, or is right to the last bit."""
+    """(engine, scenario) of the sweeps where the matched engine failed, was not timed, or is right to the last bit."""
     here = beside(found)
     lost = here[~measurable(here)]
     return list(zip(lost.engine, lost.scenario))
 
 
 def beside(found: pd.DataFrame) -> pd.DataFrame:
-    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its dial is turned."""
+    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its parameter is swept."""
     dt = found[found.change != PLAIN].groupby("scenario").dt_s.first()
     here = found[(found.change == PLAIN) & (found.dt_s == found.scenario.map(dt))]
     both = here[["scenario", "engine", "cost", "error"]]
@@ -70,7 +70,7 @@ def measurable(here: pd.DataFrame) -> pd.Series:
 
 
 def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
-    """A row a scenario, player, change and dt of one kind.
+    """A row a scenario, engine, change and dt of one kind.
 
     Columns: scenario, engine, profile, change, dt_s, substeps, until_s and duration_s (of the first
     seed, see `ladder.errors_of`), seeds, failed (how many), status and reason (of the
@@ -113,7 +113,7 @@ def in_us(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario and player: slope, low, high, verdict, see `order.Order`; coarsest_error and finest_error in
+    """A row a scenario and engine: slope, low, high, verdict, see `order.Order`; coarsest_error and finest_error in
     radii (medians over the seeds), the latter at finest_dt_s; steps, how many were played, and failed, at how many of
     them a draw failed: what failed has no part in slope and verdict.
     """
@@ -150,7 +150,7 @@ def ladders(measured: Measured) -> Iterator[tuple[tuple, np.ndarray, np.ndarray,
 
 
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
-    """A row a scenario, player and accuracy: accuracy (radii), cost (µs per simulated second), dt_s, why it is not, and
+    """A row a scenario, engine and accuracy: accuracy (radii), cost (µs per simulated second), dt_s, why it is not, and
     lost: it is not at any dt, or failed."""
     verdicts: dict[tuple, str] = dict(zip(zip(fitted.scenario, fitted.engine, fitted.profile), fitted.verdict))
     rows = []
@@ -167,7 +167,7 @@ def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
 
 
 def noise(measured: Measured) -> pd.DataFrame:
-    """A row a scenario and player: ratio of the median costs of an engine and its copy in the same rounds."""
+    """A row a scenario and engine: ratio of the median costs of an engine and its copy in the same rounds."""
     samples = measured.samples[measured.samples.kind == SCENE]
     both = (
         summed_up(samples, ["scenario", *WHO, "dt_s", "copy_of"])
@@ -212,10 +212,10 @@ def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
     return costs, pd.DataFrame(rows)
 
 
-def features(measured: Measured) -> pd.DataFrame:
+def options(measured: Measured) -> pd.DataFrame:
     """A row a scenario, engine and change: cost and error, each over the unchanged engine's; and both errors."""
-    samples = measured.samples[measured.samples.kind == FEATURE]
-    errors = measured.errors[measured.errors.kind == FEATURE]
+    samples = measured.samples[measured.samples.kind == OPTION]
+    errors = measured.errors[measured.errors.kind == OPTION]
     if samples.empty or errors.empty:
         return pd.DataFrame()
     keys = ["scenario", *WHO, "change"]

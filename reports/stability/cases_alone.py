@@ -10,12 +10,12 @@ import numpy as np
 from adapters.engine import Unsupported
 from adapters.play import Run, fault_of, gather
 from reports.stability.limits import Case
-from reports.stability.phases import EDGE, drawn, phase
-from reports.stability.players import Player, with_variant
-from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_APART, SPRING_GROWS, STRAYS
+from reports.stability.phases import EDGE, phase, sampled
+from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_DEVIATION, SPRING_GROWS, STRAYS
+from reports.stability.variants import Variant, with_variant
 from scenarios.families.placing import lay_out
 from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
-from scenarios.truth.closed_forms import Hit, answer, bouncing, flight, pair
+from scenarios.truth.closed_forms import Collision, answer, bouncing, flight, pair
 
 FAMILY = "One disk, or two"
 RADIUS, G = 0.25, 10.0
@@ -31,7 +31,7 @@ def ball(x: float, run: int) -> Scenario:
     where a fall lasts a whole number of steps, some methods are flattered. Their dt over the time of the fall is x, or
     less by up to a step of the fall.
     """
-    height = HEIGHT * (1 + 0.01 * drawn(seed=1)[run])
+    height = HEIGHT * (1 + 0.01 * sampled(seed=1)[run])
     fall = sqrt(2 * height / G)
     dt = fall / (1 / x + phase(run) - EDGE)
     every = max(1, int(1 / (12 * x)))
@@ -46,7 +46,7 @@ def ball(x: float, run: int) -> Scenario:
         legs = bouncing(height, G, 1.0, t[-1])
         gap, speed = legs.at(t)
         position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + RADIUS, speed))
-        return answer(scene, t, (position, velocity), legs.wall_hits(0, (0,), 1.0, 1.0))
+        return answer(scene, t, (position, velocity), legs.wall_collisions(0, (0,), 1.0, 1.0))
 
     return Scenario(
         "ball", "Does it come back?", "the bouncing ball in closed form", scene, samples * interval, interval, (every,),
@@ -64,8 +64,8 @@ def scaled(x: float, _run: int) -> Scenario:
 
     def truth(t: Array) -> Trajectory:
         legs, impulse = pair(scene.position, scene.velocity, scene.radius, scene.mass, 1.0)
-        hits: list[Hit] = [(float(legs.start[1]), 0, 1, float(impulse[0]))]
-        return answer(scene, t, legs.at(t), hits)
+        collisions: list[Collision] = [(float(legs.start[1]), 0, 1, float(impulse[0]))]
+        return answer(scene, t, legs.at(t), collisions)
 
     return Scenario("scaled", "Is it the same scene?", "similarity", scene, 1.0, 1 / 60, (1,), truth=truth)
 
@@ -105,17 +105,17 @@ def oscillator(x: float, _run: int) -> Scenario:
     return Scenario("oscillator", "Does it keep its swing?", "cos w t", scene, OSCILLATION * x, x, (1,), truth=truth)
 
 
-def on_spring(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
-    """Play a disk whose push -x N is read off its position before every step, as a user of an engine writes it."""
+def on_spring(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
+    """Play a disk whose force -x N is read off its position before every step, as a user of an engine writes it."""
     states: list[State] = []
     status, reason, settings = "ok", "", {}
-    with closing(player.make()) as engine:
+    with closing(variant.make()) as engine:
         try:
             engine.load(scenario.scene, scenario.sample_interval)
             settings = engine.settings()
             states.append(engine.read())
             for _ in range(scenario.samples):
-                engine.push(0, -states[-1].position[0], 0.0)
+                engine.apply_force(0, -states[-1].position[0], 0.0)
                 engine.step()
                 states.append(engine.read())
                 if reason := fault_of(states[-1], 1e6):
@@ -123,7 +123,7 @@ def on_spring(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
                     break
         except Unsupported as refusal:
             status, reason = "unsupported", str(refusal)
-    name, profile = player.name.split(":")
+    name, profile = variant.name.split(":")
     trajectory = gather(scenario, states, NO_COLLISIONS) if states else None
     return scenario, Run(
         name, profile, scenario.name, scenario.sample_interval, status, reason, trajectory, settings=settings
@@ -137,15 +137,15 @@ ALONE = (
         "bounce_drift", FAMILY, "Up to which dt does a ball at e = 1 come back to its height?",
         "dt / fall time", "1", (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2),
         ball, BOUNCES_OFF, runs=16,
-        also=(*with_variant("16_substeps"), *with_variant("push_out")),
+        also=(*with_variant("16_substeps"), *with_variant("position_correction")),
     ),
     Case(
         "scale_up", FAMILY, "How much larger may a scene be made and stay the same?",
-        "scale", "1", (1.0, 3.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3), scaled, SCALED_APART,
+        "scale", "1", (1.0, 3.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3), scaled, SCALED_DEVIATION,
     ),
     Case(
         "scale_down", FAMILY, "How much smaller may a scene be made and stay the same?",
-        "scale", "1", (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3), scaled, SCALED_APART,
+        "scale", "1", (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3), scaled, SCALED_DEVIATION,
     ),
     Case(
         "far_from_origin", FAMILY, "How far from the origin may a disk at 1 m/s be and still fly on?",
@@ -157,7 +157,7 @@ ALONE = (
         also=with_variant("16_substeps"),
     ),
     Case(
-        "stiff_push", FAMILY, "How stiff may a spring be whose push is read off the positions before each step?",
+        "stiff_force", FAMILY, "How stiff may a spring be whose force is read off the positions before each step?",
         "w dt", "1", (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0), oscillator, SPRING_GROWS,
         play=on_spring,
     ),

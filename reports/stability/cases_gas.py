@@ -9,8 +9,8 @@ from numpy.random import Generator, default_rng
 
 from adapters.play import Run
 from reports.stability.limits import RARELY, Case
-from reports.stability.players import Player, played, with_variant
 from reports.stability.predicates_gas import ENERGY_DRIFTS, GAS_PARTS, MOMENTUM_DRIFTS, TEMPERATURES_PART, WRONG_GAS
+from reports.stability.variants import Variant, played, with_variant
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
 
@@ -87,7 +87,7 @@ def mixture(x: float, run: int) -> Scenario:
 
 
 def thermometer(x: float, run: int) -> Scenario:
-    """x = packing of 100 disks, 4000 steps; seen more often than they hit."""
+    """x = packing of 100 disks, 4000 steps; seen more often than they collide."""
     return gas(x, run, rows=10, columns=10, steps=4000, every=20)
 
 
@@ -98,40 +98,40 @@ def steps_of_gas(x: float, run: int) -> Scenario:
 
 
 def against(other: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
-    """The scenario with another run of the same player in the place of the truth."""
+    """The scenario with another run of the same engine in the place of the truth."""
     if other.status != "ok" or other.trajectory is None:
         return scenario, other
     beside: Trajectory = other.trajectory
     return replace(scenario, truth=lambda _: beside), run
 
 
-def reversed_order(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
+def reversed_order(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
     """The same gas inserted in the opposite order, beside the gas in its own order."""
     scene = scenario.scene
     names = ("position", "velocity", "radius", "mass", "angle", "angular_velocity", "inertia")
     turned = replace(scenario, scene=replace(scene, **{name: getattr(scene, name)[::-1] for name in names}))
-    run = played(player, turned)
+    run = played(variant, turned)
     if run.trajectory is not None:
         run = replace(run, trajectory=renumbered(run.trajectory, scene.n))
-    return against(played(player, scenario), run, scenario)
+    return against(played(variant, scenario), run, scenario)
 
 
 def renumbered(played: Trajectory, n: int) -> Trajectory:
     """The trajectory with disk i for disk n - 1 - i."""
-    hits = played.collisions
-    i, j = n - 1 - hits.i, np.where(hits.j < 0, hits.j, n - 1 - hits.j)
+    collisions = played.collisions
+    i, j = n - 1 - collisions.i, np.where(collisions.j < 0, collisions.j, n - 1 - collisions.j)
     low, high = np.where(j < 0, i, np.minimum(i, j)), np.where(j < 0, j, np.maximum(i, j))
     return replace(
         played,
         position=played.position[:, ::-1], velocity=played.velocity[:, ::-1], angle=played.angle[:, ::-1],
         angular_velocity=played.angular_velocity[:, ::-1],
-        collisions=Collisions(hits.t, frozen(low, np.int64), frozen(high, np.int64), hits.impulse),
+        collisions=Collisions(collisions.t, frozen(low, np.int64), frozen(high, np.int64), collisions.impulse),
     )  # fmt: skip
 
 
-def restarted(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
+def restarted(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
     """The gas stopped half way, read, and loaded into a new engine, beside the gas played through."""
-    whole = played(player, scenario)
+    whole = played(variant, scenario)
     if whole.status != "ok" or whole.trajectory is None:
         return scenario, whole
     half = scenario.samples // 2
@@ -141,7 +141,7 @@ def restarted(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
         angular_velocity=state.angular_velocity,
     )  # fmt: skip
     left = (scenario.samples - half) * scenario.sample_interval
-    rest = played(player, replace(scenario, scene=fresh, duration=left))
+    rest = played(variant, replace(scenario, scene=fresh, duration=left))
     if rest.status != "ok" or rest.trajectory is None:
         return scenario, rest
     before, after = whole.trajectory, rest.trajectory
@@ -150,8 +150,8 @@ def restarted(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
         frozen(np.concatenate([getattr(before, name)[:half], getattr(after, name)]))
         for name in ("position", "velocity", "angle", "angular_velocity")
     )
-    hits = Collisions(frozen(late.t + half * scenario.sample_interval), late.i, late.j, late.impulse)
-    joined = Trajectory(before.t, position, velocity, angle, spin, hits)
+    collisions = Collisions(frozen(late.t + half * scenario.sample_interval), late.i, late.j, late.impulse)
+    joined = Trajectory(before.t, position, velocity, angle, spin, collisions)
     return against(whole, replace(rest, trajectory=joined), scenario)
 
 
@@ -196,7 +196,7 @@ GAS = (
         by_chance=BY_CHANCE,
     ),
     Case(
-        "thermometer", FAMILY, "Has a gas the speeds, the rate of hits and the wall pressure of the literature?",
+        "thermometer", FAMILY, "Has a gas the speeds, the rate of collisions and the wall pressure of the literature?",
         "packing", "1", (0.2, 0.3, 0.4, 0.5, 0.6), thermometer, WRONG_GAS, runs=SEEDS, refines=False,
         by_chance=BY_CHANCE, quick_values=(0.2, 0.6),
     ),

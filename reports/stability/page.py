@@ -12,14 +12,14 @@ import numpy as np
 
 from adapters.play import Run
 from reports.page import style
-from reports.page.charts import Drawing, Line, figure_of, packed_charts, shortened
+from reports.page.charts import ChartLine, Drawing, figure_of, packed_charts, shortened
 from reports.page.documents import CHARTED, render
 from reports.page.replay import pack_layers, ratio_of
 from reports.stability import overview
-from reports.stability.atlas import Atlas, case_named
 from reports.stability.failures import kept_failure, near
 from reports.stability.limits import EXACT, FORMS, Case, Limit, Trial
 from reports.stability.maps import MAPS
+from reports.stability.results import StabilityResults, case_named
 from reports.stability.touching import GAPS, TOUCHING
 from reports.terminal.foreign_text import put_text
 from scenarios.model import Scenario, Trajectory
@@ -30,16 +30,16 @@ SECONDS = 5.0  # a replay lasts
 
 @dataclass(frozen=True)
 class Replay:
-    """The first failing run of a player: what the page's player takes, its height over its width, and a sentence."""
+    """The first failing run of an engine: what the page's player takes, its height over its width, and a sentence."""
 
-    player: str
+    engine: str
     pack: str
     ratio: float
     says: str
 
 
 @dataclass(frozen=True)
-class Section:
+class CaseSection:
     """One case as the page shows it."""
 
     case: Case
@@ -54,48 +54,48 @@ class Section:
         """Its name as a fragment of a URL."""
         return "".join(c if c.isalnum() or c in "_-" else "-" for c in self.case.name)
 
-    def cell(self, player: str) -> overview.Cell:
+    def cell(self, engine: str) -> overview.LimitCell:
         """Its limit in the overview; empty where it was not asked."""
-        return overview.cell_of(self.case, next((limit for limit in self.limits if limit.player == player), None))
+        return overview.cell_of(self.case, next((limit for limit in self.limits if limit.engine == engine), None))
 
-    def replay(self, player: str) -> Replay | None:
-        """The replay of a player's failure, if there is one."""
-        return next((replay for replay in self.replays if replay.player == player), None)
+    def replay(self, engine: str) -> Replay | None:
+        """The replay of an engine's failure, if there is one."""
+        return next((replay for replay in self.replays if replay.engine == engine), None)
 
 
-def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
-    """Write the page of an atlas, whose failing runs are in `folder`, to `path`."""
-    limits, maps, laws = atlas.limits, atlas.maps, atlas.laws
+def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
+    """Write the page of a stability report, whose failing runs are in `folder`, to `path`."""
+    limits, maps, laws = results.limits, results.maps, results.laws
     by_case: dict[str, list[Limit]] = {}
     for limit in limits:
         by_case.setdefault(limit.case, []).append(limit)
     sections = [section_of(case_named(name), found, folder) for name, found in by_case.items()]
-    names = [limit.player for limit in limits] + [one.player for one in maps] + [one.player for one in laws]
+    names = [limit.engine for limit in limits] + [one.engine for one in maps] + [one.engine for one in laws]
     names = list(dict.fromkeys(names))
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
     html = render(
         "stability/stability.html.j2", generator=GENERATOR, scripts=(*CHARTED, "stability/stability.js"),
         styles=["stability/stability.css"], looks=looks, plotly=True,
-        sections=sections, families=families_of(sections), findings=overview.findings(limits), about=atlas.header,
-        players=[name for name in names if "+" not in name], maps=overview.map_tables(maps), all_maps=MAPS, laws=laws,
-        touching=TOUCHING, gaps=GAPS, words=overview, exact=EXACT, form=FORMS[atlas.header["form"]],
+        sections=sections, families=families_of(sections), findings=overview.findings(limits), about=results.header,
+        engines=[name for name in names if "+" not in name], maps=overview.map_tables(maps), all_maps=MAPS, laws=laws,
+        touching=TOUCHING, gaps=GAPS, words=overview, exact=EXACT, form=FORMS[results.header["form"]],
     )  # fmt: skip
     put_text(path, html)
 
 
-def families_of(sections: Sequence[Section]) -> dict[str, list[Section]]:
+def families_of(sections: Sequence[CaseSection]) -> dict[str, list[CaseSection]]:
     """The sections under their headings, both in the order of appearance."""
-    found: dict[str, list[Section]] = {}
+    found: dict[str, list[CaseSection]] = {}
     for section in sections:
         found.setdefault(section.case.family, []).append(section)
     return found
 
 
-def section_of(case: Case, limits: list[Limit], folder: Path) -> Section:
+def section_of(case: Case, limits: list[Limit], folder: Path) -> CaseSection:
     """All that the page shows of one case."""
     replays = [replay for limit in limits if (replay := replay_of(case, limit, folder)) is not None]
     drawing = readings(case, limits)
-    return Section(case, limits, replays, overview.reasons(limits), drawing, packed_charts({"readings": drawing}))
+    return CaseSection(case, limits, replays, overview.reasons(limits), drawing, packed_charts({"readings": drawing}))
 
 
 def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
@@ -114,17 +114,17 @@ def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
         layers.append((None, beside))
     pack = pack_layers(scenario, layers, shown, opening(failing, scenario, shown))
     says = f"{case.parameter} = {style.number(failing.value)}: {failing.event}"
-    return Replay(limit.player, pack, ratio_of(scenario, layers), says)
+    return Replay(limit.engine, pack, ratio_of(scenario, layers), says)
 
 
 def named(limit: Limit) -> Run:
-    """A run that carries a player's name, which decides how it is drawn."""
-    engine, profile = limit.player.split(":")
+    """A run that carries an engine's name, which decides how it is drawn."""
+    engine, profile = limit.engine.split(":")
     return Run(engine, profile, limit.case, 0.0)
 
 
 def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, Any]:
-    """Where the player starts: a tenth of what is shown before the failure; and what it marks."""
+    """Where the engine starts: a tenth of what is shown before the failure; and what it marks."""
     first, last = float(scenario.times[shown[0]]), float(scenario.times[shown[-1]])
     at = min(max(failing.at, first), last) if np.isfinite(failing.at) else first
     return {
@@ -135,7 +135,7 @@ def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, 
 
 
 def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
-    """The worst reading of every player against the parameter, and the bound above which it fails."""
+    """The worst reading of every engine against the parameter, and the bound above which it fails."""
     predicate = case.predicate
     if predicate.bound == 0:
         return shares(case, limits)
@@ -149,9 +149,9 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
         trials = [trial for trial in limit.trials if np.isfinite(trial.worst) and np.isfinite(trial.value)]
         if len(trials) > 1:
             x, y = (np.array([getattr(trial, name) for trial in trials], float) for name in ("value", "worst"))
-            lines.append(Line(named(limit), x, np.abs(y)))
+            lines.append(ChartLine(named(limit), x, np.abs(y)))
     if not lines or not any((line.y > 0).any() for line in lines):
-        return Drawing(title, "No player reads more than 0 anywhere.", None)
+        return Drawing(title, "No engine reads more than 0 anywhere.", None)
     ends = [min(case.values), max(case.values)]
     guide = {
         "type": "scatter", "x": shortened(ends), "y": [predicate.bound or None] * 2, "mode": "lines", "name": "bound",
@@ -166,7 +166,7 @@ def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
     for limit in limits:
         trials = [trial for trial in limit.trials if not trial.left]
         x, y = (np.array(pair, float) for pair in zip(*((t.value, t.failed / t.runs) for t in trials)))
-        lines.append(Line(named(limit), x, y))
+        lines.append(ChartLine(named(limit), x, y))
     caption = (
         f"How many of the runs at each {case.parameter} failed; harsher to the right. Values that were left at their "
         "first failing run, as the quick form does, are not drawn."

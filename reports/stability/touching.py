@@ -1,4 +1,5 @@
-"""Which law a player follows where touching disks are hit, and how far they must be apart until the question is gone.
+"""Which law an engine follows where touching disks are struck, and how far they must be apart until the question is
+gone.
 
 Named, never scored: where disks touch, no limit of small gaps decides; where they do not, the exact answer does.
 """
@@ -12,15 +13,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reports.stability.cases_hits import LEAD, RADIUS
-from reports.stability.players import play_as
+from reports.stability.cases_collisions import LEAD, RADIUS
+from reports.stability.variants import play_as
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario
 from scenarios.truth.exact import with_oracle
 
-NEAR = 0.02  # of the incoming speed: a player whose velocities are farther from every law follows none of them
-SPEED, DT = 8.0, 1 / 1024  # a radius in 32 steps: where a hit is found late, its normal is off; above any threshold
-AFTER = 24  # steps after the hit: a player may take a step a contact
+NEAR = 0.02  # of the incoming speed: an engine whose velocities are farther from every law follows none of them
+SPEED, DT = (
+    8.0,
+    1 / 1024,
+)  # a radius in 32 steps: where a collision is found late, its normal is off; above any threshold
+AFTER = 24  # steps after the collision: an engine may take a step a contact
 PAIRS, AT_ONCE = "pair after pair", "all contacts at once"
 
 
@@ -29,25 +33,25 @@ GAPS = (0.0, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0)  # radii
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """A scene at e = 1 in which disk 0 hits disks that touch each other.
+    """A scene at e = 1 in which disk 0 strikes disks that touch each other.
 
     Attributes:
         asks: what happens, in a sentence.
         position: (n, 2) in radii, all touching; disk 0 comes in along x at speed 1.
-        parted: (n, 2) by how much a disk is moved for each radius of gap.
+        displaced: (n, 2) by how much a disk is moved for each radius of gap.
         laws: name -> velocities (n, 2) in units of the incoming speed; several where the order is free.
         source: of the laws.
     """
 
     asks: str
     position: Array
-    parted: Array
+    displaced: Array
     laws: dict[str, list[Array]]
     source: str
 
 
 class AtGap(NamedTuple):
-    """What a player did at a gap in radii: the law it is nearest to, how far it is, and what it made of the start's.
+    """What an engine did at a gap in radii: the law it is nearest to, how far it is, and what it made of the start's.
 
     `law` is "none" if it is farther than `NEAR` from every one; momentum: by how much it changed, of all there is;
     energy: what is left of it; velocity: of the disks, over the incoming speed.
@@ -63,10 +67,10 @@ class AtGap(NamedTuple):
 
 @dataclass(frozen=True)
 class LawOf:
-    """What a player did at every gap."""
+    """What an engine did at every gap."""
 
     name: str
-    player: str
+    engine: str
     gaps: tuple[AtGap, ...]
     status: str = "ok"
 
@@ -86,7 +90,7 @@ class LawOf:
 
 
 def cradle(n: int) -> Touching:
-    """A disk hits a row of n - 1."""
+    """A disk strikes a row of n - 1."""
     row = np.stack([2.0 * np.arange(n) - 2, np.zeros(n)], axis=-1)
     apart = np.stack([np.maximum(0.0, np.arange(n) - 1), np.zeros(n)], axis=-1)
     last, together = np.zeros((n, 2)), np.zeros((n, 2))
@@ -94,7 +98,7 @@ def cradle(n: int) -> Touching:
     together[:, 0] = 2 / n
     together[0, 0] -= 1
     return Touching(
-        f"A disk hits a row of {n - 1}.", row, apart, {PAIRS: [last], AT_ONCE: [together]},
+        f"A disk strikes a row of {n - 1}.", row, apart, {PAIRS: [last], AT_ONCE: [together]},
         "equal masses swap velocities pair by pair; or e = 1 is asked of every contact in one solve",
     )  # fmt: skip
 
@@ -105,7 +109,7 @@ TOUCHING = {
     "touching_cradle_of_3": cradle(3),
     "touching_cradle_of_5": cradle(5),
     "touching_break": Touching(
-        "A disk hits two, in their middle.",
+        "A disk strikes two, in their middle.",
         np.array([[-sqrt(3), 0], [0, 1], [0, -1]]),
         np.array([[0.0, 0], [0, 0], [sqrt(3) / 2, -1 / 2]]),
         {
@@ -118,8 +122,8 @@ TOUCHING = {
 
 
 def scene_of(one: Touching, gap: float) -> Scenario:
-    """Disk 0 flies in and is there in the middle of its fourth step; seen until the last hit is long over."""
-    position = (one.position + gap * one.parted) * RADIUS
+    """Disk 0 flies in and is there in the middle of its fourth step; seen until the last collision is long over."""
+    position = (one.position + gap * one.displaced) * RADIUS
     position[0, 0] -= SPEED * DT * (LEAD + 0.5)
     n = len(position)
     scene = lay_out(
@@ -142,17 +146,17 @@ def answers(name: str, gap: float) -> dict[str, list[Array]]:
     return one.laws | {PAIRS: [scenario.truth(scenario.times).velocity[-1] / SPEED]}
 
 
-def law_of(name: str, player: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
+def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
     """Play a scene at every gap, and compare with every law."""
     found = []
     for gap in gaps:
-        run = play_as(player, scene_of(TOUCHING[name], gap))
+        run = play_as(engine, scene_of(TOUCHING[name], gap))
         if run.status != "ok" or run.trajectory is None:
             found.append(AtGap(gap, "refused" if run.status == "unsupported" else run.status, nan, nan, nan, ()))
             continue
         velocity = run.trajectory.velocity[-1] / SPEED
         found.append(named(velocity, gap, answers(name, gap)))
-    return LawOf(name, player, tuple(found))
+    return LawOf(name, engine, tuple(found))
 
 
 def named(velocity: Array, gap: float, laws: dict[str, list[Array]]) -> AtGap:

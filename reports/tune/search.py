@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from adapters.conformance.conform import conform
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES
 from adapters.matched import Searched
-from reports.tune.score import Against, Make, Played, against, cost_of, measured, posed
+from reports.tune.score import Against, Make, TrialScores, against, cost_of, measured, posed
 from scenarios.families.tuning import FAMILIES
 
 SEEDS, OTHER_SEEDS = (0, 1), (2, 3)  # what is chosen on, and what has to bear it out
@@ -27,7 +27,7 @@ COLUMNS = [
 MATCHED = ":matched"
 CHOSEN, BETTER, NO_BETTER, BREAKS = "chosen", "better", "no better", "breaks"
 NO_SEARCH = "not searched"
-TUNED: dict[str, Row] = {
+TUNED: dict[str, EngineRow] = {
     name.removesuffix(MATCHED): row
     for name, row in ENGINES.items()
     if name.endswith(MATCHED) and row.searched is not None
@@ -66,13 +66,13 @@ class Trial(NamedTuple):
 
 @dataclass
 class Search:
-    """The search for one engine; `say` is told of every trial."""
+    """The search for one engine; `say` is called with every trial."""
 
     engine: str
     families: tuple[str, ...] = tuple(each.__name__ for each in FAMILIES)
     seeds: tuple[tuple[int, ...], tuple[int, ...]] = (SEEDS, OTHER_SEEDS)
     say: Callable[[str], None] = print
-    known: dict[tuple[Any, ...], tuple[Played, Played]] = field(default_factory=dict)
+    known: dict[tuple[Any, ...], tuple[TrialScores, TrialScores]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.searched = searched_of(self.engine)
@@ -89,7 +89,7 @@ class Search:
         row = replace(TUNED[self.engine], make=self.make(settings))
         return {finding.probe for finding in conform(self.engine + MATCHED, row) if finding.verdict == "keeps"}
 
-    def played(self, settings: dict[str, Any]) -> tuple[Played, Played]:
+    def played(self, settings: dict[str, Any]) -> tuple[TrialScores, TrialScores]:
         """What the settings make of both halves; measured once."""
         key = tuple(settings.values())
         if key not in self.known:

@@ -93,7 +93,9 @@ def grazing(rng: np.random.Generator, r: float, v: float) -> Scenario:
 def near_miss(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """Pairs that do not collide."""
     offset = 1 + near(rng)
-    return pairs(rng, np.array([r, r]), FASTER * v * r, offset, 0.5, "Is a collision of two that miss invented?")
+    return pairs(
+        rng, np.array([r, r]), FASTER * v * r, offset, 0.5, "Is there a spurious collision of two disks that miss?"
+    )
 
 
 def unlike(rng: np.random.Generator, r: float) -> Array:
@@ -162,7 +164,9 @@ def long_bounce(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """The same for forty bounces, of which only conservation of energy is asked."""
     ball = dropped(rng, r, v, ELASTIC, 80.0)
     asks = "Does a ball keep its energy over many bounces?"
-    return replace(ball, asks=asks, truth=None, without_truth="after so many bounces a late collision is all there is")
+    return replace(
+        ball, asks=asks, truth=None, without_truth="after so many bounces the detection delay is all there is"
+    )
 
 
 def coming_to_rest(rng: np.random.Generator, r: float, v: float) -> Scenario:
@@ -175,7 +179,7 @@ def coming_to_rest(rng: np.random.Generator, r: float, v: float) -> Scenario:
         legs = bouncing(height, g, restitution, t[-1])
         gap, speed = legs.at(t)
         position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + r, speed))
-        return answer(asked.scene, t, (position, velocity), legs.wall_hits(0, (0,), 1.0, restitution))
+        return answer(asked.scene, t, (position, velocity), legs.wall_collisions(0, (0,), 1.0, restitution))
 
     return replace(asked, truth=truth)
 

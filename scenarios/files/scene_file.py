@@ -206,8 +206,8 @@ def _overlaps(scene: Scene, free_walls: int) -> Iterator[str]:
     found = sorted(islice(_overlapping(scene), MOST_FAULTS + 1), key=lambda each: each[:2])
     for first, second, overlap, (x, y) in found:
         where = f"{names[second]}.position = {scene.position[second - len(scene.walls)].tolist()}"
-        cure = f"must be shifted by [{x:.15g}, {y:.15g}] m or more"
-        yield f"{where}: overlaps {names[first]} by {overlap:.6g} m; {cure}"
+        remedy = f"must be shifted by [{x:.15g}, {y:.15g}] m or more"
+        yield f"{where}: overlaps {names[first]} by {overlap:.6g} m; {remedy}"
 
 
 def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
@@ -239,9 +239,9 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
             normal = away[k] / distance[k] if distance[k] > rounding else np.array([-unit[1], unit[0]])
             one, two = number[row], number[w + first[row] + k]
             if overlap[k] > rounding:
-                # Where the side cannot be told, the way out may lead across the middle: it is longer by that.
-                push = thick[row] + radius[near][k] - away[k] @ normal
-                yield min(one, two), max(one, two), overlap[k], normal * push * np.sign(two - one) + 0.0
+                # Where the side is not known, the way out may lead across the middle: it is longer by that.
+                reach = thick[row] + radius[near][k] - away[k] @ normal
+                yield min(one, two), max(one, two), overlap[k], normal * reach * np.sign(two - one) + 0.0
 
 
 def write_scene_file(scenario: Scenario, path: str | Path) -> None:

@@ -22,7 +22,7 @@ from scenarios.regular import opened
 HERE = Path(__file__).parent
 ARRAYS = {"legs": 12, "events": 5, "outcomes": 4, "orders": 3}
 """The arrays of a record and how many columns each has."""
-NUMBERS = ("valid_until", "error_bound", "bits", "method", "reason", "followed_until", "remains")
+NUMBERS = ("horizon", "error_bound", "bits", "method", "reason", "float64_horizon", "remains")
 
 
 def folder() -> Path | None:
@@ -38,7 +38,7 @@ def folder() -> Path | None:
 
 
 def key_of(scenario: Scenario, certifying: bool) -> str:
-    """A hash over all that decides a record: scene, pushes, duration, the oracle's source and what it can prove."""
+    """A hash over all that decides a record: scene, thrusts, duration, the oracle's source and what it can prove."""
     scene, hashed = scenario.scene, hashlib.sha256()
     parts = [
         scene.position, scene.velocity, scene.radius, scene.mass, scene.walls, scene.gravity, scene.restitution,
@@ -94,7 +94,7 @@ def is_said(numbers: Any) -> bool:
     """Whether they are what `NUMBERS` are: anybody may have edited the file."""
     if not isinstance(numbers, dict) or set(numbers) != set(NUMBERS):
         return False
-    of = {type(numbers[name]) for name in ("valid_until", "error_bound", "followed_until")}
+    of = {type(numbers[name]) for name in ("horizon", "error_bound", "float64_horizon")}
     texts = numbers["remains"]
     return (
         of <= {int, float}

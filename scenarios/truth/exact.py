@@ -1,4 +1,5 @@
-"""The exact answer to scenes without a closed form: hit by hit in many digits, and no further than it is right."""
+"""The exact answer to scenes without a closed form: event by event in many digits, and no further than it is
+right."""
 
 from __future__ import annotations
 
@@ -18,16 +19,16 @@ from scenarios.truth.oracle.path import Path
 from scenarios.truth.oracle.work import Clock, Work
 from scenarios.truth.record import TruthRecord, record_of
 
-FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be told apart
+FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be distinguished
 LEAST_GAIN = 1.05  # times as far must half as many bits again reach, or more will not help
 SPARE, LEFT = 1.3, 64  # times as many bits as the rate so far asks for, and so many to be left for the accuracy
 MOST_DISKS = 200
 WORK = 40_000  # steps of the event loop for one attempt, some twenty seconds; few attempts get so far
 HEAVY = 4096  # bits that make a step twice as dear as one of few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
-CLOSED_FORM, HIT_BY_HIT, NOTHING = "closed form", "hit by hit, in many digits", "nothing"
+CLOSED_FORM, EVENT_DRIVEN, NOTHING = "closed form", "event-driven, in many digits", "nothing"
 COARSE = 0.45  # of the time that is left for both of two precisions: the finer one takes a little longer
-ACCURACY = 1e-12  # radii of the smallest disk, and s; two precisions that differ by more have parted
+ACCURACY = 1e-12  # radii of the smallest disk, and s; two precisions that differ by more have diverged
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ class OracleTruth:
         if np.max(t) > one.duration * (1 + 1e-9):
             raise ValueError(f"t = {np.max(t):g} s: the truth of {one.name} is known up to {one.duration:g} s")
         record = self.record()
-        if record.valid_until < one.sample_interval:
+        if record.horizon < one.sample_interval:
             raise NoTruth(record.reason)
         return record.sampled(one.scene, one.thrusts, t)
 
@@ -72,10 +73,10 @@ def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:
 
 
 def answered_by(scenario: Scenario) -> str:
-    """The cheapest model that answers it and is no player, which the harness takes for its truth: one of the three."""
+    """The cheapest model that answers it and is no engine, which the harness takes for its truth: one of the three."""
     if scenario.truth is None:
         return NOTHING
-    return HIT_BY_HIT if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
+    return EVENT_DRIVEN if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
 
 
 def with_oracle(scenario: Scenario) -> Scenario:
@@ -96,28 +97,28 @@ def computed(
     """
     scene, thrusts = scenario.scene, scenario.thrusts
     if scene.n > MOST_DISKS:
-        raise NoTruth(f"{scene.n} disks are more than the {MOST_DISKS} that are followed in many digits")
+        raise NoTruth(f"{scene.n} disks are more than the {MOST_DISKS} that are computed in many digits")
     if fault := _out_of_scale(scenario):
         raise NoTruth(fault)
-    if any(push.frame == "body" and push.force.any() for push in thrusts):
-        raise NoTruth("a push that turns with its disk makes paths whose contacts no polynomial gives")
-    pushes = [push for push in thrusts if push.force.any()]
+    if any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts):
+        raise NoTruth("a thrust that turns with its disk makes paths whose contacts no polynomial gives")
+    forced = [thrust for thrust in thrusts if thrust.force.any()]
     clock = clock or Clock()
-    record = certified(scenario, pushes, clock) if kind is None and has_balls() else None
-    return record or two_precisions(scenario, pushes, kind or digits, clock)
+    record = certified(scenario, forced, clock) if kind is None and has_balls() else None
+    return record or two_precisions(scenario, forced, kind or digits, clock)
 
 
-def certified(scenario: Scenario, pushes: Sequence[Thrust], clock: Clock) -> TruthRecord | None:
+def certified(scenario: Scenario, forced: Sequence[Thrust], clock: Clock) -> TruthRecord | None:
     """The record by interval arithmetic, which proves every comparison; None where no precision decides one.
 
-    How far the first bits reach tells how many are needed for all: a motion loses them at a steady rate. When the
+    How far the first bits reach shows how many are needed for all: a motion loses them at a steady rate. When the
     `clock` is over it is that of the attempt which got farthest.
     """
     bits, before, until, accuracy = FEWEST_BITS, 0.0, scenario.duration, accuracy_of(scenario)
     attempts: list[tuple[Path, int]] = []
     while bits <= MOST_BITS:
         try:
-            path = trace(scenario.scene, pushes, until, balls(bits), Work(steps(bits), clock))
+            path = trace(scenario.scene, forced, until, balls(bits), Work(steps(bits), clock))
             error, reached = spread(path, until), until
             if error < accuracy and not clock.struck:
                 return record_of(scenario, path, error, bits, "certified")
@@ -182,25 +183,25 @@ def widest(table: Array, until: float) -> float:
 
 
 def two_precisions(
-    scenario: Scenario, pushes: Sequence[Thrust], kind: Callable[[int], Numbers], clock: Clock
+    scenario: Scenario, forced: Sequence[Thrust], kind: Callable[[int], Numbers], clock: Clock
 ) -> TruthRecord:
     """The record in numbers of one kind, up to where twice as many bits say the same, or the `clock` is over."""
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     attempts: list[tuple[Path, float, int]] = []
     while True:
-        coarse = trace(scene, pushes, until, kind(bits), Work(steps(bits), clock, COARSE))
-        fine = trace(scene, pushes, until, kind(2 * bits), Work(steps(2 * bits), clock))
-        parted, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
+        coarse = trace(scene, forced, until, kind(bits), Work(steps(bits), clock, COARSE))
+        fine = trace(scene, forced, until, kind(2 * bits), Work(steps(2 * bits), clock))
+        diverged, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
         if clock.struck and coarse.end < fine.end:
             fine = replace(fine, end=end, reason=coarse.reason, disks=[], outcomes=[], named=[])
-        if parted < end:
-            reason = f"the digits of {2 * bits} bits are used up at t = {parted:.9g} s"
-            fine = replace(fine, end=parted, reason=reason, disks=[], outcomes=[])
+        if diverged < end:
+            reason = f"the digits of {2 * bits} bits are used up at t = {diverged:.9g} s"
+            fine = replace(fine, end=diverged, reason=reason, disks=[], outcomes=[])
         attempts.append((fine, error, 2 * bits))
-        if parted >= end or 2 * bits >= MOST_BITS or clock.struck:
+        if diverged >= end or 2 * bits >= MOST_BITS or clock.struck:
             break
-        needed = ceil(SPARE * bits * until / max(parted, until * bits / MOST_BITS))
+        needed = ceil(SPARE * bits * until / max(diverged, until * bits / MOST_BITS))
         bits = min(max(2 * bits, needed), MOST_BITS // 2)
     best = max(attempts, key=lambda attempt: min(attempt[0].end, until)) if clock.struck else attempts[-1]
     return record_of(scenario, *best, "two-precision")
@@ -210,7 +211,7 @@ def _out_of_scale(scenario: Scenario) -> str:
     """What is too small or too large for `Numbers.tie`, which takes numbers to be of the order of 1; or ""."""
     scene = scenario.scene
     if not (scene.radius >= 1 / LARGEST).all():
-        return f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a hit from a touch"
+        return f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a collision from a touch"
     sizes = {
         "radius": scene.radius, "position": scene.position, "wall": scene.walls, "velocity": scene.velocity,
         "gravity": scene.gravity, "duration": np.array([scenario.duration]),
@@ -229,19 +230,19 @@ def accuracy_of(scenario: Scenario) -> float:
 
 def difference(coarse: Path, fine: Path, until: float, k: Numbers, accuracy: float) -> tuple[float, float]:
     """When the two part, s, or inf: the first event in which they differ by `accuracy` m; the error until then, m."""
-    parted, errors = np.inf, [(0.0, 0.0)]
+    diverged, errors = np.inf, [(0.0, 0.0)]
     end = min(coarse.end, fine.end, until)
     with k.precise():
         for mine, theirs in zip(coarse.legs, fine.legs):
             for leg in mine[len(theirs) :] + theirs[len(mine) :]:
-                parted = min(parted, float(leg.t)) if float(leg.t) < end - ACCURACY else parted
+                diverged = min(diverged, float(leg.t)) if float(leg.t) < end - ACCURACY else diverged
             for one, other in zip(mine, theirs):
                 t = min(float(one.t), float(other.t))
                 if t < end and (error := _apart(one, other, end - t)) > accuracy:
-                    parted = min(parted, t)
+                    diverged = min(diverged, t)
                     break
                 errors.append((t, error if t < end else 0.0))
-    return parted, max((error for t, error in errors if t < parted), default=0.0)
+    return diverged, max((error for t, error in errors if t < diverged), default=0.0)
 
 
 def _apart(one: Leg, other: Leg, left: float) -> float:

@@ -1,4 +1,5 @@
-"""The truth record: an exact motion in float64 as flights and bounces, with its hits, its end and what is left open."""
+"""The truth record: an exact motion in float64 as flights and bounces, with its collisions, its end and what is left
+open."""
 
 from __future__ import annotations
 
@@ -8,14 +9,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
-from scenarios.truth.closed_forms import Hit, answer, world_pushes
-from scenarios.truth.horizon import ASTRAY, horizon
+from scenarios.truth.closed_forms import Collision, answer, world_thrusts
+from scenarios.truth.horizon import DIVERGED, float64_horizon
 from scenarios.truth.oracle.path import Event, Path
 
 EPS = float(np.finfo(float).eps)
 ROUNDINGS = 4 * EPS  # of the largest coordinate and of the longest way: a few for a leg's start, a time, a sample
 LEAST = 1e-4  # s; of the bounces that die out those that last less are not listed, as in `walls.bouncing_ball_e09`
-TOUCH = 1e-6  # m, what is closer to a wall at the end may be pushed by it
+TOUCH = 1e-6  # m, what is closer to a wall at the end may be in contact with it
 NONE: Array = frozen(np.zeros((0, 1)))
 
 
@@ -27,48 +28,50 @@ class TruthRecord:
         legs: (l, 12) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2, and where the disk bounces on for good beside that:
             normal nx, ny, speed m/s after the first bounce, fall m/s2; else 0. Disk by disk in order of time.
         events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle |v_n| / |v|; an
-            impulse of 0 is no hit: from there on the disk rests on the other.
-        valid_until: s; nothing is said of what comes later.
+            impulse of 0 is no collision: from there on the disk rests on the other.
+        horizon: s; nothing is said of what comes later.
         error_bound: m.
         bits: of the numbers it was computed with.
         method: "closed form", "two-precision" (the same with half as many bits) or "certified" (interval arithmetic).
         reason: why it ends where it does.
-        followed_until: s; until then a float64 engine can be held to it, see `horizon.py`.
-        outcomes: (o, 4) outcome, disk, vx, vy m/s: where the order of simultaneous hits matters, all ends it may have.
-        orders: (p, 3) outcome, disk, other: the hits, in one order, that lead to each.
+        float64_horizon: s; until then a float64 engine can be held to it, see `horizon.py`.
+        outcomes: (o, 4) outcome, disk, vx, vy m/s: where the order of simultaneous collisions matters, all ends it may
+            have.
+        orders: (p, 3) outcome, disk, other: the collisions, in one order, that lead to each.
         remains: what can still be said after the end, a sentence each.
     """
 
     legs: Array = field(repr=False)
     events: Array = field(repr=False)
-    valid_until: float
+    horizon: float
     error_bound: float
     bits: int
     method: str
     reason: str
-    followed_until: float = np.inf
+    float64_horizon: float = np.inf
     outcomes: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 4))))
     orders: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 3))))
     remains: tuple[str, ...] = ()
 
     def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
-        """The motion at the times t (k,) s up to where it is known and can be followed; later times are left out."""
+        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64; later times are left
+        out."""
         t = np.asarray(t, float)
         position, velocity = np.empty((len(t), scene.n, 2)), np.empty((len(t), scene.n, 2))
         for i in range(scene.n):
             legs = self.legs[self.legs[:, 0] == i]
             leg = legs[np.maximum(np.searchsorted(legs[:, 1], t, side="right") - 1, 0)]
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
-        turning = world_pushes(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
+        turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
         # What lies there from the start counts as a contact that begins with no impulse; later ones began before.
-        hits: list[Hit] = [
+        collisions: list[Collision] = [
             (float(at), int(i), int(j), float(kick)) for at, i, j, kick, _ in self.events if kick or not at
         ]
         angles = turning.angle, turning.angular_velocity
-        until, reason = self.valid_until, self.reason
-        if self.followed_until < until:
-            until, reason = self.followed_until, "from there on the rounding of float64 leads any player elsewhere"
-        return answer(scene, t, (position, velocity), hits, angles, until, self.error_bound, reason)
+        until, reason = self.horizon, self.reason
+        if self.float64_horizon < until:
+            until, reason = self.float64_horizon, "beyond it the rounding of float64 makes any engine diverge"
+        return answer(scene, t, (position, velocity), collisions, angles, until, self.error_bound, reason)
 
 
 def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
@@ -101,22 +104,22 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
     end = min(path.end, scenario.duration) if path.reason else np.inf
     legs = legs_of(path, end)
     rows = [_row(event) for event in path.events if float(event.t) < end]
-    rows += [hit for leg, stop in bouncing(legs, end) for hit in bounces(scenario.scene, leg, stop)]
+    rows += [collision for leg, stop in bouncing(legs, end) for collision in bounces(scenario.scene, leg, stop)]
     outcomes = [
         [k, i, *map(float, v)] for k, one in enumerate(path.outcomes) for i, v in one.velocities.items()
         if i < scenario.scene.n
     ]  # fmt: skip
-    orders = [[k, *pair] for k, hits in enumerate(path.named) for pair in hits]
+    orders = [[k, *pair] for k, collisions in enumerate(path.named) for pair in collisions]
     return TruthRecord(
         legs=frozen(legs),
         events=frozen(np.array(sorted(rows, key=lambda row: row[:3])).reshape(-1, 5)),
         # The instant at which the answer is lost already belongs to what is not known.
-        valid_until=max(float(np.nextafter(end, 0)), 0.0) if path.reason else np.inf,
+        horizon=max(float(np.nextafter(end, 0)), 0.0) if path.reason else np.inf,
         error_bound=error + ROUNDINGS * reach(legs, min(end, scenario.duration)),
         bits=bits,
         method=method,
         reason=path.reason,
-        followed_until=horizon(scenario, path),
+        float64_horizon=float64_horizon(scenario, path),
         outcomes=frozen(np.array(outcomes).reshape(-1, 4)),
         orders=frozen(np.array(orders).reshape(-1, 3)),
         remains=tuple(remains(scenario.scene, legs, path.disks, end)) if path.disks else (),
@@ -126,18 +129,18 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
 def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
     """The path up to where legs and samples, which are float64, tell it as exactly as is promised.
 
-    What is promised is `ASTRAY` radii of the smallest disk, as it is by that that engines are held to an answer. Far
+    What is promised is `DIVERGED` radii of the smallest disk, as it is by that that engines are held to an answer. Far
     from the origin, and after a long way, the rounding of float64 is more.
     """
     end = min(path.end, scenario.duration) if path.reason else scenario.duration
     legs = legs_of(path, end)
-    room = (ASTRAY * float(scenario.scene.radius.min()) - error) / ROUNDINGS
+    room = (DIVERGED * float(scenario.scene.radius.min()) - error) / ROUNDINGS
     if reach(legs, end) <= room:
         return path
     held, lost = 0.0, end
     for _ in range(64):  # halvings: to the last place of float64
         held, lost = (middle, lost) if reach(legs, middle := (held + lost) / 2) <= room else (held, middle)
-    reason = f"the rounding of float64 is more than {ASTRAY:g} of the smallest radius from t = {held:.9g} s on"
+    reason = f"the rounding of float64 is more than {DIVERGED:g} of the smallest radius from t = {held:.9g} s on"
     return replace(path, end=held, reason=reason, disks=[], outcomes=[], named=[])
 
 
@@ -207,17 +210,17 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     near = span[touched.any(axis=0)]
     names = f"disk {ours[0]}" if len(ours) == 1 else "disks " + ", ".join(map(str, ours))
     momentum = (mass[:, None] * v).sum(axis=0)
-    # Round a fixed disk, or round the end of a wall, the push turns: no direction keeps its momentum.
+    # Round a fixed disk, or round the end of a wall, the normal turns: no direction keeps its momentum.
     if any(scene.static[i] for i in disks if i < scene.n) or (touched & ((share <= 0) | (share >= 1))).any():
         near = np.eye(2)
-    pull = " but for gravity" if scene.gravity.any() else ""
+    exception = " but for gravity" if scene.gravity.any() else ""
     if not len(near):
         total = f"({momentum[0]:.6g}, {momentum[1]:.6g}) N s"
-        yield f"{names}: nothing else touches them, so their momentum, {total}, stays{pull}"
+        yield f"{names}: nothing else touches them, so their momentum, {total}, stays{exception}"
     elif np.abs(near[:, 0] * near[0, 1] - near[:, 1] * near[0, 0]).max() <= EPS * np.abs(near).max() ** 2:
         way = near[0] / np.hypot(*near[0])
         yield (
             f"{names}: all walls they touch lie along ({way[0]:.4g}, {way[1]:.4g}), so their momentum that way, "
-            f"{momentum @ way:.6g} N s, stays{pull}"
+            f"{momentum @ way:.6g} N s, stays{exception}"
         )
-    yield f"{names}: their kinetic energy, {(mass * (v**2).sum(axis=1)).sum() / 2:.6g} J, can only fall{pull}"
+    yield f"{names}: their kinetic energy, {(mass * (v**2).sum(axis=1)).sum() / 2:.6g} J, can only fall{exception}"

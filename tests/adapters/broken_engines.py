@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from adapters.engine import Engine, Hit, Row, Unsupported
+from adapters.engine import ContactImpulse, Engine, EngineRow, Unsupported
 from adapters.engines import ENGINES
 from adapters.reference import Reference
 from reference_impl import exercise, ordered
@@ -23,14 +23,14 @@ class Sound(Reference):
 
 
 class LeaksMomentum(Sound):
-    """A millionth of a disk's velocity is lost in every hit."""
+    """A millionth of a disk's velocity is lost in every collision."""
 
     def step(self, count=1):
         for _ in range(count):
             before = len(self.log)
             super().step()
-            for hit in self.log[before:]:
-                self.disks.velocity[hit.i] *= 1 - 1e-6
+            for collision in self.log[before:]:
+                self.disks.velocity[collision.i] *= 1 - 1e-6
 
 
 class GivesLiveView(Sound):
@@ -63,7 +63,7 @@ class SquaresRestitution(Sound):
         super().load(replace(scene, restitution=scene.restitution**2), dt)
 
 
-class StopsSlowHits(Sound):
+class StopsSlowCollisions(Sound):
     """Everything that closes at less than 1 m/s is inelastic."""
 
     def load(self, scene, dt):
@@ -81,15 +81,15 @@ class NanAtStep7(Sound):
                 self.disks.velocity[0] = np.nan
 
 
-class PushLasts(Sound):
+class ForceLasts(Sound):
     """Nobody clears the forces."""
 
     def step(self, count=1):
-        self.pushed = False
+        self.forced = False
         super().step(count)
 
 
-class LoadKeepsHits(Sound):
+class LoadKeepsCollisions(Sound):
     """The log of the last scene is still there."""
 
     def load(self, scene, dt):
@@ -98,14 +98,14 @@ class LoadKeepsHits(Sound):
         self.log = kept
 
 
-class LoadKeepsPush(Sound):
-    """A push that waited for a step waits on."""
+class LoadKeepsForce(Sound):
+    """A force that waited for a step waits on."""
 
     def load(self, scene, dt):
-        waiting = self.disks.force.sum(axis=0) if getattr(self, "pushed", False) else None
+        waiting = self.disks.force.sum(axis=0) if getattr(self, "forced", False) else None
         super().load(scene, dt)
         if waiting is not None:
-            self.push(0, waiting, 0.0)
+            self.apply_force(0, waiting, 0.0)
 
 
 class SharesOneWorld(Sound):
@@ -177,43 +177,46 @@ class StaticGivesWay(Sound):
         super().load(replace(scene, mass=np.where(scene.static, 1e6, scene.mass), inertia=None), dt)
 
 
-class TellsNoHits(Sound):
+class ReportsNoCollisions(Sound):
     """The contact listener was never registered."""
 
-    def hits(self):
+    def collisions(self):
         return []
 
 
 class NumbersWallsFromTheEnd(Sound):
     """Walls are known by the engine's list, which is the scene's reversed."""
 
-    def hits(self):
-        return [Hit(h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse) for h in self.log]
+    def collisions(self):
+        return [
+            ContactImpulse(h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse)
+            for h in self.log
+        ]
 
 
 class CountsStepsFromOne(Sound):
-    """The step counter is raised before the hits are logged."""
+    """The step counter is raised before the collisions are logged."""
 
-    def hits(self):
-        return [hit._replace(step=hit.step + 1) for hit in self.log]
+    def collisions(self):
+        return [collision._replace(step=collision.step + 1) for collision in self.log]
 
 
-class TellsImpulsePerSecond(Sound):
-    """A contact force is told where an impulse is asked for."""
+class ReportsImpulsePerSecond(Sound):
+    """A contact force is reported where an impulse is asked for."""
 
-    def hits(self):
-        return [hit._replace(impulse=hit.impulse / self.dt) for hit in self.log]
+    def collisions(self):
+        return [collision._replace(impulse=collision.impulse / self.dt) for collision in self.log]
 
 
 class RubsSidewise(Sound):
-    """The default friction is on: a hit turns a part of the spin into sideways speed."""
+    """The default friction is on: a collision turns a part of the spin into sideways speed."""
 
     def step(self, count=1):
         for _ in range(count):
             before = len(self.log)
             super().step()
-            for hit in self.log[before:]:
-                for disk in (hit.i, hit.j):
+            for collision in self.log[before:]:
+                for disk in (collision.i, collision.j):
                     self.disks.velocity[disk, 1] += 0.01 * self.disks.angular_velocity[disk]
 
 
@@ -251,7 +254,7 @@ class RaisesInStep(Sound):
 
 
 class Exact(Reference):
-    """The solver that takes collisions in their order: beside it a wrong energy is not lost among late collisions."""
+    """The solver that takes collisions in their order: beside it a wrong energy is not lost among detection delays."""
 
     def __init__(self) -> None:
         super().__init__(ordered)
@@ -305,31 +308,31 @@ CAUGHT_BY: dict[type[Engine], str] = {
     ReadsFloat32: "order_and_shapes",
     WrapsAngles: "order_and_shapes",
     GivesLiveView: "read_copies",
-    LoadKeepsHits: "load_forgets",
-    LoadKeepsPush: "load_forgets",
-    SharesOneWorld: "worlds_are_apart",
+    LoadKeepsCollisions: "load_forgets",
+    LoadKeepsForce: "load_forgets",
+    SharesOneWorld: "worlds_are_separate",
     IgnoresCount: "counts_are_steps",
     IgnoresDt: "steps_obey_dt",
     NanAtStep7: "stays_finite",
-    PushLasts: "push_lasts_one_step",
-    MassFromDensity: "mass_by_push",
-    SolidDiskInertia: "inertia_by_push",
+    ForceLasts: "force_lasts_one_step",
+    MassFromDensity: "mass_by_force",
+    SolidDiskInertia: "inertia_by_torque",
     VelocityHalfAStepOff: "same_instant",
-    TellsNoHits: "hits_are_told",
-    NumbersWallsFromTheEnd: "walls_are_told",
-    CountsStepsFromOne: "hits_name_their_step",
-    TellsImpulsePerSecond: "impulse_is_told",
+    ReportsNoCollisions: "collisions_are_reported",
+    NumbersWallsFromTheEnd: "walls_are_reported",
+    CountsStepsFromOne: "collisions_name_their_step",
+    ReportsImpulsePerSecond: "impulse_is_reported",
     StaticGivesWay: "static_stays",
     OtherOrderOfUpdates: "free_flight",
     FallsAsleep: "slow_flight",
     HasSpeedLimit: "fast_flight",
     LeaksMomentum: "pair_momentum",
-    StopsSlowHits: "restitution_0.5",
+    StopsSlowCollisions: "restitution_0.5",
     SquaresRestitution: "restitution_wall",
     RubsSidewise: "friction",
 }
 
 
-def row_of(make: Callable[[], Engine]) -> Row:
+def row_of(make: Callable[[], Engine]) -> EngineRow:
     """A row like the reference's, with another engine."""
     return replace(ENGINES["reference:exercise"], make=make)

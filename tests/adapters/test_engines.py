@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapters.conformance.probe import first_difference, history, loaded, one_disk, plain
-from adapters.engine import NOT_TOLD
+from adapters.engine import NOT_REPORTED
 from adapters.engines import ENGINES
-from adapters.play import STATUSES, play, pushed_steps
+from adapters.play import STATUSES, play, thrust_steps
 from adapters.reference import Reference
 from reference_impl import exercise
 from reports.run.cells import Cell
@@ -42,30 +42,30 @@ def played(name, scenario, dt):
 
 def arrays(trajectory):
     """Every array of a trajectory as bytes."""
-    hits = trajectory.collisions
+    collisions = trajectory.collisions
     return [
         array.tobytes()
         for array in (
             trajectory.t, trajectory.position, trajectory.velocity, trajectory.angle, trajectory.angular_velocity,
-            hits.t, hits.i, hits.j, hits.impulse,
+            collisions.t, collisions.i, collisions.j, collisions.impulse,
         )
     ]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_thrust_that_starts_and_stops_inside_steps_gives_its_exact_impulse(name):
-    """0.013 s to 0.687 s in steps of 0.02 s: the first and last push carry a share of a step."""
+    """0.013 s to 0.687 s in steps of 0.02 s: the first and last thrust carry a share of a step."""
     thrust = Thrust(0, 0.013, 0.687, [3.0, -2.0], torque=0.4)
     end = played(name, asked(one_disk(), [thrust]), 0.02).trajectory.at(-1)
     seconds, digits = 0.687 - 0.013, ENGINES[name].rounding
-    # A push and a velocity round in each of 35 steps.
+    # A force and a velocity round in each of 35 steps.
     assert end.velocity[0] == pytest.approx(seconds * thrust.force / 7.3, rel=2 * 35 * digits)
     assert end.angular_velocity[0] == pytest.approx(seconds * 0.4 / 0.9, rel=2 * 35 * digits)
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_body_frame_thrust_turns_with_the_disk(name):
-    """A disk that stands at a right angle is pushed along y by a force along its own x."""
+    """A disk that stands at a right angle is accelerated along y by a force along its own x."""
     scene = replace(one_disk(), angle=np.array([np.pi / 2]))
     thrust = Thrust(0, 0.0, 1.0, [7.3, 0.0], frame="body")
     end = played(name, asked(scene, [thrust]), 0.05).trajectory.at(-1)
@@ -84,9 +84,9 @@ def test_the_shares_of_a_thrust_add_up_to_its_length(start, lasts, dt, at_once):
     """However the steps are cut into samples, and no step is lost or done twice."""
     thrust = Thrust(0, start, start + lasts, [1.0, 0.0])
     steps = at_once * (int((start + lasts) / dt / at_once) + 1)
-    cuts = [cut for first in range(0, steps, at_once) for cut in pushed_steps([thrust], first, at_once, dt)]
+    cuts = [cut for first in range(0, steps, at_once) for cut in thrust_steps([thrust], first, at_once, dt)]
     assert sum(count for count, _ in cuts) == steps
-    shares = sum(share for _, pushes in cuts for _, share in pushes)
+    shares = sum(share for _, acting in cuts for _, share in acting)
     # The first and the last share may be dropped below 1e-9; start / dt rounds at 300 steps of 2^-53.
     assert abs(shares * dt - lasts) <= 2e-9 * dt + 300 * 2.0**-53
 
@@ -121,7 +121,7 @@ def test_a_disk_that_leaves_the_box_is_set_onto_the_opposite_edge_and_keeps_its_
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_disks_do_not_see_each_other_across_the_edge_but_meet_after_it(name):
-    """Nothing happens while their images overlap; a hit once both are on the same side."""
+    """Nothing happens while their images overlap; a collision once both are on the same side."""
     scene = Scene(
         position=[[4.9, 0.0], [-4.2, 0.0]], velocity=[[2.0, 0.0], [0.0, 0.0]], radius=[0.25, 0.25], mass=[1.0, 1.0],
         restitution=1.0, wrap=BOX,
@@ -234,7 +234,7 @@ def test_what_was_asked_of_an_engine_is_what_it_resolved(name, e):
     assert versions
     for setting, (wanted, resolved) in settings.items():
         assert resolved is not None, setting
-        if resolved in NOT_TOLD or resolved == "no wall":
+        if resolved in NOT_REPORTED or resolved == "no wall":
             continue
         if isinstance(wanted, float):
             assert resolved == pytest.approx(wanted, rel=2.0**-24), setting  # float32
@@ -254,7 +254,7 @@ def test_matched_pymunk_resolves_slop_and_iterations_as_asked():
 
 
 def test_box2d_v3_reads_its_length_unit_off_the_engine():
-    """Off a default that is a multiple of it; negative control: what was asked for is not simply told again."""
+    """Off a default that is a multiple of it; negative control: what was asked for is not simply repeated."""
     import pyb2d3
 
     with loaded(ENGINES["box2d_v3:matched"], plain()) as engine:
@@ -286,7 +286,7 @@ def test_box2d_tells_its_own_sleep_setting(name):
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_an_engine_repeats_itself_bit_for_bit(name):
-    """Twenty-one disks that spin, hit and wrap, with a thrust on one of them."""
+    """Twenty-one disks that spin, collide and wrap, with a thrust on one of them."""
     scenario = replace(from_catalogue("asteroids", 1), thrusts=[Thrust(0, 0.11, 0.63, [0.2, 0.1], torque=0.05)])
     scenario = replace(scenario, duration=20 * scenario.sample_interval)
     once, again = (played(name, scenario, scenario.sample_interval / 2) for _ in range(2))

@@ -1,4 +1,4 @@
-"""An engine is played once and closed; where a collision begins in the pushes that it tells of, step by step."""
+"""An engine is played once and closed; where a collision begins in the impulses that it reports of, step by step."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.engine import Engine, Hit, NotStarted, Unsupported
+from adapters.engine import ContactImpulse, Engine, NotStarted, Unsupported
 from adapters.engines import ENGINES
-from adapters.play import first_hits, play, play_once
+from adapters.play import first_collisions, play, play_once
 from scenarios.catalogue import scenario
 
-NAME, SCENE = "reference:exercise", scenario("slow_hit")
+NAME, SCENE = "reference:exercise", scenario("slow_collision")
 DT = SCENE.dt(SCENE.substeps[0])
 
 
@@ -86,24 +86,33 @@ def test_no_source_file_closes_an_engine_by_hand():
     assert found == {"reports/game/flight.py", "reports/speed/sizes.py"}
 
 
-def test_weight_in_consecutive_steps_is_one_collision_and_hits_are_each_their_own():
-    """Pushes no stronger than weight go on with the one before; a stronger one is a hit again, a step later or not."""
-    hits = [Hit(3, 1, 0, 2.0), Hit(4, 0, 1, 1.0), Hit(5, 1, 0, 1.0), Hit(7, 0, 1, 4.0), Hit(4, -1, 0, 8.0)]
-    found = first_hits(hits, 0.5, weight=1.0)
-    assert len(first_hits(hits, 0.5)) == 5
-    assert len(first_hits([*hits, Hit(9, 0, 1, 1e-9)], 0.5)) == 5  # a rounding of the impulses above
+def test_weight_in_consecutive_steps_is_one_collision_and_collisions_are_each_their_own():
+    """Impulses no larger than weight continue the one before; a larger one is a collision again, a step later or
+    not."""
+    collisions = [
+        ContactImpulse(3, 1, 0, 2.0),
+        ContactImpulse(4, 0, 1, 1.0),
+        ContactImpulse(5, 1, 0, 1.0),
+        ContactImpulse(7, 0, 1, 4.0),
+        ContactImpulse(4, -1, 0, 8.0),
+    ]
+    found = first_collisions(collisions, 0.5, weight=1.0)
+    assert len(first_collisions(collisions, 0.5)) == 5
+    assert (
+        len(first_collisions([*collisions, ContactImpulse(9, 0, 1, 1e-9)], 0.5)) == 5
+    )  # a rounding of the impulses above
     assert found.t.tolist() == [2.0, 2.5, 4.0]
     assert list(zip(found.i.tolist(), found.j.tolist())) == [(0, 1), (0, -1), (0, 1)]
     assert found.impulse.tolist() == [2.0, 8.0, 4.0]
-    assert len(first_hits([], 0.5)) == 0
+    assert len(first_collisions([], 0.5)) == 0
 
 
 @settings(derandomize=True)
 @given(st.sets(st.tuples(st.integers(0, 12), st.sampled_from([(0, 1), (0, 2), (1, 2), (1, -1), (1, -2)]))))
-def test_collisions_are_the_beginnings_of_runs_of_pushes(pushes):
-    """Counted the slow way: a push whose pair did not push in the step before."""
-    rows = sorted((step, pair) for step, pair in pushes)
-    found = first_hits([Hit(step, *pair, 1.0) for step, pair in rows], 1.0, weight=1.0)
-    begins = {(step + 1.0, *pair) for step, pair in pushes if (step - 1, pair) not in pushes}
+def test_collisions_are_the_beginnings_of_runs_of_impulses(impulses):
+    """Counted the slow way: an impulse whose pair had none in the step before."""
+    rows = sorted((step, pair) for step, pair in impulses)
+    found = first_collisions([ContactImpulse(step, *pair, 1.0) for step, pair in rows], 1.0, weight=1.0)
+    begins = {(step + 1.0, *pair) for step, pair in impulses if (step - 1, pair) not in impulses}
     assert set(zip(found.t.tolist(), found.i.tolist(), found.j.tolist())) == begins
     assert (np.diff(found.t) >= 0).all()

@@ -29,7 +29,7 @@ FLOORS = {60.0: 0.2, 600.0: 3.0}  # s, for a certified answer of the box at e = 
 FALLS = {0.5: range(4), 0.8: range(4), 0.9: range(2)}  # restitution and seeds
 FALL = 10.0  # s, of the falling boxes
 COLUMNS = (
-    "scene", "duration_s", "method", "bits", "hits", "rests", "first_rest_s", "horizon_s", "ends_because", "seconds",
+    "scene", "duration_s", "method", "bits", "collisions", "rests", "first_rest_s", "horizon_s", "ends_because", "seconds",
 )  # fmt: skip
 Row = dict[str, str | float | int]
 
@@ -64,17 +64,17 @@ def said(one: Scenario, record: TruthRecord) -> Row:
     """What does not depend on the machine."""
     rests = record.events[record.events[:, 3] == 0, 0]
     return {
-        "method": record.method, "bits": record.bits, "hits": len(record.events) - len(rests), "rests": len(rests),
+        "method": record.method, "bits": record.bits, "collisions": len(record.events) - len(rests), "rests": len(rests),
         "first_rest_s": round(float(rests[0]), 6) if len(rests) else "",
-        "horizon_s": round(min(record.valid_until, one.duration), 6), "ends_because": record.reason,
+        "horizon_s": round(min(record.horizon, one.duration), 6), "ends_because": record.reason,
     }  # fmt: skip
 
 
 def growth(one: Scenario, bits: int = 128) -> float:
     """1/s, of the distance of runs with so many and twice as many bits, from 2^-bits to what they may be off."""
     coarse, fine = (trace(one.scene, [], one.duration, digits(each)) for each in (bits, 2 * bits))
-    parted, _ = difference(coarse, fine, one.duration, digits(2 * bits), accuracy_of(one))
-    return (bits * log(2) + log(accuracy_of(one))) / parted
+    diverged, _ = difference(coarse, fine, one.duration, digits(2 * bits), accuracy_of(one))
+    return (bits * log(2) + log(accuracy_of(one))) / diverged
 
 
 def main() -> None:

@@ -1,9 +1,10 @@
 """How fast the reference is beside the engines: `python -m tests.bench.reference` prints and writes its figures.
 
 A gas of equal disks between walls (area fraction 0.3, e = 1, dt 1/240 s, kT = m = diameter = 1), played by every engine
-in turn, round by round in shuffled order: nothing is read and no hit is told while the clock runs, and Python calls the
-engine once a step where it cannot take many. Each engine's own state goes on from round to round. The clock is that of
-the thread, which does not run while others have the processor; they still take its caches: leave the machine alone.
+in turn, round by round in shuffled order: nothing is read and no collision is reported while the clock runs, and Python
+calls the engine once a step where it cannot take many. Each engine's own state goes on from round to round. The clock
+is that of the thread, which does not run while others have the processor; they still take its caches: leave the machine
+alone.
 
 The figures go to tests/data/reference_figures.csv, each with the least or the most that is demanded of it;
 `uv run pytest tests/bench/test_reference_figures.py` holds them to it, and with `-m slow` measures some ratios anew.
@@ -27,7 +28,7 @@ from adapters.box2d import Box2DEngine
 from adapters.box2d_v3 import Box2DV3
 from adapters.pymunk import Pymunk
 from adapters.reference import Reference
-from reference_impl import crowd, ordered
+from reference_impl import ordered, verlet_list
 from reports.run.machine import about, busy_cores
 from scenarios.model import Scene
 from tests.adapters.event_driven.gases import boxed_asteroids, boxed_gas
@@ -54,7 +55,7 @@ class Figure(NamedTuple):
 
 
 def reference(variant, scene: Scene, dt: float) -> Step:
-    """The compiled solver, whose hits are counted but not handed to Python."""
+    """The compiled solver, whose collisions are counted but not handed to Python."""
     engine = Reference(variant)
     engine.load(scene, dt)
     return lambda count: silent(variant)(engine.disks, engine.world, dt, count)
@@ -62,7 +63,7 @@ def reference(variant, scene: Scene, dt: float) -> Step:
 
 @cache
 def silent(variant):
-    """The variant's `advance`, which returns how many hits there were."""
+    """The variant's `advance`, which returns how many collisions there were."""
     advance = variant.advance
     return njit(lambda disks, world, dt, count: len(advance(disks, world, dt, count)))
 
@@ -85,7 +86,8 @@ def box2d(profile: str, scene: Scene, dt: float) -> Step:
 
 
 def box2d_v3(profile: str, scene: Scene, dt: float) -> Step:
-    """The world, whose hit events nobody collects; its unit of length is global, so it is set before each round."""
+    """The world, whose collision events nobody collects; its unit of length is global, so it is set before each
+    round."""
     import pyb2d3
 
     engine = Box2DV3(profile)
@@ -103,8 +105,8 @@ def box2d_v3(profile: str, scene: Scene, dt: float) -> Step:
 def engines(scene: Scene, dt: float) -> dict[str, Step]:
     """Everyone who steps, and the reference a second time: what it measures against itself is the noise."""
     steps = {
-        "reference:exercise": reference(crowd, scene, dt),
-        "reference:exercise again": reference(crowd, scene, dt),
+        "reference:exercise": reference(verlet_list, scene, dt),
+        "reference:exercise again": reference(verlet_list, scene, dt),
     }
     for profile in ("matched", "shipped"):
         steps[f"pymunk:{profile}"] = pymunk(profile, scene, dt)
@@ -145,15 +147,15 @@ def compared(scene: str, n: int, steps: dict[str, Step], least: dict[str, float]
 
 def added(n: int) -> float:
     """Bytes a disk that playing n disks adds at most to what the process holds; scene and compiled code not counted."""
-    warm = Reference(crowd)
+    warm = Reference(verlet_list)
     warm.load(boxed_gas(1000, 0.3), DT)
     scene = boxed_gas(n, 0.3)
     Path("/proc/self/clear_refs").write_text("5")  # forget the peak so far (Linux, proc(5))
     before = status("VmRSS")
-    engine = Reference(crowd)
+    engine = Reference(verlet_list)
     engine.load(scene, DT)
     for _ in range(5):
-        crowd.advance(engine.disks, engine.world, DT, 20)
+        verlet_list.advance(engine.disks, engine.world, DT, 20)
     return (status("VmHWM") - before) / n
 
 
@@ -177,7 +179,7 @@ def gases() -> Iterator[Figure]:
 
 def sizes() -> Iterator[Figure]:
     """What a disk costs among many, and what room it takes."""
-    sized = {str(n): reference(crowd, boxed_gas(n, 0.3), DT) for n in SIZES}
+    sized = {str(n): reference(verlet_list, boxed_gas(n, 0.3), DT) for n in SIZES}
     measured = {n: samples * 1e3 / n for n, samples in zip(SIZES, times(sized, 50).values())}
     for n, samples in measured.items():
         low, middle, high = np.quantile(samples, [0.25, 0.5, 0.75])
@@ -192,7 +194,7 @@ def in_order() -> Iterator[Figure]:
     asteroids, dt = boxed_asteroids(0), 1 / 60
     steps = {
         "reference:ordered": reference(ordered, asteroids, dt),
-        "reference:exercise": reference(crowd, asteroids, dt),
+        "reference:exercise": reference(verlet_list, asteroids, dt),
         "pymunk:matched": pymunk("matched", asteroids, dt),
         "pymunk:shipped": pymunk("shipped", asteroids, dt),
     }
@@ -208,8 +210,8 @@ def in_order() -> Iterator[Figure]:
 
 def header() -> str:
     """Machine and versions, as comment lines."""
-    told = about("python -m tests.bench.reference", 0)
-    lines = {"started": told["started"], **told["machine"], **told["versions"], "busy cores": f"{busy_cores():.2f}"}
+    saved = about("python -m tests.bench.reference", 0)
+    lines = {"started": saved["started"], **saved["machine"], **saved["versions"], "busy cores": f"{busy_cores():.2f}"}
     return "".join(f"# {key}: {value}\n" for key, value in lines.items())
 
 

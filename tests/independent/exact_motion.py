@@ -1,4 +1,4 @@
-"""The exact motion of hard disks, written from the definitions alone: collision by collision, in 420 bits.
+"""The exact motion of hard disks, written from the definitions alone: event-driven, in 420 bits.
 
 A disk flies on a parabola until something happens. To know what happens first, every disk is asked of every other
 disk, of both faces and both ends of every wall, and of every edge of the wrapping box when it would get there; the
@@ -217,8 +217,8 @@ class Motion:
         disks = [Disk(exact(x) + dx, exact(v) + dv, mpc(0), *size) for x, v, (dx, dv), size in starts]
         breaks = {mpfr(t) for thrust in scenario.thrusts for t in (thrust.start, thrust.stop) if 0 < t < stop}
         for until in (*sorted(breaks), stop):
-            pushed = [acceleration(scene, scenario.thrusts, i, self.now) for i in range(scene.n)]
-            disks = [disk._replace(a=a) for disk, a in zip(disks, pushed)]
+            accelerations = [acceleration(scene, scenario.thrusts, i, self.now) for i in range(scene.n)]
+            disks = [disk._replace(a=a) for disk, a in zip(disks, accelerations)]
             while self.now < until:
                 self.times.append(self.now)
                 self.states.append(disks)

@@ -14,7 +14,7 @@ from scenarios.model import Array, Scenario, Scene, Thrust
 
 Draw = np.random.Generator
 
-INTERVAL = 1 / 16  # s; thrusts switch at samples, so that every step is pushed as a whole
+INTERVAL = 1 / 16  # s; thrusts switch at samples, so that every step is under a thrust as a whole
 RESTITUTIONS = (0.0, 0.02, 0.5, 0.9, 1.0, None)  # None: anything from 0 to 1
 NEAREST = 1e-3  # m between things that do not touch
 GRID = 1 / 8  # m; multiples of it are exact in float64, and so is whether disks on it touch
@@ -47,7 +47,7 @@ def random_scenario(seed: int, number: int) -> Scenario:
     return Scenario(
         name=f"random_{layout}_{seed}_{number}",
         asks="Does it end, whatever meets, and is it the same for all who answer?",
-        source="drawn",
+        source="random",
         scene=scene,
         duration=duration,
         sample_interval=INTERVAL,

@@ -76,7 +76,7 @@ def test_a_corrupted_file_is_made_anew(content: bytes, folder: Path, made: list[
 
 
 def test_what_decides_the_answer_decides_the_key():
-    """Duration, scene and pushes; not the name, the question or the ladder."""
+    """Duration, scene and thrusts; not the name, the question or the ladder."""
     keys = {
         truth_cache.key_of(one, False)
         for one in (
@@ -142,19 +142,19 @@ def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_pa
 def test_an_answer_with_any_bit_turned_is_what_was_written_or_none(tmp_path: Path):
     """Nothing but the answer is ever read, and no bit ends in an error: its sums tell, or its header cannot be read."""
     path = tmp_path / "answer.npz"
-    put_answer(path, Answer(record_of(scenario("slow_hit")), "ok", "", 60.0))
+    put_answer(path, Answer(record_of(scenario("slow_collision")), "ok", "", 60.0))
     whole, data = read_answer(path), path.read_bytes()
     assert whole is not None
-    told = 0
+    found_out = 0
     for k in range(8 * len(data)):
         turned = bytearray(data)
         turned[k // 8] ^= 1 << k % 8
         path.write_bytes(turned)
         found = read_answer(path)
-        told += found is None
+        found_out += found is None
         assert found is None or same(found, whole), f"bit {k % 8} of byte {k // 8}"
 
-    assert told > 4 * len(data)  # the rest: dates and attributes, which nobody reads
+    assert found_out > 4 * len(data)  # the rest: dates and attributes, which nobody reads
 
 
 def same(one: Answer, other: Answer) -> bool:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.catalogue import DRAWN, SCENARIOS, scenario
+from scenarios.catalogue import RANDOM, SCENARIOS, scenario
 
 ANSWERED = [name for name in SCENARIOS if scenario(name).truth]
-# Among the hundreds of hits of a drawn scene some fall on a step, in every draw.
-MOVING = [name for name in ANSWERED if name not in (*DRAWN, "rest_on_floor", "slide_on_incline", "column_of_ten")]
+# Among the hundreds of collisions of a drawn scene some fall on a step, in every draw.
+MOVING = [name for name in ANSWERED if name not in (*RANDOM, "rest_on_floor", "slide_on_incline", "column_of_ten")]
 
 
 def smallest_gap(scene, position):
@@ -28,7 +28,7 @@ def test_there_are_at_least_24_and_each_is_listed_under_its_own_name():
     """The catalogue is keyed by `Scenario.name`."""
     assert len(SCENARIOS) >= 24
     assert [scenario(name).name for name in SCENARIOS] == list(SCENARIOS)
-    assert set(SCENARIOS) >= DRAWN
+    assert set(SCENARIOS) >= RANDOM
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
@@ -44,7 +44,7 @@ def test_scenario_asks_one_question_and_has_a_truth_or_a_reason_for_none(name):
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_nothing_overlaps_at_the_start_and_all_is_on_the_page(name):
-    """No engine begins by pushing disks apart."""
+    """No engine begins by correcting overlaps."""
     scene = scenario(name).scene
     # A unit in the last place of the coordinates: touching disks touch to rounding.
     assert smallest_gap(scene, scene.position[None])[0] >= -1e-15
@@ -66,19 +66,21 @@ def test_truth_starts_as_the_scene(name):
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_truth_has_one_state_a_sample_up_to_its_horizon(name):
-    """All arrays have the shapes of `Trajectory`; no hit lies beyond the last sample."""
+    """All arrays have the shapes of `Trajectory`; no collision lies beyond the last sample."""
     run = scenario(name)
     truth, n = run.truth(run.times), run.scene.n
-    k = int((run.times <= truth.valid_until).sum())
+    k = int((run.times <= truth.horizon).sum())
     assert truth.t.tolist() == run.times[:k].tolist()
     assert truth.position.shape == truth.velocity.shape == (k, n, 2)
     assert truth.angle.shape == truth.angular_velocity.shape == (k, n)
     for field in ("position", "velocity", "angle", "angular_velocity"):
         assert np.isfinite(getattr(truth, field)).all()
-    hits = truth.collisions
-    assert ((hits.t >= 0) & (hits.t <= truth.t[-1])).all()
-    assert ((hits.i >= 0) & (hits.i < n) & (hits.j < n) & (hits.j >= -len(run.scene.walls))).all()
-    assert (hits.impulse >= 0).all()
+    collisions = truth.collisions
+    assert ((collisions.t >= 0) & (collisions.t <= truth.t[-1])).all()
+    assert (
+        (collisions.i >= 0) & (collisions.i < n) & (collisions.j < n) & (collisions.j >= -len(run.scene.walls))
+    ).all()
+    assert (collisions.impulse >= 0).all()
 
 
 @pytest.mark.parametrize("name", ANSWERED)
@@ -91,31 +93,31 @@ def test_truth_never_penetrates(name):
 
 
 @pytest.mark.parametrize("name", MOVING)
-def test_no_hit_falls_on_a_step(name):
+def test_no_collision_falls_on_a_step(name):
     """What is measured is late detection at some phase of a step, not the luck of a tie."""
     run = scenario(name)
-    hits = run.truth(run.times).collisions.t
+    collisions = run.truth(run.times).collisions.t
     for substeps in run.substeps:
-        phase = hits / run.dt(substeps) % 1
+        phase = collisions / run.dt(substeps) % 1
         # Far above the rounding of a clock that adds up steps, 1e5 times 1e-16 of the time.
         assert ((phase > 1e-4) & (phase < 1 - 1e-4)).all()
-        if len(hits) <= 20:  # few hits, so each one's phase shows in the result
+        if len(collisions) <= 20:  # few collisions, so each one's phase shows in the result
             assert ((phase > 0.04) & (phase < 0.96)).all()
 
 
 @pytest.mark.parametrize("name", ANSWERED)
-def test_pushes_begin_and_end_at_samples(name):
-    """No step of any dt of the ladder is pushed for a part of it only."""
+def test_thrusts_begin_and_end_at_samples(name):
+    """No step of any dt of the ladder is under a thrust for a part of it only."""
     run = scenario(name)
-    for push in run.thrusts:
-        samples = np.array([push.start, push.stop]) / run.sample_interval
+    for thrust in run.thrusts:
+        samples = np.array([thrust.start, thrust.stop]) / run.sample_interval
         # One rounding of the quotient.
         np.testing.assert_allclose(samples, np.round(samples), rtol=1e-15)
 
 
-@pytest.mark.parametrize("name", sorted(DRAWN))
+@pytest.mark.parametrize("name", sorted(RANDOM))
 def test_same_seed_same_scene_and_another_seed_another(name):
-    """A drawn scene is its seed, bit for bit."""
+    """A random scene is its seed, bit for bit."""
     one, same, other = scenario(name, 3), scenario(name, 3), scenario(name, 4)
     for field in ("position", "velocity", "angular_velocity", "radius", "mass", "inertia"):
         assert getattr(one.scene, field).tobytes() == getattr(same.scene, field).tobytes()
@@ -124,8 +126,8 @@ def test_same_seed_same_scene_and_another_seed_another(name):
 
 
 def test_other_scenarios_do_not_depend_on_the_seed():
-    """Only what `DRAWN` lists is drawn."""
-    for name in set(SCENARIOS) - DRAWN:
+    """Only what `RANDOM` lists is drawn."""
+    for name in set(SCENARIOS) - RANDOM:
         one, other = scenario(name, 3), scenario(name, 4)
         assert one.seed is None
         assert one.scene.position.tobytes() == other.scene.position.tobytes()

@@ -12,21 +12,21 @@ from scenarios.model import Scene
 from scenarios.truth.exact import OracleTruth
 
 ANSWERED = [name for name in SCENARIOS if (truth := scenario(name).truth) and not isinstance(truth, OracleTruth)]
-PUSHED = [name for name in ANSWERED if scenario(name).thrusts]
+THRUST = [name for name in ANSWERED if scenario(name).thrusts]
 RESTING = ["rest_on_floor", "slide_on_incline", "column_of_ten"]
-FLYING = [name for name in ANSWERED if name not in (*PUSHED, *RESTING)]
+FLYING = [name for name in ANSWERED if name not in (*THRUST, *RESTING)]
 
 
 def exact(name):
-    """A scenario, its truth, and until when hits can be told apart (a ball settles after infinitely many)."""
+    """A scenario, its truth, and until when collisions can be distinguished (a ball settles after infinitely many)."""
     run = scenario(name)
     truth = run.truth(run.times)
     return run, truth, 8.0 if name == "bouncing_ball_e09" else truth.t[-1]
 
 
-def between(hits, until):
-    """An instant between each two hits, those that coincide (49 balls on one floor) taken as one."""
-    apart = np.append(0, hits)[np.diff(np.append(0, hits), append=np.inf) > 1e-6]
+def between(collisions, until):
+    """An instant between each two collisions, those that coincide (49 balls on one floor) taken as one."""
+    apart = np.append(0, collisions)[np.diff(np.append(0, collisions), append=np.inf) > 1e-6]
     return (apart + np.append(apart[1:], until)) / 2
 
 
@@ -40,13 +40,13 @@ def wall_frames(scene):
 
 
 def next_events(scene: Scene, x, v):
-    """The earliest hit ahead: (time, disk, other disk or -1 - wall)."""
+    """The earliest collision ahead: (time, disk, other disk or -1 - wall)."""
     found = [(np.inf, 0, 0)]
     a, b = np.triu_indices(scene.n, 1)
     dr, dv, reach = x[b] - x[a], v[b] - v[a], scene.radius[a] + scene.radius[b]
     closing, gap = (dr * dv).sum(1), (dr**2).sum(1) - reach**2
     disc = closing**2 - (dv**2).sum(1) * gap
-    # After a hit at e = 0 nothing closes in; what is computed is the rounding of 1 m/s.
+    # After a collision at e = 0 nothing closes in; what is computed is the rounding of 1 m/s.
     can = (closing < -1e-14) & (disc > 0)
     if can.any():
         t = np.full(len(a), np.inf)
@@ -55,19 +55,21 @@ def next_events(scene: Scene, x, v):
     for w, (point, normal) in enumerate(zip(*wall_frames(scene))):
         side = np.sign((scene.position - point) @ normal)
         gap = np.maximum((x - point) @ normal * side - scene.radius, 0)
-        speed, pull = v @ normal * side, scene.gravity @ normal * side
+        speed, acceleration = v @ normal * side, scene.gravity @ normal * side
         for i in np.flatnonzero(np.isfinite(scene.mass)):
-            if pull[i] < 0:
-                root = np.sqrt(speed[i] ** 2 - 2 * pull[i] * gap[i])
-                t = 2 * gap[i] / (root - speed[i]) if speed[i] < 0 else (speed[i] + root) / -pull[i]
+            if acceleration[i] < 0:
+                root = np.sqrt(speed[i] ** 2 - 2 * acceleration[i] * gap[i])
+                t = 2 * gap[i] / (root - speed[i]) if speed[i] < 0 else (speed[i] + root) / -acceleration[i]
                 found.append((t, i, -1 - w))
-            elif speed[i] < 0 and speed[i] ** 2 > 2 * pull[i] * gap[i]:
-                found.append((2 * gap[i] / (np.sqrt(speed[i] ** 2 - 2 * pull[i] * gap[i]) - speed[i]), i, -1 - w))
+            elif speed[i] < 0 and speed[i] ** 2 > 2 * acceleration[i] * gap[i]:
+                found.append(
+                    (2 * gap[i] / (np.sqrt(speed[i] ** 2 - 2 * acceleration[i] * gap[i]) - speed[i]), i, -1 - w)
+                )
     return min(found)
 
 
 def simulate(scene: Scene, until):
-    """State after each hit up to `until`: a list of (t, position, velocity), the first one at 0."""
+    """State after each collision up to `until`: a list of (t, position, velocity), the first one at 0."""
     t, x, v = 0.0, np.array(scene.position), np.array(scene.velocity)
     g, w = np.where(scene.static[:, None], 0.0, scene.gravity), 1 / scene.mass
     path = [(t, x, v)]
@@ -86,14 +88,15 @@ def simulate(scene: Scene, until):
 
 @pytest.mark.parametrize("name", FLYING)
 def test_truth_is_what_an_event_by_event_simulation_finds(name):
-    """Same hits at the same times, same states between them."""
+    """Same collisions at the same times, same states between them."""
     run, truth, until = exact(name)
     path = simulate(run.scene, until)
-    hits = truth.collisions.t[truth.collisions.t <= until]
-    # Rounding of the simulation, 1e-16 a hit over hundreds of hits; on the two-disk orbit it grows to 1e-9 m.
+    collisions = truth.collisions.t[truth.collisions.t <= until]
+    # Rounding of the simulation, 1e-16 a collision over hundreds of collisions; on the two-disk orbit it grows to 1e-9
+    # m.
     tolerance = 1e-8 if name == "disk_between_static_disks" else 1e-10
-    np.testing.assert_allclose([t for t, _, _ in path[1:]], hits, rtol=0, atol=tolerance)
-    times = between(hits, until)
+    np.testing.assert_allclose([t for t, _, _ in path[1:]], collisions, rtol=0, atol=tolerance)
+    times = between(collisions, until)
     answer = run.truth(times)
     last = np.searchsorted([t for t, _, _ in path], times) - 1
     g = np.where(run.scene.static[:, None], 0.0, run.scene.gravity)
@@ -114,25 +117,25 @@ def contact(scene, position, i, j):
 
 
 @pytest.mark.parametrize("name", FLYING)
-def test_hits_lie_at_touching_distance_and_their_impulse_is_the_change_of_momentum(name):
-    """Each listed hit is one: contact, restitution, action and reaction."""
+def test_collisions_lie_at_touching_distance_and_their_impulse_is_the_change_of_momentum(name):
+    """Each listed collision is one: contact, restitution, action and reaction."""
     run, truth, until = exact(name)
-    scene, hits = run.scene, truth.collisions
+    scene, collisions = run.scene, truth.collisions
     gravity = np.where(scene.static[:, None], 0.0, scene.gravity)
-    times = between(hits.t[hits.t <= until], until)
-    around, at = run.truth(times), run.truth(np.append(hits.t, until))
-    for k in np.flatnonzero(hits.t <= until):
-        i, j, step = hits.i[k], hits.j[k], np.searchsorted(times, hits.t[k])
+    times = between(collisions.t[collisions.t <= until], until)
+    around, at = run.truth(times), run.truth(np.append(collisions.t, until))
+    for k in np.flatnonzero(collisions.t <= until):
+        i, j, step = collisions.i[k], collisions.j[k], np.searchsorted(times, collisions.t[k])
         gap, normal = contact(scene, at.position[k], i, j)
         # Positions and paths of 10 m have a last place of 2e-15; Galperin's weighted axis adds two digits.
         assert abs(gap) < 1e-13
-        before, after = (around.velocity[s] + gravity * (hits.t[k] - times[s]) for s in (step - 1, step))
-        approach, parting = (((v[j] if j >= 0 else 0) - v[i]) @ normal for v in (before, after))
+        before, after = (around.velocity[s] + gravity * (collisions.t[k] - times[s]) for s in (step - 1, step))
+        approach, separating = (((v[j] if j >= 0 else 0) - v[i]) @ normal for v in (before, after))
         # The same of velocities up to 25 m/s.
-        assert parting == pytest.approx(-scene.restitution * approach, abs=1e-13)
+        assert separating == pytest.approx(-scene.restitution * approach, abs=1e-13)
         for disk, sign in ((i, -1), (j, 1)):
             if disk >= 0:
-                kick = sign * hits.impulse[k] * normal / scene.mass[disk]
+                kick = sign * collisions.impulse[k] * normal / scene.mass[disk]
                 np.testing.assert_allclose(after[disk] - before[disk], kick, rtol=0, atol=1e-13)
 
 
@@ -142,7 +145,7 @@ def test_velocity_is_the_derivative_of_position(name):
     run, truth, until = exact(name)
     h = 1e-4
     times = np.linspace(0.01, until - 0.01, 301)
-    edges = np.concatenate([truth.collisions.t, *([push.start, push.stop] for push in run.thrusts), [-1]])
+    edges = np.concatenate([truth.collisions.t, *([thrust.start, thrust.stop] for thrust in run.thrusts), [-1]])
     times = times[np.abs(times[:, None] - edges).min(axis=1) > 2 * h]
     before, now, after = (run.truth(times + shift) for shift in (-h, 0, h))
     # Central differences: jerk h2 / 6 < 5 m/s3 1e-8 / 6 = 1e-8 (0 in a parabola), rounding 15 m 1e-16 / h = 3e-11.
@@ -151,8 +154,8 @@ def test_velocity_is_the_derivative_of_position(name):
         np.testing.assert_allclose(slope, getattr(now, rate), rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", PUSHED)
-def test_velocity_and_spin_change_by_the_pushes_as_quadrature_has_it(name):
+@pytest.mark.parametrize("name", THRUST)
+def test_velocity_and_spin_change_by_the_thrusts_as_quadrature_has_it(name):
     """The integral of force and torque over every sample interval, world and body frame."""
     run, truth, _ = exact(name)
     nodes, weights = np.polynomial.legendre.leggauss(8)
@@ -162,13 +165,13 @@ def test_velocity_and_spin_change_by_the_pushes_as_quadrature_has_it(name):
         t = start + width * (nodes + 1) / 2
         angle = run.truth(t).angle
         gained[k + 1], turned[k + 1] = gained[k], turned[k]
-        for push in run.thrusts:
-            if not push.start - 1e-9 < start < push.stop - 1e-9:
+        for thrust in run.thrusts:
+            if not thrust.start - 1e-9 < start < thrust.stop - 1e-9:
                 continue
-            turn = np.exp(1j * angle[:, push.disk]) if push.frame == "body" else np.ones(8)
-            force = (complex(*push.force) * turn * weights).sum() * width / 2
-            gained[k + 1, push.disk] += np.array([force.real, force.imag]) / run.scene.mass[push.disk]
-            turned[k + 1, push.disk] += push.torque * width / run.scene.inertia[push.disk]
+            turn = np.exp(1j * angle[:, thrust.disk]) if thrust.frame == "body" else np.ones(8)
+            force = (complex(*thrust.force) * turn * weights).sum() * width / 2
+            gained[k + 1, thrust.disk] += np.array([force.real, force.imag]) / run.scene.mass[thrust.disk]
+            turned[k + 1, thrust.disk] += thrust.torque * width / run.scene.inertia[thrust.disk]
     # Eight nodes per 1/60 s are exact to rounding: some hundreds of sums of 1e-16.
     np.testing.assert_allclose(truth.velocity, run.scene.velocity + gained, rtol=0, atol=1e-13)
     np.testing.assert_allclose(truth.angular_velocity, run.scene.angular_velocity + turned, rtol=0, atol=1e-13)
@@ -188,7 +191,7 @@ def test_velocity_and_spin_change_by_the_pushes_as_quadrature_has_it(name):
         ("simbenchmark_bouncing", 490),
     ],
 )
-def test_number_of_hits(name, count):
+def test_number_of_collisions(name, count):
     """Known counts: pi, all pairs of a cradle, ten bounces of 49 balls."""
     _, truth, _ = exact(name)
     assert len(truth.collisions) == count
@@ -201,7 +204,7 @@ def test_energy_is_kept_at_restitution_one(name):
     mass, g = np.where(run.scene.static, 0, run.scene.mass), run.scene.gravity
     kinetic = (mass * (truth.velocity**2).sum(axis=2)).sum(axis=1) / 2
     energy = kinetic - (mass * (truth.position @ g)).sum(axis=1)
-    # Rounding of one hit's velocities and of a sum of at most 49 terms.
+    # Rounding of one collision's velocities and of a sum of at most 49 terms.
     np.testing.assert_allclose(energy, energy[0], rtol=4e-15)
 
 
@@ -269,8 +272,8 @@ def test_an_offset_grows_between_static_disks_as_the_horizon_assumes():
     offset = [abs(along[0] * x[0, 1] - along[1] * x[0, 0]) for _, x, _ in simulate(moved, 7.0)][1:]
     # q = 1 + 0.75 / 1.5; after a few bounces only the growing direction is left, while 1e-7 m is still small.
     assert offset[7] / offset[6] == pytest.approx(1.5 + np.sqrt(1.25), rel=1e-3)
-    assert truth.valid_until < run.duration
-    assert truth.t[-1] <= truth.valid_until
+    assert truth.horizon < run.duration
+    assert truth.t[-1] <= truth.horizon
 
 
 def test_a_disk_slides_down_the_incline_in_contact_and_does_not_turn():

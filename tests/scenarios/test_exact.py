@@ -14,43 +14,43 @@ from scenarios.no_truth import NoTruth
 from scenarios.truth import exact as oracle
 from scenarios.truth import record as oracle_record
 from scenarios.truth.exact import computed, with_oracle
-from scenarios.truth.horizon import ASTRAY
+from scenarios.truth.horizon import DIVERGED
 from scenarios.truth.record import TruthRecord
 from tests.reports.compare.metamorphic import Change
 from tests.scenarios.exercise_box import boxed, lasting
 
 
-def pushed(force: float, away: float = 0.0, duration: float = 2.0) -> Scenario:
+def under_thrust(force: float, away: float = 0.0, duration: float = 2.0) -> Scenario:
     """A disk of 1 kg under a thrust, `away` m from the origin."""
     scene = lay_out(position=[[away, 0.0]], velocity=[[2.0, 0.0]], radius=[0.25], mass=[1.0], restitution=0.9)
-    return with_oracle(Scenario("pushed", "?", "", scene, duration, 0.02, thrusts=[Thrust(0, 0.0, 1.0, [force, 0.0])]))
+    return with_oracle(Scenario("thrust", "?", "", scene, duration, 0.02, thrusts=[Thrust(0, 0.0, 1.0, [force, 0.0])]))
 
 
 def keeps_its_promise(one: Scenario, record: TruthRecord) -> bool:
     """Whether the error bound is what engines are held to at most; a last place for the sum that it is."""
-    return record.error_bound <= ASTRAY * one.scene.radius.min() * (1 + 1e-12)
+    return record.error_bound <= DIVERGED * one.scene.radius.min() * (1 + 1e-12)
 
 
 @pytest.mark.parametrize(("force", "away"), [(1e6, 0.0), (9e5, 1e3), (1.0, 1e5), (0.0, 1e5), (1e3, 2e5)])
 def test_an_answer_ends_where_float64_cannot_tell_it_any_more(force: float, away: float):
     """After a long way, or far from the origin; before that it is what was promised."""
-    one = pushed(force, away, 20.0)
+    one = under_thrust(force, away, 20.0)
     record = record_of(one)
     assert keeps_its_promise(one, record)
-    if record.valid_until < one.duration:
+    if record.horizon < one.duration:
         assert "the rounding of float64 is more than 1e-09 of the smallest radius from t = " in record.reason
 
 
-def test_where_nothing_can_be_told_there_is_no_answer():
+def test_where_nothing_can_be_proved_there_is_no_answer():
     """At 10^6 m a rounding is 10^-10 m, and a few of them too much."""
     with pytest.raises(NoTruth, match="the rounding of float64 is more than"):
-        record_of(pushed(0.0, away=1e6))
+        record_of(under_thrust(0.0, away=1e6))
 
 
 def test_without_the_rule_the_promise_is_broken(monkeypatch: pytest.MonkeyPatch):
     """The control: the same record, taken to its end."""
     monkeypatch.setattr(oracle_record, "within_float64", lambda _scenario, path, _error: path)
-    one = pushed(1e6, 0.0, 20.0)
+    one = under_thrust(1e6, 0.0, 20.0)
     assert not keeps_its_promise(one, computed(one))
 
 
@@ -58,7 +58,7 @@ def test_without_the_rule_the_promise_is_broken(monkeypatch: pytest.MonkeyPatch)
 def test_a_thrust_out_of_scale_is_refused_at_once(force: float):
     """It went on for ever from 1e154 N on, and gave an answer to 10^85 m below."""
     with pytest.raises(NoTruth, match="the largest acceleration by a thrust is"):
-        record_of(pushed(force))
+        record_of(under_thrust(force))
 
 
 @settings(max_examples=60, deadline=None)
@@ -72,8 +72,8 @@ def test_no_record_breaks_its_promise(force: float, away: float, radius: float, 
         position=[[away, 0.0], [away, 40.0]], velocity=[[1.0, 0.0], [0.0, -1.0]], radius=[radius] * 2,
         mass=[1.0, 2.0], restitution=1.0, gravity=gravity,
     )  # fmt: skip
-    push = Thrust(0, 0.0, duration / 2, [force, 0.0])
-    one = with_oracle(Scenario("any", "?", "", scene, duration, duration / 10, thrusts=[push]))
+    thrust = Thrust(0, 0.0, duration / 2, [force, 0.0])
+    one = with_oracle(Scenario("any", "?", "", scene, duration, duration / 10, thrusts=[thrust]))
     try:
         record = record_of(one)
     except NoTruth:
@@ -99,29 +99,29 @@ def test_the_horizon_and_the_end_of_an_answer_are_the_same_in_other_units(units:
     new = with_oracle(replace(change.scenario(replace(one, truth=None)), truth=None))
     before, after = computed(one), computed(new)
     # The derivatives of a motion whose start is off by 1e-16, and that is followed until this is 1e-9.
-    assert after.followed_until == pytest.approx(change.time * before.followed_until, rel=1e-6)
-    assert after.valid_until == pytest.approx(change.time * before.valid_until)
+    assert after.float64_horizon == pytest.approx(change.time * before.float64_horizon, rel=1e-6)
+    assert after.horizon == pytest.approx(change.time * before.horizon)
     assert after.reason == before.reason == ""
-    early = before.events[:, 0] < before.followed_until
+    early = before.events[:, 0] < before.float64_horizon
     times, impulses = before.events[early][:, [0, 3]].T
     found = after.events[: early.sum()]
     np.testing.assert_array_equal(found[:, 1:3], before.events[early][:, 1:3])
     np.testing.assert_allclose(found[:, 0], change.time * times, rtol=1e-8)
     np.testing.assert_allclose(found[:, 3], change.mass * change.length / change.time * impulses, rtol=1e-7)
-    assert before.followed_until < 12.0
+    assert before.float64_horizon < 12.0
     assert keeps_its_promise(new, after)
 
 
 def test_a_horizon_by_metres_is_caught(monkeypatch: pytest.MonkeyPatch):
-    """The control: astray by a nanometre, whatever the radius."""
+    """The control: diverged by a nanometre, whatever the radius."""
     change, one = UNITS["lengths x 1000"], with_oracle(lasting(boxed(1), 12.0))
-    monkeypatch.setattr("scenarios.truth.horizon.ASTRAY", 1e-9 / one.scene.radius.max())
+    monkeypatch.setattr("scenarios.truth.horizon.DIVERGED", 1e-9 / one.scene.radius.max())
     before = computed(one)
     monkeypatch.setattr(
-        "scenarios.truth.horizon.ASTRAY", 1e-12 / one.scene.radius.max()
+        "scenarios.truth.horizon.DIVERGED", 1e-12 / one.scene.radius.max()
     )  # of radii a thousand times as large
     after = computed(with_oracle(change.scenario(replace(one, truth=None))))
-    assert after.followed_until < 0.99 * before.followed_until
+    assert after.float64_horizon < 0.99 * before.float64_horizon
 
 
 def test_the_answer_up_to_the_bound_of_work_is_kept_and_says_so(monkeypatch: pytest.MonkeyPatch):
@@ -138,7 +138,7 @@ def test_the_answer_up_to_the_bound_of_work_is_kept_and_says_so(monkeypatch: pyt
     monkeypatch.setattr(oracle, "WORK", 400)
     record = computed(one)
     assert record.reason.startswith("the work allowed for an answer in ")
-    assert 10 < record.valid_until < 100
+    assert 10 < record.horizon < 100
     truth = record.sampled(scene, (), one.times)
-    assert truth.t[-1] == np.floor(record.valid_until)
+    assert truth.t[-1] == np.floor(record.horizon)
     assert keeps_its_promise(one, record)

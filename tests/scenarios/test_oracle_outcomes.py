@@ -1,4 +1,5 @@
-"""Where contacts come at once: one outcome is the truth, several are all told; and where the oracle has no answer."""
+"""Where contacts come at once: one outcome is the truth, several are all reported; and where the oracle has no
+answer."""
 
 from __future__ import annotations
 
@@ -55,9 +56,13 @@ SEAM = lay_out(position=[[1.5, 0], [-1.8, 0.1]], velocity=[[1, 0], [0, 0]], radi
 @pytest.mark.parametrize(
     ("scene", "until", "reason"),
     [
-        (BREAK, 2.0, "disks 0, 1, 2 touch at once and the outcome depends on the order of their hits (2 outcomes)"),
+        (
+            BREAK,
+            2.0,
+            "disks 0, 1, 2 touch at once and the outcome depends on the order of their collisions (2 outcomes)",
+        ),
         # The upper one falls 1.25 m onto the lower one, which rests since sqrt(1.5 / 9.81) 1.1 / 0.9 s.
-        (BALL, np.sqrt(2.5 / 9.81), "disks 0, 1 touch at once and their hits do not end"),
+        (BALL, np.sqrt(2.5 / 9.81), "disks 0, 1 touch at once and their collisions do not end"),
         (SEAM, 0.5, "disk 0 re-enters over the edge of the wrap onto disk 1 at t = 0.5 s"),
     ],
 )
@@ -66,10 +71,10 @@ def test_the_truth_ends_where_there_is_no_more_of_it(scene: Scene, until: float,
     one = asked(scene, 4.0)
     record = computed(one)
 
-    assert record.valid_until == pytest.approx(until, rel=1e-15)
+    assert record.horizon == pytest.approx(until, rel=1e-15)
     assert reason in record.reason
     assert f"at t = {until:.4g}"[:10] in record.reason
-    assert states(one, record).t[-1] <= record.valid_until
+    assert states(one, record).t[-1] <= record.horizon
     assert states(one, record).reason == record.reason
 
 
@@ -82,14 +87,14 @@ CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201,
     [
         (asked(replace(ROW, position=ROW.position * [0.9, 1])), "disk 1 and disk 2 overlap by 0.05 m at the start"),
         (asked(replace(BALL, position=[[0, 0.1], [0, 2]])), "disk 0 and wall 0 overlap by 0.15 m at the start"),
-        (asked(ROW, thrusts=BODY), "a push that turns with its disk"),
+        (asked(ROW, thrusts=BODY), "a thrust that turns with its disk"),
         (asked(CROWD), "201 disks are more than the 200"),
         (asked(replace(SEAM, radius=[1e-9, 1])), "a radius of 1e-09 m is below 1e-06 m"),
         (asked(replace(BALL, velocity=[[1e9, 0], [0, 0]])), r"the largest velocity is 1e\+09 \(SI\), above 1e\+06"),
     ],
 )
 def test_what_it_cannot_do_is_refused(one: Scenario, reason: str):
-    """With one sentence; nothing is pushed apart."""
+    """With one sentence; no overlap is corrected."""
     with pytest.raises(NoTruth, match=reason):
         computed(one)
 
@@ -112,8 +117,8 @@ def row(speeds: list[float], mass: list[float], restitution: float = 1.0, gaps: 
     )  # fmt: skip
 
 
-def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_hits():
-    """The cue ends with (-1/8, -+0.2165); the second target, hit first, with (3/4, 0.433)."""
+def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_collisions():
+    """The cue ends with (-1/8, -+0.2165); the second target, collision first, with (3/4, 0.433)."""
     one = asked(BREAK, 4.0)
     record = computed(one)
     found = sorted(ends(record), key=lambda end: end[0][1])
@@ -125,7 +130,7 @@ def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_hits():
         np.testing.assert_allclose(end[3 - first], (0.375, -mirror * np.sqrt(3) / 8), rtol=0, atol=1e-15)
     for k in (0, 1):
         assert {*map(tuple, record.orders[record.orders[:, 0] == k, 1:].tolist())} <= {(0, 1), (0, 2), (1, 0), (2, 0)}
-    assert states(one, record).t[-1] < record.valid_until  # none of them is scored
+    assert states(one, record).t[-1] < record.horizon  # none of them is scored
 
 
 def test_a_squeeze_of_unequal_masses_has_two_outcomes():
@@ -147,8 +152,8 @@ def test_a_cradle_that_loses_energy_has_many_outcomes(coming: int, outcomes: tup
     assert spread == pytest.approx({1: 3e-5, 2: 4e-3}[coming], rel=0.3)
 
 
-def test_taking_the_hits_of_a_chain_as_they_come_is_caught(monkeypatch: pytest.MonkeyPatch):
-    """The planted bug: each hit by itself. It ends in one of the eight, as if there were no others."""
+def test_taking_the_collisions_of_a_chain_as_they_come_is_caught(monkeypatch: pytest.MonkeyPatch):
+    """The planted bug: each collision by itself. It ends in one of the eight, as if there were no others."""
     one = asked(row([1.0, 0, 0, 0, 0], [1] * 5, 0.9, (1.0,)), 2.0)
     assert len(ends(computed(one))) == 8
     monkeypatch.setattr(oracle_ahead.Ahead, "alone", lambda *_: True)
@@ -206,7 +211,7 @@ def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
         (with_oracle(asked(BREAK, 4.0)), "(2 outcomes)"),
         (scenario("disk_between_static_disks"), "the unstable orbit"),
     ):
-        until = one.truth(one.times).valid_until
+        until = one.truth(one.times).horizon
         before, after = np.array([0.0, until * 0.99]), np.array([until * 1.01])
 
         assert len(truth_at(one, before)) == 2

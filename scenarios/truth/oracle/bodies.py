@@ -13,7 +13,8 @@ from scenarios.truth.oracle.numbers import Number, Numbers
 from scenarios.truth.oracle.ties import Contact, Matter, Touch, Velocity
 
 STATIC, FALLING = 0, 1
-"""Kinds of acceleration: none, gravity; each pushed disk is a kind of its own, from 2 on; below 0: slides on a wall."""
+"""Kinds of acceleration: none, gravity; each disk under a thrust is a kind of its own, from 2 on; below 0: slides on a
+wall."""
 
 
 STILL, STRAIGHT, CURVED = range(3)
@@ -69,7 +70,7 @@ class Bodies:
         shape: (b,) whether each leg is a point, a straight line or a parabola.
         asleep: (b,) whose bounces die out untouched, so that nothing need be asked of them.
         held: (b,) the contacts each rests on: gap 0, no speed and no acceleration across it.
-        parted: pairs that touched, and did not approach, when the two had had so many events.
+        separated: pairs that touched, and did not approach, when the two had had so many events.
         leaning: (b,) the same of walls, at the start of the leg.
         matter: masses and restitution.
     """
@@ -77,19 +78,19 @@ class Bodies:
     def __init__(self, scene: Scene, k: Numbers) -> None:
         self.k, self.scene, exact = k, scene, k.exact
         ends = np.unique(scene.walls.reshape(-1, 2), axis=0)
-        # The wall that is blamed for a hit on its end: the first that has it.
+        # The wall that is blamed for a collision on its end: the first that has it.
         self.owner = [int(np.argmax((scene.walls == end).all(axis=2).any(axis=1))) for end in ends]
         nought, still = exact(0.0), ~scene.static
         positions = np.concatenate([scene.position, ends])
         velocities = np.concatenate([scene.velocity, np.zeros_like(ends)])
-        pulls = np.concatenate([still[:, None] * scene.gravity, np.zeros_like(ends)])
-        rows = [[nought, *map(exact, row)] for row in np.hstack([positions, velocities, pulls]).tolist()]
+        accelerations = np.concatenate([still[:, None] * scene.gravity, np.zeros_like(ends)])
+        rows = [[nought, *map(exact, row)] for row in np.hstack([positions, velocities, accelerations]).tolist()]
         self.legs = [Leg(*row) for row in rows]
-        self.pull = [FALLING if moves else STATIC for moves in still] + [STATIC] * len(ends)
+        self.kind = [FALLING if moves else STATIC for moves in still] + [STATIC] * len(ends)
         if not scene.gravity.any():
-            self.pull = [STATIC] * len(self.legs)
+            self.kind = [STATIC] * len(self.legs)
         # What accelerates each while nothing holds it.
-        self.free = [(kind, leg.ax, leg.ay) for kind, leg in zip(self.pull, self.legs)]
+        self.free = [(kind, leg.ax, leg.ay) for kind, leg in zip(self.kind, self.legs)]
         self.count = [0] * len(self.legs)
         self.radii = np.append(scene.radius, np.zeros(len(ends)))
         self.radius = [exact(r) for r in self.radii.tolist()]
@@ -100,7 +101,7 @@ class Bodies:
         inverse = [nought if m is None else exact(1.0) / m for m in mass] + [nought] * len(ends)
         self.matter = Matter(k, inverse, exact(scene.restitution), scene.restitution == 0)
         self.walls = [_frame(k, wall) for wall in scene.walls.tolist()]
-        self.parted: dict[tuple[int, int], tuple[int, int]] = {}
+        self.separated: dict[tuple[int, int], tuple[int, int]] = {}
         self.leaning: list[set[Contact]] = [set() for _ in self.legs]
         self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
 
@@ -137,7 +138,7 @@ class Bodies:
         return self.state_at(i, now)[2:]
 
     def fly(self, i: int, now: Number, v: Velocity, beside: Contact | None = None) -> None:
-        """Body i goes on from here with velocity v, held by what holds it; set exactly beside a wall it has hit."""
+        """Body i goes on from here with velocity v, held by what holds it; set exactly beside a wall it has struck."""
         x, y, _, _ = self.state_at(i, now)
         if beside is not None:
             x, y = self.beside(beside, x, y)
@@ -152,8 +153,8 @@ class Bodies:
         x, y, vx, vy = place
         self.begin(i, Leg(now, x, y, vx, vy, *self.acceleration(i)))
 
-    def push(self, i: int, now: Number, thrusts: Sequence[Thrust]) -> None:
-        """Body i is pushed by all of `thrusts` from now on."""
+    def set_thrusts(self, i: int, now: Number, thrusts: Sequence[Thrust]) -> None:
+        """Body i is accelerated by all of `thrusts` from now on."""
         exact, inverse = self.k.exact, self.matter.inverse_mass[i]
         a = [exact(g) for g in (self.scene.gravity * (not self.scene.static[i])).tolist()]
         for thrust in thrusts:
@@ -193,16 +194,16 @@ class Bodies:
                 level = square_to(self.scene.walls[walls[0].j], self.scene.gravity)
                 kind, along = (STATIC, self.k.exact(0.0)) if level else (-1 - walls[0].j, along)
             ax, ay = along * tx, along * ty
-        self.pull[i] = kind
+        self.kind[i] = kind
         return ax, ay
 
-    def remember(self, touches: Sequence[Touch], hit: set[int]) -> None:
-        """After the hits of one instant: these contacts touch, exactly, and do not approach."""
+    def remember(self, touches: Sequence[Touch], collision: set[int]) -> None:
+        """After the collisions of one instant: these contacts touch, exactly, and do not approach."""
         for contact, _, _ in touches:
             if contact.kind == "body":
                 i, j = sorted((contact.i, contact.j))
-                self.parted[i, j] = self.count[i], self.count[j]
-            elif contact.i in hit or not hit:
+                self.separated[i, j] = self.count[i], self.count[j]
+            elif contact.i in collision or not collision:
                 self.leaning[contact.i].add(contact)
 
     def height(self, contact: Contact, x: Number, y: Number) -> Number:

@@ -13,7 +13,7 @@ HALVINGS = 12  # of a bracket, before Newton is tried: enough to leave the neigh
 
 
 class Pressed(ArithmeticError):
-    """Two bodies touch, do not approach, and are pushed together: a contact that lasts, no hit."""
+    """Two bodies touch, do not approach, and are pressed together: a contact that lasts, no collision."""
 
 
 def meeting(k: Numbers, c: Number, b: Number, a2: Number) -> Number | None:
@@ -38,12 +38,12 @@ def crossing(k: Numbers, s: Number, v: Number, a: Number) -> Number | None:
 
     s < 0 is a point already behind the line: it must come out again before it can cross. Raises `Pressed`.
     """
-    side, going, pulled = k.sign(s), k.sign(v), k.sign(a)
+    side, going, curving = k.sign(s), k.sign(v), k.sign(a)
     if side == 0 and going < 0:
         return k.exact(0.0)
-    if side == 0 and going == 0 and pulled < 0:
+    if side == 0 and going == 0 and curving < 0:
         raise Pressed
-    if pulled < 0:
+    if curving < 0:
         under = v * v - 2 * a * s
         if side < 0 and (going <= 0 or k.sign(under) <= 0):
             return None
@@ -51,7 +51,7 @@ def crossing(k: Numbers, s: Number, v: Number, a: Number) -> Number | None:
         return 2 * s / (root - v) if going < 0 else (v + root) / -a
     if side <= 0 or going >= 0:
         return None
-    if pulled == 0:
+    if curving == 0:
         return s / -v
     under = v * v - 2 * a * s
     return 2 * s / (k.sqrt(under) - v) if k.sign(under) > 0 else None
@@ -61,7 +61,7 @@ def falling_meeting(k: Numbers, gap: Sequence[Number], limit: float) -> Number |
     """s until the gap c0 + c1 t + ... + c4 t^4 (m2) of two bodies that accelerate differently closes, or None.
 
     Only up to `limit` s. float64 finds between which times, by margins far above its rounding; many digits find the
-    time. Raises `Pressed`, and `Undecided` for balls where float64 cannot tell: the two graze.
+    time. Raises `Pressed`, and `Undecided` for balls where float64 cannot decide: the two graze.
     """
     touching = k.sign(gap[0]) <= 0
     approach = k.sign(gap[1] / 2) if touching else 0

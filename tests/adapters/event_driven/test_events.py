@@ -14,7 +14,7 @@ from scenarios.model import Scenario, Scene, Thrust
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import OracleTruth
 from tests.adapters.event_driven.event_truth import float64_truth
-from tests.adapters.event_driven.gases import gas, hits_of, state_after
+from tests.adapters.event_driven.gases import collisions_of, gas, state_after
 
 REFUSED = {
     "column_of_ten": "accumulate",
@@ -25,7 +25,7 @@ ANSWERED = [name for name in SCENARIOS if scenario(name).truth and name not in R
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_the_closed_forms_are_met_up_to_the_horizon(name):
-    """States and lists of hits, to a few roundings, which chaos makes a thousand: far within the 1e-9 m claimed.
+    """States and lists of collisions, to a few roundings, which chaos makes a thousand: far within the 1e-9 m claimed.
 
     The truth is the closed form, or the oracle in many digits, which shares no algorithm with the event engine.
     """
@@ -37,13 +37,15 @@ def test_the_closed_forms_are_met_up_to_the_horizon(name):
     chaos = 1e3 if isinstance(run.truth, OracleTruth) else 1.0
     for field, tolerance in (("position", 1e-12), ("velocity", 2e-12), ("angle", 1e-14), ("angular_velocity", 1e-14)):
         np.testing.assert_allclose(getattr(found, field)[:k], getattr(exact, field)[:k], rtol=0, atol=chaos * tolerance)
-    told, listed = found.collisions, exact.collisions
-    last = min(found.t[k - 1], 8.0 if name == "bouncing_ball_e09" else np.inf)  # it lists only hits 1e-4 s apart
+    reported, listed = found.collisions, exact.collisions
+    last = min(found.t[k - 1], 8.0 if name == "bouncing_ball_e09" else np.inf)  # it lists only collisions 1e-4 s apart
     h = int((listed.t <= last).sum())
-    assert h == (told.t <= last).sum()
-    pairs = [sorted(zip(np.round(c.t[:h], 8), c.i[:h], c.j[:h])) for c in (told, listed)]  # 49 balls hit at once
+    assert h == (reported.t <= last).sum()
+    pairs = [
+        sorted(zip(np.round(c.t[:h], 8), c.i[:h], c.j[:h])) for c in (reported, listed)
+    ]  # 49 balls collide at once
     assert pairs[0] == pairs[1]
-    np.testing.assert_allclose(told.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=chaos * 1e-12)
+    np.testing.assert_allclose(reported.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=chaos * 1e-12)
 
 
 @pytest.mark.parametrize("name", ["free_fall", "galperin_3", "ping_pong", "mass_ratios", "line_gas"])
@@ -51,24 +53,24 @@ def test_where_nothing_is_chaotic_the_horizon_is_the_duration(name):
     """A start one unit in the last place away leads to the same answer."""
     run = scenario(name)
     truth = float64_truth(run)
-    assert (truth.valid_until, truth.reason) == (run.times[-1], "")
+    assert (truth.horizon, truth.reason) == (run.times[-1], "")
 
 
 @pytest.mark.parametrize(("name", "words"), REFUSED.items())
 def test_a_scene_without_an_answer_is_refused_with_its_reason(name, words):
-    """Resting contacts, disks that touch and close in, pushes in the body frame."""
+    """Resting contacts, disks that touch and close in, thrusts in the body frame."""
     with pytest.raises(NoTruth, match=words):
         float64_truth(scenario(name))
 
 
 @pytest.mark.parametrize("name", ["gas_of_100", "asteroids", "falling_box"])
-def test_the_horizon_of_a_chaotic_scene_is_told(name):
+def test_the_horizon_of_a_chaotic_scene_is_reported(name):
     """It lies within the duration, and no sample beyond it is given; more samples do not change it."""
     run = scenario(name)
     truth = float64_truth(run)
-    assert 0 < truth.valid_until < run.duration
+    assert 0 < truth.horizon < run.duration
     assert "float64 cannot tell" in truth.reason
-    assert truth(run.times).t[-1] <= truth.valid_until
+    assert truth(run.times).t[-1] <= truth.horizon
     assert truth(run.times).error_bound == 1e-9
 
 
@@ -101,9 +103,9 @@ def test_a_start_that_is_none_is_refused_and_says_what_would_cure_it(scene, toru
 
 
 def test_touching_disks_that_part_are_allowed():
-    """And never hit."""
+    """And never collision."""
     engine, x, _ = state_after(two(gap=0.0, closing=-1.0), 1.0)
-    assert len(engine.hits) == 0
+    assert len(engine.collisions) == 0
     assert x.tolist() == [[-1.0, 0.0], [1.0, 0.0]]
 
 
@@ -115,7 +117,7 @@ def test_accumulation_is_refused_with_time_and_disk():
     )  # fmt: skip
     end = 3 * np.sqrt(2 * 1.4 / 9.81)
     truth = float64_truth(Scenario("ball", "", "", fall, 3.0, 0.01))
-    assert truth.valid_until == pytest.approx(end, abs=1e-12)
+    assert truth.horizon == pytest.approx(end, abs=1e-12)
     assert re.search(r"the collisions of disk 0 on disk 1 accumulate at 1\.6027", truth.reason)
     assert truth(np.linspace(0, 3, 301)).t[-1] == 1.6
 
@@ -130,7 +132,7 @@ def test_the_wrap_is_an_event_and_a_reentry_on_top_of_a_disk_ends_the_answer():
         )  # fmt: skip
         if free:
             engine, x, v = state_after(scene, 1.0)
-            assert hits_of(engine) == [(0.75, 0, 1)]
+            assert collisions_of(engine) == [(0.75, 0, 1)]
             assert x.tolist() == [[-4.5, 0.0], [-3.0, 0.0]]
             assert v.tolist() == [[0.0, 0.0], [2.0, 0.0]]
         else:
@@ -138,10 +140,10 @@ def test_the_wrap_is_an_event_and_a_reentry_on_top_of_a_disk_ends_the_answer():
                 state_after(scene, 1.0)
 
 
-def test_a_pushed_disk_hits_a_resting_one_at_the_root_of_the_gap():
+def test_a_disk_under_a_thrust_strikes_a_resting_one_at_the_root_of_the_gap():
     """From rest under 2 m/s2: a gap of 1 m is closed after 1 s at 2 m/s; equal masses swap."""
     scene = two(gap=1.0, closing=0.0, restitution=1.0)
-    run = Scenario("pushed", "", "", scene, 4.0, 0.125, thrusts=[Thrust(0, 0.5, 1.5, [2.0, 0.0])])
+    run = Scenario("thrust", "", "", scene, 4.0, 0.125, thrusts=[Thrust(0, 0.5, 1.5, [2.0, 0.0])])
     truth = float64_truth(run)(run.times)
     assert truth.collisions.t.tolist() == pytest.approx([1.5], abs=1e-15)
     assert truth.velocity[-1, 1, 0] == pytest.approx(2.0, abs=1e-14)
@@ -149,15 +151,15 @@ def test_a_pushed_disk_hits_a_resting_one_at_the_root_of_the_gap():
 
 
 def test_the_log_and_the_epochs_change_nothing():
-    """Hits are told in full over many epochs of the clock, whatever the stops on the way."""
+    """Collisions are reported in full over many epochs of the clock, whatever the stops on the way."""
     scene, torus = gas(16, 0.05)
     at_once, x, _ = state_after(scene, 5.0, torus)
     often = EventEngine(scene, torus)
     for at in np.linspace(0, 5, 777):
         often.advance(at)
-    assert (often.hits == at_once.hits).all()
+    assert (often.collisions == at_once.collisions).all()
     assert (often.look(5.0)[0] == x).all()
     long, _, end = state_after(scene, 20000.0, torus)
-    assert len(long.hits) > 2 * events.LOG_ROWS
-    assert (np.diff(long.hits[:, 0]) >= 0).all()
+    assert len(long.collisions) > 2 * events.LOG_ROWS
+    assert (np.diff(long.collisions[:, 0]) >= 0).all()
     assert (end**2).sum() == pytest.approx((scene.velocity**2).sum(), rel=1e-12)

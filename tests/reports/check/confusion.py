@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from reports.check.rows import Row
+from reports.check.rows import CheckRow
 from reports.check.verdict import FileCheck, check_file
 from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 
 TABLE = Path(__file__).parents[3] / "tests" / "data" / "confusion.csv"
-COLUMNS = ("solver", "fault is in", "found", "told first in", "first cause", "first cause is right")
+COLUMNS = ("solver", "fault is in", "found", "reported first in", "first cause", "first cause is right")
 
 
 def judged(paths: Sequence[Path]) -> dict[Path, FileCheck]:
@@ -24,7 +24,7 @@ def judged(paths: Sequence[Path]) -> dict[Path, FileCheck]:
         return dict(zip(paths, pool.map(check_file, paths)))
 
 
-def first(one: FileCheck) -> Row | None:
+def first(one: FileCheck) -> CheckRow | None:
     """What is said first: a fault, or where there is none the note that a guard is missing."""
     return next(iter(one.faults), None) or next(
         (row for row in one.rows if row.verdict == "note" and row.name == "same centre"), None
@@ -55,9 +55,9 @@ def main() -> None:
 def row_of(name: str, mutant: Mutant | None, one: FileCheck) -> tuple[str, ...]:
     """A row of the table; a correct solver has no fault that could be found."""
     row = first(one) if mutant else next(iter(one.faults), None)
-    told = (row.task, row.cause) if row else ("", "")
+    reported = (row.task, row.cause) if row else ("", "")
     right = "" if mutant is None else "yes" if said_first(mutant, one) else "no"
-    return (name, mutant.task if mutant else "", "yes" if row else "no", *told, right)
+    return (name, mutant.task if mutant else "", "yes" if row else "no", *reported, right)
 
 
 if __name__ == "__main__":

@@ -66,7 +66,7 @@ def test_the_same_file_gets_the_same_rows():
     assert check_solver(path) == check_solver(str(path))
 
 
-def test_two_mistakes_are_both_told(tmp_path: Path):
+def test_two_mistakes_are_both_reported(tmp_path: Path):
     """One in task 1 and one in 2d: two sentences, in this order, without those that only follow."""
     text = (CORRECT[0].parent / "plain.py").read_text()
     text = text.replace(" / sphere.mass * dt", " * dt").replace("sphereB.velocity.x -= J", "sphereB.velocity.x += J")
@@ -90,15 +90,15 @@ def test_free_choices_are_notes():
     """`<=`, a one-sided displacement, an impulse on pairs that part, no guard for equal centres."""
     rows = {row.name: row for row in check_solver(next(path for path in CORRECT if path.name == "one_sided.js"))}
 
-    notes = [rows[name].cause for name in ("touch", "split", "parting", "same centre")]
-    assert {rows[name].verdict for name in ("touch", "split", "parting", "same centre")} == {"note"}
+    notes = [rows[name].cause for name in ("touch", "split", "separating", "same centre")]
+    assert {rows[name].verdict for name in ("touch", "split", "separating", "same centre")} == {"note"}
     assert "compares with <=" in notes[0]
     assert "A alone is moved" in notes[1]
     assert "as the formula is printed" in notes[2]
 
 
 def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):
-    """Numbers that no formula of the table gives are told as numbers."""
+    """Numbers that no formula of the table gives are reported as numbers."""
     text = (CORRECT[0].parent / "plain.py").read_text()
     (tmp_path / "solver.py").write_text(text.replace("J = -(1 + RESTITUTION) * vn", "J = -(1 + RESTITUTION) * vn**3"))
     sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences
@@ -178,14 +178,14 @@ READS_IT = """function integrate(sphere, dt) {
 
 
 def library(mark: int) -> str:
-    """A library of that name, which can be told from others."""
+    """A library of that name, which can be reported from others."""
     return f"var vec2 = {{ mark: {mark} }};"
 
 
 def library_read(path: Path) -> float:
     """The mark of the gl-matrix that a solver finds; 0 if it finds none."""
     with SolverProcess(read_solver(path)) as process:
-        return ask(process, {"push": QUESTIONS["push"]})["push"].last[0].alpha
+        return ask(process, {"force": QUESTIONS["force"]})["force"].last[0].alpha
 
 
 def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path):
@@ -241,13 +241,13 @@ def test_gl_matrix_is_read_once_and_decides_what_the_solver_is(tmp_path: Path):
     (tmp_path / "gl-matrix.js").write_text(library(2))
     after = read_solver(path)
     with SolverProcess(before) as process:
-        assert ask(process, {"push": QUESTIONS["push"]})["push"].last[0].alpha == 1.0
+        assert ask(process, {"force": QUESTIONS["force"]})["force"].last[0].alpha == 1.0
 
     assert (before.digest, [name for name, _ in before.beside]) == (after.digest, ["gl-matrix.js"])
     assert before.source != after.source
 
 
-def test_who_calls_gl_matrix_where_there_is_none_is_told_where_to_put_it(tmp_path: Path):
+def test_who_calls_gl_matrix_where_there_is_none_is_reported_where_to_put_it(tmp_path: Path):
     """One sentence, where it is called and where what lies there is no library; nothing where the name is his own."""
     path = tmp_path / "Exercise.js"
     path.write_text((CORRECT[0].parent / "gl_vec3.js").read_text())

@@ -61,15 +61,15 @@ def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
     """JSON of a folder: four files in order, as the schema says; what is no text is refused with its reason."""
     done = crosscheck("check", folder, "--json", "--junit", folder / "class.xml", cwd=folder)
-    told = json.loads(done.stdout)
+    reported = json.loads(done.stdout)
 
-    jsonschema.validate(told, json.loads(SCHEMA.read_text()))
+    jsonschema.validate(reported, json.loads(SCHEMA.read_text()))
     assert done.returncode == 1
-    assert [(Path(one["file"]).parent.name, one["passed"]) for one in told["files"]] == [
+    assert [(Path(one["file"]).parent.name, one["passed"]) for one in reported["files"]] == [
         ("anna", True), ("ben", False), ("cem", False), ("dora", False)
     ]  # fmt: skip
-    assert "SyntaxError" in told["files"][2]["sentences"][0]
-    assert "is not text" in told["files"][3]["refused"]
+    assert "SyntaxError" in reported["files"][2]["sentences"][0]
+    assert "is not text" in reported["files"][3]["refused"]
     suites = ElementTree.parse(folder / "class.xml").getroot()
     assert [int(s.get("failures", "")) > 0 for s in suites] == [False, True, True, False]
     assert [s.get("errors") for s in suites] == ["0", "0", "0", "1"]
@@ -159,7 +159,7 @@ def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smalle
 
 
 def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """Without any time to draw scenes, a pair that hits is tried."""
+    """Without any time to draw scenes, a pair that collides is tried."""
     monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
     with SolverProcess(read_solver(folder / "ben" / "Exercise.js")) as process:
         found = smallest_scene(process, 0.9)
@@ -184,8 +184,8 @@ def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
     page_path = folder / "page.html"
     write_page(page_path, check_file(folder / "ben" / "Exercise.js"), smallest)
     page, heard = opened(browser, page_path.as_uri(), viewport={"width": width, "height": 800})
-    page.wait_for_function("players.smallest")
-    at_end = "name => { players.smallest.seek(1); return players.smallest.positions(name); }"
+    page.wait_for_function("engines.smallest")
+    at_end = "name => { engines.smallest.seek(1); return engines.smallest.positions(name); }"
     shown = {name: page.evaluate(at_end, name) for name in ("Exercise.js:own", "truth")}
     fits = page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     title = page.locator("h1").inner_text()

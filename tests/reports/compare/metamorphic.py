@@ -1,4 +1,4 @@
-"""A scenario, its exact answer and what was played of it, all told otherwise: turned, shifted, in other units ...
+"""A scenario, its exact answer and what was played of it, all stated otherwise: turned, shifted, in other units ...
 
 What is changed is what was played, not how: the metrics are under test here, and no engine. Steps, samples and the
 collisions of a stepping engine are put on the grid of the new units, as the engine would have put them.
@@ -18,7 +18,7 @@ ON_GRID = 1e-6  # of a step: a collision that is as near to the end of one was f
 
 
 def the_same(w: int, _x: Array, _walls: Array, _truth: bool) -> Sequence[int]:
-    """The wall that was hit is the wall that is hit."""
+    """The wall that was struck is the wall that is struck."""
     return (w,)
 
 
@@ -30,7 +30,8 @@ class Change:
         length, time, mass: m, s and kg in the new units.
         turn: rad; flip: -1 for the mirror image (y -> -y, before the turn).
         shift: m; boost: m/s, both in the new frame and units.
-        order: for n disks, which comes where; walls: those of a scene -> new ones; wall: of each hit -> the new walls.
+        order: for n disks, which comes where; walls: those of a scene -> new ones; wall: of each collision -> the new
+            walls.
         thrusts: of a scenario -> new ones.
     """
 
@@ -64,7 +65,7 @@ class Change:
         return self.length / self.time * self.way(np.asarray(v)) + np.array(self.boost)
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene, told otherwise."""
+        """The scene, stated otherwise."""
         order = self.order(scene.n)
         unit = self.length / self.time
         velocity = np.where(scene.static[:, None], 0.0, self.speed(scene.velocity))
@@ -79,8 +80,8 @@ class Change:
             wrap=None if scene.wrap is None else np.sort(self.place(scene.wrap), axis=0),
         )  # fmt: skip
 
-    def push(self, thrust: Thrust, n: int) -> Thrust:
-        """The thrust, told otherwise; one that turns with its disk only flips."""
+    def thrust(self, thrust: Thrust, n: int) -> Thrust:
+        """The thrust, stated otherwise; one that turns with its disk only flips."""
         flipped = thrust.force * [1, self.flip] if thrust.frame == "body" else self.way(thrust.force)
         force = self.mass * self.length / self.time**2 * flipped
         torque = self.mass * self.length**2 / self.time**2 * self.flip * thrust.torque
@@ -88,11 +89,11 @@ class Change:
         return Thrust(disk, self.time * thrust.start, self.time * thrust.stop, force, torque, thrust.frame)
 
     def scenario(self, one: Scenario) -> Scenario:
-        """The scenario, with its exact answer told otherwise."""
-        pushes = [self.push(thrust, one.scene.n) for thrust in self.thrusts(one.thrusts)]
+        """The scenario, with its exact answer stated otherwise."""
+        thrusts = [self.thrust(thrust, one.scene.n) for thrust in self.thrusts(one.thrusts)]
         new = replace(
             one, scene=self.scene(one.scene), duration=self.time * one.duration,
-            sample_interval=self.time * one.sample_interval, thrusts=pushes, truth=None,
+            sample_interval=self.time * one.sample_interval, thrusts=thrusts, truth=None,
         )  # fmt: skip
         if one.truth is None:
             return new
@@ -113,16 +114,20 @@ class Change:
             t=frozen(t), position=frozen(self.place(old.position, t[:, None])[:, order]),
             velocity=frozen(velocity[:, order]), angle=frozen((self.flip * old.angle + self.turn)[:, order]),
             angular_velocity=frozen((self.flip / self.time * old.angular_velocity)[:, order]),
-            collisions=self.collisions(old, one, dt), valid_until=self.time * old.valid_until,
+            collisions=self.collisions(old, one, dt), horizon=self.time * old.horizon,
             error_bound=self.length * old.error_bound, reason=old.reason,
         )  # fmt: skip
 
     def collisions(self, old: Trajectory, one: Scenario, dt: float | None) -> Collisions:
         """The collisions of what was played; those that the end of a step has found are found there again."""
-        hits, rows, number = old.collisions, [], np.argsort(self.order(one.scene.n))
-        asked = one.truth if dt is None and len(hits) else None
-        where = asked(hits.t).position if asked else old.position[np.searchsorted(old.t, hits.t).clip(max=len(old) - 1)]
-        for t, i, j, impulse, x in zip(hits.t, hits.i, hits.j, hits.impulse, where):
+        collisions, rows, number = old.collisions, [], np.argsort(self.order(one.scene.n))
+        asked = one.truth if dt is None and len(collisions) else None
+        where = (
+            asked(collisions.t).position
+            if asked
+            else old.position[np.searchsorted(old.t, collisions.t).clip(max=len(old) - 1)]
+        )
+        for t, i, j, impulse, x in zip(collisions.t, collisions.i, collisions.j, collisions.impulse, where):
             steps = round(t / dt) if dt else 0
             found = dt is not None and abs(steps - t / dt) < ON_GRID
             now = steps * (self.time * dt) if dt and found else self.time * t
@@ -131,7 +136,7 @@ class Change:
         return Collisions.of(rows)
 
     def run(self, run: Run, one: Scenario) -> Run:
-        """A run, told otherwise."""
+        """A run, stated otherwise."""
         assert run.trajectory is not None
         times = np.arange(len(run.trajectory)) * (self.time * one.sample_interval)
         new = self.trajectory(run.trajectory, one, times, run.dt)
@@ -159,7 +164,7 @@ def which_half(w: int, x: Array, walls: Array, _truth: bool) -> Sequence[int]:
 
 
 def both(w: int, _x: Array, walls: Array, truth: bool) -> Sequence[int]:
-    """Of two walls in one place an engine tells both, the exact answer the second."""
+    """Of two walls in one place an engine reports both, the exact answer the second."""
     return (w + len(walls),) if truth else (w, w + len(walls))
 
 

@@ -16,7 +16,7 @@ from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.truth.exact import with_oracle
 from tests.reports.compare.answers import beside_truth, truth_of
 
-HELD = ("velocity_max", "velocity_rms", "momentum_apart", "energy_apart")
+HELD = ("velocity_max", "velocity_rms", "momentum_deviation", "energy_deviation")
 
 
 def values(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> list[float]:
@@ -55,10 +55,10 @@ def test_gravity_hides_no_error_of_an_integrator():
     one, truth = truth_of("bouncing_ball_e1")
     dt = one.dt(1)
     gravity = np.linalg.norm(one.scene.gravity)
-    hits = truth.collisions.t
+    collisions = truth.collisions.t
     played = replace(truth, velocity=truth.velocity - one.scene.gravity * dt)
-    apart = beside_truth(one, dt, played, truth).velocity_apart[1:, 0]
-    near = np.abs(truth.t[1:, None] - hits).min(axis=1) < WINDOW * dt
+    apart = beside_truth(one, dt, played, truth).velocity_deviation[1:, 0]
+    near = np.abs(truth.t[1:, None] - collisions).min(axis=1) < WINDOW * dt
 
     assert near.sum() > 20
     np.testing.assert_allclose(apart[near & np.isfinite(apart)], gravity * dt, rtol=1e-9)  # digits of v - g dt
@@ -70,9 +70,9 @@ def test_a_disk_that_is_late_may_keep_falling(steps: float):
     one, truth = truth_of("bouncing_ball_e1")
     dt = one.dt(1)
     velocity = truth.velocity.copy()
-    for hit, impulse in zip(truth.collisions.t, truth.collisions.impulse):
-        since = truth.t - hit
-        # `steps` dt after the bounce the player has not met the floor.
+    for collision, impulse in zip(truth.collisions.t, truth.collisions.impulse):
+        since = truth.t - collision
+        # `steps` dt after the bounce the engine has not met the floor.
         velocity[(since >= 0) & (since <= steps * dt), 0, 1] -= impulse / one.scene.mass[0]
 
     # Rounding of 10 m/s, ten bounces.
@@ -85,12 +85,12 @@ def test_a_sample_at_the_instant_of_a_collision_may_have_the_velocity_before_it_
     one, truth = truth_of(name)
     assert one.truth is not None
     jumps = jumps_of(truth, one)
-    hits = jumps.t[np.diff(jumps.t, prepend=-1) > 1e-6]
-    if not len(hits):
+    collisions = jumps.t[np.diff(jumps.t, prepend=-1) > 1e-6]
+    if not len(collisions):
         pytest.skip("nothing collides here")
-    at = one.truth(hits)
+    at = one.truth(collisions)
     for shift in (-1e-9, 1e-9):  # s
-        played = replace(at, velocity=one.truth(hits + shift).velocity)
+        played = replace(at, velocity=one.truth(collisions + shift).velocity)
         apart = np.abs(nearest_velocity(played, at, jumps, 1e-7) - played.velocity)
         assert apart.max() < 1e-7  # m/s: gravity for a nanosecond
     wrong = replace(at, velocity=at.velocity * 1.01 + 0.01)
@@ -115,16 +115,17 @@ def test_collisions_take_the_energy_and_the_walls_the_momentum_that_the_truth_lo
 
 
 def test_of_two_collisions_at_one_instant_either_may_come_first():
-    """A ball in the middle of a row is pushed and pushes on; mirrored, the list has the two the other way round."""
+    """A ball in the middle of a row receives an impulse and gives one; mirrored, the list has the two the other way
+    round."""
     t, when = np.array([1.0]), np.array([1.0, 1.0])
-    push, give = np.array([1.0, 0.0]), np.array([-1.0, 0.0])
+    receive, give = np.array([1.0, 0.0]), np.array([-1.0, 0.0])
     still = np.zeros((1, 1, 2))
     limits = np.array([0, 2])
-    for change in (np.array([push, give]), np.array([give, push])):
-        for met in (push, give, np.zeros(2)):
+    for change in (np.array([receive, give]), np.array([give, receive])):
+        for met in (receive, give, np.zeros(2)):
             assert np.array_equal(nearest(t, met[None, None], still, limits, when, change, 0.1)[0, 0], met)
-    apart = np.array([1.0, 1.01])  # the control: one after the other, to push on before it is pushed is wrong
-    found = nearest(t + 0.02, give[None, None], still, limits, apart, np.array([push, give]), 0.1)[0, 0]
+    apart = np.array([1.0, 1.01])  # the control: one after the other, to give before it receives is wrong
+    found = nearest(t + 0.02, give[None, None], still, limits, apart, np.array([receive, give]), 0.1)[0, 0]
     assert not np.array_equal(found, give)
 
 
@@ -183,7 +184,7 @@ def largest_change(metric: str) -> float:
 
 @pytest.mark.parametrize("metric", HELD)
 def test_the_same_scene_ten_times_as_fast_reads_the_same(metric: str):
-    """Samples, steps and the collisions that are told of them lie on one grid: no rounding of it decides."""
+    """Samples, steps and the collisions that are reported of them lie on one grid: no rounding of it decides."""
     # Rounding of the speeds, 3 m/s, that a few collisions have spread; momenta and energies are relative.
     assert largest_change(metric) < 1e-9
 
@@ -193,4 +194,4 @@ def test_a_threshold_on_the_grid_is_seen(monkeypatch: pytest.MonkeyPatch):
     for module in (delays, view):
         monkeypatch.setattr(module, "WINDOW", 3.0)
 
-    assert largest_change("momentum_apart") > 1e-6
+    assert largest_change("momentum_deviation") > 1e-6

@@ -14,7 +14,7 @@ from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Collisions, Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
-NAMES = ("collisions_missed", "collisions_invented", "first_wrong_collision_s")
+NAMES = ("collisions_missed", "collisions_spurious", "first_wrong_collision_s")
 NOTHING = Collisions.of([])
 WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
 
@@ -43,7 +43,7 @@ def test_an_engine_that_reports_no_collision_is_caught_wherever_one_is_judged(na
         silent, right = (read(one, dt, each, truth) for each in (replace(truth, collisions=NOTHING), truth))
         if not len(truth.collisions):
             assert silent["collisions_missed"].note.startswith(NOT_JUDGED)
-            assert (silent["collisions_invented"].value, silent["first_wrong_collision_s"].value) == (0, np.inf)
+            assert (silent["collisions_spurious"].value, silent["first_wrong_collision_s"].value) == (0, np.inf)
             continue
         judged, total = counts(right["collisions_missed"].note)
 
@@ -98,10 +98,10 @@ def test_where_there_is_no_collision_none_is_missed_but_one_may_be_invented():
     invents = replace(truth, collisions=Collisions.of([(one.duration / 2, 0, 1, 1.0)]))
     found = read(one, one.dt(1), invents, truth)
     runs = [Run("pymunk", "matched", one.name, one.dt(k), trajectory=invents) for k in one.substeps]
-    column = list(overview.SUMMARY).index("wrong_hits")
+    column = list(overview.SUMMARY).index("wrong_collisions")
 
     assert found["collisions_missed"].note == f"{NOT_JUDGED}: no collision to miss"
-    assert found["collisions_invented"].value == 1
+    assert found["collisions_spurious"].value == 1
     assert found["first_wrong_collision_s"].value == one.duration / 2
     for played, total in ((invents, "1"), (truth, "0")):
         each = compare(one, [replace(run, trajectory=played) for run in runs])
@@ -113,7 +113,7 @@ def test_a_scene_in_which_too_few_collisions_are_judged_is_left_out_of_the_sum()
     """Of wrong collisions on the page: column_of_ten is named as not judged."""
     one, truth = truth_of("column_of_ten")
     runs = [Run("pymunk", "matched", one.name, one.dt(k), trajectory=truth) for k in one.substeps]
-    column = list(overview.SUMMARY).index("wrong_hits")
+    column = list(overview.SUMMARY).index("wrong_collisions")
     cell = overview.summary([compare(one, runs)], ["pymunk:matched"], set())["pymunk:matched"][column]
 
     assert (cell.text, cell.remark) == ("–", f"in 0 scenarios, {NOT_JUDGED} in 1")

@@ -1,4 +1,4 @@
-"""Every metric changes as its unit says if the same is told otherwise: numbers of disks, axes, origin, units, walls.
+"""Every metric changes as its unit says if the same is stated otherwise: numbers of disks, axes, origin, units, walls.
 
 Nothing else may change a number, not by more than rounding, and not by the rounding of a grid on which steps, samples
 and collisions lie together.
@@ -27,7 +27,7 @@ from scenarios.model import Scenario, Scene, Thrust
 from scenarios.truth.exact import with_oracle
 from tests.reports.compare.metamorphic import CHANGES, Change
 
-PLAYERS = ("reference:exercise", "reference:ordered", "pymunk:matched", "box2d:matched", "event_driven:float64")
+PLAYED = ("reference:exercise", "reference:ordered", "pymunk:matched", "box2d:matched", "event_driven:float64")
 ROOM = box([-2.5, -2.5], [2.5, 2.5])
 
 
@@ -59,11 +59,11 @@ SCENES: dict[str, Callable[[], Scenario]] = {
             restitution=1.0, walls=box([-1.1, -1.7], [1.1, 1.7]),
         ), 3.0, 0.1,
     ),
-    "pushed": lambda: asked(
-        "pushed", crowd(restitution=0.8), 1.0, 0.02,
+    "thrust": lambda: asked(
+        "thrust", crowd(restitution=0.8), 1.0, 0.02,
         (Thrust(0, 0.1, 0.5, [1.5, -2.0], 0.3), Thrust(3, 0.2, 0.77, [0.0, 4.0])),
     ),
-    "pushed to the walls": lambda: asked(
+    "thrust to the walls": lambda: asked(
         "steered", crowd(restitution=0.7, walls=ROOM), 0.8, 0.02, (Thrust(1, 0.0, 0.6, [3.0, 0.5], 0.3, "body"),),
     ),
     "wrapped": lambda: asked("wrapped", crowd(restitution=0.9, wrap=[[-3.0, -2.0], [3.0, 2.0]]), 1.0, 0.02),
@@ -71,13 +71,13 @@ SCENES: dict[str, Callable[[], Scenario]] = {
 
 # What a change cannot be asked of: a moving frame moves walls, what stands still and gravity's energy; the wrap stands
 # along the axes and is as long as it is.
-WALLED = ("elastic", "room", "falling", "grid", "pushed to the walls", "wrapped")
+WALLED = ("elastic", "room", "falling", "grid", "thrust to the walls", "wrapped")
 LEFT_OUT = {("boosted", name) for name in WALLED} | {
     (name, "wrapped") for name in ("turned", "turned by a quarter and mirrored")
 }
 # Numbers that belong to a frame: energies and the spin of the whole about a point are others in a moving one.
 OF_A_FRAME = (
-    "energy_error", "energy_apart", "energy_created", "energy_loss_error", "angular_momentum_error",
+    "energy_error", "energy_deviation", "energy_created", "energy_loss_error", "angular_momentum_error",
 )  # fmt: skip
 
 ROUNDING = 1e-9
@@ -89,7 +89,7 @@ where lengths are of 1 m, spread a hundredfold by restitutions read off small ch
 def played(name: str) -> tuple[Scenario, tuple[Run, ...], pd.DataFrame]:
     """A scene, every run of it that came to its end, and their table."""
     one = SCENES[name]()
-    every = [play(ENGINES[who].make(), who, one, one.dt(k)) for who in PLAYERS for k in one.substeps]
+    every = [play(ENGINES[who].make(), who, one, one.dt(k)) for who in PLAYED for k in one.substeps]
     runs = tuple(run for run in every if run.status == "ok")
     return one, runs, compare(one, runs).table
 
@@ -140,7 +140,7 @@ def test_every_metric_is_under_test():
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     length=st.floats(1e-4, 1e4), time=st.floats(1e-4, 1e4), mass=st.floats(1e-4, 1e4), turn=st.floats(0, 7),
-    flip=st.sampled_from([1, -1]), name=st.sampled_from(["free", "falling", "grid", "pushed"]),
+    flip=st.sampled_from([1, -1]), name=st.sampled_from(["free", "falling", "grid", "thrust"]),
 )  # fmt: skip
 def test_any_units_and_any_axes_will_do(length: float, time: float, mass: float, turn: float, flip: int, name: str):
     """All at once."""
@@ -155,12 +155,12 @@ def three_steps_away(view: View) -> Value:
 
 def by_a_millimetre(view: View) -> Value:
     """How many disks are off by more than 1 mm in some sample."""
-    return Value(float((view.apart > 1e-3).any(axis=0).sum()))
+    return Value(float((view.deviation > 1e-3).any(axis=0).sum()))
 
 
 def of_the_first_disk(view: View) -> Value:
     """How far the first disk is off."""
-    return _largest_of_disks(view.apart[:, :1], view)
+    return _largest_of_disks(view.deviation[:, :1], view)
 
 
 def along_x(view: View) -> Value:
@@ -226,8 +226,8 @@ WRONG = [
     (per_second, "1", "room", "walls doubled"),
     (heavy, "1", "room", "in g"),
     (largest, "1", "room", "in mm"),
-    (of_thrusts, "1", "pushed", "thrusts cut in two"),
-    (of_thrusts, "1", "pushed", "thrusts shared by two"),
+    (of_thrusts, "1", "thrust", "thrusts cut in two"),
+    (of_thrusts, "1", "thrust", "thrusts shared by two"),
     (fastest, "m/s", "free", "boosted"),
 ]
 

@@ -95,10 +95,10 @@ def test_energy_that_is_created_is_seen():
 
 
 def test_weight_and_thrust_are_accounted_for():
-    """Free flight under gravity and a world-frame push has no momentum error."""
+    """Free flight under gravity and a world-frame thrust has no momentum error."""
     scene = Scene(position=[[0, 0]], velocity=[[1, 2]], radius=[0.1], mass=[2], restitution=1, gravity=[0, -9.81])
     one = Scenario(
-        name="pushed", asks="?", source="", scene=scene, duration=1.0, sample_interval=0.1,
+        name="thrust", asks="?", source="", scene=scene, duration=1.0, sample_interval=0.1,
         thrusts=[Thrust(0, 0.25, 0.6, [3.0, 1.0])],
     )  # fmt: skip
     run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
@@ -158,8 +158,8 @@ def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
 
 
 def test_a_run_that_diverged_earns_a_status_and_no_score():
-    """A player that gives NaN at step 7 was right before it, for a scene that nobody else played so short."""
-    one = scenario("slow_hit")
+    """An engine that gives NaN at step 7 was right before it, for a scene that nobody else played so short."""
+    one = scenario("slow_collision")
     run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
     good = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", one, one.dt(1))
     table = compare(one, [run, good]).table
@@ -172,7 +172,7 @@ def test_a_run_that_diverged_earns_a_status_and_no_score():
 
 def test_to_refuse_a_scene_does_not_help_in_the_ranking():
     """Who has no result in a scene is last in it, and who has none in half of them is not ranked first."""
-    one, two = scenario("slow_hit"), scenario("near_miss")
+    one, two = scenario("slow_collision"), scenario("near_miss")
     runs = {
         name: [play(ENGINES[name].make(), name, each, each.dt(4)) for each in (one, two)]
         for name in ("reference:exercise", "box2d:shipped")
@@ -222,7 +222,7 @@ def test_falling_through_a_wrap_is_no_energy_error():
 
 
 def test_comparison_stops_where_the_other_ends():
-    """Samples and hits beyond the truth's horizon are cut off."""
+    """Samples and collisions beyond the truth's horizon are cut off."""
     _, truth = truth_of("line_gas")
     short = cut(truth, 100)
 

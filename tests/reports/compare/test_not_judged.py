@@ -23,7 +23,7 @@ from scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
 CARRIED = (
-    "velocity_max", "velocity_rms", "angular_velocity_max", "momentum_apart", "energy_apart", "energy_error",
+    "velocity_max", "velocity_rms", "angular_velocity_max", "momentum_deviation", "energy_deviation", "energy_error",
     "energy_loss_error",
 )  # fmt: skip
 NAMES = ("reference:exercise", "pymunk:matched")
@@ -98,24 +98,24 @@ def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
     assert runs[0] is not None
     assert runs[1] is not None
     view = View(one, one.dt(1), runs[0], runs[1])
-    hits = np.append(runs[0].collisions.t, runs[1].collisions.t)
-    near = np.abs(view.played.t[:, None] - hits).min(axis=1) < WINDOW * one.dt(1)
+    collisions = np.append(runs[0].collisions.t, runs[1].collisions.t)
+    near = np.abs(view.played.t[:, None] - collisions).min(axis=1) < WINDOW * one.dt(1)
 
-    assert len(hits) == 2
+    assert len(collisions) == 2
     assert (view.judged == (~near & (view.played.t > 0))[:, None]).all()
     assert view.carried == f"{view.judged.sum()} of {2 * one.samples} samples of a disk"
 
 
 def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisions():
-    """Each tells of a collision every other step: less than a tenth of the samples is left."""
+    """Each reports a collision every other step: less than a tenth of the samples is left."""
     one = scenario("slide_on_incline")
     found = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)).trajectory
     assert found is not None
     times = np.arange(0.0, one.duration, 2 * one.dt(1))
-    hits = replace(
+    collisions = replace(
         found.collisions, t=times, i=np.zeros(len(times), int), j=np.full(len(times), -1), impulse=np.ones(len(times))
     )
-    view = View(one, one.dt(1), replace(found, collisions=hits), found)
+    view = View(one, one.dt(1), replace(found, collisions=collisions), found)
     value = METRICS["velocity_max"].of(view)
 
     assert view.share < LEAST_SHARE
@@ -187,7 +187,7 @@ def test_a_velocity_that_overflows_is_judged_and_bad():
     one, truth = truth_of("wall_to_wall")
     huge = replace(truth, velocity=truth.velocity * 1e200)
     with np.errstate(over="ignore", invalid="ignore"):
-        found = METRICS["energy_apart"].of(beside_truth(one, one.dt(1), huge, truth))
+        found = METRICS["energy_deviation"].of(beside_truth(one, one.dt(1), huge, truth))
 
     assert found is not None
     assert not np.isfinite(found.value)
@@ -205,7 +205,7 @@ def test_a_failed_run_is_no_number_that_is_not_judged():
 
 def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
     """The only engine broke the protocol: there is an exact answer, and nobody to be held to it."""
-    comparisons = [compared(known_until("slow_hit", 5))]
+    comparisons = [compared(known_until("slow_collision", 5))]
     alone, without = findings(comparisons, set(NAMES))[0], findings([], set())[0]
 
     assert alone == "No engine that counts was played to its end in a scene with an exact answer, so nobody is scored."

@@ -36,14 +36,14 @@ def met(*after: float, e: float = 1.0, others: tuple[tuple[float, int, int], ...
     scene = Scene(
         position=position[0], velocity=velocity[0], radius=[0.1] * 2, mass=[1] * 2, restitution=e, walls=WALLS
     )
-    hits = Collisions.of([(2 * STEP, 0, 1, 1.0), *((*other, 1.0) for other in others)])
-    return effective_restitution(Trajectory(t, position, velocity, still, still, hits), scene, 0.0, FLOAT64)
+    collisions = Collisions.of([(2 * STEP, 0, 1, 1.0), *((*other, 1.0) for other in others)])
+    return effective_restitution(Trajectory(t, position, velocity, still, still, collisions), scene, 0.0, FLOAT64)
 
 
 def test_a_soft_contact_is_read_when_the_two_part(monkeypatch: pytest.MonkeyPatch):
     """Stopped and thrown back over three samples; without looking on, the control, e would be negative."""
     found = met(-0.6, -0.1, 0.5, 0.8, 0.8)
-    # It is over as soon as they no longer approach: at 0.5, of which the third sample after the contact tells.
+    # It is over as soon as they no longer approach: at 0.5, of which the third sample after the contact reports.
     assert found.values == pytest.approx([0.5])
     assert (found.below, found.unfinished) == (0, 0)
 

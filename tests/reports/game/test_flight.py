@@ -1,4 +1,5 @@
-"""A flight without a server: keys push as the exercise says, the same keys give the same bits, a saved flight too."""
+"""A flight without a server: keys accelerate as the exercise says, the same keys give the same bits, a saved flight
+too."""
 
 from __future__ import annotations
 
@@ -9,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES
 from adapters.play import play
 from reports.game.flight import EARTH, FRAME, Flight, field_scenario
 from reports.game.pilot import SHIP
 from scenarios.families.exercise import SHIP as START
 from scenarios.files.scene_file import read_scene_file, scene_text
-from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.closed_forms import world_thrusts
 
-EVENTS = [  # frame, key, down: a turn, a push across it, a renewed push, both keys of a pair
+EVENTS = [  # frame, key, down: a turn, a thrust across it, a renewed thrust, both keys of a pair
     (8, "a", True), (24, "w", True), (40, "w", True), (56, "a", False), (72, "w", False), (80, "s", True),
     (88, "d", True), (96, "w", True), (110, "d", False), (120, "s", False), (130, "w", False),
 ]  # fmt: skip
@@ -43,13 +44,13 @@ def bits(flight: Flight) -> list[dict[str, bytes]]:
 
 @pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64"])
 def test_keys_move_the_ship_as_the_exercise_says(name: str):
-    """Against x + v t + F t2 / 2m, pushes of 0.25 m/s2 along the heading at the key event and turns of 1 rad/s2."""
+    """Against x + v t + F t2 / 2m, thrusts of 0.25 m/s2 along the heading at the key event and turns of 1 rad/s2."""
     flight = flown([name], 160, asteroids=0)
     scenario = flight.saved()
-    truth = world_pushes(scenario.scene, scenario.thrusts, scenario.times).at(-1)
-    # Each push of T s puts the ship (alpha - 1/2) a dt T off, which it keeps; alpha is the order of the updates.
-    pushed = sum(thrust.stop - thrust.start for thrust in scenario.thrusts if thrust.force.any())
-    offset = abs(ENGINES[name].alpha - 0.5) * 0.25 * flight.dt * pushed
+    truth = world_thrusts(scenario.scene, scenario.thrusts, scenario.times).at(-1)
+    # Each thrust of T s puts the ship (alpha - 1/2) a dt T off, which it keeps; alpha is the order of the updates.
+    thrusting = sum(thrust.stop - thrust.start for thrust in scenario.thrusts if thrust.force.any())
+    offset = abs(ENGINES[name].alpha - 0.5) * 0.25 * flight.dt * thrusting
     rounding = ENGINES[name].rounding * 160 * 16 * 4  # one a step, of coordinates up to 4 m
     apart = np.abs(flight.solid.state.position[SHIP] - truth.position[SHIP]).max()
 
@@ -58,22 +59,22 @@ def test_keys_move_the_ship_as_the_exercise_says(name: str):
     assert np.hypot(*(truth.position[SHIP] - START)) > 0.2
 
 
-def test_a_push_keeps_its_direction_while_the_ship_turns():
+def test_a_thrust_keeps_its_direction_while_the_ship_turns():
     """W aims once when it goes down, and anew when its event is repeated; the force's size is mass times 0.25."""
     flight = flown(["reference:exercise"], 60, EVENTS[:4], asteroids=0)
-    pushes = [thrust for thrust in flight.saved().thrusts if thrust.force.any()]
+    thrusts = [thrust for thrust in flight.saved().thrusts if thrust.force.any()]
     size = flight.scenario.scene.mass[SHIP] * 0.25
-    headings = [np.arctan2(*thrust.force[::-1]) for thrust in pushes]
+    headings = [np.arctan2(*thrust.force[::-1]) for thrust in thrusts]
 
-    assert [(thrust.start / FRAME, thrust.stop / FRAME) for thrust in pushes] == [(24, 40), (40, 60)]
-    assert np.allclose([np.hypot(*thrust.force) for thrust in pushes], size, rtol=1e-15)
+    assert [(thrust.start / FRAME, thrust.stop / FRAME) for thrust in thrusts] == [(24, 40), (40, 60)]
+    assert np.allclose([np.hypot(*thrust.force) for thrust in thrusts], size, rtol=1e-15)
     # alpha'' = 1 rad/s2 since frame 8; symplectic Euler turns dt t / 2 further, and rounds.
     expected = [((frame - 8) * FRAME) ** 2 / 2 for frame in (24, 40)]
     assert np.allclose(headings, expected, atol=flight.dt * 32 * FRAME / 2 + 1e-12)
 
 
-def test_releasing_either_key_of_a_pair_ends_the_push():
-    """As in the exercise: S takes over from W, and when S is released nothing pushes, though W is still held."""
+def test_releasing_either_key_of_a_pair_ends_the_thrust():
+    """As in the exercise: S takes over from W, and when S is released no force acts, though W is still held."""
     flight = flown(["reference:exercise"], 40, [(0, "w", True), (10, "s", True), (20, "s", False)], asteroids=0)
     first, second = flight.saved().thrusts
 
@@ -164,7 +165,8 @@ def test_a_ship_that_leaves_is_set_back_to_its_start():
 
 @pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched"])
 def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
-    """As in the exercise: the rest of the frame it is already under way again, pushed from its start and from rest."""
+    """As in the exercise: the rest of the frame it is already under way again, thrusting from its start and from
+    rest."""
     flight = flown([name], 222, [(0, "s", True)], asteroids=0)
     while flight.left_at < 0:
         flight.advance()
@@ -196,19 +198,20 @@ def test_looking_at_every_step_near_an_edge_changes_no_bit():
         assert {name: array.tobytes() for name, array in vars(end.at(-1)).items()} == state
 
 
-def test_the_marker_names_the_first_hit():
-    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it parts at the first hit; the oracle names it."""
+def test_the_marker_names_the_first_collision():
+    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it parts at the first collision; the oracle names
+    it."""
     flight = flown(["reference:exercise", "pymunk:shipped", "pymunk:matched"], 64, [])
     scenario = flight.saved()
     ghost, matched = flight.flyers[1:]
     truth = read_truth(scenario)
     t, i, j = truth.collisions.t[0], truth.collisions.i[0], truth.collisions.j[0]
 
-    assert ghost.parting is not None
-    assert (ghost.parting.hit.i, ghost.parting.hit.j) in ((i, j), (j, i))
-    assert ghost.parting.hit.frame == int(t / FRAME)
-    assert ghost.parting.shared
-    assert matched.parting is None or matched.parting.hit.frame > ghost.parting.hit.frame
+    assert ghost.divergence is not None
+    assert (ghost.divergence.collision.i, ghost.divergence.collision.j) in ((i, j), (j, i))
+    assert ghost.divergence.collision.frame == int(t / FRAME)
+    assert ghost.divergence.shared
+    assert matched.divergence is None or matched.divergence.collision.frame > ghost.divergence.collision.frame
 
 
 def read_truth(scenario):  # type: ignore[no-untyped-def]
@@ -221,7 +224,7 @@ def read_truth(scenario):  # type: ignore[no-untyped-def]
 class Failing:
     """An engine that raises in its third frame."""
 
-    def __init__(self, row: Row) -> None:
+    def __init__(self, row: EngineRow) -> None:
         self.inner, self.frames = row.make(), 0
 
     def __getattr__(self, name: str):  # type: ignore[no-untyped-def]
@@ -237,7 +240,7 @@ class Failing:
 def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.MonkeyPatch):
     """With its reason; where it was the solid one, the next takes over."""
     row = ENGINES["pymunk:matched"]
-    monkeypatch.setitem(ENGINES, "pymunk:matched", Row(lambda: Failing(row), "fails", 0.0, 0.0))  # type: ignore[arg-type,return-value]
+    monkeypatch.setitem(ENGINES, "pymunk:matched", EngineRow(lambda: Failing(row), "fails", 0.0, 0.0))  # type: ignore[arg-type,return-value]
     flight = Flight(field_scenario(), ["pymunk:matched", "reference:exercise"])
     flight.advance(10)
 
@@ -249,10 +252,10 @@ def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.M
 def test_spin_is_part_of_the_energy():
     """m v2 / 2 + I w2 / 2, and momentum m v, of all disks."""
     flight = Flight(field_scenario(), ["reference:exercise"])
-    scene, told = flight.scenario.scene, flight.measures(flight.solid)
+    scene, reported = flight.scenario.scene, flight.measures(flight.solid)
     each = [m * (v @ v) / 2 + i * w * w / 2 for m, v, i, w in zip(
         scene.mass, scene.velocity, scene.inertia, scene.angular_velocity)]  # fmt: skip
 
-    assert told["energy"] == pytest.approx(sum(each), rel=1e-14)
-    assert told["momentum"] == pytest.approx((scene.mass @ scene.velocity).tolist(), rel=1e-13)
-    assert 0 < pi / 4 * 0.3**4 * scene.angular_velocity[1] ** 2 < told["energy"]
+    assert reported["energy"] == pytest.approx(sum(each), rel=1e-14)
+    assert reported["momentum"] == pytest.approx((scene.mass @ scene.velocity).tolist(), rel=1e-13)
+    assert 0 < pi / 4 * 0.3**4 * scene.angular_velocity[1] ** 2 < reported["energy"]

@@ -19,7 +19,7 @@ from reports.game.flight import FRAME
 from reports.game.pilot import SHIP
 from reports.game.server import Game
 from scenarios.files.scene_file import read_scene_file
-from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.closed_forms import world_thrusts
 from tests.reports.game.test_flight import steered_home
 from tests.reports.page.browsing import opened, overhang, served
 
@@ -90,7 +90,7 @@ def test_keys_held_and_released_move_the_ship(page: Page):
     x, y, vx, vy, angle, spin = page.evaluate("game.now.ship")
     dt, t = FRAME / 16, 64 * FRAME
 
-    # Symplectic Euler is a dt T / 2 further on after a push of T s, and rounds.
+    # Symplectic Euler is a dt T / 2 further on after a thrust of T s, and rounds.
     assert x == pytest.approx(-3.5 + 0.25 * t * (t / 2 + 64 * FRAME) + 0.25 * dt * t / 2, abs=1e-12)
     assert (y, vx, vy) == (0.0, pytest.approx(0.25 * t, abs=1e-14), 0.0)
     assert spin == pytest.approx(32 * FRAME, abs=1e-14)
@@ -110,26 +110,27 @@ def test_a_scripted_flight_wins(page: Page):
     assert page.locator("#banner.won").inner_text() == "You won"
 
 
-def test_ghosts_part_after_the_first_hit_and_the_marker_names_the_pair(page: Page, tmp_path: Path):
-    """pymunk as shipped makes e2 of e: it parts at the first hit, whose pair and instant the exact answer tells."""
+def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(page: Page, tmp_path: Path):
+    """pymunk as shipped makes e2 of e: it contributions at the first collision, whose pair and instant the exact answer
+    reports."""
     fly(page, 16)
-    together = [flyer["apart"] for flyer in page.evaluate("game.now.flyers")]
+    together = [flyer["deviation"] for flyer in page.evaluate("game.now.flyers")]
     page.locator("#stop").check()
     page.locator("#pause").click()  # fly on, until it stops by itself
     page.wait_for_function("() => game.paused && game.now.frame > 16", timeout=20_000)
     scenario = read_scene_file(saved(page, tmp_path))
-    hits = scenario.truth(scenario.times).collisions  # type: ignore[misc]
-    parted = page.evaluate("game.now.flyers[1].parted")
-    story = page.locator("tr[data-engine='pymunk:shipped'] [data-cell=parted]").inner_text()
+    collisions = scenario.truth(scenario.times).collisions  # type: ignore[misc]
+    diverged = page.evaluate("game.now.flyers[1].diverged")
+    story = page.locator("tr[data-engine='pymunk:shipped'] [data-cell=diverged]").inner_text()
     marks = page.evaluate("game.sky.last[3]")
 
     # A step at the edge: stepping engines set what wraps onto it, and lose what it flew on beyond.
     assert max(together) < 0.71 * FRAME / 16
-    assert {parted["i"], parted["j"]} == {hits.i[0], hits.j[0]}
-    assert 0 <= parted["t"] - hits.t[0] <= 2 * FRAME
-    assert f"{parted['i']} × {parted['j']}: both hit, and part differently" in story
+    assert {diverged["i"], diverged["j"]} == {collisions.i[0], collisions.j[0]}
+    assert 0 <= diverged["t"] - collisions.t[0] <= 2 * FRAME
+    assert f"{diverged['i']} × {diverged['j']}: both collide, and diverge" in story
     assert marks[0]["name"] == "pymunk:shipped"
-    assert page.evaluate("game.now.flyers[1].apart") > 1e-3
+    assert page.evaluate("game.now.flyers[1].deviation") > 1e-3
 
 
 def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Path):
@@ -148,7 +149,7 @@ def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Pa
     shown, solid = page.evaluate("game.now.ship"), FLOWN[0]
     scenario = read_scene_file(saved(page, tmp_path))
     end = play(ENGINES[solid].make(), solid, scenario, scenario.dt(scenario.substeps[1])).trajectory.at(-1)  # type: ignore[union-attr]
-    exact = world_pushes(scenario.scene, scenario.thrusts, scenario.times).at(-1)
+    exact = world_thrusts(scenario.scene, scenario.thrusts, scenario.times).at(-1)
 
     assert len(scenario.thrusts) >= 2
     assert shown == [*end.position[SHIP], *end.velocity[SHIP], end.angle[SHIP], end.angular_velocity[SHIP]]
@@ -192,7 +193,7 @@ def test_any_scene_file_can_be_flown(browser: Browser):
 
 
 def test_a_finger_steers_too(page: Page):
-    """The button pushes as long as it is held."""
+    """The button acts as long as it is held."""
     wish(page, asteroids=0)
     box = page.locator("[data-key=w]").bounding_box()
     assert box is not None
@@ -205,7 +206,7 @@ def test_a_finger_steers_too(page: Page):
     assert page.evaluate("game.now.ship[2]") == pytest.approx(0.25 * 20 * FRAME, abs=1e-14)
 
 
-def test_a_lost_connection_is_told_and_mended(page: Page):
+def test_a_lost_connection_is_reported_and_mended(page: Page):
     """The page says so, and begins anew when the server is there again."""
     fly(page, 3)
     page.evaluate("game.socket.close(); game.field.seen = true")
@@ -246,7 +247,7 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
 
 
 def test_with_reduced_motion_nothing_moves_by_itself(page: Page):
-    """The flight waits for the player."""
+    """The flight waits for the engine."""
     page.wait_for_timeout(200)
 
     assert page.evaluate("[game.now.frame, game.paused]") == [0, True]

@@ -1,4 +1,4 @@
-"""What the lessons claim: off, the switches give the reference; on, the engine; and every number is of a run."""
+"""What the lessons claim: off, the mechanisms give the reference; on, the engine; and every number is of a run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.switched import Switched
+from adapters.mechanisms.ablated import AblatedReference
 from adapters.play import play
 from reports.commands.serve import application
 from reports.game.server import Game
@@ -19,8 +19,8 @@ from reports.lessons import pages
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson, run_of
-from reports.lessons.mechanisms import SWITCHED
-from reports.lessons.meeting import hit_of_the_reference, two
+from reports.lessons.mechanisms import ABLATED
+from reports.lessons.meeting import collision_of_the_reference, two
 from reports.page.style import TRUTH
 from scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened, overhang, served
@@ -31,30 +31,30 @@ EVERY = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for
 
 
 @pytest.mark.parametrize("name", ["oblique_e09", "bouncing_ball_e1", "free_fall"])
-def test_with_nothing_switched_on_the_switches_give_the_reference(name: str):
+def test_with_nothing_switched_on_the_mechanisms_give_the_reference(name: str):
     """To the bit."""
     scene = scenario(name)
     plain = run_of("reference:exercise", scene, 2).trajectory
-    switched = play(Switched(), SWITCHED, scene, scene.dt(2)).trajectory
+    ablated = play(AblatedReference(), ABLATED, scene, scene.dt(2)).trajectory
 
     assert plain is not None
-    assert switched is not None
-    assert np.array_equal(plain.position, switched.position)
-    assert np.array_equal(plain.velocity, switched.velocity)
+    assert ablated is not None
+    assert np.array_equal(plain.position, ablated.position)
+    assert np.array_equal(plain.velocity, ablated.velocity)
 
 
 @pytest.mark.parametrize(
     ("name", "engine", "on", "off", "bound"),
     [
-        # Float32 rounds e of a hit a few times; at 1 m/s the threshold of Box2D.
+        # Float32 rounds e of a collision a few times; at 1 m/s the threshold of Box2D.
         ("threshold", "box2d:shipped", (3, 1), (2, 1), 8 * FLOAT32),
         ("mixing", "pymunk:shipped", (4,), (3,), 8 * 2.0**-53),
         ("order", "pymunk:matched", (1, 0), (0, 0), 1e-12),
         # 600 steps that each round a height of up to 2 m, and bounces that hand the error on.
         ("gravity", "box2d:matched", (2, 1), (0, 1), 2400 * FLOAT32),
         ("gravity", "pymunk:matched", (1, 1), (2, 1), 1e-12),
-        # mm: 24 steps with three push-outs each, of coordinates up to 1 m.
-        ("push-out", "box2d:matched+no_ccd", (2, 2), (2, 1), 1e3 * 72 * FLOAT32),
+        # mm: 24 steps with three position corrections each, of coordinates up to 1 m.
+        ("correction", "box2d:matched+no_ccd", (2, 2), (2, 1), 1e3 * 72 * FLOAT32),
         # mm: 360 substeps, of heights up to 4 m.
         ("substeps", "box2d_v3:matched", (2, 0), (1, 0), 1e3 * 360 * 4 * FLOAT32),
         ("digits", "box2d:shipped", (1, 2), (0, 2), 0.0),
@@ -65,14 +65,14 @@ def test_with_nothing_switched_on_the_switches_give_the_reference(name: str):
         ("row", "pymunk:matched", (0, 3, 1), (1, 3, 1), 1e-12),
     ],
 )  # fmt: skip
-def test_the_switched_reference_lies_on_the_engine(
+def test_the_ablated_reference_lies_on_the_engine(
     name: str, engine: str, on: tuple[int, ...], off: tuple[int, ...], bound: float
 ):
     """Within the rounding of the engine where the right mechanism is on; far off with another setting."""
 
     def apart(places: tuple[int, ...]) -> float:
         curves = {curve.name: np.asarray(curve.y, float) for curve in LESSONS[name].at(places).charts[0].curves}
-        return float(np.nanmax(np.abs(curves[SWITCHED] - curves[engine])))
+        return float(np.nanmax(np.abs(curves[ABLATED] - curves[engine])))
 
     assert apart(on) <= bound
     assert apart(off) > 300 * bound
@@ -87,13 +87,13 @@ def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name:
 
     assert shown.film is not None
     assert any(run.trajectory is not None for run in shown.film.runs)
-    assert (shown.film.truth is None) == (name == "push-out")  # its disks overlap from the start
-    assert (TRUTH in drawn) == (name not in ("push-out", "crowd"))  # nor has a cost in time
+    assert (shown.film.truth is None) == (name == "correction")  # its disks overlap from the start
+    assert (TRUTH in drawn) == (name not in ("correction", "crowd"))  # nor has a cost in time
     assert drawn | {run.name for run in shown.film.runs} <= set(lesson.names)
 
 
 def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
-    """Equal disks, e = 1, hit at one end: all orders of the hits give everything to the last disk."""
+    """Equal disks, e = 1, collision at one end: all orders of the collisions give everything to the last disk."""
     curves = {curve.name: np.asarray(curve.y) for curve in LESSONS["row"].at((0, 3, 2)).charts[0].curves}
 
     assert curves[TRUTH].tolist() == [0, 0, 0, 0, 0, 5]
@@ -101,17 +101,17 @@ def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
     assert np.abs(curves["box2d:matched"] - curves[TRUTH]).max() > 1.0
 
 
-def test_the_numbers_of_a_hit_are_those_of_the_solver():
-    """The impulse that lesson 4 writes out is the one the solver tells, and momentum is kept."""
+def test_the_numbers_of_a_collision_are_those_of_the_solver():
+    """The impulse that lesson 4 writes out is the one the solver reports, and momentum is kept."""
     scene = two(0.9, 10.0, 1.0).scene
-    before, after, told = hit_of_the_reference(scene, 1 / 64)
+    before, after, reported = collision_of_the_reference(scene, 1 / 64)
     steps = dict(LESSONS["meeting"].at((2, 2, 2, 0)).steps)
     kick = scene.mass[0] * np.hypot(*(after.velocity[0] - before.velocity[0]))
 
-    assert told == pytest.approx(kick, rel=1e-14)
-    assert f"the solver tells {told:.3g} N s" in steps["Impulse"]
-    assert f"= {told:.3g} N s; the solver" in steps["Impulse"]
-    assert "parting over closing speed: 0.9" in steps["Update"]
+    assert reported == pytest.approx(kick, rel=1e-14)
+    assert f"the solver reports {reported:.3g} N s" in steps["Impulse"]
+    assert f"= {reported:.3g} N s; the solver" in steps["Impulse"]
+    assert "separation over approach speed: 0.9" in steps["Update"]
 
 
 def test_conventions_are_measured():
@@ -187,7 +187,7 @@ def test_the_list_of_lessons_fits_and_leads_to_each(browser: Browser, url: str, 
         ("/nothing/shown?at=0", 400, "no such lesson"),
     ],
 )
-def test_what_cannot_be_shown_is_told(url: str, path: str, status: int, said: str):
+def test_what_cannot_be_shown_is_reported(url: str, path: str, status: int, said: str):
     """A status and a sentence, no traceback."""
     with pytest.raises(HTTPError) as refusal:
         urlopen(url + path, timeout=10)

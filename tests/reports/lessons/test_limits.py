@@ -1,4 +1,5 @@
-"""Lesson 8: its brackets are those of the atlas, measured when asked for, and its run is the one that fails."""
+"""Lesson 8: its brackets are those of the stability report, measured when asked for, and its run is the one that
+fails."""
 
 from __future__ import annotations
 
@@ -11,39 +12,39 @@ from adapters.engines import ENGINES
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.limits import HARSHNESS, SEEN, limits_of
 from reports.page.style import TRUTH
-from reports.stability import players
+from reports.stability import variants
 from reports.stability.cases import CASES
-from reports.stability.players import Player
+from reports.stability.variants import Variant
 from tests.reports.stability.kept_limits import agrees, kept
 
 LESSON = LESSONS["limits"]
-PLAYERS = list(ENGINES)
+PLAYED = list(ENGINES)
 NAMES = [seen.case for seen in SEEN.values()]
 
 
-def at(case: str, player: str, place: int) -> tuple[int, int, int]:
+def at(case: str, engine: str, place: int) -> tuple[int, int, int]:
     """Where the sliders are for this."""
-    return NAMES.index(case), PLAYERS.index(player), place
+    return NAMES.index(case), PLAYED.index(engine), place
 
 
-@pytest.mark.parametrize("name", ["slow_hit", "spin", "far_from_origin"])
-def test_the_brackets_are_those_of_the_atlas(name: str):
+@pytest.mark.parametrize("name", ["slow_collision", "spin", "far_from_origin"])
+def test_the_brackets_are_those_of_the_stability_report(name: str):
     """Searched here and now they hold the limits of the full form."""
-    rows = {row.player: row for row in kept() if row.case == name}
-    found = {limit.player: limit for limit in limits_of(name)}
+    rows = {row.engine: row for row in kept() if row.case == name}
+    found = {limit.engine: limit for limit in limits_of(name)}
 
     assert set(found) == set(rows)
-    for player, row in rows.items():
-        assert found[player].verdict == row.verdict
-        assert agrees(found[player], row)
+    for engine, row in rows.items():
+        assert found[engine].verdict == row.verdict
+        assert agrees(found[engine], row)
 
 
 def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
     """The limit of Box2D is not typed in: what is given its name without the threshold does not fail."""
-    place = at("slow_hit", "box2d:shipped", 5)
+    place = at("slow_collision", "box2d:shipped", 5)
     limits_of.cache_clear()
     with monkeypatch.context() as patch:
-        patch.setitem(players.PLAYERS, "box2d:shipped", Player("box2d:shipped", ENGINES["box2d:matched"].make))
+        patch.setitem(variants.VARIANTS, "box2d:shipped", Variant("box2d:shipped", ENGINES["box2d:matched"].make))
         without = dict(LESSON.at(place).facts)["box2d:shipped"]
     limits_of.cache_clear()
 
@@ -54,31 +55,31 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
 
 
 @pytest.mark.parametrize(
-    ("case", "player", "place", "fails"),
+    ("case", "engine", "place", "fails"),
     [
-        ("slow_hit", "box2d:shipped", 1, False), ("slow_hit", "box2d:shipped", 3, True),
-        ("slow_hit", "box2d:matched", 3, False), ("tunnelling_thin_wall", "pymunk:matched", 3, False),
+        ("slow_collision", "box2d:shipped", 1, False), ("slow_collision", "box2d:shipped", 3, True),
+        ("slow_collision", "box2d:matched", 3, False), ("tunnelling_thin_wall", "pymunk:matched", 3, False),
         ("tunnelling_thin_wall", "pymunk:matched", 5, True), ("tunnelling_thin_wall", "event_driven:float64", 8, False),
         ("spin", "box2d:matched", 8, True), ("near_miss", "box2d_v3:shipped", 7, True),
     ],
 )  # fmt: skip
-def test_the_run_fails_beyond_the_limit_and_only_there(case: str, player: str, place: int, fails: bool):
+def test_the_run_fails_beyond_the_limit_and_only_there(case: str, engine: str, place: int, fails: bool):
     """What is drawn leaves the exact answer, and the replay marks where; else it stays, and marks nothing."""
-    shown = LESSON.at(at(case, player, place))
+    shown = LESSON.at(at(case, engine, place))
     curves = {curve.name: np.asarray(curve.y) for curve in shown.charts[0].curves}
     here = dict(shown.steps)["Here"]
 
     assert ("event" in shown.opening) == fails
     assert ("0 of" in here or "none of" in here or "it works" in here) != fails
-    if fails and player in curves:
-        k = len(curves[player])
+    if fails and engine in curves:
+        k = len(curves[engine])
         way = np.ptp(curves[TRUTH])
         # A near miss leaves it by the thousandth part of a way that is none at all.
-        assert np.abs(curves[player] - curves[TRUTH][:k]).max() > (0.2 * way if case != "near_miss" else 1e-4)
+        assert np.abs(curves[engine] - curves[TRUTH][:k]).max() > (0.2 * way if case != "near_miss" else 1e-4)
 
 
 def test_refusals_are_shown_beside_the_exact_answer():
-    """Box2D refuses a spin it would cut: there is nothing of it to draw, the reason is told."""
+    """Box2D refuses a spin it would cut: there is nothing of it to draw, the reason is reported."""
     shown = LESSON.at(at("spin", "box2d:matched", 8))
 
     assert [curve.name for curve in shown.charts[0].curves] == [TRUTH]
@@ -86,7 +87,7 @@ def test_refusals_are_shown_beside_the_exact_answer():
     assert "b2_maxRotation" in dict(shown.steps)["Why"]
 
 
-def test_every_case_has_its_values_within_the_atlas():
+def test_every_case_has_its_values_within_the_report():
     """From the case's gentlest to its harshest, or to where a replay can still show it."""
     for seen in SEEN.values():
         values, ladder = CASES[seen.case].values, [seen.value(place) for place in HARSHNESS]
@@ -98,6 +99,6 @@ def test_every_case_has_its_values_within_the_atlas():
 
 def test_the_slider_says_the_parameter_of_its_case():
     """With its unit: what the same place means depends on the case."""
-    said = [LESSON.at(at(name, "pymunk:matched", 3)).said["place"] for name in ("slow_hit", "tunnelling_head_on")]
+    said = [LESSON.at(at(name, "pymunk:matched", 3)).said["place"] for name in ("slow_collision", "tunnelling_head_on")]
 
     assert said == ["closing speed = 0.275 m/s", "v dt / R = 1"]

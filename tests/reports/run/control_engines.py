@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from scenarios.model import State
 
 FATAL = 100  # the step
@@ -28,7 +28,7 @@ class Controlled:
         self.dt, self.steps, self.start = dt, 0, scene
         self.position, self.velocity = np.array(scene.position), np.array(scene.velocity)
 
-    def push(self, disk, force, torque):
+    def apply_force(self, disk, force, torque):
         pass
 
     def step(self, count=1):
@@ -44,7 +44,7 @@ class Controlled:
     def read(self):
         return State(self.position.copy(), self.velocity.copy(), self.start.angle, self.start.angular_velocity)
 
-    def hits(self):
+    def collisions(self):
         return []
 
     def settings(self):
@@ -160,7 +160,7 @@ class Remembers(Controlled):
 
 
 class Once(Controlled):
-    """Killed by `kill -9` the first time only: where it is told to, it leaves a mark that it has been here."""
+    """Killed by `kill -9` the first time only: where it is asked to, it leaves a mark that it has been here."""
 
     def misbehave(self):
         mark = Path(os.environ["CONTROL_MARK"])
@@ -169,9 +169,9 @@ class Once(Controlled):
             os.kill(os.getpid(), signal.SIGKILL)
 
 
-def row(make: type[Controlled], leaves_state: bool = False) -> Row:
+def row(make: type[Controlled], leaves_state: bool = False) -> EngineRow:
     """As a row of `ENGINES`."""
-    return Row(make, "a control", alpha=0.5, rounding=2.0**-53, leaves_state=leaves_state)
+    return EngineRow(make, "a control", alpha=0.5, rounding=2.0**-53, leaves_state=leaves_state)
 
 
 CONTROLS = {

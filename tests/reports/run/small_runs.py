@@ -8,21 +8,27 @@ from reports.run.cells import Cell, scene_hash
 from reports.run.folders import RUN, open_new, part_of, replace_folder
 from reports.run.known_answers import KNOWN_ANSWERS
 from reports.run.playing import play_here
-from reports.run.suite import Means, Plan, begin, keep_answer, keep_cell, tasks_of
+from reports.run.suite import Means, RunPlan, begin, keep_answer, keep_cell, tasks_of
 
-PLAYERS = ("pymunk:shipped", "pymunk:matched")
+PLAYED = ("pymunk:shipped", "pymunk:matched")
 
 
 def make(folder: Path, scene_file: Path) -> Path:
     """Its folder, complete but for its tables: every kind of line is in its journal."""
-    plan = Plan(
-        ["slow_hit", str(scene_file)], {name: ENGINES[name] for name in PLAYERS}, 0, [], False, 0, "made by a test"
+    plan = RunPlan(
+        ["slow_collision", str(scene_file)],
+        {name: ENGINES[name] for name in PLAYED},
+        0,
+        [],
+        False,
+        0,
+        "made by a test",
     )
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
     cells = [task for task in tasks_of(plan, scenarios) if isinstance(task, Cell)]
     with open_new(folder) as journal:
         begin(plan, journal, scenarios, len(cells))
-        for name in PLAYERS:
+        for name in PLAYED:
             finding = Finding(
                 *name.split(":"), "read_copies", "Does read give copies?", "copies", "copies", 0.0, "keeps"
             )

@@ -75,7 +75,7 @@ def endless(path: Path) -> None:
 
 EDITS: dict[str, Callable[[Path], None]] = {
     "half as far": lambda path: with_arrays(path, halved),
-    "valid until soon": lambda path: with_arrays(path, numbers(valid_until="soon")),
+    "valid until soon": lambda path: with_arrays(path, numbers(horizon="soon")),
     "nothing remains": lambda path: with_arrays(path, numbers(remains=5)),
     "said otherwise": saying("timeout", "x", "soon"),
     "said in a list": saying("timeout", "x", 5.0),
@@ -98,7 +98,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("edit", EDITS)
 def test_an_edited_answer_is_as_good_as_none(tmp_path: Path, edit: str):
     """Whatever was done to its file: nothing of it is read, and nothing is waited for."""
-    put_answer(tmp_path / "one.npz", Answer(record_of(scenario("slow_hit")), "ok", "", 60.0))
+    put_answer(tmp_path / "one.npz", Answer(record_of(scenario("slow_collision")), "ok", "", 60.0))
     EDITS[edit](tmp_path / "one.npz")
 
     assert read_answer(tmp_path / "one.npz") is None
@@ -135,7 +135,7 @@ def test_an_answer_that_nobody_edited_is_believed_without_a_word(whole: Path, tm
 
 def test_the_answer_to_another_scene_is_not_the_answer_to_this_one(tmp_path: Path):
     """A file that is whole, under another name."""
-    put_answer(tmp_path / "one.npz", Answer(record_of(scenario("slow_hit")), "ok", "", 60.0))
+    put_answer(tmp_path / "one.npz", Answer(record_of(scenario("slow_collision")), "ok", "", 60.0))
     shutil.copy(tmp_path / "one.npz", tmp_path / "other.npz")
 
     assert read_answer(tmp_path / "one.npz") is not None
@@ -144,9 +144,9 @@ def test_the_answer_to_another_scene_is_not_the_answer_to_this_one(tmp_path: Pat
 
 def test_numbers_of_a_record_are_numbers_and_its_texts_texts():
     """What is read from the user's own cache is asked the same."""
-    good = {"valid_until": 1.0, "error_bound": 1e-9, "followed_until": 2, "bits": 53, "method": "", "reason": "",
+    good = {"horizon": 1.0, "error_bound": 1e-9, "float64_horizon": 2, "bits": 53, "method": "", "reason": "",
             "remains": ["a"]}  # fmt: skip
-    bad = [{"valid_until": "soon"}, {"remains": 5}, {"remains": [5]}, {"bits": 1.5}, {"bits": True}, {"reason": None}]
+    bad = [{"horizon": "soon"}, {"remains": 5}, {"remains": [5]}, {"bits": 1.5}, {"bits": True}, {"reason": None}]
 
     assert is_said(good)
     assert not any(is_said(good | one) for one in bad)

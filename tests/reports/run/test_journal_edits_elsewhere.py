@@ -19,19 +19,19 @@ from reports.run.made import digest_of, read_made
 from reports.speed import budget, ladder, lines, models
 from reports.speed.kept import Kept
 from reports.speed.measure import in_turns, scene_rows
-from reports.speed.plan import PLAIN, SCENE, Player
-from reports.stability import lines as atlas_lines
-from reports.stability.atlas import Task, found_limit, journalled
+from reports.speed.plan import PLAIN, SCENE, Measurement
+from reports.stability import lines as stability_lines
 from reports.stability.command import write_files
 from reports.stability.limits import Limit
 from reports.stability.maps import MAPS, MapOf
+from reports.stability.results import Task, found_limit, journalled
 from reports.stability.touching import law_of
 from reports.terminal.exits import FolderTaken
 from scenarios.catalogue import scenario
 from tests.reports.run.test_journal_edits import WRONG, edited, places
 
-SCENES, NAME = {"slow_hit": scenario("slow_hit")}, "reference:exercise"
-HEADER = {"scenes": ["slow_hit"], "files": {}, "engines": [NAME], "effort": {"rounds": 1}, "whole": False} | {
+SCENES, NAME = {"slow_collision": scenario("slow_collision")}, "reference:exercise"
+HEADER = {"scenes": ["slow_collision"], "files": {}, "engines": [NAME], "effort": {"rounds": 1}, "whole": False} | {
     key: value for key, value in about("", 0).items() if key in ("seed", "versions", "machine")
 }
 SAMPLE = 60  # edits whose pages are made in the long test
@@ -41,29 +41,29 @@ SAMPLE = 60  # edits whose pages are made in the long test
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The journal of a measurement: a ladder, what its error is made of, times and a closed form."""
     place = tmp_path_factory.mktemp("measured")
-    player = Player(SCENE, "slow_hit", 0, NAME, PLAIN, row_of(NAME).make, (1, 2, 4))
+    engine = Measurement(SCENE, "slow_collision", 0, NAME, PLAIN, row_of(NAME).make, (1, 2, 4))
     with Journal(place) as journal:
         kept = Kept(journal, HEADER, False, SCENES)
-        kept.add(player.task, player.errors())
-        kept.add(("budget", "slow_hit", NAME), budget.budget_of("slow_hit", 0, NAME, 2))
+        kept.add(engine.task, engine.errors())
+        kept.add(("budget", "slow_collision", NAME), budget.budget_of("slow_collision", 0, NAME, 2))
         often = {"rounds": 1, "budget": 0.0}
-        kept.add(("time", SCENE, "slow_hit"), scene_rows(SCENE, "slow_hit", 0, in_turns([player]), often))
-        kept.add(("time", "truth", "slow_hit"), models.closed_form("slow_hit", 0))
-    assert ladder.held("slow_hit", 0).scenario.name == "slow_hit"
+        kept.add(("time", SCENE, "slow_collision"), scene_rows(SCENE, "slow_collision", 0, in_turns([engine]), often))
+        kept.add(("time", "truth", "slow_collision"), models.closed_form("slow_collision", 0))
+    assert ladder.held("slow_collision", 0).scenario.name == "slow_collision"
     return place
 
 
 @pytest.fixture(scope="module")
-def atlas(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The journal of an atlas: a limit, a law, and a map whose readings are all alike."""
-    place = tmp_path_factory.mktemp("atlas")
+def stability(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The journal of an stability: a limit, a law, and a map whose readings are all alike."""
+    place = tmp_path_factory.mktemp("stability")
     (place / "trajectories").mkdir()
     one = MAPS["dt_and_speed"]
     tasks = [Task(kind, name, "pymunk:matched", "quick") for kind, name in
              (("limit", "spin"), ("law", "touching_break"), ("map", one.name))]  # fmt: skip
     cells = tuple((x, y, 0.1, False, "") for x, y in product(one.x, one.y))
-    found = [found_limit(tasks[0], place), law_of(tasks[1].name, tasks[1].player),
-             MapOf(one.name, tasks[2].player, cells)]  # fmt: skip
+    found = [found_limit(tasks[0], place), law_of(tasks[1].name, tasks[1].engine),
+             MapOf(one.name, tasks[2].engine, cells)]  # fmt: skip
     with Journal(place) as journal:
         journal.append({"header": about("", 0) | {"form": "quick", "files": {}}})
         for task, result in zip(tasks, found):
@@ -79,7 +79,7 @@ def resumed(folder: Path) -> None:
 
 
 READ: dict[str, tuple[dict, Callable[[Path], Any]]] = {
-    "measured": (lines.KINDS.models, resumed), "atlas": (atlas_lines.KINDS.models, journalled),
+    "measured": (lines.KINDS.models, resumed), "stability": (stability_lines.KINDS.models, journalled),
 }  # fmt: skip
 
 
@@ -171,7 +171,7 @@ def test_a_line_that_is_there_twice_counts_once(journal: tuple, tmp_path: Path):
 @pytest.mark.parametrize(
     ("fixture", "number", "at", "value", "said"),
     [
-        ("measured", 1, ("result", 0, "scenario"), "other", "result[0].scenario = 'other': must be 'slow_hit'"),
+        ("measured", 1, ("result", 0, "scenario"), "other", "result[0].scenario = 'other': must be 'slow_collision'"),
         ("measured", 1, ("result", 0, "error_radii"), -1.0, "result[0].error_radii = -1.0: must be a number that is"),
         ("measured", 1, ("result", 0, "dt_s"), 0.5, "result[0].dt_s = 0.5: must divide"),
         ("measured", 1, ("result", 0, "substeps"), 3, "must have a row for each step that the task names"),
@@ -180,14 +180,14 @@ def test_a_line_that_is_there_twice_counts_once(journal: tuple, tmp_path: Path):
         ("measured", 3, ("result", 0, "round"), 7, "must have each round"),
         ("measured", 3, ("result", 0, "engine"), "other", "must have each round"),
         ("measured", 3, ("result", 0, "cost"), 1e300, "result[0].cost = 1e+300: must be less than"),
-        ("atlas", 0, ("header", "form"), "x", "header.form = 'x': must be 'quick' or 'full'"),
-        ("atlas", 0, ("header", "files"), {"../x": "y"}, "header.files.../x = 'y': must match pattern"),
-        ("atlas", 1, ("limit", "trials", 0, "value"), 1e9, "limit.trials[0].value = 1000000000.0: must be from"),
-        ("atlas", 1, ("limit", "cured"), "x", "limit.cured = 'x': must be"),
-        ("atlas", 1, ("limit", "case"), "../x.toml:dt", "limit: must be of the task's name and player"),
-        ("atlas", 2, ("law", "gaps", 0, 5), [[1]], "gaps[0][5]: must hold numbers"),
-        ("atlas", 3, ("map", "cells", 0, 0), 17, "cells: must be those of the map's grid"),
-        ("atlas", 3, ("task", "player"), "pymunk:x", "map: must be of the task's name and player"),
+        ("stability", 0, ("header", "form"), "x", "header.form = 'x': must be 'quick' or 'full'"),
+        ("stability", 0, ("header", "files"), {"../x": "y"}, "header.files.../x = 'y': must match pattern"),
+        ("stability", 1, ("limit", "trials", 0, "value"), 1e9, "limit.trials[0].value = 1000000000.0: must be from"),
+        ("stability", 1, ("limit", "intervention"), "x", "limit.intervention = 'x': must be"),
+        ("stability", 1, ("limit", "case"), "../x.toml:dt", "limit: must be of the task's name and engine"),
+        ("stability", 2, ("law", "gaps", 0, 5), [[1]], "gaps[0][5]: must hold numbers"),
+        ("stability", 3, ("map", "cells", 0, 0), 17, "cells: must be those of the map's grid"),
+        ("stability", 3, ("task", "engine"), "pymunk:x", "map: must be of the task's name and engine"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_named(
@@ -217,9 +217,9 @@ def test_a_file_that_never_ends_has_no_digest(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_pages_are_made_of_what_is_taken(atlas: Path, tmp_path: Path):
+def test_pages_are_made_of_what_is_taken(stability: Path, tmp_path: Path):
     """Of the edits that are let pass, a sample is written: an exception would fail this test."""
-    whole = [json.loads(line) for line in (atlas / JOURNAL).read_text().splitlines()]
+    whole = [json.loads(line) for line in (stability / JOURNAL).read_text().splitlines()]
     taken = [
         (number, line, what) for number, line, what in edits(whole)
         if not fault_of(journalled, put(tmp_path, whole, number, line))
@@ -230,13 +230,13 @@ def test_pages_are_made_of_what_is_taken(atlas: Path, tmp_path: Path):
         assert (tmp_path / "stability.html").exists(), what
 
 
-def test_a_text_that_reads_nan_stays_a_text(measured: Path, atlas: Path, tmp_path: Path):
+def test_a_text_that_reads_nan_stays_a_text(measured: Path, stability: Path, tmp_path: Path):
     """It became a number when it was read back, and a traceback where it was taken for text."""
     whole = [json.loads(line) for line in (measured / JOURNAL).read_text().splitlines()]
     whole[1]["result"][0]["reason"] = "nan"
     with Journal(put(tmp_path, whole)) as journal:
         assert Kept(journal, HEADER, True, SCENES)[tuple(whole[1]["task"])][0]["reason"] == "nan"
-    whole = [json.loads(line) for line in (atlas / JOURNAL).read_text().splitlines()]
+    whole = [json.loads(line) for line in (stability / JOURNAL).read_text().splitlines()]
     whole[1]["limit"]["source"] = "nan"
     _, results = journalled(put(tmp_path, whole))
     assert [one.source for one in results.values() if isinstance(one, Limit)] == ["nan"]

@@ -41,7 +41,7 @@ def test_an_interrupted_run_can_be_reported_and_says_it_is_not_finished(small: P
 
 
 def test_an_engine_that_was_asked_but_has_not_played_yet_does_not_spoil_the_page(small: Path, tmp_path: Path):
-    """Broken off after the first cell: the probes of all have ended, one player has a row."""
+    """Broken off after the first cell: the probes of all have ended, one engine has a row."""
     broken_off(small, tmp_path / "out", after=5)
     done = crosscheck("report", "out", cwd=tmp_path)
 
@@ -103,10 +103,10 @@ def test_a_second_writer_is_refused_and_a_dead_one_is_no_hindrance(small: Path, 
     ("words", "said"),
     [
         (["run", "--resume", "nowhere"], "no run is there"),
-        (["run", "slow_hit", "--resume", "out"], "it takes no scenarios"),
-        (["run", "slow_hit", "--timeout", "inf"], "less than or equal to 1000000"),
-        (["run", "slow_hit", "--memory", "10000000000000"], "less than or equal to 1000000000"),
-        (["run", "slow_hit", "--memory", "10"], "--memory 10: a worker takes 400 MB"),
+        (["run", "slow_collision", "--resume", "out"], "it takes no scenarios"),
+        (["run", "slow_collision", "--timeout", "inf"], "less than or equal to 1000000"),
+        (["run", "slow_collision", "--memory", "10000000000000"], "less than or equal to 1000000000"),
+        (["run", "slow_collision", "--memory", "10"], "--memory 10: a worker takes 400 MB"),
         (["replay", "zzz", "--out", "whole"], "'zzz' is no cell of"),
         (["diff", "whole", "nowhere"], "nowhere: has no journal.jsonl"),
     ],

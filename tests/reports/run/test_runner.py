@@ -9,12 +9,12 @@ from unittest import mock
 
 import pytest
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES
 from reports.run import playing, worker
 from reports.run.archive import from_trail, load_trajectory, packed
 from reports.run.cells import Cell
-from reports.run.playing import Played, play_cell, play_here
+from reports.run.playing import CellResult, play_cell, play_here
 from reports.run.runner import NoScheduler, cluster, run_all
 from reports.run.worker_process import Failure
 from scenarios.catalogue import scenario
@@ -32,18 +32,18 @@ from tests.reports.run.control_engines import (
     row,
 )  # fmt: skip
 
-SCENE = "slow_hit"  # 240 samples of 1/60 s; at one step a sample the 100th step is due after 99 of them
+SCENE = "slow_collision"  # 240 samples of 1/60 s; at one step a sample the 100th step is due after 99 of them
 GOOD = {f"good{i}:control": row(Controlled) for i in range(24)}
 
 
-def cells(rows: dict[str, Row]) -> dict[str, partial]:
+def cells(rows: dict[str, EngineRow]) -> dict[str, partial]:
     """A task a row: `SCENE` at its coarsest step."""
     question = replace(scenario(SCENE), truth=None)
     return {name: partial(play_here, Cell(SCENE, 0, name, 1), row, question) for name, row in rows.items()}
 
 
 @pytest.fixture(scope="module")
-def ended() -> dict[str, Played | Failure]:
+def ended() -> dict[str, CellResult | Failure]:
     """How 24 good cells ended and nine bad ones among them, on two workers."""
     mixed = {**dict(list(GOOD.items())[:12]), **CONTROLS, **dict(list(GOOD.items())[12:])}
     tasks = cells(mixed)
@@ -114,7 +114,7 @@ def test_the_clock_of_a_cell_starts_when_its_engine_is_loaded():
     assert "stopped after 3 s in load" in never.reason
 
 
-def impatient(*words: Any) -> Played:
+def impatient(*words: Any) -> CellResult:
     """In the worker: play, with little time to load."""
     playing.LOADING = 3.0
     return play_here(*words)
@@ -142,7 +142,7 @@ def test_an_engine_that_leaves_state_gets_a_process_a_cell():
 @pytest.mark.parametrize("name", ENGINES)
 def test_no_engine_remembers_what_it_played(name: str):
     """After other scenes in the same process a cell has the bits it has as the first, so no row has `leaves_state`."""
-    first, *others = ("slow_hit", "line_gas", "falling_box")
+    first, *others = ("slow_collision", "line_gas", "falling_box")
     tasks = {
         key: partial(play_here, Cell(scene, 0, name, 1), ENGINES[name], replace(scenario(scene), truth=None))
         for key, scene in (("before", first), *((other, other) for other in others), ("after", first))
@@ -170,7 +170,7 @@ def test_a_cluster_without_its_extra_is_one_clear_sentence(monkeypatch: pytest.M
 
 
 def test_a_trajectory_comes_back_from_its_file_bit_for_bit(tmp_path: Path):
-    """The .npz holds every array of the trajectory and its hits."""
+    """The .npz holds every array of the trajectory and its collisions."""
     here = play_cell(
         Cell("line_gas", 0, "pymunk:matched", 1), ENGINES["pymunk:matched"], scenario("line_gas")
     ).trajectory

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Hit
+from adapters.engine import ContactImpulse
 from scenarios.model import Array, Scene, State
 
 
 class Sleeper:
-    """Takes a fixed time a step, and much longer to build, to read, and to hear of hits; it moves nothing."""
+    """Takes a fixed time a step, and much longer to build, to read, and to hear of collisions; it moves nothing."""
 
     listening, wrapping = True, 0.0
 
@@ -24,7 +24,7 @@ class Sleeper:
         self.scene, self.dt = scene, dt
         sleep(0.005)
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Nothing moves."""
 
     def step(self, count: int = 1) -> None:
@@ -38,7 +38,7 @@ class Sleeper:
         """Must not be called while time is taken."""
         raise AssertionError("read while timed")
 
-    def hits(self) -> list[Hit]:
+    def collisions(self) -> list[ContactImpulse]:
         """None."""
         return []
 

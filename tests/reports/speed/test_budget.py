@@ -10,25 +10,33 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES
-from adapters.mechanisms.habits import DIGITS, FLIGHT, HABITS, LATE, PUSH_OUT, RESTITUTION, Habit
-from adapters.mechanisms.switched import Switched
+from adapters.mechanisms.ablated import AblatedReference
+from adapters.mechanisms.table import (
+    DIGITS,
+    END_OF_STEP,
+    FLIGHT,
+    MECHANISMS,
+    POSITION_CORRECTION,
+    RESTITUTION,
+    Mechanism,
+)
 from reports.compare import scales
 from reports.speed import budget, budget_tables
-from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED, Budget, Offset, budget_of, followed
+from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL, Budget, Offset, budget_of, window_of
 from scenarios.model import Array, State
 
 FLOAT64 = 2.0**-53
 KNOWN = [
-    Habit(FLIGHT, {"alpha": 1.0}),
-    Habit(RESTITUTION, {"mixing": "the product"}),
-    Habit(PUSH_OUT, {"project": True}),
+    Mechanism(FLIGHT, {"alpha": 1.0}),
+    Mechanism(RESTITUTION, {"mixing": "the product"}),
+    Mechanism(POSITION_CORRECTION, {"project": True}),
 ]
 
 
-class Drifting(Switched):
-    """An engine with the habits of `KNOWN` and a bug nobody knows of: what is read lies `bug` m too far up."""
+class Drifting(AblatedReference):
+    """An engine with the mechanisms of `KNOWN` and a bug nobody knows of: what is read lies `bug` m too far up."""
 
     bug = 0.003
 
@@ -38,85 +46,85 @@ class Drifting(Switched):
         return replace(state, position=state.position + np.array([0.0, self.bug]))
 
 
-def planted(habits: list[Habit]) -> Drifting:
+def planted(mechanisms: list[Mechanism]) -> Drifting:
     """An engine with just these."""
-    switches: dict[str, Any] = dict(LATE)
-    for habit in habits:
-        switches |= habit.switches
-    return Drifting(**switches)
+    parameters: dict[str, Any] = dict(END_OF_STEP)
+    for mechanism in mechanisms:
+        parameters |= mechanism.parameters
+    return Drifting(**parameters)
 
 
-def taken_apart(scene: str, known: list[Habit], substeps: int = 4) -> tuple[dict[str, Offset], Budget]:
+def budgeted(scene: str, known: list[Mechanism], substeps: int = 4) -> tuple[dict[str, Offset], Budget]:
     """The budget of the planted engine for somebody who knows only of `known`."""
-    at = followed(scene, 0, substeps)
+    at = window_of(scene, 0, substeps)
     made = Budget(at, known, at.offset(at.played(partial(planted, KNOWN))))
-    return made.parts(), made
+    return made.contributions(), made
 
 
-def test_a_planted_engine_gets_its_parts_and_its_bug_is_unexplained():
+def test_a_planted_engine_gets_its_contributions_and_its_bug_is_the_residual():
     """What is left over is the bug to rounding, of every disk in every sample."""
-    parts, made = taken_apart("oblique_e09", KNOWN)
+    contributions, made = budgeted("oblique_e09", KNOWN)
     moving = made.at.scenario.scene.radius
 
-    left = parts[UNEXPLAINED].position
+    left = contributions[RESIDUAL].position
     assert left[..., 1] == pytest.approx(np.broadcast_to(Drifting.bug / moving, left.shape[:2]), abs=1e-12)
     assert np.abs(left[..., 0]).max() <= 1e-12
-    for habit in (RESTITUTION, PUSH_OUT):
-        assert parts[habit].radii > 100 * FLOAT64
-    assert parts[FLIGHT].radii == 0.0  # nothing pulls here
+    for mechanism in (RESTITUTION, POSITION_CORRECTION):
+        assert contributions[mechanism].radii > 100 * FLOAT64
+    assert contributions[FLIGHT].radii == 0.0  # nothing accelerates here
 
 
-def test_a_habit_that_nobody_names_is_unexplained_to_its_size():
+def test_a_mechanism_that_nobody_names_is_the_residual_to_its_size():
     """Negative control: without the restitution rule in the list, what is left over is as large as it and the bug."""
-    known, _ = taken_apart("oblique_e09", KNOWN)
-    missed, _ = taken_apart("oblique_e09", [each for each in KNOWN if each.name != RESTITUTION])
+    known, _ = budgeted("oblique_e09", KNOWN)
+    missed, _ = budgeted("oblique_e09", [each for each in KNOWN if each.name != RESTITUTION])
 
-    assert missed[UNEXPLAINED].radii > 0.9 * known[RESTITUTION].radii > 10 * known[UNEXPLAINED].radii
+    assert missed[RESIDUAL].radii > 0.9 * known[RESTITUTION].radii > 10 * known[RESIDUAL].radii
 
 
 def test_the_parts_close_as_vectors_and_agree_with_the_whole():
-    """engine - truth = parts + interplay + unexplained, sample by sample; the shares add up to 1."""
-    parts, _ = taken_apart("bouncing_ball_e09", KNOWN)
-    causes = [each for part, each in parts.items() if part not in budget.TOTALS]
-    total = parts[TOTAL]
+    """engine - truth = contributions + interplay + residual, sample by sample; the shares add up to 1."""
+    contributions, _ = budgeted("bouncing_ball_e09", KNOWN)
+    causes = [each for part, each in contributions.items() if part not in budget.TOTALS]
+    total = contributions[TOTAL]
 
     assert np.abs(budget.added(causes).position - total.position).max() <= 1e-12
     assert np.abs(budget.added(causes).energy - total.energy).max() <= 1e-12
     assert sum(each.share_of(total) for each in causes) == pytest.approx(1.0, abs=1e-12)
-    assert np.abs((parts[ALL] - parts[SUM] - parts[INTERPLAY]).position).max() <= 1e-12
-    assert parts[INTERPLAY].radii > 0  # in a row of bounces each changes what the next can do
+    assert np.abs((contributions[ALL] - contributions[SUM] - contributions[INTERPLAY]).position).max() <= 1e-12
+    assert contributions[INTERPLAY].radii > 0  # in a row of bounces each changes what the next can do
 
 
 def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
     """x by (alpha - 1/2) dt a t, so that energy is off by -(alpha - 1/2) dt m a2 t, of the energy at hand."""
-    rows = pd.DataFrame(budget_of("free_fall", 0, "pymunk:matched", 4)).set_index("part")
-    at = followed("free_fall", 0, 4)
+    rows = pd.DataFrame(budget_of("free_fall", 0, "pymunk:matched", 4)).set_index("contribution")
+    at = window_of("free_fall", 0, 4)
     g, t = float(np.linalg.norm(at.scenario.scene.gravity)), at.truth.t
     offset = 0.5 * at.dt * g * t / at.scenario.scene.radius[0]
     energy = 0.5 * at.dt * g**2 * t * at.scenario.scene.mass[0] / scales.energy(at.scenario)
 
     assert rows.loc[FLIGHT].position_radii == pytest.approx(np.sqrt(np.mean(offset**2)), rel=1e-9)
     assert rows.loc[FLIGHT].energy == pytest.approx(np.sqrt(np.mean(energy**2)), rel=1e-9)
-    assert rows.loc[FLIGHT].closed_apart_radii <= 1e-12
+    assert rows.loc[FLIGHT].closed_deviation_radii <= 1e-12
     assert rows.loc[TIME].position_radii <= 1e-12
-    assert rows.loc[UNEXPLAINED].position_radii <= 1e-12
+    assert rows.loc[RESIDUAL].position_radii <= 1e-12
 
 
-def test_every_engine_is_explained_to_a_thousandth_in_a_hit_and_a_bounce():
-    """All eight with known habits; float32 alone leaves less than a thousandth of an engine's error."""
+def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce():
+    """All eight with known mechanisms; float32 alone leaves less than a thousandth of an engine's error."""
     scenes = ("head_on_equal_e09", "wall_to_wall")
-    rows = pd.DataFrame([row for scene in scenes for name in HABITS for row in budget_of(scene, 0, name, 4)])
-    wide = rows.pivot(index=["scenario", "engine", "profile"], columns="part", values="position_radii")
+    rows = pd.DataFrame([row for scene in scenes for name in MECHANISMS for row in budget_of(scene, 0, name, 4)])
+    wide = rows.pivot(index=["scenario", "engine", "profile"], columns="contribution", values="position_radii")
 
-    assert len(wide) == 2 * len(HABITS)
-    assert (wide[UNEXPLAINED] <= 1e-3 * wide[TOTAL]).all()
+    assert len(wide) == 2 * len(MECHANISMS)
+    assert (wide[RESIDUAL] <= 1e-3 * wide[TOTAL]).all()
     assert (wide[TOTAL] > 1e-3).all()
     assert (wide[DIGITS].dropna() > 0).all()
 
 
-def test_a_scene_is_followed_while_late_hits_alone_are_near_the_truth():
-    """The asteroids are not played to the end of their truth; one hit head-on is."""
-    at, whole = followed("asteroids", 0, 20), followed("head_on_equal_e09", 0, 4)
+def test_a_scene_has_a_budget_while_late_collisions_alone_are_near_the_truth():
+    """The asteroids are not played to the end of their truth; one collision head-on is."""
+    at, whole = window_of("asteroids", 0, 20), window_of("head_on_equal_e09", 0, 4)
 
     assert 0 < at.truth.t[-1] < 9
     assert at.truth.t[-1] == pytest.approx(at.scenario.duration)
@@ -130,10 +138,10 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(monkeypatch
         def read(self) -> State:
             raise RuntimeError("no <b>such</b> thing")
 
-    monkeypatch.setitem(ENGINES, "reference:exercise", Row(Refusing, "", 1.0, FLOAT64))
+    monkeypatch.setitem(ENGINES, "reference:exercise", EngineRow(Refusing, "", 1.0, FLOAT64))
     (row,) = budget_of("free_fall", 0, "reference:exercise", 4)
 
-    assert (row["part"], row["note"]) == (TOTAL, "error: RuntimeError: no <b>such</b> thing")
+    assert (row["contribution"], row["note"]) == (TOTAL, "error: RuntimeError: no <b>such</b> thing")
     table = pd.DataFrame([row], columns=budget.COLUMNS)
     assert budget_tables.of_scene(table, "free_fall").notes == {"reference:exercise": row["note"]}
     assert [cell.value for cell in budget_tables.overview(table).rows["reference:exercise"]] == [0, 0, 0, 0]
@@ -142,14 +150,14 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(monkeypatch
 def test_tables_have_the_largest_part_and_bars_by_decades():
     """Bars: full at a radius, empty at a millionth; a part that is nothing for anybody has no column."""
     rows = pd.DataFrame(
-        [row for name in ("pymunk:shipped", "box2d:matched") for row in budget_of("slow_hit", 0, name, 4)]
+        [row for name in ("pymunk:shipped", "box2d:matched") for row in budget_of("slow_collision", 0, name, 4)]
     )
-    table, overview = budget_tables.of_scene(rows, "slow_hit"), budget_tables.overview(rows)
+    table, overview = budget_tables.of_scene(rows, "slow_collision"), budget_tables.overview(rows)
     bars: Array = np.array([budget_tables.cell(value).bar for value in (2.0, 1.0, 1e-3, 1e-6, 1e-9, 0.0, np.nan)])
 
     assert bars == pytest.approx([1, 1, 0.5, 0, 0, 0, 0])
     assert FLIGHT not in table.columns
-    assert table.columns[:2] == [TOTAL, UNEXPLAINED]
+    assert table.columns[:2] == [TOTAL, RESIDUAL]
     assert dict(zip(overview.columns, overview.rows["pymunk:shipped"]))[RESTITUTION].value == 1
     assert dict(zip(overview.columns, overview.rows["box2d:matched"]))[TIME].value == 1
     assert dict(zip(overview.columns, overview.rows["box2d:matched"]))["explained"].value == 1

@@ -11,17 +11,17 @@ from reports.speed.effort import QUICK
 from reports.speed.measure import SIZE, Measured
 from reports.speed.order import ORDER
 from reports.speed.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
-from reports.speed.plan import PLAIN, Plan
+from reports.speed.plan import PLAIN, SpeedPlan
 from reports.speed.results import Results
 
 DT = np.array([0.4, 0.2, 0.1])
 
 
-def point(scenario: str = "one", rung: int = 0, cost: float = 1.0, error: float = 0.1, **more: object) -> dict:
+def point(scenario: str = "one", step_size: int = 0, cost: float = 1.0, error: float = 0.1, **more: object) -> dict:
     """A row of `points` of `pymunk:matched`."""
     return {
-        "scenario": scenario, "engine": "pymunk", "profile": "matched", "change": PLAIN, "rung": rung,
-        "dt_s": 0.4 / 2**rung, "cost": cost, "low": cost, "high": cost, "best": cost, "error": error,
+        "scenario": scenario, "engine": "pymunk", "profile": "matched", "change": PLAIN, "step_size": step_size,
+        "dt_s": 0.4 / 2**step_size, "cost": cost, "low": cost, "high": cost, "best": cost, "error": error,
         "error_low": error, "error_high": error, "seeds": 1, "failed": int(np.isinf(error)),
         "status": "error" if np.isinf(error) else "ok", "reason": "no" if np.isinf(error) else "", "wrapping": 0.0,
         "idle": 0.5,
@@ -37,27 +37,30 @@ def test_an_accuracy_that_was_not_timed_is_not_called_unreached():
 
 
 def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
-    """Of five scenes one is reached, one never, one failed, one untimed, one not yet: infinite, and all are told."""
+    """Of five scenes one is reached, one never, one failed, one untimed, one not yet: infinite, and all are
+    reported."""
     why = ["", UNREACHABLE, FAILED, NOT_TIMED, "not down to dt 0.1 s"]
     reached = pd.DataFrame({
         "scenario": list("abcde"), "engine": "pymunk", "profile": "matched", "accuracy": "1 %",
         "cost": [5.0] + [np.nan] * 4, "dt_s": np.nan, "why": why, "lost": [w in (UNREACHABLE, FAILED) for w in why],
     })  # fmt: skip
-    results = Results(Plan((), (), QUICK, 0, 1), Measured())
+    results = Results(SpeedPlan((), (), QUICK, 0, 1), Measured())
     results.reached = reached
     row = results.pooled_reached.iloc[0]
 
     assert np.isnan(row.cost)
     assert row.why == "1 of 5, never in 1, failed in 1, untimed in 1"
     assert not row.lost  # two of five
-    results = Results(Plan((), (), QUICK, 0, 1), Measured())
+    results = Results(SpeedPlan((), (), QUICK, 0, 1), Measured())
     results.reached = reached[1:4]
     assert results.pooled_reached.iloc[0].lost  # two of three
 
 
 def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_edge():
     """The one is accurate, and must not look failed."""
-    table = pd.DataFrame([point(), point(rung=1, cost=np.nan, error=0.05), point(rung=2, cost=np.nan, error=np.inf)])
+    table = pd.DataFrame(
+        [point(), point(step_size=1, cost=np.nan, error=0.05), point(step_size=2, cost=np.nan, error=np.inf)]
+    )
     figure = charts.speed(table)
     edge = next(trace for trace in figure.data if trace.mode == "markers")
 
@@ -67,17 +70,17 @@ def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_
     assert "failed in 1 of 1" in edge.text[1]
 
 
-def dial(value: str, rung: int, **more: object) -> dict:
-    """A row of a dial turned to `value`, at the dt of the row `point(rung=2)`."""
-    return point(rung=rung, profile="matched+iterations", change=value, dt_s=0.1) | more
+def sweep(value: str, step_size: int, **more: object) -> dict:
+    """A row of a sweep at `value`, at the dt of the row `point(step_size=2)`."""
+    return point(step_size=step_size, profile="matched+iterations", change=value, dt_s=0.1) | more
 
 
-def test_a_dial_that_fails_most_scenes_stays_on_the_pooled_chart():
+def test_a_sweep_that_fails_most_scenes_stays_on_the_pooled_chart():
     """At the edge: a ratio of infinity. It was not drawn at all."""
     rows = [row | {"scenario": scene} for scene in ("one", "two") for row in
-            (point(rung=2), dial("1", 0), dial("9", 1, cost=np.nan, error=np.inf, failed=1))]  # fmt: skip
-    pool = tables.pooled_dials(pd.DataFrame(rows))
-    edge = next(trace for trace in charts.dials(pool, relative=True).data if trace.mode == "markers")
+            (point(step_size=2), sweep("1", 0), sweep("9", 1, cost=np.nan, error=np.inf, failed=1))]  # fmt: skip
+    pool = tables.pooled_sweeps(pd.DataFrame(rows))
+    edge = next(trace for trace in charts.sweeps(pool, relative=True).data if trace.mode == "markers")
 
     assert pool.set_index("change").failed.to_dict() == {"": 0, "1": 0, "9": 2}
     assert "failed in 2 of 2" in edge.text[0]
@@ -86,14 +89,14 @@ def test_a_dial_that_fails_most_scenes_stays_on_the_pooled_chart():
 def test_a_scene_without_a_ratio_is_named():
     """Right to the last bit, or failed: nothing to divide by; the pool says of how many scenes it is."""
     rows = [
-        point("one", 2), dial("1", 0),
-        point("exact", 2, error=0.0), dial("1", 0, scenario="exact"),
-        point("gone", 2, cost=np.nan, error=np.inf), dial("1", 0, scenario="gone"),
+        point("one", 2), sweep("1", 0),
+        point("exact", 2, error=0.0), sweep("1", 0, scenario="exact"),
+        point("gone", 2, cost=np.nan, error=np.inf), sweep("1", 0, scenario="gone"),
     ]  # fmt: skip
     found = pd.DataFrame(rows)
 
     assert tables.without_ratio(found) == [("pymunk", "exact"), ("pymunk", "gone")]
-    assert set(tables.pooled_dials(found)["of"]) == {1}
+    assert set(tables.pooled_sweeps(found)["of"]) == {1}
 
 
 def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
@@ -105,7 +108,7 @@ def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
         "low": 1.0, "high": 1.0, "best": 1.0,
     })  # fmt: skip
     for ratio in ("error_ratio", "cost_ratio"):
-        figure = charts.features(table, ratio, "")
+        figure = charts.options(table, ratio, "")
         trace = figure.data[-1]
         assert trace.x[1] > 1.5
         assert FAILED in figure.layout.xaxis.ticktext
@@ -158,12 +161,12 @@ def test_an_engine_that_is_cheaper_than_our_own_solver_is_named_with_the_scene()
 def test_a_changed_setting_that_is_cheaper_than_our_own_solver_is_named():
     """Against our solver unchanged, in the same scene."""
     known = {"scenario": "one"}
-    features = pd.DataFrame([
+    options = pd.DataFrame([
         known | {"engine": "reference", "profile": "exercise", "change": "float32", "cost": 9.0, "cost_plain": 2.0},
         known | {"engine": "pymunk", "profile": "matched", "change": "sleeping", "cost": 1.0, "cost_plain": 5.0},
     ])  # fmt: skip
-    table = versus.against_own(pd.DataFrame([own("one", 2.0), point("one", cost=5.0)]), features)
+    table = versus.against_own(pd.DataFrame([own("one", 2.0), point("one", cost=5.0)]), options)
     row = table.set_index("change").loc["sleeping"]
 
     assert (row.ratio, row.cheaper, row.cheaper_in) == (0.5, 1, "one")
-    assert versus.against_own(pd.DataFrame([point("one")]), features).empty  # our own solver was not asked for
+    assert versus.against_own(pd.DataFrame([point("one")]), options).empty  # our own solver was not asked for

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.mechanisms.features import FEATURES
-from adapters.mechanisms.habits import HABITS
+from adapters.mechanisms.options import OPTIONS
+from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play
 from reports.run.machine import about
 from reports.speed import charts, figures
@@ -22,20 +22,20 @@ from reports.speed.explained import extent
 from reports.speed.measure import Measured, measure
 from reports.speed.page import write_page
 from reports.speed.pareto import FAILED, UNREACHABLE
-from reports.speed.plan import Plan
+from reports.speed.plan import SpeedPlan
 from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
-from scenarios.truth.exact import CLOSED_FORM, HIT_BY_HIT
+from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN
 from tests.reports.page.browsing import opened, overhang
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
 SCENES = ("head_on_equal_e09", "asteroids")
-PLAYERS = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
+PLAYED = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
 LITTLE = replace(QUICK, seeds=3, most_steps=1000, rounds=2, budget=0.0, sizes=(3, 10, 100, 1000), patience=1.0,
-    feature_scenes=("bouncing_ball_e1",), dial_scenes=("slide_on_incline", "falling_box"),
+    option_scenes=("bouncing_ball_e1",), sweep_scenes=("slide_on_incline", "falling_box"),
     budget_scenes=("head_on_equal_e09",))  # fmt: skip
 SAID = {"load": 0.0, "seconds": 1.0}
 
@@ -44,12 +44,12 @@ SAID = {"load": 0.0, "seconds": 1.0}
 def measured() -> Measured:
     """A little of everything, played and timed for real, in worker processes."""
     with Progress() as progress:
-        return measure(Plan(SCENES, PLAYERS, LITTLE, 0, 2), progress)
+        return measure(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), progress)
 
 
 @pytest.fixture(scope="module")
 def results(measured: Measured) -> Results:
-    """The same with one player that failed one rung of one scene, and one that refused all of it."""
+    """The same with one engine that failed one step size of one scene, and one that refused all of it."""
     errors = measured.errors.copy()
     here = (errors.scenario == SCENES[0]) & (errors.engine == "pymunk") & (errors.kind == "scene")
     refused = here & (errors.profile == "shipped")
@@ -60,11 +60,11 @@ def results(measured: Measured) -> Results:
     samples = measured.samples
     timed = (samples.scenario == SCENES[0]) & (samples.engine == "pymunk") & (samples.profile == "shipped")
     changed = replace(measured, errors=errors, samples=samples[~(timed & (samples.kind == "scene"))])
-    return Results(Plan(SCENES, PLAYERS, LITTLE, 0, 2), changed)
+    return Results(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), changed)
 
 
 def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
-    """A row a round for every player, dt and copy; a row a seed for every player and dt."""
+    """A row a round for every engine, dt and copy; a row a seed for every engine and dt."""
     results.write(tmp_path)
     samples, errors = (pd.read_csv(tmp_path / f"speed_{name}.csv") for name in ("samples", "errors"))
     one = samples[(samples.kind == "scene") & (samples.engine == "event_driven") & (samples.scenario == SCENES[0])]
@@ -101,8 +101,8 @@ def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Result
     assert max(edges["pymunk:matched"].x) < max(edges["pymunk:shipped"].x)
 
 
-def test_the_front_of_a_chart_is_the_event_driven_player(results: Results):
-    """In a head-on hit it is both cheapest and exact, so that nobody else is on the front."""
+def test_the_front_of_a_chart_is_the_event_driven_engine(results: Results):
+    """In a head-on collision it is both cheapest and exact, so that nobody else is on the front."""
     points = results.points[results.points.scenario == SCENES[0]]
     drawn = {trace.name: trace for trace in charts.speed(points).data}
     front, steps = drawn[charts.FRONT], drawn[charts.FRONT_OF_STEPS]
@@ -126,7 +126,7 @@ def test_what_cannot_be_reached_is_above_what_costs(results: Results):
     assert UNREACHABLE not in set(results.reached[results.reached.engine == "event_driven"].why)
 
 
-def test_a_random_scene_has_an_interval_over_its_draws(results: Results):
+def test_a_random_scene_has_an_interval_over_its_seeds(results: Results):
     """The median error lies between the ends of its bootstrap interval, which are apart."""
     row = results.points[(results.points.scenario == "asteroids") & (results.points.engine == "reference")].iloc[0]
 
@@ -141,10 +141,10 @@ def test_a_pooled_failure_counts_as_infinitely_wrong(results: Results):
     assert (row.failed, np.isinf(row.error_high)) == (1, True)
 
 
-def test_every_feature_of_a_player_is_set_against_it_in_every_scene(results: Results):
+def test_every_option_of_an_engine_is_set_against_it_in_every_scene(results: Results):
     """Time and error together; an engine changed in nothing reads 1 in both, so it is not listed."""
-    expected = {feature.change for feature in FEATURES if feature.engine in PLAYERS}
-    table = results.features
+    expected = {option.change for option in OPTIONS if option.engine in PLAYED}
+    table = results.options
 
     assert set(table.change) == expected
     assert (table.groupby("scenario").size() == len(expected)).all()
@@ -153,45 +153,45 @@ def test_every_feature_of_a_player_is_set_against_it_in_every_scene(results: Res
 
 
 def test_float32_breaks_what_it_must(results: Results):
-    """Negative control of the feature table: in a bouncing ball 2**-24 a step shows, and is not 1."""
-    row = results.features[(results.features.scenario == "bouncing_ball_e1") & (results.features.engine == "reference")]
+    """Negative control of the option table: in a bouncing ball 2**-24 a step shows, and is not 1."""
+    row = results.options[(results.options.scenario == "bouncing_ball_e1") & (results.options.engine == "reference")]
 
     assert abs(row.error_ratio.iloc[0] - 1) > 1e-3
 
 
-def test_a_dial_meets_its_engine_where_it_is_matched(results: Results):
+def test_a_sweep_meets_its_engine_where_it_is_matched(results: Results):
     """10 iterations are what pymunk has as matched: the same error, to the bit, and 1 of 1 where all are pooled."""
-    table = results.dials
+    table = results.sweeps
     here = table[(table.engine == "pymunk") & (table.scenario == "slide_on_incline")]
     turned = here[here.change == "10"].iloc[0]
     same = here[(here.change == "") & (here.dt_s == turned.dt_s)].iloc[0]
-    pooled = results.pooled_dials
+    pooled = results.pooled_sweeps
 
     assert turned.error == same.error
     assert pooled[pooled.change == "10"].error.iloc[0] == 1.0
-    assert {dial.name for dial in results.plan.dials} == {"pymunk:matched+iterations"}
+    assert {sweep.name for sweep in results.plan.sweeps} == {"pymunk:matched+iterations"}
     assert table[table.scenario == "falling_box"].seeds.eq(3).all()
 
 
-def test_a_line_a_dial_goes_over_all_its_values_from_cheap_to_dear(results: Results):
+def test_the_line_of_a_sweep_goes_over_all_its_values_from_cheap_to_expensive(results: Results):
     """Its ends are named; beside it the ladder of its engine, from four times its dt to an eighth of it."""
-    points = results.dials[results.dials.scenario == "falling_box"]
-    drawn = {trace.name: trace for trace in charts.dials(points).data}
-    dial = drawn["pymunk:matched+iterations"]
+    points = results.sweeps[results.sweeps.scenario == "falling_box"]
+    drawn = {trace.name: trace for trace in charts.sweeps(points).data}
+    sweep = drawn["pymunk:matched+iterations"]
 
-    assert len(dial.x) == len(dial.y) == 8
-    assert (dial.texttemplate[0], dial.texttemplate[-1]) == ("1", "200")
+    assert len(sweep.x) == len(sweep.y) == 8
+    assert (sweep.texttemplate[0], sweep.texttemplate[-1]) == ("1", "200")
     assert len(drawn["pymunk:matched"].x) == 6
 
 
 def test_the_cheapest_model_is_named_for_every_scene(results: Results):
-    """A closed form where the truth is one; the asteroids are answered hit by hit."""
+    """A closed form where the truth is one; the asteroids are answered event by event."""
     models = results.models.set_index("scenario")
 
     assert models.loc[SCENES[0]].truth == CLOSED_FORM
-    assert models.loc["asteroids"].truth == HIT_BY_HIT
-    assert models.loc["asteroids"].player == "event_driven:float64"
-    assert set(models.model) <= {"closed form", "hit to hit, float64"}
+    assert models.loc["asteroids"].truth == EVENT_DRIVEN
+    assert models.loc["asteroids"].engine == "event_driven:float64"
+    assert set(models.model) <= {"closed form", "collision to collision, float64"}
 
 
 def test_figures_come_back_as_they_were_kept(results: Results, tmp_path: Path):
@@ -216,7 +216,7 @@ def test_a_ratio_that_drifts_beyond_the_gate_is_named():
 
 
 def test_the_kept_figures_have_every_ratio_that_is_gated():
-    """All players but the yardstick, at all sizes."""
+    """All engines but the yardstick, at all sizes."""
     from adapters.engines import ENGINES
 
     assert set(figures.ratios(figures.read())) == {
@@ -228,7 +228,7 @@ def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
     """How much one scene moves the curve, what failed, who costs less than our own solver; and of a budget that is cut,
     which scene, when, of how long, and over how many seconds the share is. Without the cut scene none of the latter.
     """
-    rows = [row for name in HABITS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYERS]
+    rows = [row for name in MECHANISMS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYED]
     both = pd.concat([results.measured.budget, pd.DataFrame(rows, columns=results.measured.budget.columns)])
     cut = Results(results.plan, replace(results.measured, budget=both))
     whole, shorter = (page_of(each, tmp_path) for each in (results, cut))
@@ -266,6 +266,6 @@ def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
         plot.locator(".main-svg").first.wait_for()
     assert tab.locator(".plot").count() == 2 + 2 + 3 + 1 + 2 * len(SCENES)
     assert overhang(tab) <= 0
-    assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with habits: three players; two switched off
+    assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with mechanisms: three engines; two switched off
     assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
     assert heard == []

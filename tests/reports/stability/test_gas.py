@@ -1,4 +1,5 @@
-"""The thermometer of the atlas: it reads the literature's numbers off an exact gas, and notices one that is wrong."""
+"""The thermometer of the stability report: it reads the literature's numbers off an exact gas, and notices one that is
+wrong."""
 
 from __future__ import annotations
 
@@ -16,7 +17,6 @@ from reports.stability.cases import CASES
 from reports.stability.cases_gas import RADIUS, gas, wrapped_run
 from reports.stability.hard_disks import compressibility, gas_in_box
 from reports.stability.limits import QUICK
-from reports.stability.players import play_as
 from reports.stability.predicates import judge
 from reports.stability.predicates_gas import (
     BLOCKS,
@@ -31,16 +31,17 @@ from reports.stability.predicates_gas import (
     shares_of_speeds,
 )
 from reports.stability.search import Search
+from reports.stability.variants import play_as
 from scenarios.catalogue import SCENARIOS
 from scenarios.model import Scenario, Trajectory, frozen
 
 EXACT = "event_driven:float64"
-LATE_AND_NOT = ("pymunk:matched", "reference:ordered")
+AT_END_AND_IN_ORDER = ("pymunk:matched", "reference:ordered")
 
 
-def played(player: str, scenario: Scenario) -> Trajectory:
+def played(engine: str, scenario: Scenario) -> Trajectory:
     """The whole run."""
-    run = play_as(player, scenario)
+    run = play_as(engine, scenario)
     assert run.status == "ok"
     assert run.trajectory is not None
     return run.trajectory
@@ -60,7 +61,7 @@ def test_the_virial_series_is_that_of_clisby_and_mccoy(packing: float, z: float)
 
 
 def test_in_a_large_box_the_rate_is_enskogs_and_the_pressure_that_of_the_bulk():
-    """4 / sqrt(pi) (Z - 1) sqrt(kT / m) / sigma hits a disk; a wall of a million diameters is no matter."""
+    """4 / sqrt(pi) (Z - 1) sqrt(kT / m) / sigma collisions a disk; a wall of a million diameters is no matter."""
     radius, packing, n = 0.5, 0.3, 10**12
     size = np.full(2, sqrt(n * pi * radius**2 / packing))
     found, z = gas_in_box(n, radius, size, 1.0), compressibility(packing)
@@ -79,9 +80,9 @@ def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literat
     for run in range(2):
         scenario = gas(packing, run, rows=10, columns=10, steps=8000, every=80)
         one, ought = played(EXACT, scenario), literature(scenario)
-        hits = one.collisions
-        rates.append(counted(one, hits.j >= 0, np.ones(len(hits))) / ought.rate)
-        forces.append(counted(one, hits.j < 0, hits.impulse) / ought.force)
+        collisions = one.collisions
+        rates.append(counted(one, collisions.j >= 0, np.ones(len(collisions))) / ought.rate)
+        forces.append(counted(one, collisions.j < 0, collisions.impulse) / ought.force)
     scene = scenario.scene
     size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
     temperature = (scene.velocity**2).sum() / 2 / scene.n
@@ -96,7 +97,7 @@ def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literat
 
 
 def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
-    """All of it, for two draws; a gas hotter by a fifth hits more often by a tenth."""
+    """All of it, for two draws; a gas hotter by a fifth collides more often by a tenth."""
     for run in range(2):
         scenario = CASES["thermometer"].scene(0.4, run)
         assert not judge(WRONG_GAS, scenario, play_as(EXACT, scenario)).failed
@@ -143,9 +144,9 @@ def test_equipartition_holds_in_an_exact_gas_up_to_a_mass_ratio_of_1e4_and_a_hot
 def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_noticed():
     """float64 to 1e-14, float32 to 1e-6, in 1000 steps; one disk stopped at the end is one part in some twenty."""
     scenario = wrapped_run(1000.0, 0)
-    for player, bound in (("reference:exercise", 1e-14), ("pymunk:matched", 1e-14), ("box2d:matched", 1e-6),
+    for engine, bound in (("reference:exercise", 1e-14), ("pymunk:matched", 1e-14), ("box2d:matched", 1e-6),
                           ("box2d_v3:matched", 1e-6)):  # fmt: skip
-        one = played(player, scenario)
+        one = played(engine, scenario)
         reading = verdict(MOMENTUM_DRIFTS, scenario, one)
         assert not reading.failed
         assert reading.value < bound
@@ -154,14 +155,15 @@ def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_
         assert verdict(MOMENTUM_DRIFTS, scenario, replace(one, velocity=frozen(velocity))).failed
 
 
-def test_finding_hits_late_costs_a_dense_gas_its_rate_and_its_pressure():
-    """At packing 0.6 an engine that waits for the end of a step hits a tenth too seldom; in order within it, not."""
+def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
+    """At packing 0.6 an engine that detects at the end of a step has a tenth too few collisions; in order within it,
+    not."""
     scenario = CASES["thermometer"].scene(0.6, 0)
-    late, in_order = (judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in LATE_AND_NOT)
-    ought, one = literature(scenario), played(LATE_AND_NOT[0], scenario)
-    hits = one.collisions
-    rate = counted(one, hits.j >= 0, np.ones(len(hits))).mean() / ought.rate
-    pressure = counted(one, hits.j < 0, hits.impulse).mean() / ought.force
+    late, in_order = (judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in AT_END_AND_IN_ORDER)
+    ought, one = literature(scenario), played(AT_END_AND_IN_ORDER[0], scenario)
+    collisions = one.collisions
+    rate = counted(one, collisions.j >= 0, np.ones(len(collisions))).mean() / ought.rate
+    pressure = counted(one, collisions.j < 0, collisions.impulse).mean() / ought.force
 
     assert rate == pytest.approx(0.9, abs=0.02)
     assert pressure == pytest.approx(0.9, abs=0.02)
@@ -189,19 +191,21 @@ def test_pymunk_loses_energy_by_impulses_that_a_contact_inherits():
 
 
 @pytest.mark.parametrize("profile", ["shipped", "matched"])
-def test_what_pymunk_tells_of_its_hits_is_what_it_gives_only_if_it_forgets_contacts(profile: str):
+def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets_contacts(profile: str):
     """A heavy disk drives a light one against a wall: in all, impulses of twice the heavy one's momentum, once each."""
     scenario = SCENARIOS["galperin_314"]()
     dt = scenario.dt(4)
-    told = {}
+    reported = {}
     for steps in (3, 1):
         run = play(Pymunk(profile, collision_persistence=steps), "pymunk:changed", scenario, dt)
         assert run.trajectory is not None
-        hits, velocity = run.trajectory.collisions, run.trajectory.velocity[:, :, 0]
-        told[steps] = hits.impulse[hits.j >= 0].sum() / (scenario.scene.mass[1] * np.ptp(velocity[:, 1]))
+        collisions, velocity = run.trajectory.collisions, run.trajectory.velocity[:, :, 0]
+        reported[steps] = collisions.impulse[collisions.j >= 0].sum() / (
+            scenario.scene.mass[1] * np.ptp(velocity[:, 1])
+        )
 
-    assert told[1] == pytest.approx(1.0, abs=1e-9)
-    assert told[3] > 10
+    assert reported[1] == pytest.approx(1.0, abs=1e-9)
+    assert reported[3] > 10
 
 
 @pytest.mark.slow

@@ -12,12 +12,12 @@ import pytest
 
 from reports.cli import VARIED
 from reports.stability.cases import CASES
-from reports.stability.cures import CURES, cure_of, faster, larger, slower, smaller, why_played
 from reports.stability.explain import explained, tried_out
+from reports.stability.interventions import INTERVENTIONS, faster, intervention_of, larger, slower, smaller, why_played
 from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
-from reports.stability.players import PLAYERS, play_as
 from reports.stability.reasons import reason_of
 from reports.stability.search import Search
+from reports.stability.variants import VARIANTS, play_as
 from reports.stability.vary import VARIES, case_of_file, varied
 from scenarios.files.scene_file import read_scene_file
 from scenarios.truth.exact import with_oracle
@@ -26,51 +26,54 @@ SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 
 
 @cache
-def found(what: str, player: str, scene: str = "two.toml") -> Limit:
-    """The limit on a scene of tests/data/scenes, with what cures its failure, asked without a twin."""
+def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
+    """The limit on a scene of tests/data/scenes, with the intervention that removes its failure, asked without an
+    ablation."""
     path = str(SCENES / scene)
-    search = Search(case_of_file(path, what), player, QUICK)
+    search = Search(case_of_file(path, what), engine, QUICK)
     limit = search.limit()
-    [known] = explained([replace(limit, case=f"{path}:{what}", cured=cure_of(search, limit))])
+    [known] = explained([replace(limit, case=f"{path}:{what}", intervention=intervention_of(search, limit))])
     return known
 
 
 @pytest.mark.parametrize(
-    ("what", "player", "tells"),
+    ("what", "engine", "expected"),
     [
         ("offset", "box2d:matched", "positions are float32"),
         ("offset", "box2d_v3:matched", "positions are float32"),
         ("scale", "box2d:shipped", "threshold of restitution"),
         ("scale", "box2d_v3:shipped", "cap on speed"),
-        ("speed", "reference:exercise", "a hit waits for the end of its step"),
+        ("speed", "reference:exercise", "a collision takes effect at the end of the step in which it is found"),
     ],
 )
-def test_a_reason_is_what_the_failing_run_works_without(what: str, player: str, tells: str):
-    """Two disks head-on at 1 m/s and 1/200 s: the mechanisms known from the atlas come out by themselves."""
-    limit = found(what, player)
+def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, expected: str):
+    """Two disks head-on at 1 m/s and 1/200 s: the mechanisms known from the stability report come out by themselves."""
+    limit = found(what, engine)
 
-    assert tells in limit.reason
+    assert expected in limit.reason
     assert limit.tested.startswith("works ")
     assert limit.why == limit.reason
 
 
 def test_a_threshold_shows_where_the_scene_closes_at_it():
-    """Disks that meet at 2 m/s meet at less than 1 m/s in a scene half as large; later a hit is missing for it."""
+    """Disks that meet at 2 m/s meet at less than 1 m/s in a scene half as large; later a collision is missing for
+    it."""
     assert 0 < found("scale", "box2d:shipped").fails_at < 0.5
     assert found("scale", "box2d:matched").verdict == "does not fail"
 
 
-def test_where_nothing_cures_it_a_twin_may_tell_and_else_it_is_called_not_known():
-    """Where the step is what is varied, a finer one is no proof: late hits alone have the limit. Or nothing helps."""
+def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_called_not_known():
+    """Where the step is what is varied, a finer one is no proof: end-of-step detection alone has the limit. Or nothing
+    helps."""
     path = str(SCENES / "two.toml")
     search = Search(case_of_file(path, "dt"), "pymunk:matched", QUICK)
     [limit] = explained([tried_out(search, replace(search.limit(), case=f"{path}:dt"))])
-    assert limit.why == "a hit waits for the end of its step"
-    assert limit.tested == "the reference with late hits and nothing else has this limit"
+    assert limit.why == "a collision takes effect at the end of the step in which it is found"
+    assert limit.tested == "the reference with end-of-step detection and nothing else has this limit"
 
     failing = limit.failing
     assert failing is not None
-    nothing = replace(limit, case="x.toml:speed", twin="", trials=(replace(failing, broken="hits"),))
+    nothing = replace(limit, case="x.toml:speed", mechanisms="", trials=(replace(failing, broken="collisions"),))
     reason, _, tested = why_played(nothing, "speed")
     assert reason.startswith(NOT_KNOWN)
     assert "in steps of an eighth" in reason
@@ -79,12 +82,12 @@ def test_where_nothing_cures_it_a_twin_may_tell_and_else_it_is_called_not_known(
 
 
 @pytest.mark.parametrize("change", [faster, slower, larger, smaller])
-@pytest.mark.parametrize("player", ["reference:exercise", "reference:ordered"])
-def test_a_solver_without_units_plays_a_similar_scene_to_the_same_bits(change, player: str):
+@pytest.mark.parametrize("engine", ["reference:exercise", "reference:ordered"])
+def test_a_solver_without_units_plays_a_similar_scene_to_the_same_bits(change, engine: str):
     """So that none of these changes can help by chance: in it only what has a unit of its own plays otherwise."""
     one = replace(read_scene_file(SCENES / "bumper.toml"), substeps=(1,))
     other = change(one)
-    run, same = play_as(player, one).trajectory, play_as(player, other).trajectory
+    run, same = play_as(engine, one).trajectory, play_as(engine, other).trajectory
     assert run is not None
     assert same is not None
     size = float(other.scene.radius[0] / one.scene.radius[0])
@@ -120,19 +123,20 @@ def test_a_scene_in_which_nothing_can_go_wrong_has_limits_all_the_same():
 
 def test_every_change_is_tried_on_somebody():
     """None is left over."""
-    players = ("reference:exercise", "pymunk:shipped", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
+    engines = ("reference:exercise", "pymunk:shipped", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
                "box2d_v3:matched")  # fmt: skip
-    for name, cure in CURES.items():
-        assert any(cure.fits(player, what) for player in players for what in ("dt", "speed", "offset")), name
+    for name, intervention in INTERVENTIONS.items():
+        assert any(intervention.fits(engine, what) for engine in engines for what in ("dt", "speed", "offset")), name
 
 
-def test_a_hit_that_nobody_makes_fails_however_near_to_the_start_it_is():
-    """Within two steps of the start `match` lets it pass; a pair that should hit, and never does, is a wrong hit."""
+def test_a_collision_that_nobody_makes_fails_however_near_to_the_start_it_is():
+    """Within two steps of the start `match` lets it pass; a pair that should collision, and never does, is a wrong
+    collision."""
     path = str(SCENES / "two.toml")
     search = Search(case_of_file(path, "speed"), "reference:exercise", QUICK)
     fast = search.trial(1000.0)
 
-    assert (fast.works, fast.broken) == (False, "hits")
+    assert (fast.works, fast.broken) == (False, "collisions")
     assert search.trial(1.0).works
     assert Search(case_of_file(path, "speed"), "event_driven:float64", QUICK).trial(1000.0).works
 
@@ -140,7 +144,7 @@ def test_a_hit_that_nobody_makes_fails_however_near_to_the_start_it_is():
 def test_a_disk_that_float32_keeps_where_it_is_fails():
     """A million metres out the last place is 6 cm, and a step of 2 cm is none, whatever the velocity says."""
     path = str(SCENES / "two.toml")
-    far = {name: Search(case_of_file(path, "offset"), name, QUICK).trial(1e6) for name in PLAYERS if "+" not in name}
+    far = {name: Search(case_of_file(path, "offset"), name, QUICK).trial(1e6) for name in VARIANTS if "+" not in name}
 
     assert far["box2d:matched"].broken == "strays"
     assert not far["box2d:matched"].works
@@ -149,7 +153,7 @@ def test_a_disk_that_float32_keeps_where_it_is_fails():
 
 
 @pytest.mark.parametrize("x", [0.00294, 0.0167])
-def test_a_disk_that_is_hit_twice_between_two_samples_is_not_called_stuck(x: float):
+def test_a_disk_that_is_struck_twice_between_two_samples_is_not_called_stuck(x: float):
     """In the cradle it leaves as it came, at rest or not, and has gone less than that."""
     trial = Search(CASES["dt_cradle_with_gaps"], "box2d_v3:matched", FULL).trial(x)
     assert trial.works, trial.event
@@ -157,12 +161,13 @@ def test_a_disk_that_is_hit_twice_between_two_samples_is_not_called_stuck(x: flo
 
 @pytest.mark.parametrize("name", ["tunnelling_mine.toml", "dt_mine.toml", "overlap_mine.toml"])
 def test_the_name_of_a_scene_file_does_not_pick_its_reason(name: str):
-    """The table's patterns are for the atlas' own cases; what every exact method refuses holds everywhere."""
+    """The table's patterns are for the stability report' own cases; what every exact method refuses holds
+    everywhere."""
     failing = Trial(2.0, 1, 1, 2.0, 0, broken="refused")
     limit = Limit(f"{name}:speed", "box2d:matched", "quick", "limit", 1.0, 2.0, (failing,))
 
     assert reason_of(limit) is None
-    assert reason_of(replace(limit, player="event_driven:float64")) is not None
+    assert reason_of(replace(limit, engine="event_driven:float64")) is not None
 
 
 def test_the_help_names_what_can_be_varied():

@@ -37,7 +37,7 @@ SOLVERS = {path.name: path for path in CORRECT if path.name in ("plain.js", "pla
 
 
 def trapped(folder: Path, names: Iterable[str]) -> Callable[[], str]:
-    """Put a module of each name into `folder`; returns what tells which of them were run."""
+    """Put a module of each name into `folder`; returns what shows which of them were run."""
     mark = folder.parent / f"{folder.name}.ran"
     folder.mkdir()
     for name in names:
@@ -47,18 +47,21 @@ def trapped(folder: Path, names: Iterable[str]) -> Callable[[], str]:
 
 @pytest.fixture
 def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
-    """What tells which modules were run of the current folder, which has all names of Python's and of what we use."""
-    told = trapped(tmp_path / "here", (*sys.stdlib_module_names, *OURS, *LIBRARIES, *BY_THEMSELVES))
+    """What shows which modules were run of the current folder, which has all names of Python's and of what we use."""
+    reported = trapped(tmp_path / "here", (*sys.stdlib_module_names, *OURS, *LIBRARIES, *BY_THEMSELVES))
     for name, path in SOLVERS.items():
         (tmp_path / "here" / f"my_{name}").write_text(path.read_text())
     monkeypatch.chdir(tmp_path / "here")
-    return told
+    return reported
 
 
 def in_a_worker() -> Any:
     """How a cell ended that was played in a worker started here."""
     task = partial(
-        play_here, Cell("slow_hit", 0, "good:control", 1), row(Controlled), replace(scenario("slow_hit"), truth=None)
+        play_here,
+        Cell("slow_collision", 0, "good:control", 1),
+        row(Controlled),
+        replace(scenario("slow_collision"), truth=None),
     )
     [(_, ended)] = run_all({"one": task}, workers=1)
     return ended
@@ -171,7 +174,7 @@ def test_a_folder_that_modules_are_installed_in_stays_where_it_was_last(
 
 
 def test_of_the_folder_of_the_program_only_its_packages_are_found():
-    """pyproject.toml beside them is no hindrance, nor a conftest.py; `tests` are found by who is told of them."""
+    """pyproject.toml beside them is no hindrance, nor a conftest.py; `tests` are found by who is reported of them."""
     found = safe_path.OwnPackages(safe_path.PACKAGES).find_spec
     assert all(found(name) is not None for name in OURS[:4])
     assert [found(name) for name in ("tests", "scipy", "conftest", "random")] == [None] * 4
@@ -180,7 +183,7 @@ def test_of_the_folder_of_the_program_only_its_packages_are_found():
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], str]]:
-    """A clone of the program with modules in its root that nobody asked for, and what tells which of them were run."""
+    """A clone of the program with modules in its root that nobody asked for, and what shows which of them were run."""
     base = tmp_path_factory.mktemp("clone")
     ran = trapped(base / "root", {"scipy", "yaml", "pyarrow", "cffi", "random", "secrets", "numbers", *LIBRARIES})
     for name in OURS[:4]:

@@ -1,4 +1,4 @@
-"""The hand-written solver with switches, as a player: the exercise's, or what an engine does instead."""
+"""The ablated reference as an engine: the exercise's solver with the mechanisms of other engines switched on or off."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Hit
-from adapters.mechanisms import ablated_reference as switched
-from adapters.mechanisms.ablated_reference import STAGES, Switches
+from adapters.engine import ContactImpulse
+from adapters.mechanisms import ablated_reference
+from adapters.mechanisms.ablated_reference import STAGES, Parameters
 from adapters.mechanisms.contacts import no_contacts
 from adapters.reference import Reference
 from scenarios.model import Scene
@@ -17,8 +17,9 @@ from scenarios.model import Scene
 EXERCISE = ("accelerate", "move", "pairs", "walls")
 POSITION_FIRST = ("move", "pairs", "walls", "accelerate")
 # Collide where they are, then aim at a velocity after gravity, then move (Box2D 2.3, b2Island::Solve).
-BOX2D = ("detect", "by_island", "accelerate", "aim", "warm_start", "bounce", "cap", "move", "push_out")
-# Move, collide there, aim at a velocity before gravity; the push-out moves in the next step (Munk2D, cpSpaceStep).
+BOX2D = ("detect", "by_island", "accelerate", "aim", "warm_start", "bounce", "cap", "move", "position_correction")
+# Move, collide there, aim at a velocity before gravity; the position correction moves in the next step (Munk2D,
+# cpSpaceStep).
 PYMUNK = ("move", "detect", "aim", "accelerate", "warm_start", "bounce", "nudge")
 # Collide and aim once, then soft substeps, then one sweep for restitution (Box2D 3.1, b2SolverStage).
 BOX2D_V3 = ("detect", "by_colour", "aim", *("accelerate", "warm_start", "soften", "move", "relax") * 4, "restitute")
@@ -32,25 +33,25 @@ MIXING: dict[str, Callable[[float, float], float]] = {
 }
 
 
-class Switched(Reference):
-    """`adapters.mechanisms.ablated_reference` with these switches; without any the exercise's solver, to the bit.
+class AblatedReference(Reference):
+    """`adapters.mechanisms.ablated_reference` with these parameters; without any the exercise's solver, to the bit.
 
     order: the stages of a step; substeps: how often it is gone through in a dt, whose share falls to every move.
     alpha: free flight advances by v dt + alpha a dt2 a step, whatever the order; None: as the order has it.
-    mixing: how the restitutions of two disks make that of the pair, a key of `MIXING`. `switches`: fields of
-    `adapters.mechanisms.ablated_reference.Switches`.
+    mixing: how the restitutions of two disks make that of the pair, a key of `MIXING`. `parameters`: fields of
+    `adapters.mechanisms.ablated_reference.Parameters`.
     """
 
     def __init__(
         self, order: Sequence[str] = EXERCISE, *, substeps: int = 1, alpha: float | None = None,
-        mixing: str = "as stated", precision: type = np.float64, **switches: Any,
+        mixing: str = "as stated", precision: type = np.float64, **parameters: Any,
     ) -> None:  # fmt: skip
-        super().__init__(switched, precision=precision)
+        super().__init__(ablated_reference, precision=precision)
         self.order, self.substeps, self.alpha, self.mixing = tuple(order), substeps, alpha, mixing
         self.moves = substeps * self.order.count("move")
-        kinds = Switches._field_defaults  # the solver is compiled once: an int in place of a float would be another
-        numbers = {name: type(kinds[name])(value) for name, value in switches.items()}
-        self.on = Switches(np.array([STAGES.index(stage) for stage in self.order]), self._drift(), **numbers)
+        kinds = Parameters._field_defaults  # the solver is compiled once: an int in place of a float would be another
+        numbers = {name: type(kinds[name])(value) for name, value in parameters.items()}
+        self.on = Parameters(np.array([STAGES.index(stage) for stage in self.order]), self._drift(), **numbers)
 
     def _drift(self) -> float:
         """What each of the moves of a step has to add to v h, in a h2, for the whole step to have alpha."""
@@ -68,12 +69,14 @@ class Switched(Reference):
 
     def _advance(self, count: int) -> None:
         h = self.precision(self.dt / self.moves)
-        hits = switched.advance(self.disks, self.world, self.on, self.kept, h, count * self.substeps)
+        collisions = ablated_reference.advance(self.disks, self.world, self.on, self.kept, h, count * self.substeps)
         if self.listening:
-            self.log += [Hit(self.steps + k // self.substeps, i, j, impulse) for k, i, j, impulse in hits]
+            self.log += [
+                ContactImpulse(self.steps + k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions
+            ]
         self.steps += count
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """What is switched on."""
-        told = {"mixing": self.mixing, "substeps": self.substeps, "alpha": self.alpha} | self.on._asdict()
-        return {name: (value, value) for name, value in (told | {"order": ", ".join(self.order)}).items()}
+        reported = {"mixing": self.mixing, "substeps": self.substeps, "alpha": self.alpha} | self.on._asdict()
+        return {name: (value, value) for name, value in (reported | {"order": ", ".join(self.order)}).items()}

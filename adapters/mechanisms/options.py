@@ -1,4 +1,5 @@
-"""What an engine costs with one thing more, or one less, than its matched profile: a row a feature, or a dial."""
+"""What an engine costs with one option changed against its matched profile: a row an option, or a sweep of one
+parameter."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from adapters.engines import ENGINES, changed
 
 
 @dataclass(frozen=True)
-class Feature:
+class Option:
     """One change to one engine.
 
     Attributes:
@@ -40,21 +41,21 @@ def _always_listing() -> Engine:
 
 @cache
 def listing() -> Any:
-    """The reference's solver for crowds with a list of neighbours for the fewest disks, too: the same source."""
+    """The reference's solver with a neighbour list for the fewest disks, too: the same source."""
     from numba import njit
 
-    from reference_impl import crowd
+    from reference_impl import verlet_list
 
-    advance = FunctionType(crowd.advance.py_func.__code__, vars(crowd) | {"CROWD": 0})
-    return SimpleNamespace(__name__="crowd", advance=njit(error_model="numpy")(advance))
+    advance = FunctionType(verlet_list.advance.py_func.__code__, vars(verlet_list) | {"LISTED_FROM": 0})
+    return SimpleNamespace(__name__="verlet_list", advance=njit(error_model="numpy")(advance))
 
 
-FEATURES: tuple[Feature, ...] = tuple(
-    feature
+OPTIONS: tuple[Option, ...] = tuple(
+    option
     for name, row in ENGINES.items()
-    for feature in (
-        *(Feature(name, change, partial(changed, name, **settings)) for change, settings in row.features.items()),
-        *([Feature(name, "broad phase, always", _always_listing)] if name == "reference:exercise" else []),
+    for option in (
+        *(Option(name, change, partial(changed, name, **settings)) for change, settings in row.options.items()),
+        *([Option(name, "broad phase, always", _always_listing)] if name == "reference:exercise" else []),
     )
 )
 """What an engine cannot be changed in is not here: pymunk has no CCD and always starts warm, Box2D 3.1 hides its
@@ -62,14 +63,14 @@ warm start, and no outside engine lets its broad phase be switched off."""
 
 
 @dataclass(frozen=True)
-class Dial:
-    """What an engine lets one spend time on instead of smaller steps.
+class Sweep:
+    """A parameter of an engine over its values: what time can be spent on instead of smaller steps.
 
     Attributes:
-        engine: the row of `ENGINES` it is turned in, `engine:profile`.
-        what: the number that is turned.
+        engine: the row of `ENGINES` whose parameter is swept, `engine:profile`.
+        what: the parameter, in a word.
         parameter: the name of that number among those of the engine's `make`.
-        values: from cheap to dear.
+        values: from cheap to expensive.
     """
 
     engine: str
@@ -79,7 +80,7 @@ class Dial:
 
     @property
     def name(self) -> str:
-        """The engine and a profile that says what is turned, as `reports.page.style` knows it."""
+        """The engine and a profile that says what is swept, as `reports.page.style` knows it."""
         return f"{self.engine}+{self.what}"
 
     def at(self, value: int) -> Callable[[], Engine]:
@@ -87,8 +88,8 @@ class Dial:
         return partial(changed, self.engine, **{self.parameter: value})
 
 
-DIALS: tuple[Dial, ...] = tuple(
-    Dial(name, row.work.what, row.work.setting, row.work.values)
+SWEEPS: tuple[Sweep, ...] = tuple(
+    Sweep(name, row.work.what, row.work.setting, row.work.values)
     for name, row in ENGINES.items()
     if row.work is not None and name.endswith(":matched")
 )
