@@ -9,7 +9,7 @@ from typing import Any
 import Box2D
 import numpy as np
 
-from adapters.engine import KEPT, PASSED, Hit
+from adapters.engine import KEPT, PASSED, Collision
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from scenarios.model import Array, Scene, State
 
@@ -47,7 +47,7 @@ e = 1. `adapters/matched.csv` holds what else was tried."""
 class Box2DEngine:
     """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
 
-    `matched`: the scene in other units. Box2D treats hits below 1 unit of length per unit of time as
+    `matched`: the scene in other units. Box2D treats collisions below 1 unit of length per unit of time as
     inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The length unit
     is a quarter of the smallest radius, which shrinks slop and the tolerance of continuous collision; or twice what
     the fastest disk moves in a step where that is more, because nothing moves by more than 2 units a step; a scene that
@@ -188,9 +188,9 @@ class Box2DEngine:
             must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
         return State(position, velocity, angle, angular_velocity)
 
-    def hits(self) -> list[Hit]:
+    def collisions(self) -> list[Collision]:
         """From `PostSolve`, impulses back in N s."""
-        return [Hit(step, i, j, impulse / self.speed) for step, i, j, impulse in self.listener.log]
+        return [Collision(step, i, j, impulse / self.speed) for step, i, j, impulse in self.listener.log]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """Resolved values are read back from the world, a fixture and the engine's constants."""

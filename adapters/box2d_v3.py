@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
-from adapters.engine import PASSED, UNREAD, Hit
+from adapters.engine import PASSED, UNREAD, Collision
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from scenarios.model import Array, Scene, State
 
@@ -91,7 +91,7 @@ class Box2DV3:
             walls=scene.walls, gravity=scene.gravity,
         )  # fmt: skip
         self.scene, self.dt, self.steps = scene, dt, 0
-        self.log: list[Hit] = []
+        self.log: list[Collision] = []
         self.unit = float(self.chosen["length_unit"] * scene.radius.min()) if self.matched else 1.0
         pyb2d3.set_length_units_per_meter(self.unit)
         # The binding has no way to ask for the unit, but the default of this limit is 400 of it.
@@ -103,7 +103,7 @@ class Box2DV3:
         self.world.sleeping_enabled = self.sleeping
         if self.matched:
             self.world.set_contact_tuning(*self._tuning())
-        self.world.hit_event_threshold = 0.0  # listening only: report every hit
+        self.world.hit_event_threshold = 0.0  # listening only: report every collision
         self.bodies = [self._disk(i) for i in range(scene.n)]
         self.every = pyb2d3.Bodies()
         for body in self.bodies:
@@ -162,7 +162,7 @@ class Box2DV3:
 
     @in_its_unit
     def step(self, count: int = 1) -> None:
-        """`count` calls of `step`; hit events live for one step, so they are collected after each."""
+        """`count` calls of `step`; collision events live for one step, so they are collected after each."""
         pyb2d3.set_length_units_per_meter(self.unit)  # another world may have set its own since
         for _ in range(count):
             self.world.step(self.dt, self.substeps)
@@ -175,9 +175,9 @@ class Box2DV3:
                 self.wrapping += perf_counter() - started
 
     def _listen(self) -> None:
-        for hit in self.world.get_contact_events().hit_events():
-            i, j = hit.shape_a.body.user_data, hit.shape_b.body.user_data
-            self.log.append(Hit(self.steps, self._index(i), self._index(j), np.nan))
+        for collision in self.world.get_contact_events().hit_events():
+            i, j = collision.shape_a.body.user_data, collision.shape_b.body.user_data
+            self.log.append(Collision(self.steps, self._index(i), self._index(j), np.nan))
 
     def _index(self, user_data: int) -> int:
         return user_data if user_data < self.scene.n else self.scene.n - 1 - user_data
@@ -209,8 +209,8 @@ class Box2DV3:
         self.spin, self.seen = spin, self.steps
         return self.angle.copy()
 
-    def hits(self) -> list[Hit]:
-        """From the hit events, which tell the approach speed but no impulse."""
+    def collisions(self) -> list[Collision]:
+        """From the collision events, which tell the approach speed but no impulse."""
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:

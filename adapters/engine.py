@@ -28,10 +28,10 @@ class NotStarted(Exception):
     outside = True
 
 
-class Hit(NamedTuple):
+class Collision(NamedTuple):
     """One contact that pushed during step `step` (from 0): i and j in either order, wall w as -1 - w; N s.
 
-    A contact that lasts gives a hit in every step; `play` keeps where each one begins.
+    A contact that lasts gives a collision in every step; `play` keeps where each one begins.
     """
 
     step: int
@@ -44,8 +44,8 @@ class Engine(Protocol):
     """The protocol. `read` gives all four arrays at the same instant, in the scene's order, static disks included.
 
     Attributes:
-        listening: whether hits are logged; set before `load`. Off where speed is measured: hearing of every hit in
-            Python costs more than some engines' whole step.
+        listening: whether collisions are logged; set before `load`. Off where speed is measured: hearing of every
+            collision in Python costs more than some engines' whole step.
         wrapping: s spent since it was set to 0 on setting disks onto the opposite edge in Python, for an engine that
             knows no such edge; part of what `step` takes, and no fault of the engine's.
     """
@@ -65,7 +65,7 @@ class Engine(Protocol):
     def read(self) -> State:
         """The present state, as float64 copies."""
 
-    def hits(self) -> list[Hit]:
+    def collisions(self) -> list[Collision]:
         """Every push of a contact since `load`, in order of steps."""
 
     def settings(self) -> dict[str, tuple[Any, Any]]:

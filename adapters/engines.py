@@ -61,7 +61,7 @@ ENGINES: dict[str, Row] = {
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
     ),
     "reference:ordered": Row(
-        _ordered, "hand-written: exact flight, hits in the order in which they happen within a step", 0.5, FLOAT64
+        _ordered, "hand-written: exact flight, collisions in the order in which they happen within a step", 0.5, FLOAT64
     ),
     "pymunk:shipped": Row(
         partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64
@@ -85,7 +85,7 @@ ENGINES: dict[str, Row] = {
         "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction", 0.625, FLOAT32
     ),
     "event_driven:float64": Row(
-        _event_driven, "from hit to hit without steps: parabolas and contact times, in float64", 0.5, FLOAT64
+        _event_driven, "from collision to collision without steps: parabolas and contact times, in float64", 0.5, FLOAT64
     ),
 }  # fmt: skip
 

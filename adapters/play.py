@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Engine, Hit, NotStarted, Unsupported
+from adapters.engine import Collision, Engine, NotStarted, Unsupported
 from scenarios.model import Array, Collisions, Scenario, Scene, State, Thrust, Trajectory, frozen
 
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
@@ -66,7 +66,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callab
     if substeps < 1 or abs(substeps * dt - scenario.sample_interval) > 1e-9 * scenario.sample_interval:
         raise ValueError(f"dt {dt:g} s does not divide the sample interval {scenario.sample_interval:g} s")
     states: list[State] = []
-    hits: list[Hit] = []
+    collisions: list[Collision] = []
     settings: dict[str, tuple[Any, Any]] = {}
     versions: dict[str, str] = {}
     seconds, farthest = 0.0, RUNAWAY * reach(scenario)
@@ -91,15 +91,19 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callab
     except Exception as error:  # an engine may raise anything; the run says what
         status, reason = getattr(error, "status", "error"), f"{type(error).__name__}: {error}"
     if states:
-        hits = hits_of(engine)
-    trajectory = gather(scenario, states, first_hits(hits, dt, weight_impulse(scenario.scene, dt))) if states else None
+        collisions = collisions_of(engine)
+    trajectory = (
+        gather(scenario, states, first_collisions(collisions, dt, weight_impulse(scenario.scene, dt)))
+        if states
+        else None
+    )
     return Run(engine_name, profile, scenario.name, dt, status, reason, trajectory, seconds, settings, versions)
 
 
-def hits_of(engine: Engine) -> list[Hit]:
-    """The hits of an engine that may have failed; none if it cannot tell any more."""
+def collisions_of(engine: Engine) -> list[Collision]:
+    """The collisions of an engine that may have failed; none if it cannot tell any more."""
     try:
-        return engine.hits()
+        return engine.collisions()
     except Exception:  # the run already carries the reason
         return []
 
@@ -182,17 +186,17 @@ def weight_impulse(scene: Scene, dt: float) -> float:
     return float(2 * moving * np.linalg.norm(scene.gravity) * dt)
 
 
-def first_hits(hits: Sequence[Hit], dt: float, weight: float = 0.0) -> Collisions:
+def first_collisions(collisions: Sequence[Collision], dt: float, weight: float = 0.0) -> Collisions:
     """One collision where a pair begins to push; its time is the end of the step.
 
     A push in the step after another of the same pair goes on with it if it is no stronger than `weight` N s, or if
-    the engine does not tell how strong it is: else it is a hit of its own. Pushes of less than a millionth of the
+    the engine does not tell how strong it is: else it is a collision of its own. Pushes of less than a millionth of the
     pair's strongest are rounding, and left out.
     """
-    if not hits:
+    if not collisions:
         return Collisions.of([])
-    step, i, j = (np.array(column) for column in list(zip(*hits))[:3])
-    impulse = np.array([hit.impulse for hit in hits])
+    step, i, j = (np.array(column) for column in list(zip(*collisions))[:3])
+    impulse = np.array([collision.impulse for collision in collisions])
     low, high = np.minimum(i, j), np.maximum(i, j)
     disk, other = np.where(low < 0, high, low), np.where(low < 0, low, high)
     order = np.lexsort((step, other, disk))

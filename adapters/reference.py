@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Hit
+from adapters.engine import Collision
 from reference_impl import exercise
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, Disks, World, make_disks
 from scenarios.model import Array, Scene, State
@@ -18,7 +18,11 @@ METHODS = {  # of the variants by their module
     "exercise": {"integrator": "symplectic Euler"},
     "crowd": {"integrator": "symplectic Euler"},
     "lesson": {"integrator": "explicit Euler"},
-    "ordered": {"integrator": "parabolas", "hits": "in order, each where and when it happens", "projection": "none"},
+    "ordered": {
+        "integrator": "parabolas",
+        "collisions": "in order, each where and when it happens",
+        "projection": "none",
+    },
 }
 
 
@@ -37,7 +41,7 @@ class Reference:
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
         self.dt, self.steps = dt, 0
-        self.log: list[Hit] = []
+        self.log: list[Collision] = []
         disks = make_disks(
             scene.position, scene.velocity, scene.radius, scene.mass,
             scene.inertia, scene.angle, scene.angular_velocity,
@@ -69,9 +73,9 @@ class Reference:
 
     def _advance(self, count: int) -> None:
         done = self.steps
-        hits = self.variant.advance(self.disks, self.world, self.dt, count)
+        collisions = self.variant.advance(self.disks, self.world, self.dt, count)
         if self.listening:
-            self.log += [Hit(done + k, i, j, impulse) for k, i, j, impulse in hits]
+            self.log += [Collision(done + k, i, j, impulse) for k, i, j, impulse in collisions]
         self.steps += count
 
     def read(self) -> State:
@@ -80,7 +84,7 @@ class Reference:
         kept = disks.position, disks.velocity, disks.angle, disks.angular_velocity
         return State(*(array.astype(np.float64) for array in kept))
 
-    def hits(self) -> list[Hit]:
+    def collisions(self) -> list[Collision]:
         """As the solver returned them."""
         return self.log
 

@@ -16,7 +16,7 @@ from reference_impl.neighbours import Near, astray, look_around
 from reference_impl.state import Disks, World
 
 CROWD = 64  # disks, from which on the list is cheaper than all pairs, even if a call is one step; if long, from 16 on
-EARLY = 0.8  # of the leash: the rest is for what the hits of a step move
+EARLY = 0.8  # of the leash: the rest is for what the collisions of a step move
 LOOK = 256  # disks a look at all neighbours in mid-step: more looks would cost more than asking all pairs
 NONE = -1  # in place of a number
 BLOCK = 256  # disks that fly at a time: few enough for the nearest cache
@@ -27,13 +27,13 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """As `exercise.advance`, to the bit."""
     if len(disks.radius) < CROWD:
         return exercise.advance(disks, world, dt, count)
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
-    advance_listed(disks, world, dt, count, hits)
-    return hits
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+    advance_listed(disks, world, dt, count, collisions)
+    return collisions
 
 
 @compiled
-def advance_listed(disks: Disks, world: World, dt: float, count: int, hits: list) -> int:
+def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> int:
     """Advance by near pairs, however few the disks are; returns in how many steps all pairs had to be asked."""
     pull, n, unlisted = pull_on(disks, world, dt), len(disks.radius), 0
     k, i, j, looks = 0, 0, 0, 0  # in step k nothing has been asked from the pair (i, j) on
@@ -43,11 +43,11 @@ def advance_listed(disks: Disks, world: World, dt: float, count: int, hits: list
     while k < count:
         near, began = look_around(disks, world, dt, count - k), k
         if near.listed:
-            k, i, j = play(disks, world, dt, count, hits, pull, near, k, i, j)
+            k, i, j = play(disks, world, dt, count, collisions, pull, near, k, i, j)
         looks = looks + 1 if k == began else 0
         if k < count and (not near.listed or looks > n // LOOK):
-            collide_rest(disks, world, k, hits, i, j)
-            collide_walls(disks, world, k, hits)
+            collide_rest(disks, world, k, collisions, i, j)
+            collide_walls(disks, world, k, collisions)
             wrap(disks.position, world)
             k, i, j, looks, unlisted = k + 1, 0, 0, 0, unlisted + 1
             if k < count:
@@ -84,7 +84,7 @@ def pull_on(disks: Disks, world: World, dt: float) -> Pull:
 
 @compiled
 def play(
-    disks: Disks, world: World, dt: float, count: int, hits: list, pull: Pull, near: Near, k: int, i: int, j: int
+    disks: Disks, world: World, dt: float, count: int, collisions: list, pull: Pull, near: Near, k: int, i: int, j: int
 ) -> tuple[int, int, int]:
     """Go on from the pair (i, j) of step k up to `count` or until a disk goes astray; returns where that is."""
     pairs, p = len(near.first), first_from(near, i, j)
@@ -96,7 +96,7 @@ def play(
             a, b = pair(near, p)
             impulse = collide(disks, a, b, world)
             if impulse != 0.0:
-                hits.append((k, a, b, impulse))
+                collisions.append((k, a, b, impulse))
             if off_leash(disks, near, a, b):
                 return k, a, b + 1
             p += 1
@@ -105,7 +105,7 @@ def play(
             for later in range(w, len(world.walls)):  # as it is moved, it may touch one that it was not near
                 impulse = collide_wall(disks, i, later, world)
                 if impulse != 0.0:
-                    hits.append((k, i, -1 - later, impulse))
+                    collisions.append((k, i, -1 - later, impulse))
             p = past(near, i, p)
 
 
@@ -150,7 +150,8 @@ def fly(disks: Disks, dt: float, pull: Pull, home, leash: float) -> int:  # type
 
 @kernel
 def turn(disks: Disks, dt: float, count: int, pull: Pull) -> None:
-    """The angles and spins of all steps, at last, as no hit asks for them: a block is fetched once for all of them."""
+    """The angles and spins of all steps, at last, as no collision asks for them: a block is fetched once for all of
+    them."""
     angle, spin = disks.angle, disks.angular_velocity
     for run in range(len(pull.moving)):
         begin, end = np.int64(pull.moving[run, 0]), np.int64(pull.moving[run, 1])
@@ -221,11 +222,11 @@ def off_leash(disks: Disks, near: Near, a: int, b: int) -> bool:
 
 
 @compiled
-def collide_rest(disks: Disks, world: World, k: int, hits: list, i: int, j: int) -> None:
+def collide_rest(disks: Disks, world: World, k: int, collisions: list, i: int, j: int) -> None:
     """Collide all pairs from (i, j) on, as the double loop of `exercise.step` does."""
     n = len(disks.radius)
     for a in range(i, n):
         for b in range(max(a + 1, j if a == i else 0), n):
             impulse = collide(disks, a, b, world)
             if impulse != 0.0:
-                hits.append((k, a, b, impulse))
+                collisions.append((k, a, b, impulse))

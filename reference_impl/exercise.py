@@ -12,15 +12,15 @@ from reference_impl.state import BY_INVERSE_MASS, EQUAL, Disks, World
 
 @compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
-    """Advance `count` steps of `dt` s; return the hits as (step, i, j, impulse in N s), wall w as j = -1 - w."""
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall w as j = -1 - w."""
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
-        step(disks, world, dt, k, hits)
-    return hits
+        step(disks, world, dt, k, collisions)
+    return collisions
 
 
 @compiled
-def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
+def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> None:
     """One step, as `performSimStep`: integrate all, collide every pair i < j in order, then the edges of the world."""
     integrate(disks, world, dt)
     n = len(disks.radius)
@@ -28,8 +28,8 @@ def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
         for j in range(i + 1, n):
             impulse = collide(disks, i, j, world)
             if impulse != 0.0:
-                hits.append((k, i, j, impulse))
-    collide_walls(disks, world, k, hits)
+                collisions.append((k, i, j, impulse))
+    collide_walls(disks, world, k, collisions)
     wrap(disks.position, world)
 
 
@@ -78,13 +78,13 @@ def collide(disks: Disks, a: int, b: int, world: World) -> float:
 
 
 @compiled
-def collide_walls(disks: Disks, world: World, k: int, hits: list) -> None:
+def collide_walls(disks: Disks, world: World, k: int, collisions: list) -> None:
     """Every disk against every wall, in order."""
     for i in range(len(disks.radius)):
         for w in range(len(world.walls)):
             impulse = collide_wall(disks, i, w, world)
             if impulse != 0.0:
-                hits.append((k, i, -1 - w, impulse))
+                collisions.append((k, i, -1 - w, impulse))
 
 
 @kernel

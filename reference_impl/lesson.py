@@ -1,4 +1,4 @@
-"""The solver of the lesson "Simple body dynamics": explicit Euler, walls that flip, hits from two equations.
+"""The solver of the lesson "Simple body dynamics": explicit Euler, walls that flip, collisions from two equations.
 
 Every function is compiled by numba from the source you read; with NUMBA_DISABLE_JIT=1 the same source
 runs as plain Python and gives the same bits. It shares no kernel with `exercise`: read one file, know one method.
@@ -12,18 +12,18 @@ from reference_impl.state import Disks, World
 
 @compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
-    """Advance `count` steps of `dt` s; return the hits as (step, i, j, impulse in N s), wall w as j = -1 - w."""
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall w as j = -1 - w."""
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
-        step(disks, world, dt, k, hits)
-    return hits
+        step(disks, world, dt, k, collisions)
+    return collisions
 
 
 @compiled
-def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
+def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> None:
     """One step: move, accelerate, bounce off the walls, collide every pair i < j, then the edges of the world."""
     integrate(disks, world, dt)
-    bounce(disks, world, k, hits)
+    bounce(disks, world, k, collisions)
     x, r = disks.position, disks.radius
     for i in range(len(r)):
         for j in range(i + 1, len(r)):
@@ -31,7 +31,7 @@ def step(disks: Disks, world: World, dt: float, k: int, hits: list) -> None:
             if sqrt((x[i, 0] - x[j, 0]) ** 2 + (x[i, 1] - x[j, 1]) ** 2) < r[i] + r[j]:
                 impulse = collide(disks, i, j, world)
                 if impulse != 0.0:
-                    hits.append((k, i, j, impulse))
+                    collisions.append((k, i, j, impulse))
     wrap(x, world)
 
 
@@ -52,7 +52,7 @@ def integrate(disks: Disks, world: World, dt: float) -> None:
 
 
 @compiled
-def bounce(disks: Disks, world: World, k: int, hits: list) -> None:
+def bounce(disks: Disks, world: World, k: int, collisions: list) -> None:
     """A wall flips the normal velocity of a disk that comes in, v' = -c_r v; the position stays as it is."""
     x, v, mass = disks.position, disks.velocity, disks.mass
     for i in range(len(mass)):
@@ -68,7 +68,7 @@ def bounce(disks: Disks, world: World, k: int, hits: list) -> None:
             change = -(1.0 + world.restitution) * speed / (distance * distance)
             v[i, 0] += change * nx
             v[i, 1] += change * ny
-            hits.append((k, i, -1 - w, mass[i] * change * distance))
+            collisions.append((k, i, -1 - w, mass[i] * change * distance))
 
 
 @compiled

@@ -1,12 +1,13 @@
-"""The hits of a step in the order in which they happen: exact flight, and every impulse where and when two meet.
+"""The collisions of a step in the order in which they happen: exact flight, and every impulse where and when two meet.
 
 The same law of impact as `exercise`, and no projection: all fly to the end of the step on their parabolas; then, as
 long as two met on the way, the two that met first go back to where they touched, get the impulse there, and fly to
 the end anew. Times count back from the end of the step: s = 0 is the end, s = -dt the start.
 
-Every search asks all pairs, so this is for some hundred disks at most. Where hits accumulate (a ball that bounces ever
-lower, a stack) the work is bounded: a bounce that would last less than a `REST` of a step is the last one, and after
-`MOST` hits a disk the rest of a step goes unresolved, which shows as overlap. Compiled by numba, as `exercise` is.
+Every search asks all pairs, so this is for some hundred disks at most. Where collisions accumulate (a ball that bounces
+ever lower, a stack) the work is bounded: a bounce that would last less than a `REST` of a step is the last one, and
+after `MOST` collisions a disk the rest of a step goes unresolved, which shows as overlap. Compiled by numba, as
+`exercise` is.
 """
 
 from math import inf, sqrt
@@ -17,22 +18,22 @@ from reference_impl.compiled import compiled
 from reference_impl.state import Disks, World
 
 REST = 1 / 16  # of a step
-MOST = 8  # hits a disk and step, on average
+MOST = 8  # collisions a disk and step, on average
 NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the world
 
 
 @compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
-    """Advance `count` steps of `dt` s; return the hits as (step, i, j, impulse in N s), wall w as j = -1 - w."""
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall w as j = -1 - w."""
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     pull = np.zeros_like(disks.velocity)
     for k in range(count):
-        step(disks, world, pull, dt, k, hits)
-    return hits
+        step(disks, world, pull, dt, k, collisions)
+    return collisions
 
 
 @compiled
-def step(disks: Disks, world: World, pull, dt: float, k: int, hits: list) -> None:  # type: ignore[no-untyped-def]
+def step(disks: Disks, world: World, pull, dt: float, k: int, collisions: list) -> None:  # type: ignore[no-untyped-def]
     """One step: fly, then resolve meeting after meeting. `pull` (n, 2) m/s2 is what accelerates each disk now."""
     fly(disks, world, pull, dt)
     now = -dt
@@ -45,7 +46,7 @@ def step(disks: Disks, world: World, pull, dt: float, k: int, hits: list) -> Non
         else:
             impulse = collide(disks, world, pull, i, j, now, dt)
             if impulse > 0.0:
-                hits.append((k, i, j, impulse))
+                collisions.append((k, i, j, impulse))
 
 
 @compiled
@@ -68,7 +69,8 @@ def fly(disks: Disks, world: World, pull, dt: float) -> None:  # type: ignore[no
 def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[no-untyped-def]
     """Move disk i, and keep what rounding cuts off for the next time (Kahan, Comm. ACM 8, 40, 1965).
 
-    Hundreds of small steps would else round ten times as much as the few flights from hit to hit that they are.
+    Hundreds of small steps would else round ten times as much as the few flights from collision to collision that they
+    are.
     """
     before, way = x[i, axis], way + remainder[i, axis]
     x[i, axis] = before + way

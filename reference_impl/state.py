@@ -12,7 +12,7 @@ BY_INVERSE_MASS, EQUAL, ONE_SIDED = 0, 1, 2
 
 
 class Disks(NamedTuple):
-    """One row a disk. A static disk has mass `inf`; it is hit but never moves.
+    """One row a disk. A static disk has mass `inf`; it is struck but never moves.
 
     `force` (N) and `torque` (N m) act during every step until you change them.
     """

@@ -129,12 +129,12 @@ def diff(
 @app.command()
 def truth(
     scene: Annotated[str, typer.Argument(metavar="SCENARIO|FILE.toml")],
-    events: Annotated[bool, typer.Option("--events", help="All hits, not only the first and last ten.")] = False,
+    events: Annotated[bool, typer.Option("--events", help="All collisions, not only the first and last ten.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="For programs: all of it as JSON.")] = False,
     seed: Seed = 0,
     timeout: Timeout = 60.0,
 ) -> None:
-    """Print the exact answer to a scene: its hits, how far it reaches, how precise it is and what ends it."""
+    """Print the exact answer to a scene: its collisions, how far it reaches, how precise it is and what ends it."""
     from reports.commands.truth import show_truth
 
     show_truth(scene, seed, events, as_json, timeout)

@@ -32,11 +32,11 @@ class Scene:
         velocity: (n, 2) m/s.
         radius: (n,) m, positive.
         mass: (n,) kg, positive; `inf` makes the disk static (it must be at rest).
-        restitution: normal speed after a hit over normal speed before it, 0 to 1, the same for all.
+        restitution: normal speed after a collision over normal speed before it, 0 to 1, the same for all.
         angle: (n,) rad, default 0.
         angular_velocity: (n,) rad/s, default 0.
         inertia: (n,) kg m2, default m r2 / 2 of a solid disk.
-        walls: (w, 2, 2) m, segments from walls[:, 0] to walls[:, 1]; static, hit from both sides.
+        walls: (w, 2, 2) m, segments from walls[:, 0] to walls[:, 1]; static, struck from both sides.
         gravity: (2,) m/s2, default none; acts on every disk that is not static.
         wrap: None, or (2, 2) m, low and high corner of the exercise's box: a disk whose centre is
             beyond an edge is set onto the opposite edge; disks do not see each other across it.
@@ -237,10 +237,10 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Collisions:
-    """Hits in order of time; one entry where a contact begins to push, however long it lasts.
+    """Collisions in order of time; one entry where a contact begins to push, however long it lasts.
 
     Attributes:
-        t: (h,) s; for a stepping engine the end of the step that resolved the hit.
+        t: (h,) s; for a stepping engine the end of the step that resolved the collision.
         i: (h,) index of the first disk.
         j: (h,) index of the other disk, i < j; or -1 - w for wall w.
         impulse: (h,) N s along the normal; NaN where an engine does not tell.
@@ -259,7 +259,7 @@ class Collisions:
         return Collisions(frozen(t), frozen(i, np.int64), frozen(j, np.int64), frozen(impulse))
 
     def __len__(self) -> int:
-        """Number of hits."""
+        """Number of collisions."""
         return len(self.t)
 
 
@@ -276,7 +276,7 @@ class Trajectory:
         velocity: (k, n, 2) m/s.
         angle: (k, n) rad, unwrapped.
         angular_velocity: (k, n) rad/s.
-        collisions: the hits up to t[-1].
+        collisions: the collisions up to t[-1].
         valid_until: s, the horizon up to which players are held to a truth: no sample lies beyond it.
         reason: why the truth ends there; "" if it does not.
         error_bound: m, how far a truth may be off before it; 0: a closed form, right to a few roundings.

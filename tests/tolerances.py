@@ -29,7 +29,7 @@ class Departure(NamedTuple):
 
 
 PRODUCT = "the elasticities of the two shapes are multiplied, so e on every shape gives e2"
-THRESHOLD = "hits that close at less than 1 m/s are taken as inelastic"
+THRESHOLD = "collisions that close at less than 1 m/s are taken as inelastic"
 ASLEEP = "a disk below the sleep tolerance for 0.5 s is put to sleep, and its velocity set to 0"
 CAP = "a disk moves at most 2 units of length a step; the velocity is cut, not only the path"
 NO_FRICTION_IN_BOUNCE = (
@@ -52,7 +52,7 @@ DEPARTURES = [
             "restitution_100", "restitution_wall",
         )
     ),
-    # What stops does so exactly: the two velocities of an inelastic hit agree to rounding in float32.
+    # What stops does so exactly: the two velocities of an inelastic collision agree to rounding in float32.
     *(
         Departure(engine, probe, 0.0, 8 * FLOAT32, THRESHOLD, source)
         for engine, source in (
@@ -76,7 +76,7 @@ DEPARTURES = [
     Departure("box2d:matched", "fast_spin", "refused", 0.0, TURN, BOX2D_SETTINGS + "b2_maxRotation (0.5f * b2_pi)"),
     Departure("box2d_v3:shipped", "fast_spin", 16 * pi, 16 * pi * 4 * FLOAT32, TURN, MAX_ROTATION),
     Departure("box2d_v3:matched", "fast_spin", "refused", 0.0, TURN, MAX_ROTATION),
-    # A ratio of two momenta that round as often as a hit does.
+    # A ratio of two momenta that round as often as a collision does.
     Departure(
         "box2d:shipped", "friction", 0.2, 8 * FLOAT32, "every shape has friction 0.2, and the pair sqrt(0.2 * 0.2)",
         "Box2D 2.3 Dynamics/b2Fixture.h: b2FixtureDef, friction = 0.2f",

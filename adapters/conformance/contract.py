@@ -63,18 +63,18 @@ def read_copies(row: Row) -> Reading:
 
 
 def load_forgets(row: Row) -> Reading:
-    """An engine that has played, been hit, and still holds a push does after `load` what a fresh one does."""
+    """An engine that has played, been struck, and still holds a push does after `load` what a fresh one does."""
     with loaded(row, head_on(2.0)) as used:
         for _ in range(12):
             used.push(2, np.array([1.0, 2.0]), 3.0)
             used.step()
         used.push(1, np.array([5.0, 5.0]), 5.0)
         used.load(plain(), DT / 2)
-        left = len(used.hits())
+        left = len(used.collisions())
         seen = history(used)
     with loaded(row, plain(), DT / 2) as fresh:
         wanted = history(fresh)
-    return Reading("hits at the start" if left else first_difference(seen, wanted), "nowhere")
+    return Reading("collisions at the start" if left else first_difference(seen, wanted), "nowhere")
 
 
 def worlds_are_apart(row: Row) -> Reading:
@@ -113,7 +113,7 @@ def steps_obey_dt(row: Row) -> Reading:
 
 
 def stays_finite(row: Row) -> Reading:
-    """20 steps of a scene with a hit, a bounce, gravity and spin."""
+    """20 steps of a scene with a collision, a bounce, gravity and spin."""
     with loaded(row, plain()) as engine:
         for k in range(20):
             engine.step()
@@ -175,15 +175,15 @@ def same_instant(row: Row) -> Reading:
     return Reading(speed, gravity * steps * DT, row.rounding * steps * gravity)
 
 
-def hits_are_told(row: Row) -> Reading:
-    """One hit of disks 1 and 2 of three gives one collision, of these two."""
+def collisions_are_told(row: Row) -> Reading:
+    """One collision of disks 1 and 2 of three gives one collision, of these two."""
     with loaded(row, head_on(2.0)) as engine:
         engine.step(12)
         return Reading(told(engine), "disk 1 and disk 2")
 
 
 def walls_are_told(row: Row) -> Reading:
-    """One hit on the second of two walls gives one collision, with this wall."""
+    """One collision on the second of two walls gives one collision, with this wall."""
     scene = scene_of(
         position=[[0.0, 9.0], [0.0, 0.0]], velocity=[[0.0, 0.0], [2.0, 0.0]], radius=[0.5, 0.5], mass=[1.0, 1.0],
         walls=[[[-0.53, -2.0], [-0.53, 2.0]], [[0.53, -2.0], [0.53, 2.0]]],
@@ -193,15 +193,15 @@ def walls_are_told(row: Row) -> Reading:
         return Reading(told(engine), "disk 1 and wall 1")
 
 
-def hits_name_their_step(row: Row) -> Reading:
-    """The step of a hit, from 0, is the one in which the velocities change."""
+def collisions_name_their_step(row: Row) -> Reading:
+    """The step of a collision, from 0, is the one in which the velocities change."""
     with loaded(row, head_on(2.0)) as engine:
         before = engine.read().velocity[1, 0]
         changed = 0
         while changed < 12 and abs(engine.read().velocity[1, 0] / before - 1) < 0.1:
             engine.step()
             changed += 1
-        steps = [hit.step for hit in engine.hits()]
+        steps = [collision.step for collision in engine.collisions()]
     return Reading(steps[0] if steps else np.nan, changed - 1)
 
 
@@ -211,14 +211,14 @@ def impulse_is_told(row: Row) -> Reading:
         before = engine.read().velocity[2, 0]
         engine.step(12)
         moved = engine.read().velocity[2, 0] - before
-        impulses = [hit.impulse for hit in engine.hits()]
+        impulses = [collision.impulse for collision in engine.collisions()]
     if np.isnan(impulses).any():
         return Reading("not told", "not told", note="the engine's events carry no impulse")
     return Reading(float(sum(impulses)), float(moved), ROUNDINGS * row.rounding * abs(moved))
 
 
 def static_stays(row: Row) -> Reading:
-    """A static disk that is hit and pushed keeps its state to the bit."""
+    """A static disk that is struck and pushed keeps its state to the bit."""
     scene = scene_of(
         position=[[-1.02, 0.1], [0.0, 0.0]], velocity=[[2.0, 0.0], [0.0, 0.0]], radius=[0.5, 0.5], mass=[1.0, np.inf],
         gravity=[0.0, -9.8],
@@ -228,10 +228,10 @@ def static_stays(row: Row) -> Reading:
         for _ in range(12):
             engine.push(1, np.array([5.0, 5.0]), 5.0)
             engine.step()
-        after, hits = engine.read(), told(engine)
+        after, collisions = engine.read(), told(engine)
     moved = [name for name, array in vars(after).items() if (array[1] != getattr(before, name)[1]).any()]
     return Reading(
-        "; ".join(f"{name} changed" for name in moved) or f"stays, told {hits}", "stays, told disk 0 and disk 1"
+        "; ".join(f"{name} changed" for name in moved) or f"stays, told {collisions}", "stays, told disk 0 and disk 1"
     )
 
 
@@ -249,9 +249,11 @@ CONTRACT: dict[str, Probe] = {
     "mass_by_push": Probe("What mass does a push feel? (kg)", mass_by_push, "breaks"),
     "inertia_by_push": Probe("What inertia does a torque feel? (kg m2)", inertia_by_push, "breaks"),
     "same_instant": Probe("How fast is a disk after 1 s under 9.81 m/s2? (m/s)", same_instant, "breaks"),
-    "hits_are_told": Probe("Which collisions are told when disks 1 and 2 meet once?", hits_are_told, "breaks"),
+    "collisions_are_told": Probe(
+        "Which collisions are told when disks 1 and 2 meet once?", collisions_are_told, "breaks"
+    ),
     "walls_are_told": Probe("Which collisions are told when disk 1 meets wall 1 once?", walls_are_told, "breaks"),
-    "hits_name_their_step": Probe("In which step is a hit told?", hits_name_their_step, "breaks"),
-    "impulse_is_told": Probe("Which impulse is told of a hit? (N s)", impulse_is_told, "breaks"),
-    "static_stays": Probe("Does a static disk that is hit and pushed stay?", static_stays, "breaks"),
+    "collisions_name_their_step": Probe("In which step is a collision told?", collisions_name_their_step, "breaks"),
+    "impulse_is_told": Probe("Which impulse is told of a collision? (N s)", impulse_is_told, "breaks"),
+    "static_stays": Probe("Does a static disk that is struck and pushed stay?", static_stays, "breaks"),
 }

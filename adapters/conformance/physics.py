@@ -10,7 +10,9 @@ from adapters.conformance.probe import DT, Probe, Reading, head_on, largest, loa
 from adapters.engine import Row
 
 SPEEDS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)  # m/s, on both sides of Box2D's threshold of 1
-ROUNDINGS = 8  # a relative velocity, an effective mass, a target, an impulse, two updates: a hit rounds no more often
+ROUNDINGS = (
+    8  # a relative velocity, an effective mass, a target, an impulse, two updates: a collision rounds no more often
+)
 
 
 def free_flight(row: Row) -> Reading:
@@ -61,7 +63,8 @@ def spins_freely(row: Row) -> Reading:
 
 
 def pair_momentum(row: Row) -> Reading:
-    """Change of momentum over sum m |v|, in an oblique hit of 1 kg and 7 kg; both velocities round once or twice."""
+    """Change of momentum over sum m |v|, in an oblique collision of 1 kg and 7 kg; both velocities round once or
+    twice."""
     scene = scene_of(
         position=[[-0.52, 0.2], [0.5, -0.1]], velocity=[[2.0, 0.3], [-1.0, 0.1]], radius=[0.5, 0.5], mass=[1.0, 7.0],
         angular_velocity=[3.0, -2.0],
@@ -71,7 +74,7 @@ def pair_momentum(row: Row) -> Reading:
         engine.step(24)
         after = engine.read().velocity
     if np.abs(after - before).max() < 0.1:
-        return Reading("no hit", 0.0)
+        return Reading("no collision", 0.0)
     change = largest(scene.mass @ (after - before)) / float(scene.mass @ np.hypot(*before.T))
     return Reading(change, 0.0, ROUNDINGS * row.rounding)
 
@@ -86,7 +89,7 @@ def restitution(row: Row, closing: float) -> Reading:
 
 
 def wall_restitution(row: Row) -> Reading:
-    """Speed after over speed before a hit of 2 m/s on a wall, e = 0.5."""
+    """Speed after over speed before a collision of 2 m/s on a wall, e = 0.5."""
     scene = scene_of(
         position=[[0.0, 0.0]], velocity=[[2.0, 0.0]], radius=[0.5], mass=[7.3],
         walls=[[[0.53, -2.0], [0.53, 2.0]]],
@@ -97,7 +100,7 @@ def wall_restitution(row: Row) -> Reading:
 
 
 def friction(row: Row) -> Reading:
-    """Sideways over normal momentum taken up by a disk in a head-on hit of two that spin fast: the effective
+    """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin fast: the effective
     coefficient of friction while they slide. Frictionless, the sideways part is 0 and is not even rounded."""
     with loaded(row, head_on(2.0, spin=40.0)) as engine:
         before = engine.read().velocity[1]
@@ -112,7 +115,9 @@ PHYSICS: dict[str, Probe] = {
     "fast_flight": Probe("How fast is a free disk of 512 m/s after 4 steps? (m/s)", fast_flight, "departs"),
     "fast_spin": Probe("How fast does a free disk of 300 rad/s spin after 4 steps? (rad/s)", fast_spin, "departs"),
     "spins_freely": Probe("What angle has a free disk after 1 s at 20 rad/s? (rad)", spins_freely, "departs"),
-    "pair_momentum": Probe("How much momentum does a hit of two disks make? (of sum m v)", pair_momentum, "departs"),
+    "pair_momentum": Probe(
+        "How much momentum does a collision of two disks make? (of sum m v)", pair_momentum, "departs"
+    ),
     **{
         f"restitution_{speed:g}": Probe(
             f"What is e of a pair that closes at {speed:g} m/s, where 0.5 is stated?",
@@ -121,6 +126,8 @@ PHYSICS: dict[str, Probe] = {
         )
         for speed in SPEEDS
     },
-    "restitution_wall": Probe("What is e of a wall hit at 2 m/s, where 0.5 is stated?", wall_restitution, "departs"),
+    "restitution_wall": Probe(
+        "What is e of a wall collision at 2 m/s, where 0.5 is stated?", wall_restitution, "departs"
+    ),
     "friction": Probe("What coefficient of friction acts between two disks?", friction, "departs"),
 }

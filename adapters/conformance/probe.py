@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from adapters.engine import Engine, Row
-from adapters.play import first_hits
+from adapters.play import first_collisions
 from scenarios.model import Array, Scene, frozen
 
 DT = 1 / 256  # s; a power of two, so that a whole number of steps is a time without rounding
@@ -85,7 +85,7 @@ def head_on(closing: float, spin: float = 0.0, lead: float = 4.5) -> Scene:
 
 
 def plain() -> Scene:
-    """Two disks that hit each other obliquely after 2 steps, fall, spin, and bounce off a floor."""
+    """Two disks that collide obliquely after 2 steps, fall, spin, and bounce off a floor."""
     return scene_of(
         position=[[-0.42, 0.1], [0.0, 0.4]], velocity=[[2.0, 0.0], [-1.0, 0.5]], radius=[0.25, 0.25], mass=[1.0, 3.0],
         angle=[0.1, -0.2], angular_velocity=[1.0, -2.0], gravity=[0.0, -9.8],
@@ -95,19 +95,20 @@ def plain() -> Scene:
 
 def told(engine: Engine, dt: float = DT) -> str:
     """The collisions an engine tells, as "disk 0 and disk 1, disk 0 and wall 2"."""
-    hits = first_hits(engine.hits(), dt)
-    names = [(f"disk {i}", f"disk {j}" if j >= 0 else f"wall {-1 - j}") for i, j in zip(hits.i, hits.j)]
+    collisions = first_collisions(engine.collisions(), dt)
+    names = [(f"disk {i}", f"disk {j}" if j >= 0 else f"wall {-1 - j}") for i, j in zip(collisions.i, collisions.j)]
     return ", ".join(" and ".join(pair) for pair in names) or "none"
 
 
 def history(engine: Engine, steps: int = 60) -> list[tuple[str, bytes]]:
-    """What an engine does from now on: (what and when, its bytes) for every array at every 10th step, then the hits."""
+    """What an engine does from now on: (what and when, its bytes) for every array at every 10th step, then the
+    collisions."""
     seen: list[tuple[str, bytes]] = []
     for k in range(0, steps + 1, 10):
         if k:
             engine.step(10)
         seen += [(f"{name} after {k} steps", array.tobytes()) for name, array in vars(engine.read()).items()]
-    return [*seen, ("hits", repr([hit[:3] for hit in engine.hits()]).encode())]
+    return [*seen, ("collisions", repr([collision[:3] for collision in engine.collisions()]).encode())]
 
 
 def first_difference(seen: list[tuple[str, bytes]], wanted: list[tuple[str, bytes]]) -> str:

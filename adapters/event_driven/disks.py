@@ -2,8 +2,8 @@
 
 A record holds the earliest contact of its disk with another one, as of when it was last looked for, and the earliest
 event of the disk by itself: a wall, an edge of its cell or of the wrap box. A contact is void if the other disk has
-been hit since (its `count` moved on); it is looked for again when its time comes, and is early rather than late until
-then. Every pair is covered by the record made last of its two (Lubachevsky, J. Comput. Phys. 94, 255, 1991).
+been struck since (its `count` moved on); it is looked for again when its time comes, and is early rather than late
+until then. Every pair is covered by the record made last of its two (Lubachevsky, J. Comput. Phys. 94, 255, 1991).
 """
 
 from __future__ import annotations
@@ -35,20 +35,20 @@ DISK = np.dtype(
         ("radius", "f8"),
         ("next", "u4"),  # the next disk in the chain of its cell
         ("cx", "i4"), ("cy", "i4"),  # its cell
-        ("count", "i4"),  # hits and changes of pull so far
+        ("count", "i4"),  # collisions and changes of pull so far
         ("weight", "f8"),  # 1 / mass
-        ("noise", "f8"),  # m/s, what rounding may have left of the closing speed of its last hit
+        ("noise", "f8"),  # m/s, what rounding may have left of the closing speed of its last collision
         ("pair_time", "f8"), ("own_time", "f8"),  # when it meets another disk, or something by itself
         ("partner", "u4"), ("partner_count", "i4"),  # that disk, and its count when this was found
         ("own_code", "i4"),  # what it meets by itself, as above
-        ("last", "i4"),  # what it hit last: a disk, or -1 - wall
+        ("last", "i4"),  # what it collision last: a disk, or -1 - wall
         ("before", "u4"),  # the disk before it in its chain
-        ("mark_hits", "i4"), ("mark_time", "f8"),  # hits since, to notice when they accumulate
+        ("mark_collisions", "i4"), ("mark_time", "f8"),  # collisions since, to notice when they accumulate
         ("ax", "f8"), ("ay", "f8"),  # acceleration; lying on a wall, only that along it
         ("pull_x", "f8"), ("pull_y", "f8"),  # acceleration of free flight
         ("ox", "f8"), ("oy", "f8"),  # where cell (0, 0) of its lap lies: the grid of an open scene repeats for ever
         ("wall", "i4"),  # the wall it lies on; -1: none; -2 - wall: none since it slid off that one
-        ("bounces", "i4"),  # hits in a row on the face of one wall
+        ("bounces", "i4"),  # collisions in a row on the face of one wall
         ("corner", "i4"),  # the second wall of the corner in which it lies still; -1: none
         ("", "i4"),
     ]
@@ -57,7 +57,7 @@ DISK = np.dtype(
 # Of each disk the collisions in a row between which it has not flown, see `event_rest.rattles`.
 RUN = np.dtype(
     [
-        ("hits", "i4"),  # those that count
+        ("collisions", "i4"),  # those that count
         ("walls", "i4"),  # collisions in a row with walls, whether it has flown between them or not
         ("start", "f8"),  # s, when the first of the run was
         ("pull", "f8"),  # m/s2, the largest that acted on those who took part
@@ -88,7 +88,9 @@ class Rules(NamedTuple):
     mixed: bool  # not everything alike
     wrapped: bool
     lasting: bool  # bounces die out too slowly for `crowd`, or never
-    crowd: float  # units in the last place of the time: who hits 64 times within so many has no single continuation
+    crowd: (
+        float  # units in the last place of the time: who collisions 64 times within so many has no single continuation
+    )
 
 
 class Walls(NamedTuple):

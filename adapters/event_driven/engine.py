@@ -1,4 +1,5 @@
-"""The float64 event engine of `scenarios` as a player: from hit to hit, and asked at the end of each step."""
+"""The float64 event engine of `scenarios` as a player: from collision to collision, and asked at the end of each
+step."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Hit, Unsupported
+from adapters.engine import Collision, Unsupported
 from adapters.event_driven.events import EventEngine
 from scenarios.model import Array, Scene, State
 from scenarios.no_truth import NoTruth
@@ -19,7 +20,7 @@ class EventDriven:
     listening, wrapping = (
         True,
         0.0,
-    )  # its own list of hits is what it works with: not hearing of them would save nothing
+    )  # its own list of collisions is what it works with: not hearing of them would save nothing
 
     def load(self, scene: Scene, dt: float) -> None:
         """Find every disk's first event; a start without a single continuation is refused."""
@@ -81,12 +82,12 @@ class EventDriven:
         """Every disk flown from its own last event to now."""
         return State(*self.engine.look(self.steps * self.dt), *self.turn())
 
-    def hits(self) -> list[Hit]:
-        """Every hit in the step at whose end it had happened."""
+    def collisions(self) -> list[Collision]:
+        """Every collision in the step at whose end it had happened."""
         found = []
-        for t, i, j, impulse in self.engine.hits.tolist():
+        for t, i, j, impulse in self.engine.collisions.tolist():
             step = int(t / self.dt)
-            found.append(Hit(step - (step * self.dt >= t and step > 0), int(i), int(j), impulse))
+            found.append(Collision(step - (step * self.dt >= t and step > 0), int(i), int(j), impulse))
         return found
 
     def settings(self) -> dict[str, tuple[Any, Any]]:

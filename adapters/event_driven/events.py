@@ -1,4 +1,5 @@
-"""The float64 event engine: disks, walls, a torus or the exercise's wrap, from hit to hit without time steps.
+"""The float64 event engine: disks, walls, a torus or the exercise's wrap, from collision to collision without time
+steps.
 
 It has no step size and no tolerance: contact times are roots, flights are parabolas. Where the motion has no single
 continuation it says so (`NoTruth`) rather than go on.
@@ -110,7 +111,7 @@ class EventEngine:
         self.spent, self.since = 0, now
 
     def partners(self, i: int, last: int, since: float) -> str:
-        """What disk `i` has hit since a time, in words; `last` was the last of it."""
+        """What disk `i` has struck since a time, in words; `last` was the last of it."""
         log = np.concatenate([np.empty((0, 5)), *self.kept[-2:]])
         log = log[log[:, 0] >= since * (1 - 1e-12)]
         found = {last, *log[log[:, 1] == i, 2].astype(int).tolist(), *log[log[:, 2] == i, 1].astype(int).tolist()}
@@ -137,13 +138,14 @@ class EventEngine:
         return out[:, :2], out[:, 2:]
 
     @property
-    def hits(self) -> Array:
-        """(h, 4): t s, disk, other disk or -1 - wall, impulse N s, of all hits so far."""
+    def collisions(self) -> Array:
+        """(h, 4): t s, disk, other disk or -1 - wall, impulse N s, of all collisions so far."""
         return np.concatenate([np.empty((0, 5)), *self.kept])[:, :4]
 
     @property
     def cosines(self) -> Array:
-        """(h,) of the impact angle of each of the hits, normal over whole speed: the smaller, the more a graze."""
+        """(h,) of the impact angle of each of the collisions, normal over whole speed: the smaller, the more a
+        graze."""
         return np.concatenate([np.empty((0, 5)), *self.kept])[:, 4]
 
     def refuse_pairs(self) -> None:

@@ -1,4 +1,5 @@
-"""What a hit does in the event engine: Newton's restitution along the line of centres, without friction; and its note.
+"""What a collision does in the event engine: Newton's restitution along the line of centres, without friction; and its
+note.
 
 A collision is logged and counted, so that those without an end are noticed: between which float64 tells no time, or
 between which nothing flies.
@@ -13,16 +14,16 @@ import numpy as np
 
 from adapters.event_driven.compiled import inlined, kernel
 from adapters.event_driven.disks import ACCUMULATION, BASE, GOES_ON, LOGGED, NOBODY, STOP, WHO, WHOM, Arena, Walls
-from adapters.event_driven.rest import HITS, hold, jolt, rattles, rests, second_wall, slow
+from adapters.event_driven.rest import COLLISIONS, hold, jolt, rattles, rests, second_wall, slow
 from adapters.event_driven.search import ROUNDING, image
 
 
 @inlined
 def collide(a: Any, b: Any, i: int, j: int, shift: tuple[float, float], restitution: float) -> tuple[float, float]:
-    """Hit of disks i and j that are in contact; impulse N s, 0 if they do not close in, and cosine of the angle.
+    """Collision of disks i and j that are in contact; impulse N s, 0 if they do not close in, and cosine of the angle.
 
     v_i -= q w_i dr, v_j += q w_j dr, q = -(1 + e) b / (dr.dr (w_i + w_j)): a normal that is made a unit vector by a
-    square root would let the energy drift by 1.5e-17 a hit.
+    square root would let the energy drift by 1.5e-17 a collision.
     """
     dx, dy = b.x - a.x + image(b.cx - a.cx, shift[0]), b.y - a.y + image(b.cy - a.cy, shift[1])
     ux, uy = b.vx - a.vx, b.vy - a.vy
@@ -42,7 +43,7 @@ def collide(a: Any, b: Any, i: int, j: int, shift: tuple[float, float], restitut
 
 @kernel
 def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) -> tuple[float, float]:
-    """Hit of a disk on a wall it touches, set exactly beside the face; as `collide`."""
+    """Collision of a disk on a wall it touches, set exactly beside the face; as `collide`."""
     ux, uy, speed2 = walls.segment[w, 2], walls.segment[w, 3], a.vx * a.vx + a.vy * a.vy
     dx, dy = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
     a.bounces = 0 if part else (a.bounces + 1 if a.last == -1 - w else 1)
@@ -67,7 +68,7 @@ def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) ->
 
 @inlined
 def tell(arena: Arena, now: float, i: int, j: int, impulse: float, cosine: float) -> None:
-    """Write a hit into the log."""
+    """Write a collision into the log."""
     log, k = arena.log, arena.told[LOGGED]
     log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = arena.clock[BASE] + now, i, j, impulse, cosine
     arena.told[LOGGED] += 1
@@ -81,14 +82,15 @@ def stop(arena: Arena, now: float, i: int, j: int) -> None:
 
 @inlined
 def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) -> bool:
-    """Count and log a hit; True if hits of disk `i` follow each other faster than float64 tells times apart."""
+    """Count and log a collision; True if collisions of disk `i` follow each other faster than float64 tells times
+    apart."""
     a.count += 1
     if impulse > 0.0:
         tell(arena, a.t, i, j, impulse, cosine)
-    a.mark_hits += 1
-    if a.mark_hits < HITS:
+    a.mark_collisions += 1
+    if a.mark_collisions < COLLISIONS:
         return False
-    since, a.mark_hits, a.mark_time = a.t - a.mark_time, 0, a.t
+    since, a.mark_collisions, a.mark_time = a.t - a.mark_time, 0, a.t
     if since > arena.rules.crowd * np.spacing(arena.clock[BASE] + a.t):
         return False
     stop(arena, a.t - since, i, j)
@@ -97,7 +99,7 @@ def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) ->
 
 @inlined
 def change(a: Any) -> None:
-    """Make void what others know of a disk, and forget what it hit last."""
+    """Make void what others know of a disk, and forget what it collision last."""
     a.count += 1
     a.last = NOBODY
 
@@ -113,7 +115,7 @@ def rattles_on_disk(run: Any, a: Any, b: Any, restitution: float, impulse: float
 
 
 @kernel
-def hit_wall(arena: Arena, i: int, w: int, part: int) -> int:
+def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
     """Disk `i` bounces off a wall, or comes to rest on its face or in a corner with another one.
 
     Bounces to and fro in a corner go on, however many there are at one instant, until they have made it slow.
@@ -124,7 +126,7 @@ def hit_wall(arena: Arena, i: int, w: int, part: int) -> int:
     jolt(walls, a)
     crowded = note(arena, a, i, -1 - w, impulse, cosine)
     run.walls += 1
-    walls_only = run.walls >= HITS  # no other disk has a part in it
+    walls_only = run.walls >= COLLISIONS  # no other disk has a part in it
     trapped = False
     if arena.rules.falling or arena.rules.restitution < 1.0:
         closing = impulse * a.weight / (1.0 + arena.rules.restitution)

@@ -36,7 +36,7 @@ from adapters.event_driven.disks import (
     settle,
     unlink,
 )
-from adapters.event_driven.impacts import change, collide, hit_wall, note, rattles_on_disk, stop
+from adapters.event_driven.impacts import change, collide, collision_wall, note, rattles_on_disk, stop
 from adapters.event_driven.queue import Tree, put
 from adapters.event_driven.rest import across, bear, jolt, take_off
 from adapters.event_driven.search import ALL, ROUNDING, find_own, find_pair
@@ -74,7 +74,7 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
             if b.count == a.partner_count:
                 j = np.int64(a.partner)
                 fly(b, now, scenery)
-                status = hit(arena, scenery, i, j)
+                status = collision(arena, scenery, i, j)
         elif a.own_code < WRAP:
             side = a.own_code - EDGE
             cross(disks, arena.head, arena.grid, i, side)
@@ -103,8 +103,8 @@ def renew(arena: Arena, scenery: Scenery, i: int, fresh: bool, beyond: int) -> N
 
 
 @pasted
-def hit(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
-    """Disks i and j hit each other."""
+def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
+    """Disks i and j collide."""
     a, b = arena.disks[i], arena.disks[j]
     new_to_a, new_to_b = a.last != j, b.last != i
     impulse, cosine = collide(a, b, i, j, arena.grid.shift, arena.rules.restitution)
@@ -130,7 +130,7 @@ def alone(arena: Arena, i: int) -> int:
     """What disk `i` does by itself but for changing its cell: it meets a wall, the wrap, the end of its wall."""
     code = arena.disks[i].own_code
     if code >= WALL:
-        return hit_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
+        return collision_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
     return leave(arena, i) if code == END else wrap(arena, i, code - WRAP)
 
 

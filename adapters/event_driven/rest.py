@@ -1,8 +1,9 @@
 """Rest in the event engine: what lies on a wall or in a corner, and collisions between which nothing flies any more.
 
 A disk whose bounces on a wall have come to their end lies on it: it has neither normal speed nor normal pull, and flies
-along the wall on a parabola of its own, until a hit, a change of pull or the wall's end takes it off. Between two walls
-that its pull presses it into it lies still. This is the limit of the bounces, not a model of friction or of sticking.
+along the wall on a parabola of its own, until a collision, a change of pull or the wall's end takes it off. Between two
+walls that its pull presses it into it lies still. This is the limit of the bounces, not a model of friction or of
+sticking.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from adapters.event_driven.compiled import inlined, kernel
 from adapters.event_driven.disks import Grid, Walls
 from adapters.event_driven.search import ROUNDING
 
-HITS = 64  # so many collisions of one disk, within Rules.crowd or without a flight between them, accumulate
+COLLISIONS = 64  # so many collisions of one disk, within Rules.crowd or without a flight between them, accumulate
 LONGEST = 16  # times a bounce that rounding hides, from one that counts to the next: others lie in between
 
 
@@ -61,7 +62,7 @@ def leave_corner(walls: Walls, a: Any) -> None:
 
 @inlined
 def jolt(walls: Walls, a: Any) -> None:
-    """After a hit from elsewhere a disk stays on its wall only if nothing moves it off or into the wall."""
+    """After a collision from elsewhere a disk stays on its wall only if nothing moves it off or into the wall."""
     if a.corner >= 0 and abs(a.vx) + abs(a.vy) > a.noise:
         leave_corner(walls, a)
     if a.wall >= 0:
@@ -143,7 +144,7 @@ def rests(walls: Walls, a: Any, w: int, k: int, crowded: bool, trapped: bool) ->
     """
     if k >= 0 and lie_still(walls, a, w, k, trapped):
         return True
-    over = a.bounces >= HITS if crowded or trapped else abs(across(walls, a, w, a.vx, a.vy)) <= a.noise
+    over = a.bounces >= COLLISIONS if crowded or trapped else abs(across(walls, a, w, a.vx, a.vy)) <= a.noise
     if not over or (a.wall >= 0 and k < 0) or across(walls, a, w, a.pull_x, a.pull_y) >= 0.0:
         return False
     lie_down(walls, a, w)
@@ -171,19 +172,20 @@ def rattles(run: Any, a: Any, closing: float, pull: float, counts: bool) -> bool
     """Whether a disk that has just collided, closing at so many m/s, rattles between what it touches.
 
     A bounce that gets no higher than `blur` is none that float64 can play: v2 / 2 <= g blur, where g is the largest
-    pull on those who take part, and what bends the way round a disk. It takes sqrt(8 blur / g) at most. HITS collisions
-    in a row that count, with no more than LONGEST times as long for each, have no end. What counts is a collision with
-    another thing than the one before: those with one thing die out by themselves, but where e is too near 1 for that.
+    pull on those who take part, and what bends the way round a disk. It takes sqrt(8 blur / g) at most. COLLISIONS
+    collisions in a row that count, with no more than LONGEST times as long for each, have no end. What counts is a
+    collision with another thing than the one before: those with one thing die out by themselves, but where e is too
+    near 1 for that.
     """
     run.pull = max(run.pull, pull)
     g = run.pull + (a.vx * a.vx + a.vy * a.vy) / a.radius
     if closing * closing > 2.0 * g * blur(a) + a.noise * a.noise:
-        run.hits, run.pull = 0, 0.0
+        run.collisions, run.pull = 0, 0.0
         return False
-    if run.hits == 0:
+    if run.collisions == 0:
         run.start = a.t
-    run.hits += counts
-    if run.hits < HITS:
+    run.collisions += counts
+    if run.collisions < COLLISIONS:
         return False
-    run.hits = 0
-    return (a.t - run.start) * sqrt(g) <= LONGEST * HITS * sqrt(8.0 * blur(a))
+    run.collisions = 0
+    return (a.t - run.start) * sqrt(g) <= LONGEST * COLLISIONS * sqrt(8.0 * blur(a))

@@ -111,7 +111,7 @@ def meeting(
 ) -> float:
     """When two disks meet, from position, velocity and acceleration of one relative to the other.
 
-    noise: what rounding may have left of their closing speed if these two hit each other last, else 0.
+    noise: what rounding may have left of their closing speed if these two collide last, else 0.
     """
     gap, closing, speed2 = dx * dx + dy * dy - reach * reach, dx * ux + dy * uy, ux * ux + uy * uy
     if noise > 0.0:
@@ -189,16 +189,16 @@ def find_pair(arena: Arena, scenery: Scenery, i: int, beyond: int) -> None:
             ux, uy = ux - vx, uy - vy
         reach = radius + b.radius
         if len(scenery) and arena.rules.mixed and (b.ax != a.ax or b.ay != a.ay):
-            just_hit = noise if last == j and b.last == i else 0.0
+            just_collision = noise if last == j and b.last == i else 0.0
             until = min(best, a.own_time - now)
-            t = meeting(dx, dy, ux, uy, b.ax - a.ax, b.ay - a.ay, reach, just_hit, until)
+            t = meeting(dx, dy, ux, uy, b.ax - a.ax, b.ay - a.ay, reach, just_collision, until)
             if t < best:
                 best, who = t, np.int64(j)
         else:
             gap, closing = dx * dx + dy * dy - reach * reach, dx * ux + dy * uy
             disc = closing * closing - (ux * ux + uy * uy) * gap
             t = max(gap, 0.0) / (sqrt(max(disc, 0.0)) - closing)
-            # Of a hit just resolved, rounding may have left a little closing speed.
+            # Of a collision just resolved, rounding may have left a little closing speed.
             if (closing < (-reach * noise if last == j else 0.0)) & (disc > 0.0) & (t < best):
                 best, who = t, np.int64(j)
     if who >= 0:

@@ -42,7 +42,7 @@ class Switches(NamedTuple):
 
     order: np.ndarray  # the stages of a step, as places in STAGES
     drift: float = 0.0  # of a h2, by which `move` goes farther than v h
-    threshold: float = 0.0  # m/s: closing speeds up to which a hit is inelastic
+    threshold: float = 0.0  # m/s: closing speeds up to which a collision is inelastic
     project: bool = True  # of `pairs`: an overlap is undone at once
     project_walls: bool = True  # of `walls`
     iterations: int = 8  # of `bounce`
@@ -63,30 +63,32 @@ class Switches(NamedTuple):
 
 @compiled
 def advance(disks: Disks, world: World, on: Switches, kept: Contacts, h: float, count: int) -> list:
-    """Advance `count` steps, each move by `h` s; return the hits as `exercise.advance` does."""
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+    """Advance `count` steps, each move by `h` s; return the collisions as `exercise.advance` does."""
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
         kept.start[:], kept.moved[:] = disks.position, 0.0
         for stage in on.order:
-            act(stage, disks, world, on, kept, h, k, hits)
+            act(stage, disks, world, on, kept, h, k, collisions)
         for c in range(kept.found[0]):
             if kept.rows[c].impulse > 0.0:
-                hits.append((k, kept.rows[c].i, kept.rows[c].j, kept.rows[c].impulse))
+                collisions.append((k, kept.rows[c].i, kept.rows[c].j, kept.rows[c].impulse))
         wrap(disks.position, world)
-    return hits
+    return collisions
 
 
 @compiled
-def act(stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h: float, k: int, hits: list) -> None:
+def act(
+    stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h: float, k: int, collisions: list
+) -> None:
     """One stage."""
     if stage == ACCELERATE:
         accelerate(disks, world, h)
     elif stage == MOVE:
         move(disks, world, on, kept, h)
     elif stage == PAIRS:
-        pairs(disks, world, on, k, hits)
+        pairs(disks, world, on, k, collisions)
     elif stage == WALLS:
-        walls(disks, world, on, k, hits)
+        walls(disks, world, on, k, collisions)
     elif stage == DETECT:
         detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
     elif stage == BY_ISLAND:
@@ -141,27 +143,27 @@ def move(disks: Disks, world: World, on: Switches, kept: Contacts, h: float) -> 
 
 
 @compiled
-def pairs(disks: Disks, world: World, on: Switches, k: int, hits: list) -> None:
+def pairs(disks: Disks, world: World, on: Switches, k: int, collisions: list) -> None:
     """Task 2 of the exercise for one pair of disks after the other."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for j in range(i + 1, len(radius)):
             if touching(x, radius, i, j):
-                meet(disks, world, on, i, j, k, hits)
+                meet(disks, world, on, i, j, k, collisions)
 
 
 @compiled
-def walls(disks: Disks, world: World, on: Switches, k: int, hits: list) -> None:
+def walls(disks: Disks, world: World, on: Switches, k: int, collisions: list) -> None:
     """The same for one disk and wall after the other."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for w in range(len(world.walls)):
             if touching_wall(x, radius, i, world.walls, w):
-                meet(disks, world, on, i, -1 - w, k, hits)
+                meet(disks, world, on, i, -1 - w, k, collisions)
 
 
 @compiled
-def meet(disks: Disks, world: World, on: Switches, i: int, j: int, k: int, hits: list) -> None:
+def meet(disks: Disks, world: World, on: Switches, i: int, j: int, k: int, collisions: list) -> None:
     """One pair, by the exercise; where nothing is to be projected, both are set back to where they met."""
     x, other = disks.position, max(j, 0)
     xi, yi, xj, yj = x[i, 0], x[i, 1], x[other, 0], x[other, 1]
@@ -175,12 +177,12 @@ def meet(disks: Disks, world: World, on: Switches, i: int, j: int, k: int, hits:
         if j >= 0:
             x[j, 0], x[j, 1] = xj, yj
     if impulse != 0.0:
-        hits.append((k, i, j, impulse))
+        collisions.append((k, i, j, impulse))
 
 
 @compiled
 def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
-    """Fix, for every contact at once, the velocity it shall have: e times the closing speed; 0 for slow hits."""
+    """Fix, for every contact at once, the velocity it shall have: e times the closing speed; 0 for slow collisions."""
     for c in range(kept.found[0]):
         contact = kept.rows[c]
         speed = closing(v, contact.i, contact.j, contact.nx, contact.ny)

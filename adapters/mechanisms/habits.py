@@ -1,4 +1,4 @@
-"""What every engine does otherwise than exact flight with hits found at the end of a step: switch by switch.
+"""What every engine does otherwise than exact flight with collisions found at the end of a step: switch by switch.
 
 Each habit can be switched on in `adapters.mechanisms.ablated_reference`; some can be switched off in the engine, too.
 The numbers are read off the engine. With all of its habits the reference plays what the engine plays, mostly to

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Hit
+from adapters.engine import Collision
 from adapters.mechanisms import ablated_reference as switched
 from adapters.mechanisms.ablated_reference import STAGES, Switches
 from adapters.mechanisms.contacts import no_contacts
@@ -68,9 +68,9 @@ class Switched(Reference):
 
     def _advance(self, count: int) -> None:
         h = self.precision(self.dt / self.moves)
-        hits = switched.advance(self.disks, self.world, self.on, self.kept, h, count * self.substeps)
+        collisions = switched.advance(self.disks, self.world, self.on, self.kept, h, count * self.substeps)
         if self.listening:
-            self.log += [Hit(self.steps + k // self.substeps, i, j, impulse) for k, i, j, impulse in hits]
+            self.log += [Collision(self.steps + k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions]
         self.steps += count
 
     def settings(self) -> dict[str, tuple[Any, Any]]:

@@ -64,9 +64,9 @@ class Whole:
         state = self.engine.read()
         return np.column_stack([state.position, state.velocity, state.angle, state.angular_velocity]).tolist()
 
-    def whole_hits(self, _argument: Any) -> list[list[float]]:
+    def whole_collisions(self, _argument: Any) -> list[list[float]]:
         """(step, i, j, impulse), as `advance` told them."""
-        return [[int(step), int(i), int(j), float(impulse)] for step, i, j, impulse in self.engine.hits()]
+        return [[int(step), int(i), int(j), float(impulse)] for step, i, j, impulse in self.engine.collisions()]
 
 
 def begin(module: ModuleType) -> None:

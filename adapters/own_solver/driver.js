@@ -168,7 +168,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   }
 
   function load(scene) {
-    world = { dt: scene.dt, gravity: scene.gravity, wrap: scene.wrap, steps: 0, hits: empty(), log: empty(),
+    world = { dt: scene.dt, gravity: scene.gravity, wrap: scene.wrap, steps: 0, collisions: empty(), log: empty(),
       spheres: empty() };
     for (let i = 0; i < scene.spheres.length; i++) world.spheres[i] = sphere(scene.spheres[i]);
     return "null";
@@ -203,7 +203,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     const moved = a.position.x !== ax || a.position.y !== ay || b.position.x !== bx || b.position.y !== by;
     if (kicked) {
       const sign = du * (ax - bx) + dv * (ay - by) < 0 ? -1 : 1;
-      world.hits[world.hits.length] = `[${world.steps},${i},${j},${text(sign * a.mass * sqrt(du * du + dv * dv))}]`;
+      world.collisions[world.collisions.length] = `[${world.steps},${i},${j},${text(sign * a.mass * sqrt(du * du + dv * dv))}]`;
     }
     if ((kicked || moved || overlaps) && world.log.length < 400) {
       world.log[world.log.length] = `[${world.steps},${i},${j},${text(ax)},${text(ay)},${text(au)},${text(av)},`
@@ -227,7 +227,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   }
 
   const commands = {
-    ask, load, step, read: () => rows(world.spheres), hits: () => told(world.hits), contacts: () => told(world.log),
+    ask, load, step, read: () => rows(world.spheres), collisions: () => told(world.collisions), contacts: () => told(world.log),
     begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
   };
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import FLOAT64, Hit, Row, Unsupported
+from adapters.engine import FLOAT64, Collision, Row, Unsupported
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
 from scenarios.model import Array, Scene, State
@@ -92,10 +92,10 @@ class Student:
         angle, spin = (4, 5) if self.whole else (6, 7)
         return State(*(np.ascontiguousarray(rows[:, part]) for part in (slice(0, 2), slice(2, 4), angle, spin)))
 
-    def hits(self) -> list[Hit]:
+    def collisions(self) -> list[Collision]:
         """What `advance` told, or every call of the collision function that changed a velocity."""
-        rows = self.process.do("whole_hits" if self.whole else "hits")
-        return [Hit(int(step), int(i), int(j), impulse) for step, i, j, impulse in rows]
+        rows = self.process.do("whole_collisions" if self.whole else "collisions")
+        return [Collision(int(step), int(i), int(j), impulse) for step, i, j, impulse in rows]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """What the file decides."""
@@ -130,7 +130,7 @@ def spheres_of(scene: Scene) -> list[list[float]]:
 
 
 def read_restitution(process: SolverProcess) -> float:
-    """The e of a file, from two equal spheres that meet head-on at 2 m/s; NaN where no hit comes out of it."""
+    """The e of a file, from two equal spheres that meet head-on at 2 m/s; NaN where no collision comes out of it."""
     pair = [[-0.45, 0.0, 1.0, *[0.0] * 6, 1.0, 1.0, 0.5], [0.45, 0.0, -1.0, *[0.0] * 6, 1.0, 1.0, 0.5]]
     try:
         answer = process.do("ask", {"spheres": pair, "calls": [["collide", 0, 1]], "world": False}, 1.0)

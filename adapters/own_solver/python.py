@@ -170,7 +170,7 @@ class PythonSolver:
         """Begin a scene."""
         self.scene, self.steps = scene, 0
         self.log: list[list[float]] = []
-        self.hit_rows: list[list[float]] = []
+        self.collision_rows: list[list[float]] = []
         self.spheres: list[Any] = [sphere_of(r) for r in scene["spheres"]]
 
     def step(self, argument: dict[str, Any]) -> None:
@@ -201,7 +201,7 @@ class PythonSolver:
         if before[2:4] != after[2:4] or before[6:] != after[6:]:
             du, dv = after[2] - before[2], after[3] - before[3]
             sign = -1.0 if du * x + dv * y < 0 else 1.0
-            self.hit_rows.append([self.steps, i, j, number(sign * a.mass * (du * du + dv * dv) ** 0.5)])
+            self.collision_rows.append([self.steps, i, j, number(sign * a.mass * (du * du + dv * dv) ** 0.5)])
         if (before != after or x * x + y * y < reach * reach) and len(self.log) < LOGGED:
             self.log.append([self.steps, i, j, *map(number, before), *map(number, after)])
 
@@ -209,9 +209,9 @@ class PythonSolver:
         """The scene's spheres as they are."""
         return [row_of(s) for s in self.spheres]
 
-    def hits(self, _argument: Any = None) -> list[list[float]]:
+    def collisions(self, _argument: Any = None) -> list[list[float]]:
         """(step, i, j, impulse) of every pair whose velocities a call changed."""
-        return self.hit_rows
+        return self.collision_rows
 
     def contacts(self, _argument: Any = None) -> list[list[float]]:
         """What `pair` logged."""

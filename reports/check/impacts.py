@@ -1,4 +1,4 @@
-"""What a solver may take for the impulse of a hit, and what it may do with it; and which of that it does.
+"""What a solver may take for the impulse of a collision, and what it may do with it; and which of that it does.
 
 J = -(1 + e) (vA - vB).n / (1/mA + 1/mB), vA' = vA + J n / mA, vB' = vB - J n / mB, n the unit vector from B to A
 (Newton's law of impact; Landau & Lifshitz, Mechanics, 17).
@@ -13,20 +13,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.check.hits import Hit, Impulse, changes, hit_of
+from reports.check.collisions import Collision, Impulse, changes, collision_of
 from reports.check.parts import Change, components, scalar_products
-from reports.check.questions import HITS, QUESTIONS, Answer, finite
+from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import near
 from scenarios.model import Array
 
 
-def scaled(factor: Callable[[Hit, float], float]) -> Impulse:
+def scaled(factor: Callable[[Collision, float], float]) -> Impulse:
     """The right impulse times a factor."""
     return lambda h, e: -(1 + e) * h.vn * h.mu * h.n * factor(h, e)
 
 
-def along(normal: Callable[[Hit], Array]) -> Impulse:
+def along(normal: Callable[[Collision], Array]) -> Impulse:
     """The right impulse but for its normal."""
     return lambda h, e: -(1 + e) * (h.u @ normal(h)) * h.mu * normal(h)
 
@@ -36,7 +36,7 @@ def unit(vector: Array) -> Array:
     return vector / np.hypot(*vector)
 
 
-def tangent(h: Hit) -> Array:
+def tangent(h: Collision) -> Array:
     """n turned by a quarter."""
     return np.array([-h.n[1], h.n[0]])
 
@@ -159,7 +159,7 @@ SLIPS = IMPULSES | scalar_products()
 
 @dataclass(frozen=True)
 class Finding:
-    """What the hits say.
+    """What the collisions say.
 
     Attributes:
         impulse, update: the mistake in the impulse and the one in the update, "" where there is none.
@@ -182,8 +182,11 @@ class Finding:
 
 
 def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | None:
-    """The impulse and the update that give every hit, fewest mistakes first; None if nothing does."""
-    seen = [(hit_of(q.balls, answers[name].last), changes(q.balls, answers[name].last)) for name, q in HITS.items()]
+    """The impulse and the update that give every collision, fewest mistakes first; None if nothing does."""
+    seen = [
+        (collision_of(q.balls, answers[name].last), changes(q.balls, answers[name].last))
+        for name, q in COLLISIONS.items()
+    ]
     if not finite(answers, "v"):
         return None
     for e in restitution.candidates:
@@ -196,8 +199,8 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
     return None
 
 
-def fitting(pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[Hit, Array]], e: float) -> Finding | None:
-    """The first impulse and update of `pairs` that give every hit."""
+def fitting(pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[Collision, Array]], e: float) -> Finding | None:
+    """The first impulse and update of `pairs` that give every collision."""
     with np.errstate(all="ignore"):
         for impulse, update in pairs:
             law, row = SLIPS[impulse], UPDATES[update]
@@ -212,7 +215,10 @@ def fitting(pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[Hit, Array]],
 def follows_print(answers: dict[str, Answer], e: float) -> bool:
     """Whether pairs that part get the impulse of the printed formula."""
     for name in PARTING:
-        h, came = hit_of(QUESTIONS[name].balls, answers[name].last), changes(QUESTIONS[name].balls, answers[name].last)
+        h, came = (
+            collision_of(QUESTIONS[name].balls, answers[name].last),
+            changes(QUESTIONS[name].balls, answers[name].last),
+        )
         if not near(UPDATES[""].change(h, IMPULSES[""](h, e), e), came, 0.1):
             return False
     return True

@@ -1,4 +1,4 @@
-"""Task 2 (c) and (d): the impulse of a hit and what it does to both velocities."""
+"""Task 2 (c) and (d): the impulse of a collision and what it does to both velocities."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from reports.check.hits import Hit, changes, hit_of
+from reports.check.collisions import Collision, changes, collision_of
 from reports.check.impacts import IMPULSES, PARTING, UPDATES, Finding, tangent
-from reports.check.questions import HITS, QUESTIONS, Answer, finite
+from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import Row, judged, near, not_asked, shown
 from scenarios.model import Array
@@ -19,34 +19,36 @@ def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Fi
     if not finite(answers, "v"):
         return [*no_number(answers, restitution.own), bystanders(answers)]
     e = found.e if found else restitution.own
-    name = next(iter(HITS if found else wrong_hits(answers, e) or HITS))  # numbers that show what is wrong
+    name = next(
+        iter(COLLISIONS if found else wrong_collisions(answers, e) or COLLISIONS)
+    )  # numbers that show what is wrong
     balls, after = QUESTIONS[name].balls, answers[name].last
-    hit, came = hit_of(balls, after), changes(balls, after)
-    P = IMPULSES[""](hit, e)
-    acts = acting(hit, found, P)
+    collision, came = collision_of(balls, after), changes(balls, after)
+    P = IMPULSES[""](collision, e)
+    acts = acting(collision, found, P)
     fine_c = found is not None and not found.impulse
     impulse = restitution.mistake or (found.impulse if found else partly(answers, e))
     update = found.update if found and found.task == "2d" else ""
     mistake = impulse or (found.mistake if found else "")
     spoilt = "2d" if fine_c else "2c"  # the part in which lies what spoils energy and restitution
-    got, lost = hit.ma * came[0], energy(hit, came)
-    across, gained = float(got @ tangent(hit)), hit.ma * came[0] + hit.mb * came[1]
+    got, lost = collision.ma * came[0], energy(collision, came)
+    across, gained = float(got @ tangent(collision)), collision.ma * came[0] + collision.mb * came[1]
     rows = [
-        judged("impulse", "2c", f"What impulse has A from B, for {shown(hit.ma)} and {shown(hit.mb)} kg?",
-               f"{shown(got @ hit.n)} N s along the normal", f"{shown(P @ hit.n)} N s", fine_c, impulse),
+        judged("impulse", "2c", f"What impulse has A from B, for {shown(collision.ma)} and {shown(collision.mb)} kg?",
+               f"{shown(got @ collision.n)} N s along the normal", f"{shown(P @ collision.n)} N s", fine_c, impulse),
         judged("tangential part", "2c", "What impulse is there across the normal?", f"{shown(across)} N s", "0 N s",
                near(across, 0.0) or fine_c, impulse),
-        judged("energy", spoilt, "How much kinetic energy does the hit add?", f"{shown(lost)} J",
-               f"{shown(-(1 - e * e) / 2 * hit.mu * hit.vn**2)} J", bool(lost <= 1e-9), mistake),
+        judged("energy", spoilt, "How much kinetic energy does the collision add?", f"{shown(lost)} J",
+               f"{shown(-(1 - e * e) / 2 * collision.mu * collision.vn**2)} J", bool(lost <= 1e-9), mistake),
         replace(restitution.row(mistake), task=spoilt if not near(restitution.came, e) else "2c"),
         restitution.speeds(mistake), separating(answers, found, e),
-        judged("velocity of A", "2d", "What velocity has A after the hit, by the impulse that acts?",
-               f"{shown(after[0].v)} m/s", f"{shown(hit.va + acts / hit.ma)} m/s",
-               right_update(found) or near(came[0], acts / hit.ma), update or impulse),
-        judged("velocity of B", "2d", "What velocity has B after the hit, by the impulse that acts?",
-               f"{shown(after[1].v)} m/s", f"{shown(hit.vb - acts / hit.mb)} m/s",
-               right_update(found) or near(came[1], -acts / hit.mb), update or impulse),
-        judged("momentum", "2d", "How much momentum does the hit add?", f"{shown(gained)} kg m/s", "(0, 0) kg m/s",
+        judged("velocity of A", "2d", "What velocity has A after the collision, by the impulse that acts?",
+               f"{shown(after[0].v)} m/s", f"{shown(collision.va + acts / collision.ma)} m/s",
+               right_update(found) or near(came[0], acts / collision.ma), update or impulse),
+        judged("velocity of B", "2d", "What velocity has B after the collision, by the impulse that acts?",
+               f"{shown(after[1].v)} m/s", f"{shown(collision.vb - acts / collision.mb)} m/s",
+               right_update(found) or near(came[1], -acts / collision.mb), update or impulse),
+        judged("momentum", "2d", "How much momentum does the collision add?", f"{shown(gained)} kg m/s", "(0, 0) kg m/s",
                near(gained, 0.0), update or impulse),
         symmetry(answers, mistake), bystanders(answers),
     ]  # fmt: skip
@@ -58,24 +60,24 @@ def no_number(answers: dict[str, Answer], e: float) -> list[Row]:
     """The one row on velocities that are no numbers: nothing else can be read from them."""
     if not finite(answers, "x"):
         return impulse_not_asked("the positions become no numbers before it")
-    lost = {name: [not np.isfinite(ball.v).all() for ball in answers[name].last] for name in HITS}
-    name = next(name for name in HITS if any(lost[name]))
+    lost = {name: [not np.isfinite(ball.v).all() for ball in answers[name].last] for name in COLLISIONS}
+    name = next(name for name in COLLISIONS if any(lost[name]))
     balls, after = QUESTIONS[name].balls, answers[name].last
-    hit, came = hit_of(balls, after), changes(balls, after)
-    P = IMPULSES[""](hit, e)
+    collision, came = collision_of(balls, after), changes(balls, after)
+    P = IMPULSES[""](collision, e)
     a, b = (any(both) for both in zip(*lost.values()))
     why = "(a field that does not exist, a division by zero?)"
     if a and b:
-        asked = f"What impulse has A from B, for {shown(hit.ma)} and {shown(hit.mb)} kg?"
+        asked = f"What impulse has A from B, for {shown(collision.ma)} and {shown(collision.mb)} kg?"
         return [
-            judged("impulse", "2c", asked, f"{shown(hit.ma * came[0])} N s", f"{shown(P)} N s", False,
+            judged("impulse", "2c", asked, f"{shown(collision.ma * came[0])} N s", f"{shown(P)} N s", False,
                    f"the impulse is no number {why}"),
             not_asked("velocity of A", "2d", "the impulse is no number"),
         ]  # fmt: skip
-    who, right = ("A", hit.va + P / hit.ma) if a else ("B", hit.vb - P / hit.mb)
+    who, right = ("A", collision.va + P / collision.ma) if a else ("B", collision.vb - P / collision.mb)
     return [
         not_asked("impulse", "2c", f"the velocity of {who} becomes no number"),
-        judged(f"velocity of {who}", "2d", f"What velocity has {who} after the hit?",
+        judged(f"velocity of {who}", "2d", f"What velocity has {who} after the collision?",
                f"{shown(after[int(b)].v)} m/s", f"{shown(right)} m/s", False,
                f"the velocity of {who} becomes no number {why}"),
     ]  # fmt: skip
@@ -87,36 +89,36 @@ def right_update(found: Finding | None) -> bool:
 
 
 def partly(answers: dict[str, Answer], e: float) -> str:
-    """Where no single mistake gives all hits: whether some of them are right, or the order of A and B matters."""
+    """Where no single mistake gives all collisions: whether some of them are right, or the order of A and B matters."""
     if symmetry(answers, "").verdict == "fault":
         return UNALIKE
-    wrong = wrong_hits(answers, e)
-    if 0 < len(wrong) < len(HITS):
-        names = ", ".join(name.removeprefix("hit/") for name in wrong)
+    wrong = wrong_collisions(answers, e)
+    if 0 < len(wrong) < len(COLLISIONS):
+        names = ", ".join(name.removeprefix("collision/") for name in wrong)
         return f"unknown: it is right for some pairs and wrong for others ({names})"
     return ""
 
 
-def wrong_hits(answers: dict[str, Answer], e: float) -> list[str]:
-    """The questions of `HITS` whose velocities are not those of the formula."""
+def wrong_collisions(answers: dict[str, Answer], e: float) -> list[str]:
+    """The questions of `COLLISIONS` whose velocities are not those of the formula."""
     wrong = []
-    for name, question in HITS.items():
-        h = hit_of(question.balls, answers[name].last)
+    for name, question in COLLISIONS.items():
+        h = collision_of(question.balls, answers[name].last)
         if not near(UPDATES[""].change(h, IMPULSES[""](h, e), e), changes(question.balls, answers[name].last)):
             wrong.append(name)
     return wrong
 
 
-def acting(hit: Hit, found: Finding | None, right: Array) -> Array:
+def acting(collision: Collision, found: Finding | None, right: Array) -> Array:
     """The impulse the file computes, right or wrong, so that (d) is judged by itself."""
-    return found.law(hit, found.e) if found else right
+    return found.law(collision, found.e) if found else right
 
 
-def energy(hit: Hit, came: Array) -> float:
-    """J, what a hit adds to the kinetic energy."""
-    before = hit.ma * hit.va @ hit.va + hit.mb * hit.vb @ hit.vb
-    va, vb = hit.va + came[0], hit.vb + came[1]
-    return float(hit.ma * va @ va + hit.mb * vb @ vb - before) / 2
+def energy(collision: Collision, came: Array) -> float:
+    """J, what a collision adds to the kinetic energy."""
+    before = collision.ma * collision.va @ collision.va + collision.mb * collision.vb @ collision.vb
+    va, vb = collision.va + came[0], collision.vb + came[1]
+    return float(collision.ma * va @ va + collision.mb * vb @ vb - before) / 2
 
 
 def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> Row:
@@ -124,7 +126,8 @@ def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> R
     asked = "What happens to a pair that overlaps and moves apart?"
     either = "no impulse, or that of the formula"
     seen = [
-        (hit_of(QUESTIONS[n].balls, answers[n].last), changes(QUESTIONS[n].balls, answers[n].last)) for n in PARTING
+        (collision_of(QUESTIONS[n].balls, answers[n].last), changes(QUESTIONS[n].balls, answers[n].last))
+        for n in PARTING
     ]
     if all(near(came, 0.0) for _, came in seen):
         return Row("parting", "2c", asked, "no impulse", either, "note", "only pairs that approach get an impulse")
@@ -141,9 +144,9 @@ UNALIKE = "A and B are not treated alike: it matters which is called first"
 
 def symmetry(answers: dict[str, Answer], mistake: str) -> Row:
     """Who is called A must not matter to the velocities."""
-    names = list(HITS)
+    names = list(COLLISIONS)
     came = [np.array([b.v for b in answers[n].last]) for n in names]
-    swapped = [np.array([b.v for b in answers[n.replace("hit/", "swapped/")].last]) for n in names]
+    swapped = [np.array([b.v for b in answers[n.replace("collision/", "swapped/")].last]) for n in names]
     same = all(near(x, y) for x, y in zip(came, swapped))
     return judged("order", "2d", "Are the velocities the same if A and B change places in the call?",
                   shown(swapped[0][0]) + " m/s", shown(came[0][0]) + " m/s", same,
@@ -151,7 +154,7 @@ def symmetry(answers: dict[str, Answer], mistake: str) -> Row:
 
 
 def bystanders(answers: dict[str, Answer]) -> Row:
-    """Forces, angles, spins, masses and sizes are not changed by a hit without friction."""
+    """Forces, angles, spins, masses and sizes are not changed by a collision without friction."""
     words = {
         "F": "force",
         "alpha": "alpha",
@@ -162,16 +165,16 @@ def bystanders(answers: dict[str, Answer]) -> Row:
         "r": "size",
     }
     changed = [
-        word for field, word in words.items() for name, question in HITS.items()
+        word for field, word in words.items() for name, question in COLLISIONS.items()
         for before, after in zip(question.balls, answers[name].last)
         if not near(getattr(after, field), getattr(before, field))
     ]  # fmt: skip
     what = ", ".join(dict.fromkeys(changed))
-    return judged("rest kept", "2d", "Does a hit leave force, angle, spin, mass and size alone?",
+    return judged("rest kept", "2d", "Does a collision leave force, angle, spin, mass and size alone?",
                   f"changes {what}" if what else "all as before", "all as before", not what,
                   f"it writes {what}")  # fmt: skip
 
 
 def impulse_not_asked(why: str) -> list[Row]:
-    """The rows of (c) and (d) where there is no hit to look at."""
+    """The rows of (c) and (d) where there is no collision to look at."""
     return [not_asked("impulse", "2c", why), not_asked("velocity of A", "2d", why)]

@@ -12,7 +12,7 @@ from reports.check.rows import FOLLOWS, Row, judged, near, not_asked, shown
 DT = 1e-3  # s, the exercise's
 EDGES = {"right": (5.2, 0.1), "left": (-5.2, -0.1), "top": (0.1, 3.2), "bottom": (-0.1, -3.2)}  # m, a place beyond each
 ONTO = {"right": (-5.0, 0.1), "left": (5.0, -0.1), "top": (0.1, -3.0), "bottom": (-0.1, 3.0)}
-A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)  # a pair that hits
+A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)  # a pair that collisions
 
 
 def loop_rows(process: SolverProcess, faulty: bool, begun: object) -> list[Row]:
@@ -116,7 +116,13 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> Row:
             silent.append(name_of(i, j))
         elif set(kicked) != {i, j}:
             others.append(name_of(min(set(kicked) - {i, j})))
-    got = f"no hit of {', '.join(silent)}" if silent else f"somebody else is hit: {others[0]}" if others else "yes"
+    got = (
+        f"no collision of {', '.join(silent)}"
+        if silent
+        else f"somebody else is struck: {others[0]}"
+        if others
+        else "yes"
+    )
     cause = (
         "a loop of performSimStep leaves pairs out" if silent else "performSimStep lets spheres react that are apart"
     )

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reports.check.impacts import BACKWARDS, Finding
-from reports.check.questions import HITS, QUESTIONS, Answer, Ball, direction, finite
+from reports.check.questions import COLLISIONS, QUESTIONS, Answer, Ball, direction, finite
 from reports.check.rows import Row, judged, near, not_asked, shown
 from scenarios.model import Array
 
@@ -54,8 +54,8 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
 
 
 def pulled(answers: dict[str, Answer]) -> bool:
-    """Whether pairs that hit are displaced the wrong way."""
-    shifts = [shift_of(question.balls, answers[name].last) for name, question in HITS.items()]
+    """Whether pairs that collision are displaced the wrong way."""
+    shifts = [shift_of(question.balls, answers[name].last) for name, question in COLLISIONS.items()]
     return all(s.a + s.b < 0 and near(s.across, 0.0, 0.1) for s in shifts)
 
 
@@ -71,7 +71,7 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
 
 def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[Row]:
     """The rows of (b); `found`: what the velocities say."""
-    seen = [(q.balls, shift_of(q.balls, answers[name].last), answers[name].last) for name, q in HITS.items()]
+    seen = [(q.balls, shift_of(q.balls, answers[name].last), answers[name].last) for name, q in COLLISIONS.items()]
     balls, shift, after = seen[0]
     distance = float(np.hypot(*np.subtract(after[0].x, after[1].x)))
     right = all(near(s.a + s.b, s.overlap, 0.1) for _, s, _ in seen)

@@ -96,12 +96,12 @@ def meeting(
 SIZES = ((0.25, 0.5), (0.6, 0.35), (1.5, 0.75), (0.9, 0.9))  # m; sums below, near and above 1, where squares tell
 TURNS = (0.0, 0.65, 1.57, 3.6)  # rad
 SHARES = (0.1, 0.3, 0.45, 0.6, 0.7, 0.85, 0.97, 1.03, 1.15, 1.3, 1.6, 2.2, 4.0)  # distances over the sum of sizes
-HITS = {
-    "hit/light on heavy": meeting((1.3, 5.1), (1.4, 0.3), (-0.6, 0.5), 0.5),
-    "hit/heavy on light": meeting((4.2, 0.9), (0.7, -1.1), (0.2, 0.8), -1.1),
-    "hit/from behind": meeting((2.0, 3.0), (2.1, 0.4), (0.5, 0.1), 0.2),
-    "hit/upwards": meeting((0.8, 2.9), (-0.2, 1.9), (0.3, -0.7), 1.9),
-    "hit/shallow": meeting((3.3, 1.2), (1.2, 0.9), (-0.9, -0.2), 0.4, 0.02),
+COLLISIONS = {
+    "collision/light on heavy": meeting((1.3, 5.1), (1.4, 0.3), (-0.6, 0.5), 0.5),
+    "collision/heavy on light": meeting((4.2, 0.9), (0.7, -1.1), (0.2, 0.8), -1.1),
+    "collision/from behind": meeting((2.0, 3.0), (2.1, 0.4), (0.5, 0.1), 0.2),
+    "collision/upwards": meeting((0.8, 2.9), (-0.2, 1.9), (0.3, -0.7), 1.9),
+    "collision/shallow": meeting((3.3, 1.2), (1.2, 0.9), (-0.9, -0.2), 0.4, 0.02),
 }
 
 
@@ -125,10 +125,10 @@ def questions() -> dict[str, Question]:
         "slow": head_on(2e-3),
         "even": head_on(2.0),
         "fast": head_on(200.0),
-    } | HITS
+    } | COLLISIONS
     found |= {
-        name.replace("hit/", "swapped/"): question._replace(calls=(("collide", 1, 0),))
-        for name, question in HITS.items()
+        name.replace("collision/", "swapped/"): question._replace(calls=(("collide", 1, 0),))
+        for name, question in COLLISIONS.items()
     }
     for k, (ra, rb, turn, share) in enumerate((*s, t, f) for s in SIZES for t in TURNS for f in SHARES):
         n, d = np.array([np.cos(turn), np.sin(turn)]), share * (ra + rb)
@@ -166,8 +166,8 @@ def direction(a: Ball, b: Ball) -> tuple[Array, float]:
 
 
 def finite(answers: dict[str, Answer], part: str) -> bool:
-    """Whether "x" or "v" of both spheres is a number after every hit."""
-    return bool(np.isfinite([getattr(b, part) for name in HITS for b in answers[name].last]).all())
+    """Whether "x" or "v" of both spheres is a number after every collision."""
+    return bool(np.isfinite([getattr(b, part) for name in COLLISIONS for b in answers[name].last]).all())
 
 
 def named(answers: dict[str, Answer], prefix: str) -> Iterator[tuple[Question, Answer]]:

@@ -1,4 +1,4 @@
-"""The restitution of a file: what is written into it, and what comes out of its hits."""
+"""The restitution of a file: what is written into it, and what comes out of its collisions."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Restitution:
 
     @property
     def candidates(self) -> list[float]:
-        """The values a hit is explained by: the file's own first, then what came, if nothing contradicts it."""
+        """The values a collision is explained by: the file's own first, then what came, if nothing contradicts it."""
         free = 0 <= self.came <= 1 and not self.named
         return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
 
@@ -63,7 +63,7 @@ class Restitution:
     def row(self, mistake: str) -> Row:
         """0.9 is right, another number is a note if the file says so, and a fault if it says something else.
 
-        `mistake`: what is known to be wrong with the hits, if anything.
+        `mistake`: what is known to be wrong with the collisions, if anything.
         """
         asked = "What part of its closing speed has a pair when it parts?"
         if near(self.came, EXERCISE):
@@ -85,7 +85,7 @@ class Restitution:
 
 
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
-    """What the file's text says and what its hits give."""
+    """What the file's text says and what its collisions give."""
     came, slow, fast = (parting(answers[name], name) for name in ("even", "slow", "fast"))
     named, found = named_in(text), written(text)
     absurd = not 0 <= came <= 1 and any(near(e, came) for e in named)

@@ -1,4 +1,4 @@
-"""Whole scenes: a solver's motion against the exact one, within what dt explains, and its first wrong hit."""
+"""Whole scenes: a solver's motion against the exact one, within what dt explains, and its first wrong collision."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> Played:
 
 
 def scene_rows(process: SolverProcess, rows: Sequence[Row], e: float | None) -> list[Row]:
-    """The rows on whole scenes with restitution `e`, and the one on the first wrong hit in any of them."""
+    """The rows on whole scenes with restitution `e`, and the one on the first wrong collision in any of them."""
     if any(row.name == "implemented" for row in rows):
         return [not_asked("scenes", "scenes", "a function of the file cannot be used")]
     blamed = any(row.verdict == "fault" for row in rows)
@@ -79,7 +79,7 @@ def scene_rows(process: SolverProcess, rows: Sequence[Row], e: float | None) -> 
     except SolverFailed as failure:
         return [judged("scenes", "scenes", "Does it play whole scenes?", "it fails", "yes", False,
                        FOLLOWS if blamed else str(failure))]  # fmt: skip
-    return [*found, judged("first wrong hit", "scenes", "Is every hit in these scenes right by itself?",
+    return [*found, judged("first wrong collision", "scenes", "Is every collision in these scenes right by itself?",
                            wrong or "yes", "yes", not wrong, FOLLOWS if blamed else "")]  # fmt: skip
 
 
@@ -115,7 +115,7 @@ def rounding(place: Array, rate: Array, t: Array, dt: float) -> Array:
 
 
 def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
-    """(k,) rad, how far an angle may be off: symplectic Euler is w' dt t / 2 ahead, and a hit turns nothing."""
+    """(k,) rad, how far an angle may be off: symplectic Euler is w' dt t / 2 ahead, and a collision turns nothing."""
     spin_up = max((abs(p.torque) / scenario.scene.inertia[p.disk] for p in scenario.thrusts), default=0.0)
     return 1.001 * spin_up * dt * t / 2
 
@@ -123,10 +123,10 @@ def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
 def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) -> Array:
     """(k,) m, how far a right solver in steps of `dt` s may be off at the times t (k,) s.
 
-    Free flight under a push: symplectic Euler is a dt t / 2 ahead. A hit is found up to dt late, so that each disk
-    goes on for u dt; its normal is turned by that and by what the disks were off before, over (rA + rB) cos, which
+    Free flight under a push: symplectic Euler is a dt t / 2 ahead. A collision is found up to dt late, so that each
+    disk goes on for u dt; its normal is turned by that and by what the disks were off before, over (rA + rB) cos, which
     sends them off by as much of their change of velocity. Errors add up and grow with time, so that
-    after several hits it is generous: there the row on the first wrong hit is the one that sees.
+    after several strikes it is generous: there the row on the first wrong collision is the one that sees.
     """
     scene = scenario.scene
     push = max((float(np.hypot(*p.force)) / scene.mass[p.disk] for p in scenario.thrusts), default=0.0)
@@ -145,7 +145,7 @@ def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) 
         steps.append((at, place, speed))
         before = at
     known = np.array(steps)
-    # A solver may be a step late, so that what a hit adds is allowed from a step before it on.
+    # A solver may be a step late, so that what a collision adds is allowed from a step before it on.
     leg = np.searchsorted(known[:, 0] - dt, t, side="right") - 1
     return SLACK * (known[leg, 1] + known[leg, 2] * np.abs(t - known[leg, 0]))
 
@@ -197,15 +197,15 @@ MET: dict[str, tuple] = {
         [[-0.6, 0.0, 0.9, 0.0], [0.5, 0.0, -0.7, 0.0]], [0.25, 0.3], [1.0, 2.5],
     ),
     "oblique": (
-        "Where are two unequal spheres after an oblique hit?", 1.0,
+        "Where are two unequal spheres after an oblique collision?", 1.0,
         [[-0.7, 0.1, 1.1, 0.1], [0.5, -0.05, -0.5, 0.0]], [0.3, 0.25], [2.0, 0.8],
     ),
     "row": (
-        "Where are three spheres in a row after the first has hit the second, and that the third?", 1.2,
+        "Where are three spheres in a row after the first has struck the second, and that the third?", 1.2,
         [[-1.0, 0.0, 1.3, 0.0], [0.0, 0.0, 0.0, 0.0], [0.9, 0.0, 0.0, 0.0]], [0.25, 0.25, 0.25], [1.0, 1.5, 0.7],
     ),
     "crowd": (
-        "Where are five spheres after they have hit each other?", 1.0,
+        "Where are five spheres after they have collided?", 1.0,
         [[-1.1, 0.0, 1.4, 0.1], [-0.2, 0.1, 0.0, 0.0], [0.8, 0.3, -0.7, 0.0], [0.1, 1.0, 0.0, -0.8],
          [0.2, -1.1, 0.1, 0.7]],
         [0.3, 0.25, 0.2, 0.25, 0.3], [1.0, 2.0, 0.5, 1.2, 0.8],

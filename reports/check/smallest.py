@@ -22,7 +22,7 @@ from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import computed
 
-DT = 1e-2  # s, coarse: a scene is played in milliseconds, and a hit found late is judged by the state it is found in
+DT = 1e-2  # s, coarse: a scene is played in milliseconds, and a collision found late is judged by the state it is found in
 SECONDS = 1.5  # for drawing and shrinking together
 DURATION, INTERVAL = 1.0, 0.02  # s
 DRAWS = 400
@@ -33,7 +33,7 @@ Sphere = tuple[int, int, int, int, int, int]
 """x, y in half metres, vx, vy in m/s, radius in quarters of a metre, mass in kg."""
 Drawn = tuple[list[Sphere], tuple[int, int, int]]
 """The spheres, and the push of one that is alone: force x, y in N, torque in tenths of a N m."""
-# Tried before any is drawn: on a busy machine the time may be up before a pair that hits is.
+# Tried before any is drawn: on a busy machine the time may be up before a pair that collisions is.
 FIRST: list[Drawn] = [
     ([(0, 0, 1, 1, 1, 2)], (1, 2, 1)),
     ([(-1, 0, 1, 0, 1, 1), (1, 0, 0, 0, 1, 2)], (0, 0, 0)),
@@ -160,10 +160,10 @@ def shown_by(process: SolverProcess, spheres: list[Sphere], push: tuple[int, int
     fault = fault_of(process, spheres, push, e)
     played = play_scene(process, scenario, DT)
     kicked = [row for row in played.contacts if not near(row[[5, 6, 9, 10]], row[[13, 14, 17, 18]])]
-    hits = Collisions.of([((row[0] + 1) * DT, int(row[1]), int(row[2]), float("nan")) for row in kicked])
+    collisions = Collisions.of([((row[0] + 1) * DT, int(row[1]), int(row[2]), float("nan")) for row in kicked])
     yours = Trajectory(
         frozen(scenario.times), frozen(played.position), frozen(played.velocity), frozen(played.angle),
-        frozen(played.angular_velocity), hits,
+        frozen(played.angular_velocity), collisions,
     )  # fmt: skip
     try:
         truth = truth_of(scenario, None if scenario.scene.n == 1 else computed(scenario))

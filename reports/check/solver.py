@@ -17,7 +17,7 @@ from reports.check.impulse import impulse_not_asked, impulse_rows
 from reports.check.loop import loop_rows
 from reports.check.motion import motion_rows
 from reports.check.projection import projection_rows, pulled
-from reports.check.questions import HITS, QUESTIONS, Answer, ask
+from reports.check.questions import COLLISIONS, QUESTIONS, Answer, ask
 from reports.check.restitution import Restitution, code_of, restitution_of
 from reports.check.rows import Row, judged, not_asked
 from reports.check.scenes import scene_rows
@@ -132,5 +132,5 @@ def reacts(answers: dict[str, Answer]) -> bool:
     """Whether every pair that is asked about beyond detection does something."""
     return all(
         not np.array_equal([b.numbers() for b in answers[name].last], [b.numbers() for b in QUESTIONS[name].balls])
-        for name in HITS
+        for name in COLLISIONS
     )

@@ -1,4 +1,4 @@
-"""`crosscheck truth`: the exact answer to one scene, its hits, how far it reaches and what ends it."""
+"""`crosscheck truth`: the exact answer to one scene, its collisions, how far it reaches and what ends it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from reports.terminal.progress import Progress
 from scenarios.model import Scenario
 from scenarios.truth.record import TruthRecord
 
-SHOWN = 10  # hits at the start and at the end
+SHOWN = 10  # collisions at the start and at the end
 HEADINGS = ("t, s", "disk", "other", "impulse, N s", "cos of impact angle")
 
 
@@ -61,7 +61,7 @@ def waiting(what: str) -> Iterator[None]:
 
 def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
     """The record for programs; numbers that are not finite are text or null, as JSON has none."""
-    hits = [
+    collisions = [
         {
             "t_s": t,
             "i": int(i),
@@ -76,14 +76,15 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
             "scenario": scenario.name, "method": record.method, "bits": record.bits, "duration_s": scenario.duration,
             "valid_until_s": min(record.valid_until, scenario.duration),
             "followed_until_s": min(record.followed_until, scenario.duration), "reason": record.reason,
-            "error_bound_m": record.error_bound, "hits": hits, "outcomes": outcomes(record),
+            "error_bound_m": record.error_bound, "collisions": collisions, "outcomes": outcomes(record),
             "still_known": list(record.remains),
         }
     )  # fmt: skip
 
 
 def outcomes(record: TruthRecord) -> list[dict]:
-    """How a simultaneous hit may end: the velocity (m/s) of each disk, and the hits in one order that leads there."""
+    """How a simultaneous collision may end: the velocity (m/s) of each disk, and the collisions in one order that leads
+    there."""
     return [
         {
             "velocities_m_s": {str(int(i)): [vx, vy] for _, i, vx, vy in record.outcomes[record.outcomes[:, 0] == k]},
@@ -106,7 +107,7 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
         "players held to it": f"up to {number(min(record.followed_until, record.valid_until, scenario.duration), 6)} s",
         "error bound": f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64",
         "still known": "\n".join(record.remains),
-        "hits": str(int((record.events[:, 3] != 0).sum())),
+        "collisions": str(int((record.events[:, 3] != 0).sum())),
     }
     grid = Table.grid(padding=(0, 2))
     for name, text in lines.items():
@@ -114,7 +115,7 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
             grid.add_row(name, text)
     console.print(grid)
     if len(record.events):
-        console.print(table_of_hits(record, every))
+        console.print(table_of_collisions(record, every))
     if len(record.outcomes):
         console.print(table_of_outcomes(record))
 
@@ -126,8 +127,8 @@ def precision(record: TruthRecord) -> str:
     return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (record.method == "two-precision")
 
 
-def table_of_hits(record: TruthRecord, every: bool) -> Table:
-    """The hits, or the first and the last ten."""
+def table_of_collisions(record: TruthRecord, every: bool) -> Table:
+    """The collisions, or the first and the last ten."""
     table, rows = Table(*HEADINGS), record.events.tolist()
     skipped = 0 if every else max(0, len(rows) - 2 * SHOWN)
     for k, (t, i, j, impulse, cosine) in enumerate(rows):
@@ -144,7 +145,9 @@ def table_of_hits(record: TruthRecord, every: bool) -> Table:
 def table_of_outcomes(record: TruthRecord) -> Table:
     """All ends a simultaneous contact may have; none of them is the truth."""
     found = outcomes(record)
-    table = Table("outcome", "velocities, m/s", "one order of hits", title=f"{len(found)} outcomes; none is the truth")
+    table = Table(
+        "outcome", "velocities, m/s", "one order of collisions", title=f"{len(found)} outcomes; none is the truth"
+    )
     for k, end in enumerate(found, 1):
         velocities = (f"{disk}: ({vx:.6g}, {vy:.6g})" for disk, (vx, vy) in end["velocities_m_s"].items())
         table.add_row(str(k), "\n".join(velocities), ", ".join(f"{i} on {name(j)}" for i, j in end["order"]))
@@ -152,5 +155,5 @@ def table_of_outcomes(record: TruthRecord) -> Table:
 
 
 def name(j: float) -> str:
-    """The other side of a hit."""
+    """The other side of a collision."""
     return f"disk {int(j)}" if j >= 0 else f"wall {-1 - int(j)}"

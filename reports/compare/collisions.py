@@ -1,4 +1,4 @@
-"""Which hits of the truth a player found, which it missed, which it invented, and how late it was."""
+"""Which collisions of the truth a player found, which it missed, which it invented, and how late it was."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from reports.compare.delays import WINDOW
 from reports.compare.faces import SAME, interval, on_faces
 from scenarios.model import Array, Collisions, Scene, Trajectory
 
-# Hits and steps lie on one grid, and so do halves of the time between hits. No bound is one of it, where rounding would
-# decide: all are roots of numbers that have none.
-CROWDED = 5**0.5  # dt; true hits of a pair that are closer cannot be told apart by any step
+# Collisions and steps lie on one grid, and so do halves of the time between collisions. No bound is one of it, where
+# rounding would decide: all are roots of numbers that have none.
+CROWDED = 5**0.5  # dt; true collisions of a pair that are closer cannot be told apart by any step
 FAR = 401**0.5  # dt; so late, or early, a match may always be
 ROUNDING = 1e-12  # of a sum of thousands of times
-HALF = 0.26**0.5  # of the time to the nearest other true hit: so late it may be too
+HALF = 0.26**0.5  # of the time to the nearest other true collision: so late it may be too
 
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Hits of a player set against hits of the truth.
+    """Collisions of a player set against collisions of the truth.
 
     Attributes:
-        delay: (m,) s, played time less true time of each hit found.
-        missed: (time s, i, j) of true hits not found.
-        invented: (time s, i, j) of played hits that are not true.
+        delay: (m,) s, played time less true time of each collision found.
+        missed: (time s, i, j) of true collisions not found.
+        invented: (time s, i, j) of played collisions that are not true.
     """
 
     delay: Array
@@ -37,7 +37,7 @@ class Matched:
 
     @property
     def first_wrong(self) -> tuple[float, str] | None:
-        """Time and description of the first missed or invented hit, or None."""
+        """Time and description of the first missed or invented collision, or None."""
         wrong = [(t, f"missed {who(i, j)}") for t, i, j in self.missed]
         wrong += [(t, f"invented {who(i, j)}") for t, i, j in self.invented]
         return min(wrong) if wrong else None
@@ -49,19 +49,20 @@ def who(i: int, j: int) -> str:
 
 
 def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matched:
-    """Match hits pair by pair, in order, up to `end` s, for a player with steps of `dt` s.
+    """Match collisions pair by pair, in order, up to `end` s, for a player with steps of `dt` s.
 
-    Where a pair has hit more often on one side, those hits are left over whose absence brings the others closest in
-    time; the earlier if two are as close. A match is no match if it is further off than `HALF` the time to the nearest
-    other true hit of the pair (or to the start), and than `FAR` dt: then one hit is missed and one invented.
+    Where a pair has struck more often on one side, those collisions are left over whose absence brings the others
+    closest in time; the earlier if two are as close. A match is no match if it is further off than `HALF` the time to
+    the nearest other true collision of the pair (or to the start), and than `FAR` dt: then one collision is missed and
+    one invented.
 
-    Three kinds of hits are not judged: of a pair at rest against each other from the start (a true hit without
-    impulse), as what a player reports there is weight; true hits of a pair closer together than `CROWDED` dt, as no
-    step can tell them apart, with all that a player makes of them; and hits within `WINDOW` dt of `end`, which may be
-    cut off.
+    Three kinds of collisions are not judged: of a pair at rest against each other from the start (a true collision
+    without impulse), as what a player reports there is weight; true collisions of a pair closer together than `CROWDED`
+    dt, as no step can tell them apart, with all that a player makes of them; and collisions within `WINDOW` dt of
+    `end`, which may be cut off.
     """
     resting = pair_keys(true)[true.impulse == 0]
-    mine, its = (by_pair(hits, resting, end - SAME * dt) for hits in (played, true))
+    mine, its = (by_pair(collisions, resting, end - SAME * dt) for collisions in (played, true))
     pairs = np.union1d(mine.key, its.key)
     limits = [np.append(np.searchsorted(side.key, pairs), len(side.key)) for side in (mine, its)]
     partner, lost, extra = judge(mine.t, limits[0], its.t, limits[1], dt, end)
@@ -74,7 +75,7 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
 
 
 class ByPair(NamedTuple):
-    """Hits sorted by pair and then by time: one number that stands for the pair, the time in s, the pair."""
+    """Collisions sorted by pair and then by time: one number that stands for the pair, the time in s, the pair."""
 
     key: np.ndarray
     t: Array
@@ -82,24 +83,25 @@ class ByPair(NamedTuple):
     j: np.ndarray
 
 
-def pair_keys(hits: Collisions) -> np.ndarray:
-    """(h,) a number for the pair of each hit."""
-    return (hits.i << 32) + hits.j
+def pair_keys(collisions: Collisions) -> np.ndarray:
+    """(h,) a number for the pair of each collision."""
+    return (collisions.i << 32) + collisions.j
 
 
-def by_pair(hits: Collisions, resting: np.ndarray, end: float) -> ByPair:
-    """The hits before `end` s of pairs that are not `resting`."""
-    key = pair_keys(hits)
+def by_pair(collisions: Collisions, resting: np.ndarray, end: float) -> ByPair:
+    """The collisions before `end` s of pairs that are not `resting`."""
+    key = pair_keys(collisions)
     order = np.argsort(key, kind="stable")
-    order = order[hits.t[order] < end]
+    order = order[collisions.t[order] < end]
     if len(resting):
         order = order[~np.isin(key[order], resting)]
-    return ByPair(key[order], hits.t[order], hits.i[order], hits.j[order])
+    return ByPair(key[order], collisions.t[order], collisions.i[order], collisions.j[order])
 
 
 @njit(cache=True)
 def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no-untyped-def]
-    """Pair by pair: (partner of each played hit or -1, true hits that are missed, played hits that are invented)."""
+    """Pair by pair: (partner of each played collision or -1, true collisions that are missed, played collisions that
+    are invented)."""
     partner = np.full(len(played), -1)
     lost, extra = np.zeros(len(true), dtype=np.bool_), np.zeros(len(played), dtype=np.bool_)
     for k in range(len(played_limits) - 1):
@@ -151,9 +153,9 @@ def among_crowded(t, times, gap, dt):  # type: ignore[no-untyped-def]
 def closest_in_order(few, many, same):  # type: ignore[no-untyped-def]
     """(len(few),) indices into `many`, increasing, with the least sum of |few - many[index]|; both sorted, in s.
 
-    Of sums that differ by less than `same` s the one that skips later, as a hit between two true ones on one grid may
-    be as far from both. Dynamic programming over how many of `many` have been skipped so far, one row per element of
-    `few`.
+    Of sums that differ by less than `same` s the one that skips later, as a collision between two true ones on one grid
+    may be as far from both. Dynamic programming over how many of `many` have been skipped so far, one row per element
+    of `few`.
     """
     spare = len(many) - len(few)
     cost = np.zeros(spare + 1)
@@ -182,7 +184,7 @@ class Restitutions(NamedTuple):
     below: int
 
 
-CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold hit far more
+CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold collision far more
 FLOOR = 100  # times the rounding of the velocities that a change must have: e is then read to a hundredth or so
 
 
@@ -192,7 +194,7 @@ def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, 
     One can be read if neither disk has another in the same sample interval or the next, and none of them
     changes its spin (friction): then the change of velocity points along the normal n, and e = -(dv'.n) / (dv.n).
     Two disks must also change their momenta by as much, and a disk at a wall along the wall's normal: else
-    something was hit of which the player did not tell. Those closing slower than `slowest` m/s are left out.
+    something was struck of which the player did not tell. Those closing slower than `slowest` m/s are left out.
 
     Those that change the velocities by no more than `FLOOR` times their rounding, which is relative, are below the
     floor: their normal, and with it e, would be noise. What gravity adds before and after is taken out with the
@@ -200,7 +202,7 @@ def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, 
     that slides along a wall whenever it comes nearer at any speed at all.
     """
     t, spin, collisions = trajectory.t, trajectory.angular_velocity, on_faces(trajectory, scene)
-    # A hit at the instant of a sample, at the end of its step, belongs to the interval that ends there.
+    # A collision at the instant of a sample, at the end of its step, belongs to the interval that ends there.
     before = np.searchsorted(t, collisions.t - SAME * interval(trajectory), side="left") - 1
     busy: dict[tuple[int, int], int] = {}
     for k, i, j in zip(before, collisions.i, collisions.j):

@@ -99,14 +99,15 @@ def _measure(scenario: Scenario, run: Run, versus: str, other: Trajectory | None
 
 
 def cut(trajectory: Trajectory, k: int) -> Trajectory:
-    """The first `k` samples and the hits up to the last of them."""
+    """The first `k` samples and the collisions up to the last of them."""
     if k == len(trajectory):
         return trajectory
     names = ("t", "position", "velocity", "angle", "angular_velocity")
-    hits = trajectory.collisions
-    # Steps, and so hits, lie on the grid of the samples: a hit at the last of them is kept, however it rounds.
-    early = hits.t <= trajectory.t[k - 1] + SAME * interval(trajectory)
-    kept = Collisions(hits.t[early], hits.i[early], hits.j[early], hits.impulse[early])
+    collisions = trajectory.collisions
+    # Steps, and so collisions, lie on the grid of the samples: a collision at the last of them is kept, however it
+    # rounds.
+    early = collisions.t <= trajectory.t[k - 1] + SAME * interval(trajectory)
+    kept = Collisions(collisions.t[early], collisions.i[early], collisions.j[early], collisions.impulse[early])
     return replace(trajectory, **{name: getattr(trajectory, name)[:k] for name in names}, collisions=kept)
 
 

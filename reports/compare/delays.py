@@ -1,8 +1,8 @@
 """The truth within the detection delay: what a player is held to that finds every collision, a little late or early.
 
 A player that steps finds a collision at the end of a step: for as long its velocities are those before it when the
-truth's are those after. This delay is measured by itself (`hit_delay_dt`) and costs nothing here. All else does, at
-every sample: gravity and thrust act on what a player is held to as on the truth at that instant.
+truth's are those after. This delay is measured by itself (`collision_delay_dt`) and costs nothing here. All else does,
+at every sample: gravity and thrust act on what a player is held to as on the truth at that instant.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
     J2 (1 - e) / (1 + e) / 2 m from the energy (J = (1 + e) m v, and m v2 (1 - e2) / 2; any textbook of mechanics).
     """
     assert scenario.truth is not None
-    scene, hits = scenario.scene, truth.collisions
+    scene, collisions = scenario.scene, truth.collisions
     e, inverse = scene.restitution, np.where(scene.static, 0.0, 1 / scene.mass)
-    at = scenario.truth(hits.t) if len(hits) else truth
+    at = scenario.truth(collisions.t) if len(collisions) else truth
     rows: list[tuple[float, ...]] = []
     disks: list[tuple[float, ...]] = []
-    for x, t, i, j, size in zip(at.position, hits.t, hits.i, hits.j, hits.impulse):
+    for x, t, i, j, size in zip(at.position, collisions.t, collisions.i, collisions.j, collisions.impulse):
         if not size:  # a contact at rest
             continue
         other = x[j] if j >= 0 else laws.nearest_on_segment(x[i : i + 1], *scene.walls[-1 - j])[0]
@@ -76,7 +76,7 @@ def nearest_velocity(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: fl
     """(k, n, 2) m/s: of the velocities that each disk has in the truth within `WINDOW` dt of a sample, the nearest.
 
     They are the truth's at that instant, less the disk's own collisions just before, one after the other, or with
-    those just after. Of two at one instant either may come first. A disk that lay on a floor when it was hit counts
+    those just after. Of two at one instant either may come first. A disk that lay on a floor when it was struck counts
     before that as falling, not as carried: it may read g `WINDOW` dt too much. Of a collision at the instant of a
     sample the truth has the velocity before it or that after it, as its numbers round: both are tried.
     """
@@ -172,11 +172,11 @@ def windows(played: Trajectory, jumps: Jumps, dt: float) -> tuple[np.ndarray, ..
 @laws.once
 def collision_free(trajectory: Trajectory, dt: float) -> np.ndarray:
     """(k, n) whether a disk has no collision within `WINDOW` dt of a sample."""
-    hits, near = trajectory.collisions, WINDOW * dt
+    collisions, near = trajectory.collisions, WINDOW * dt
     k, n = trajectory.angle.shape
     free = np.ones((k, n), bool)
     for disk in range(n):
-        times = hits.t[(hits.i == disk) | (hits.j == disk)]
+        times = collisions.t[(collisions.i == disk) | (collisions.j == disk)]
         early, late = (np.searchsorted(times, trajectory.t + shift) for shift in (-near, near))
         free[:, disk] = early == late
     return free

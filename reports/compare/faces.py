@@ -30,19 +30,19 @@ def on_faces(trajectory: Trajectory, scene: Scene) -> Collisions:
 
     So a floor of one segment, of two end to end, or of two on top of each other gives the same pairs.
     """
-    hits, walls = trajectory.collisions, np.unique(trajectory.collisions.j)
+    collisions, walls = trajectory.collisions, np.unique(trajectory.collisions.j)
     firsts = np.array([-1 - first_on_line(scene.walls, -1 - j) if j < 0 else j for j in walls], np.int64)
     if np.array_equal(firsts, walls):
-        return hits
-    j = firsts[np.searchsorted(walls, hits.j)]
-    order = np.lexsort((hits.t, j, hits.i))
-    near = np.diff(hits.t[order]) <= SAME * interval(trajectory)
-    again = (np.diff(hits.i[order]) == 0) & (np.diff(j[order]) == 0) & near
-    kept = np.ones(len(hits), bool)
+        return collisions
+    j = firsts[np.searchsorted(walls, collisions.j)]
+    order = np.lexsort((collisions.t, j, collisions.i))
+    near = np.diff(collisions.t[order]) <= SAME * interval(trajectory)
+    again = (np.diff(collisions.i[order]) == 0) & (np.diff(j[order]) == 0) & near
+    kept = np.ones(len(collisions), bool)
     kept[order[1:][again]] = False
-    columns = {"t": hits.t[kept], "impulse": hits.impulse[kept]}
-    whole = {"i": frozen(hits.i[kept], np.int64), "j": frozen(j[kept], np.int64)}
-    return replace(hits, **{name: frozen(column) for name, column in columns.items()}, **whole)
+    columns = {"t": collisions.t[kept], "impulse": collisions.impulse[kept]}
+    whole = {"i": frozen(collisions.i[kept], np.int64), "j": frozen(j[kept], np.int64)}
+    return replace(collisions, **{name: frozen(column) for name, column in columns.items()}, **whole)
 
 
 def interval(trajectory: Trajectory) -> float:

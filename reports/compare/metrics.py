@@ -52,7 +52,7 @@ def energy_error(view: View) -> Value | None:
 
 
 def energy_created(view: View) -> Value | None:
-    """Largest rise of the energy above an earlier sample, over the energy at hand; no hit can give any."""
+    """Largest rise of the energy above an earlier sample, over the energy at hand; no collision can give any."""
     return _largest(violations.energy_rise(view), view)
 
 
@@ -115,7 +115,7 @@ def penetration_radii(view: View) -> Value | None:
 
 
 def disks_through_walls(view: View) -> Value | None:
-    """Disks whose centre has crossed a wall: they are where no hit can bring them back from."""
+    """Disks whose centre has crossed a wall: they are where no collision can bring them back from."""
     if not len(view.scenario.scene.walls):
         return None
     through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))
@@ -177,41 +177,42 @@ def time_to_1pct_s(view: View) -> Value | None:
 
 
 def collision_count_error(view: View) -> Value | None:
-    """Hits of the player less hits of the other, whenever they come; pairs at rest from the start are not counted."""
-    resting = pair_keys(view.hits[1])[view.hits[1].impulse == 0]
-    counted = (by_pair(hits, resting, view.end - SAME * view.dt) for hits in view.hits)
-    played, true = (len(hits.t) for hits in counted)
+    """Collisions of the player less collisions of the other, whenever they come; pairs at rest from the start are not
+    counted."""
+    resting = pair_keys(view.collisions[1])[view.collisions[1].impulse == 0]
+    counted = (by_pair(collisions, resting, view.end - SAME * view.dt) for collisions in view.collisions)
+    played, true = (len(collisions.t) for collisions in counted)
     return Value(played - true, note=f"{played} of {true}")
 
 
 def collisions_missed(view: View) -> Value | None:
-    """Hits of the other, of those that a step can tell apart, that the player does not have at their time."""
-    return Value(len(view.matched.missed), note=f"of {len(view.hits[1])}")
+    """Collisions of the other, of those that a step can tell apart, that the player does not have at their time."""
+    return Value(len(view.matched.missed), note=f"of {len(view.collisions[1])}")
 
 
 def collisions_invented(view: View) -> Value | None:
-    """Hits of the player that the other does not have at their time."""
+    """Collisions of the player that the other does not have at their time."""
     return Value(len(view.matched.invented))
 
 
 def first_wrong_collision_s(view: View) -> Value | None:
-    """When the first hit is missed or invented, and whose; `inf` if none is."""
+    """When the first collision is missed or invented, and whose; `inf` if none is."""
     if view.matched.first_wrong is None:
         return Value(np.inf, note="none")
     at, what = view.matched.first_wrong
     return Value(at, at=at, note=what)
 
 
-def hit_delay_dt(view: View) -> Value | None:
-    """Median over the hits of played time less true time, in dt; a hit is dated to the end of its step."""
+def collision_delay_dt(view: View) -> Value | None:
+    """Median over the collisions of played time less true time, in dt; a collision is dated to the end of its step."""
     delay = view.matched.delay
-    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} collisions") if len(delay) else None
 
 
-def hit_delay_max_dt(view: View) -> Value | None:
-    """Largest difference in time of any hit from the true one, in dt."""
+def collision_delay_max_dt(view: View) -> Value | None:
+    """Largest difference in time of any collision from the true one, in dt."""
     delay = view.matched.delay
-    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} hits") if len(delay) else None
+    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} collisions") if len(delay) else None
 
 
 def _rms(values: Array) -> float:
@@ -285,10 +286,10 @@ METRICS: dict[str, Metric] = {
     "restitution_error": Metric(restitution_error, "1", (ITSELF,)),
     "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,)),
     "disks_through_walls": Metric(disks_through_walls, "disks", (ITSELF,)),
-    "collision_count_error": Metric(collision_count_error, "hits", (TRUTH, ENGINE), "zero"),
-    "collisions_missed": Metric(collisions_missed, "hits", (TRUTH, ENGINE)),
-    "collisions_invented": Metric(collisions_invented, "hits", (TRUTH, ENGINE)),
+    "collision_count_error": Metric(collision_count_error, "collisions", (TRUTH, ENGINE), "zero"),
+    "collisions_missed": Metric(collisions_missed, "collisions", (TRUTH, ENGINE)),
+    "collisions_invented": Metric(collisions_invented, "collisions", (TRUTH, ENGINE)),
     "first_wrong_collision_s": Metric(first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"),
-    "hit_delay_dt": Metric(hit_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
-    "hit_delay_max_dt": Metric(hit_delay_max_dt, "dt", (TRUTH, ENGINE)),
+    "collision_delay_dt": Metric(collision_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
+    "collision_delay_max_dt": Metric(collision_delay_max_dt, "dt", (TRUTH, ENGINE)),
 }

@@ -145,15 +145,15 @@ class View:
 
     @cached_property
     def calm(self) -> np.ndarray:
-        """(k,) False at samples within `WINDOW` dt of a hit of the other; sample 0 always counts.
+        """(k,) False at samples within `WINDOW` dt of a collision of the other; sample 0 always counts.
 
         For the error budget, which takes runs from each other: no metric, as in a crowd nothing but the start is left.
         """
         calm = np.ones(len(self.played), bool)
-        if self.other is not None and len(hits := self.other.collisions.t):
-            nearest = np.searchsorted(hits, self.played.t)
-            before = self.played.t - hits[np.maximum(nearest - 1, 0)]
-            after = hits[np.minimum(nearest, len(hits) - 1)] - self.played.t
+        if self.other is not None and len(collisions := self.other.collisions.t):
+            nearest = np.searchsorted(collisions, self.played.t)
+            before = self.played.t - collisions[np.maximum(nearest - 1, 0)]
+            after = collisions[np.minimum(nearest, len(collisions) - 1)] - self.played.t
             calm = np.minimum(np.abs(before), np.abs(after)) > WINDOW * self.dt
             calm[0] = True
         return calm
@@ -171,7 +171,7 @@ class View:
         return effective_restitution(self.played, scene, slowest, self.rounding)
 
     @cached_property
-    def hits(self) -> tuple[Collisions, Collisions]:
+    def collisions(self) -> tuple[Collisions, Collisions]:
         """Of the player and of the other, by what a disk can tell apart (faces.py)."""
         assert self.other is not None
         return on_faces(self.played, self.scenario.scene), on_faces(self.other, self.scenario.scene)
@@ -184,5 +184,5 @@ class View:
 
     @cached_property
     def matched(self) -> Matched:
-        """The hits of the two."""
-        return match(*self.hits, self.end, self.dt)
+        """The collisions of the two."""
+        return match(*self.collisions, self.end, self.dt)

@@ -63,7 +63,7 @@ def energy(view: View) -> Array | None:
 
 
 def energy_rise(view: View) -> Array | None:
-    """E(t) less the smallest E before t, over the energy at hand: no hit can give any, only thrust can."""
+    """E(t) less the smallest E before t, over the energy at hand: no collision can give any, only thrust can."""
     if view.scenario.thrusts or lifts(view.scenario):
         return None
     actual = laws.energy(view.played, view.scenario.scene)
@@ -82,7 +82,7 @@ def knows_impulses(scenario: Scenario) -> bool:
 
 
 def keeps_energy(scenario: Scenario) -> bool:
-    """Whether no hit takes energy and no thrust brings any."""
+    """Whether no collision takes energy and no thrust brings any."""
     return scenario.scene.restitution == 1 and not scenario.thrusts
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from adapters.engine import Engine
 from adapters.engines import ENGINES
-from adapters.play import RUNAWAY, advance, fault_of, first_hits, reach, weight_impulse
+from adapters.play import RUNAWAY, advance, fault_of, first_collisions, reach, weight_impulse
 from reports.game.parting import Parting, Touches, parting
 from reports.game.pilot import SHIP, Pilot
 from scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
@@ -45,9 +45,9 @@ class Flyer:
         name: `engine:profile`.
         state: at the end of the last frame.
         left: why it flies no more, or "".
-        touches: the latest hit of every disk.
+        touches: the latest collision of every disk.
         set_backs: how often its ship was set back to the start.
-        seen: how many of its hits since then are in `touches`.
+        seen: how many of its collisions since then are in `touches`.
         earlier: how many collisions there were before.
         collisions: how many there were since.
         parting: where it parted from the solid one.
@@ -145,17 +145,17 @@ class Flight:
         try:
             advance(flyer.engine, pushed, step, count, self.dt)
             flyer.state = flyer.engine.read()
-            hits = flyer.engine.hits()
+            collisions = flyer.engine.collisions()
         except Exception as error:  # a refusal, or whatever an engine raises
             flyer.left = str(error) or type(error).__name__
             return
         if fault := fault_of(flyer.state, self.farthest):
             flyer.state, flyer.left = before, fault
             return
-        if len(hits) > flyer.seen:
-            flyer.touches.note(hits[flyer.seen :], self.frame, flyer.state)
-            flyer.seen = len(hits)
-            flyer.collisions = len(first_hits(hits, self.dt, weight_impulse(self.scenario.scene, self.dt)))
+        if len(collisions) > flyer.seen:
+            flyer.touches.note(collisions[flyer.seen :], self.frame, flyer.state)
+            flyer.seen = len(collisions)
+            flyer.collisions = len(first_collisions(collisions, self.dt, weight_impulse(self.scenario.scene, self.dt)))
         if self.ship_left(before, flyer.state):
             self.set_back(flyer)
 
@@ -199,7 +199,8 @@ class Flight:
         return self.is_game and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
 
     def measures(self, flyer: Flyer) -> dict[str, Any]:
-        """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid one's m, hits."""
+        """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid one's m,
+        collisions."""
         scene, state = self.scenario.scene, flyer.state
         apart = self.distances(self.solid.state.position, state.position)
         moving = ~scene.static
@@ -210,7 +211,7 @@ class Flight:
             "energy": float(mass @ speed2 + inertia @ state.angular_velocity[moving] ** 2) / 2,
             "ship_apart": float(apart[SHIP]),
             "apart": float(apart.max()),
-            "hits": flyer.earlier + flyer.collisions,
+            "collisions": flyer.earlier + flyer.collisions,
         }
 
     def distances(self, here: Array, there: Array) -> Array:

@@ -146,7 +146,7 @@ class Game {
     put("energy", flyer ? flyer.energy.toFixed(3) : "");
     put("ship_apart", flyer && !solid ? short(flyer.ship_apart) : "");
     put("apart", flyer && !solid ? short(flyer.apart) : "");
-    put("hits", flyer ? String(flyer.hits) : "");
+    put("collisions", flyer ? String(flyer.collisions) : "");
     put("parted", flyer ? this.story(flyer, row.dataset.engine) : "");
     cell("parted").classList.toggle("gone", Boolean(flyer?.left));
   }
@@ -156,7 +156,7 @@ class Game {
     if (!flyer.parted) return "";
     const { t, i, j, shared, solid_only: mine } = flyer.parted;
     const solid = this.field.engines[this.now.solid];
-    const whose = shared ? "both hit, and part differently" : `only ${shortName(mine ? solid : name)} hits`;
+    const whose = shared ? "both collide, and part differently" : `only ${shortName(mine ? solid : name)} collisions`;
     return `${t.toFixed(2)} s, ${pairOf(i, j)}: ${whose}`;
   }
 

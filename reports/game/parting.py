@@ -1,4 +1,4 @@
-"""Finds the hit at which two engines part: the first after which a disk moves on differently in the two."""
+"""Finds the collision at which two engines part: the first after which a disk moves on differently in the two."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engine import Hit
+from adapters.engine import Collision
 from scenarios.model import Array, Scene, State
 
 APART = 0.01  # m/s: disks that move on differently by less have not parted, they were found a step early or late
-WAIT = 6  # frames without a hit of a disk before its velocities are compared: engines find a hit some steps apart
+WAIT = 6  # frames without a collision of a disk before its velocities are compared: engines find a collision some steps apart
 
 
-class LastHit(NamedTuple):
-    """A disk's latest hit: frame, its disks (wall w as -1 - w), and where the two touched, (x, y) m."""
+class LastCollision(NamedTuple):
+    """A disk's latest collision: frame, its disks (wall w as -1 - w), and where the two touched, (x, y) m."""
 
     frame: int
     i: int
@@ -25,30 +25,30 @@ class LastHit(NamedTuple):
 
 
 class Parting(NamedTuple):
-    """Where a ghost left the solid ship's engine: the hit, and whose it was."""
+    """Where a ghost left the solid ship's engine: the collision, and whose it was."""
 
-    hit: LastHit
+    collision: LastCollision
     shared: bool  # both engines had it, and made different velocities of it
     solid_only: bool
 
 
 class Touches:
-    """The latest hit of every disk in one engine. scene: whose radii tell where two disks touch."""
+    """The latest collision of every disk in one engine. scene: whose radii tell where two disks touch."""
 
     def __init__(self, scene: Scene) -> None:
         self.radius = scene.radius
         self.frame = np.full(scene.n, -WAIT)
-        self.last: dict[int, LastHit] = {}
+        self.last: dict[int, LastCollision] = {}
 
-    def note(self, hits: Iterable[Hit], frame: int, state: State) -> None:
-        """`hits` happened in frame `frame`, which ended in `state`."""
-        for hit in hits:
-            i, j = (hit.i, hit.j) if hit.i >= 0 else (hit.j, hit.i)
+    def note(self, collisions: Iterable[Collision], frame: int, state: State) -> None:
+        """`collisions` happened in frame `frame`, which ended in `state`."""
+        for collision in collisions:
+            i, j = (collision.i, collision.j) if collision.i >= 0 else (collision.j, collision.i)
             x, y = contact(state.position, self.radius, i, j)
             for disk in (i, j):
                 if disk >= 0:
                     self.frame[disk] = frame
-                    self.last[disk] = LastHit(frame, i, j, x, y)
+                    self.last[disk] = LastCollision(frame, i, j, x, y)
 
 
 def contact(position: Array, radius: Array, i: int, j: int) -> tuple[float, float]:
@@ -59,7 +59,7 @@ def contact(position: Array, radius: Array, i: int, j: int) -> tuple[float, floa
 
 
 def parting(solid: Touches, ghost: Touches, velocity: Array, other: Array, frame: int) -> Parting | None:
-    """The hit after which the velocities (n, 2) m/s of solid and ghost differ, if they do by frame `frame`."""
+    """The collision after which the velocities (n, 2) m/s of solid and ghost differ, if they do by frame `frame`."""
     latest = np.maximum(solid.frame, ghost.frame)
     apart = np.hypot(*(velocity - other).T) > APART
     found = np.flatnonzero(apart & (latest >= 0) & (frame - latest >= WAIT))
@@ -69,6 +69,6 @@ def parting(solid: Touches, ghost: Touches, velocity: Array, other: Array, frame
     mine, theirs = solid.last.get(disk), ghost.last.get(disk)
     both = bool(mine and theirs and {*mine[1:3]} == {*theirs[1:3]} and abs(mine.frame - theirs.frame) < WAIT)
     solid_later = mine is not None and (theirs is None or mine.frame >= theirs.frame)
-    hit = mine if both or solid_later else theirs
-    assert hit is not None
-    return Parting(hit, both, not both and solid_later)
+    collision = mine if both or solid_later else theirs
+    assert collision is not None
+    return Parting(collision, both, not both and solid_later)

@@ -95,9 +95,9 @@ class Session:
         """One engine's disks, its measures, and where it parted or why it left."""
         parted = None
         if flyer.parting is not None:
-            hit = flyer.parting.hit
-            parted = hit._asdict() | {
-                "t": (hit.frame + 1) * self.flight.scenario.sample_interval,
+            collision = flyer.parting.collision
+            parted = collision._asdict() | {
+                "t": (collision.frame + 1) * self.flight.scenario.sample_interval,
                 "shared": flyer.parting.shared, "solid_only": flyer.parting.solid_only,
             }  # fmt: skip
         return self.flight.measures(flyer) | {

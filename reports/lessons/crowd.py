@@ -68,7 +68,7 @@ COST = Lesson(
         "step: ten times the disks, a hundred times the work. Whoever sorts the disks into cells or a tree first asks "
         "only neighbours: the cost grows about as the number does. <code>reference:exercise</code> does so where "
         "there are many, and gives the same bits as with every pair. For few disks a step is mostly the call itself.",
-        "The event-driven player has no steps to take: it uses cells, too, and its time goes with the number of hits. "
+        "The event-driven player has no steps to take: it uses cells, too, and its time goes with the number of collisions. "
         "Times are the least of five runs on this machine and as noisy as it is busy.",
     ),
     sliders=(
@@ -99,7 +99,7 @@ def show_horizon(settings: Settings) -> Shown:
         )
 
     charts = [Chart("Energy of motion, of what it was", "time in s", "", shown.curves(energy))]
-    facts = [("hits of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
+    facts = [("collisions of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
     if shown.truth is not None:
         errors = shown.errors()
         charts.insert(0, Chart("Farthest disk from the exact answer", "time in s", "m", errors, "y"))
@@ -111,30 +111,30 @@ def show_horizon(settings: Settings) -> Shown:
 
 
 def growth(shown: Played, errors: list[Curve]) -> list[tuple[str, str]]:
-    """By what factor a hit makes a distance grow, fitted to the player whose errors begin at rounding."""
+    """By what factor a collision makes a distance grow, fitted to the player whose errors begin at rounding."""
     assert shown.truth is not None
     found = next((curve for curve in errors if curve.name == "event_driven:float64"), None)
     if found is None:
         return []
     t, y = np.asarray(found.x), np.asarray(found.y)
     used = (y > 1e-15) & (y < 1e-2)
-    hits = np.searchsorted(shown.truth.collisions.t, t[used])
-    if used.sum() < 10 or np.ptp(hits) < 5:
+    collisions = np.searchsorted(shown.truth.collisions.t, t[used])
+    if used.sum() < 10 or np.ptp(collisions) < 5:
         return []
-    slope = float(np.polyfit(hits, np.log(y[used]), 1)[0])
-    return [("a hit makes a distance grow, on average, by a factor of", number(float(np.exp(slope))))]
+    slope = float(np.polyfit(collisions, np.log(y[used]), 1)[0])
+    return [("a collision makes a distance grow, on average, by a factor of", number(float(np.exp(slope))))]
 
 
 HORIZON = Lesson(
     name="horizon", number="7", title="Why trajectories stop being comparable",
     asks="How long do two right solvers agree?",
     text=(
-        "Two disks that meet a hair further to the side fly off in another direction: every hit multiplies a small "
+        "Two disks that meet a hair further to the side fly off in another direction: every collision multiplies a small "
         "distance by some factor, so that it grows exponentially and reaches the size of a disk, however small "
         "it was. A "
-        "rounding of 10⁻¹⁶ lasts some ten seconds here; a step that finds its hits late begins a dozen decades higher.",
+        "rounding of 10⁻¹⁶ lasts some ten seconds here; a step that finds its collisions late begins a dozen decades higher.",
         "After this horizon no trajectory is right or wrong by its places. What stays comparable are momentum, energy, "
-        "the number of hits, and whatever else does not care which disk is where.",
+        "the number of collisions, and whatever else does not care which disk is where.",
     ),
     sliders=(
         Slider("seed", "Seed of the field", (0, 1, 2), 0), Slider("e", "Restitution", (0.9, 1.0), 0),

@@ -54,7 +54,7 @@ def aside(each: Trajectory) -> Array:
 SEEN = {
     "a fast disk meets another": Seen("tunnelling_head_on", "Way of the disk", "m", way),
     "a fast disk meets a thin wall": Seen("tunnelling_thin_wall", "Way of the disk", "m", way),
-    "a slow hit": Seen("slow_hit", "Way of the first disk", "m", way),
+    "a slow collision": Seen("slow_collision", "Way of the first disk", "m", way),
     "a near miss": Seen("near_miss", "The first disk, pushed aside", "m", aside),
     "a scene made smaller": Seen("scale_down", "Way of the first disk", "m", way),
     # A replay keeps seven digits of a place: farther out they are too few for a disk.
@@ -172,7 +172,7 @@ LIMITS = Lesson(
     asks="How harsh may a scene be before a method breaks?",
     text=(
         "Every method works in gentle scenes. Make one thing harsher, a speed, a distance, a size, and most have a "
-        "value from which on they <b>fail</b>: a hit is missed, a spin is cut, a place is rounded away. The search "
+        "value from which on they <b>fail</b>: a collision is missed, a spin is cut, a place is rounded away. The search "
         "tries values from gentle to harsh, a collision at several moments of its step, stops at the first that fails, "
         f"and halves the gap to the last that works until the two are {QUICK.ratio - 1:.0%} apart.",
         "A reason counts as tested if the limit follows from it, or if a player that differs in that one thing gets "

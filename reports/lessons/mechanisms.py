@@ -23,7 +23,7 @@ from scenarios.truth.exact import with_oracle
 SWITCHED, PLAIN, NO_CCD = "reference:switched", "reference:exercise", "box2d:matched+no_ccd"
 PRECISION = {53: np.float64, 24: np.float32}
 ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed after gravity": BOX2D}
-SHOWN = 0.5  # the e whose hit is replayed in the page on mixing
+SHOWN = 0.5  # the e whose collision is replayed in the page on mixing
 SECONDS = 3.0  # that the tenth of a second of the page on the cap is replayed for
 Read = Callable[[Trajectory], Array]
 
@@ -86,19 +86,19 @@ def over(x: Array, runs: Sequence[Run], read: Read) -> list[Curve]:
 
 
 def show_threshold(settings: Settings) -> Shown:
-    """e of a hit against its closing speed."""
+    """e of a collision against its closing speed."""
     closing = np.array([0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0])
     scenario = asked(pairs(closing, settings["e"]), 0.5)
     runs = runs_of(["box2d:shipped"], Switched(threshold=settings["threshold"]), scenario, 4)
     curves = over(closing, runs, parting(closing))
     facts = [*told(runs, "restitution threshold in m/s"), distance(curves, "box2d:shipped", "")]
     curves.append(Curve(TRUTH, closing, np.full(len(closing), settings["e"])))
-    chart = Chart("Parting over closing speed", "closing speed in m/s", "e of the hit", curves, "x")
+    chart = Chart("Parting over closing speed", "closing speed in m/s", "e of the collision", curves, "x")
     return Shown([chart], filmed(scenario, runs), facts)
 
 
 def show_mixing(settings: Settings) -> Shown:
-    """e of a hit against the e that is stated on both disks."""
+    """e of a collision against the e that is stated on both disks."""
     stated, closing = np.linspace(0.0, 1.0, 11), np.array([2.0])
     names = ("pymunk:shipped", PLAIN, SWITCHED)
     found: dict[str, list[float]] = {}
@@ -113,7 +113,9 @@ def show_mixing(settings: Settings) -> Shown:
     curves = [Curve(name, stated, found[name], dots=True) for name in names]
     facts = [("replayed: e on each of the two disks", number(SHOWN)), distance(curves, "pymunk:shipped", "")]
     curves.append(Curve(TRUTH, stated, stated))
-    return Shown([Chart("Restitution of a pair", "e on each of the two disks", "e of the hit", curves)], film, facts)
+    return Shown(
+        [Chart("Restitution of a pair", "e on each of the two disks", "e of the collision", curves)], film, facts
+    )
 
 
 def falling(names: Sequence[str], on: Switched, substeps: int) -> Shown:
@@ -194,7 +196,7 @@ def show_cap(settings: Settings) -> Shown:
 
 
 def show_row(settings: Settings) -> Shown:
-    """The velocities after a disk has hit a row that touches."""
+    """The velocities after a disk has struck a row that touches."""
     n = settings["n"]
     scene = lay_out(
         position=np.column_stack([[-2.01, *range(n)], np.zeros(n + 1)]),
@@ -209,7 +211,7 @@ def show_row(settings: Settings) -> Shown:
     film = filmed(scenario, runs)
     if film.truth is not None:
         curves.append(Curve(TRUTH, np.arange(n + 1.0), film.truth.velocity[-1, :, 0]))
-    return Shown([Chart("Velocity after the hit", "disk", "m/s", curves)], film, facts)
+    return Shown([Chart("Velocity after the collision", "disk", "m/s", curves)], film, facts)
 
 
 def page(
@@ -224,7 +226,7 @@ def page(
 MECHANISMS = (
     page(
         1, "threshold", "A restitution threshold", "Why do slow disks stick in Box2D?",
-        "A hit that closes more slowly than a threshold is taken as inelastic, so that what should rest comes to rest. "
+        "A collision that closes more slowly than a threshold is taken as inelastic, so that what should rest comes to rest. "
         "It is a speed in the engine's own units; the asteroids of the exercise fly at 0.35 to 0.7 m/s. Raise "
         "it in the "
         "reference until its curve falls where the engine's does.",
@@ -233,7 +235,7 @@ MECHANISMS = (
         Slider("e", "Restitution e", (0.5, 0.9, 1.0), 1),
     ),
     page(
-        2, "mixing", "A rule for mixing", "Whose restitution does a hit have?",
+        2, "mixing", "A rule for mixing", "Whose restitution does a collision have?",
         "A restitution belongs to a pair, but engines keep one for each shape, and mix the two by a rule of their own. "
         "Try the rules in the reference: one of them is this engine's.",
         ["pymunk:shipped"], show_mixing, Slider("rule", "Rule", tuple(MIXING), 0),
@@ -290,7 +292,7 @@ MECHANISMS = (
     page(
         9, "row", "Sequential impulses in a touching row", "What comes out of a row that touches?",
         "The exercise lets one pair after the other collide, and the last disk flies off with everything. So it is in "
-        "the exact answer, which all orders of these hits share. A solver of simultaneous contacts fixes first what "
+        "the exact answer, which all orders of these collisions share. A solver of simultaneous contacts fixes first what "
         "each contact shall become, e times its closing speed, 0 for those that only touch, and then goes through all "
         "of them again and again: what comes out depends on how often.",
         ["box2d:matched", "pymunk:matched"], show_row,

@@ -1,4 +1,4 @@
-"""Lesson 4: two disks meet, with the numbers of this very hit filled into every line of the solver."""
+"""Lesson 4: two disks meet, with the numbers of this very collision filled into every line of the solver."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def two(restitution: float, ratio: float, offset: float) -> Scenario:
     return with_oracle(
         Scenario(
             name="two_disks",
-            asks="What comes out of one hit?",
+            asks="What comes out of one collision?",
             source="the exercise, task 2",
             scene=scene,
             duration=1.0,
@@ -33,20 +33,20 @@ def two(restitution: float, ratio: float, offset: float) -> Scenario:
     )
 
 
-def hit_of_the_reference(scene: Scene, dt: float) -> tuple[State, State, float]:
-    """The reference's state before and after the step with its hit, and the impulse it tells, N s."""
+def collision_of_the_reference(scene: Scene, dt: float) -> tuple[State, State, float]:
+    """The reference's state before and after the step with its collision, and the impulse it tells, N s."""
     engine = ENGINES["reference:exercise"].make()
     engine.load(scene, dt)
     before = engine.read()
-    while not engine.hits():
+    while not engine.collisions():
         before = engine.read()
         engine.step()
-    return before, engine.read(), engine.hits()[0].impulse
+    return before, engine.read(), engine.collisions()[0].impulse
 
 
 def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
-    """Detection, projection, impulse and momentum, each with the numbers of this hit."""
-    before, after, told = hit_of_the_reference(scene, dt)
+    """Detection, projection, impulse and momentum, each with the numbers of this collision."""
+    before, after, told = collision_of_the_reference(scene, dt)
     (m1, m2), e = scene.mass, scene.restitution
     x = before.position + before.velocity * dt  # nothing pushes, so symplectic Euler moves by v dt
     gap = x[0] - x[1]
@@ -80,7 +80,7 @@ def pair(vector: Array) -> str:
 
 
 def show_meeting(settings: Settings) -> Shown:
-    """The hit, drawn and in numbers."""
+    """The collision, drawn and in numbers."""
     scenario = two(settings["e"], settings["ratio"], settings["offset"])
     shown = Played.by(scenario, NAMES, settings["k"])
     charts = [
@@ -101,7 +101,7 @@ MEETING = Lesson(
         "that they touch in a point and no velocity changes, find the <b>impulse</b> that lets them part with e "
         "times the "
         "speed they closed with, and <b>update</b> both velocities with the same impulse, so that momentum stays.",
-        "The line of centres is read when the hit is found, not when it happened. Off the centre line, a large step "
+        "The line of centres is read when the collision is found, not when it happened. Off the centre line, a large step "
         "therefore takes the wrong normal, and this is most of what the engines differ by.",
     ),
     sliders=(

@@ -154,7 +154,7 @@ def show_box(settings: Settings) -> Shown:
         moving = (scene.mass * (each.velocity**2).sum(axis=2) / 2).sum(axis=1)
         return moving + (scene.mass * each.position[:, :, 1]).sum(axis=1) * 9.81
 
-    facts = [("hits of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
+    facts = [("collisions of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
     charts = [Chart("Energy of motion and height", "time in s", "J", shown.curves(energy))]
     if shown.truth is not None:
         charts.append(Chart("Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"))
@@ -167,9 +167,9 @@ BOX = Lesson(
     asks="Where does the energy go?",
     text=(
         "Small disks from random places, with random velocities, under gravity. At a wall the normal velocity becomes "
-        "<code>v' = −c_r v</code>: each hit keeps <code>c_r²</code> of that part of the energy, and nothing "
+        "<code>v' = −c_r v</code>: each collision keeps <code>c_r²</code> of that part of the energy, and nothing "
         "else may take "
-        "any. Between two hits the sum of <code>m v²/2 + m g y</code> must be level.",
+        "any. Between two collisions the sum of <code>m v²/2 + m g y</code> must be level.",
         "With <code>c_r = 1</code> the exact line is flat: what a player gains or loses is its own. The exact answer "
         "ends where the motion is no longer knowable in float64, or where a disk comes to rest.",
     ),

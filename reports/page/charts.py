@@ -96,7 +96,7 @@ def energy(comparison: Comparison) -> Drawing:
     if not conserved and comparison.truth is None:
         return energy_course(comparison)
     lines = over(views(comparison, None if conserved else comparison.truth), violations.energy)
-    against = "what it was at the start, as no hit takes any (e = 1)," if conserved else "the truth's,"
+    against = "what it was at the start, as no collision takes any (e = 1)," if conserved else "the truth's,"
     caption = (
         f"Distance of the energy from {against} over the energy at hand{'' if conserved else DELAY}. Lower is better."
     )
@@ -111,7 +111,7 @@ def energy_course(comparison: Comparison) -> Drawing:
         scale = scales.energy(comparison.scenario) or 1.0
         lines.append(Line(run, view.played.t, laws.energy(view.played, scene) / scale))
     caption = (
-        "No exact answer says how much energy the hits should take, so this is no error: the energy over that "
+        "No exact answer says how much energy the collisions should take, so this is no error: the energy over that "
         "at hand. Without pushes it must never rise."
     )
     return Drawing("Energy", caption, over_time(comparison, lines, "energy / energy at hand", log=False))

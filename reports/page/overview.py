@@ -65,8 +65,8 @@ SUMMARY: dict[str, Column] = {
     MAPPED: Column("Position", "radii", "largest distance of any disk from where it truly is"),
     "momentum_error": Column("Momentum", "of Σ m|v|", "largest momentum that came or went unasked"),
     "energy_error": Column("Energy", "of the energy at hand", "largest energy that came or went unasked"),
-    "restitution_error": Column("Restitution", "no unit", "largest |e measured − e asked for| of any hit"),
-    "wrong_hits": Column("Wrong hits", "hits in all", "hits missed and hits invented, added up"),
+    "restitution_error": Column("Restitution", "no unit", "largest |e measured − e asked for| of any collision"),
+    "wrong_collisions": Column("Wrong collisions", "collisions in all", "collisions missed and collisions invented, added up"),
     "failed": Column("Not played", "scenarios", "refused, crashed, diverged or timed out"),
 }  # fmt: skip
 
@@ -136,15 +136,16 @@ def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: 
 
 
 def pool(metric: str, name: str, found: Sequence[Found]) -> tuple[float, str]:
-    """The median, for hits the sum, of a metric over the scenarios in which it is judged; in how many it is, or not."""
-    kinds = ("collisions_missed", "collisions_invented") if metric == "wrong_hits" else (metric,)
+    """The median, for collisions the sum, of a metric over the scenarios in which it is judged; in how many it is, or
+    not."""
+    kinds = ("collisions_missed", "collisions_invented") if metric == "wrong_collisions" else (metric,)
     known = [[each[name, kind] for kind in kinds if (name, kind) in each] for each in found]
     totals = [sum(one.value for one in each) for each in known if each and all(one.judged for one in each)]
     left_out = sum(not one.judged for each in known for one in each[:1])
     remark = f"in {len(totals)} scenarios" + (f", {NOT_JUDGED} in {left_out}" if left_out else "")
     if not totals:
         return np.nan, remark
-    return float(np.sum(totals) if metric == "wrong_hits" else np.median(totals)), remark
+    return float(np.sum(totals) if metric == "wrong_collisions" else np.median(totals)), remark
 
 
 def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[str, list[Cell]]:

@@ -1,7 +1,7 @@
 "use strict";
-// How the player's picture is drawn: the plane fitted into the canvas, walls, paths, disks, hits, the scale bar.
+// How the player's picture is drawn: the plane fitted into the canvas, walls, paths, disks, collisions, the scale bar.
 
-const HIT_LASTS = 0.12;  // s of the wall clock at speed 1: long enough to be seen
+const COLLISION_LASTS = 0.12;  // s of the wall clock at speed 1: long enough to be seen
 const FEW = 24;  // more disks than this are drawn without paths and centre marks
 
 Object.assign(Player.prototype, {
@@ -33,7 +33,7 @@ Object.assign(Player.prototype, {
     this.drawStatic(pen);
     if (few) layers.forEach((layer) => this.drawPath(pen, layer));
     layers.forEach((layer, k) => this.ended(layer) || this.drawDisks(pen, layer, few, layers.length - k));
-    layers.forEach((layer) => this.drawHits(pen, layer));
+    layers.forEach((layer) => this.drawCollisions(pen, layer));
     this.drawEvent(pen, layers);
     this.drawScaleBar(pen);
     this.note.textContent = layers.filter((layer) => this.ended(layer))
@@ -133,17 +133,17 @@ Object.assign(Player.prototype, {
     pen.restore();
   },
 
-  drawHits(pen, layer) {
-    const lasts = HIT_LASTS * Math.max(this.speed, 0.25) * this.pace;
-    for (const hit of layer.hitList) {
-      const age = (this.time - hit.t) / lasts;
-      if (age < 0 || age > 1 || hit.i >= this.pack.radius.length) continue;
-      const [x, y] = this.pixel(this.place(layer, hit.i));
+  drawCollisions(pen, layer) {
+    const lasts = COLLISION_LASTS * Math.max(this.speed, 0.25) * this.pace;
+    for (const collision of layer.hitList) {
+      const age = (this.time - collision.t) / lasts;
+      if (age < 0 || age > 1 || collision.i >= this.pack.radius.length) continue;
+      const [x, y] = this.pixel(this.place(layer, collision.i));
       pen.globalAlpha = 1 - age;
       pen.strokeStyle = this.colour(layer);
       pen.lineWidth = 2;
       pen.beginPath();
-      pen.arc(x, y, this.pack.radius[hit.i] * this.scale + 3 + 9 * age, 0, 2 * Math.PI);
+      pen.arc(x, y, this.pack.radius[collision.i] * this.scale + 3 + 9 * age, 0, 2 * Math.PI);
       pen.stroke();
       pen.globalAlpha = 1;
     }

@@ -2,7 +2,7 @@
 
 A pack is, deflated: uint32 length of a JSON head, the head, then for every layer the numbers the head announces, all
 little-endian uint16: positions on a grid over the layer's bounding box (second differences in time, zigzag, high bytes
-before low bytes: steady motion becomes zeros), angles on a grid over a turn if anything turns, and the hits.
+before low bytes: steady motion becomes zeros), angles on a grid over a turn if anything turns, and the collisions.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 FRAMES = 240
 NUMBERS = 10_000  # positions of disks a layer, so that a crowd of 100 takes no more room than the page has
-HITS = 300  # more marks than this a layer hide the disks
+COLLISIONS = 300  # more marks than this a layer hide the disks
 STEPS = 65535  # of the position grid
 
 
@@ -72,13 +72,13 @@ def name_of(run: Run | None) -> str:
 
 
 def frames(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> NDArray[np.int64]:
-    """The samples that are drawn: spread evenly, and those nearest to the last layer's hits, if these are few."""
+    """The samples that are drawn: spread evenly, and those nearest to the last layer's collisions, if these are few."""
     count = int(min(FRAMES, max(60, NUMBERS // scenario.scene.n), scenario.samples + 1))
-    hits = np.unique(np.rint(layers[-1][1].collisions.t / scenario.sample_interval).astype(int))
-    hits = hits[(hits > 0) & (hits < scenario.samples)]
-    hits = hits if len(hits) < count // 4 else hits[:0]
-    even = np.rint(np.linspace(0, scenario.samples, count - len(hits))).astype(int)
-    return np.unique(np.concatenate([even, hits]))
+    collisions = np.unique(np.rint(layers[-1][1].collisions.t / scenario.sample_interval).astype(int))
+    collisions = collisions[(collisions > 0) & (collisions < scenario.samples)]
+    collisions = collisions if len(collisions) < count // 4 else collisions[:0]
+    even = np.rint(np.linspace(0, scenario.samples, count - len(collisions))).astype(int)
+    return np.unique(np.concatenate([even, collisions]))
 
 
 def head_of(
@@ -140,15 +140,19 @@ def layer(
     if turns:
         turn = np.nan_to_num(trajectory.angle[mine]) / (2 * np.pi)
         body += smoothed(np.rint((turn % 1.0) * (STEPS + 1)).astype(np.uint32).astype(np.uint16))
-    hits = trajectory.collisions
-    marks = len(hits) if len(hits) <= HITS else 0
+    collisions = trajectory.collisions
+    marks = len(collisions) if len(collisions) <= COLLISIONS else 0
     if marks:
-        instant = np.rint(np.clip(hits.t / scenario.duration, 0, 1) * STEPS)
-        body += np.concatenate([instant, hits.i, np.where(hits.j < 0, STEPS, hits.j)]).astype("<u2").tobytes()
+        instant = np.rint(np.clip(collisions.t / scenario.duration, 0, 1) * STEPS)
+        body += (
+            np.concatenate([instant, collisions.i, np.where(collisions.j < 0, STEPS, collisions.j)])
+            .astype("<u2")
+            .tobytes()
+        )
     ends = "" if len(mine) == len(shown) else f"{trajectory.t[-1]:.4g}"
     head = {
         "name": name_of(run), "frames": len(mine), "low": [float(x) for x in low], "span": [float(x) for x in span],
-        "turns": turns, "marks": marks, "hits": len(hits), "ends": ends,
+        "turns": turns, "marks": marks, "collisions": len(collisions), "ends": ends,
     }  # fmt: skip
     return head, body
 

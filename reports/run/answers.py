@@ -116,11 +116,11 @@ def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
     if scenario.truth is None:
         raise NoTruth(scenario.without_truth)
     truth = scenario.truth(scenario.times)
-    hits = truth.collisions
-    angles = np.full(len(hits), np.nan)  # a closed form does not need them
+    collisions = truth.collisions
+    angles = np.full(len(collisions), np.nan)  # a closed form does not need them
     return TruthRecord(
         legs=np.zeros((0, 12)),
-        events=np.stack([hits.t, hits.i, hits.j, hits.impulse, angles], axis=-1),
+        events=np.stack([collisions.t, collisions.i, collisions.j, collisions.impulse, angles], axis=-1),
         valid_until=truth.valid_until,
         error_bound=truth.error_bound,
         bits=53,

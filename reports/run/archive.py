@@ -31,7 +31,7 @@ from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
 Numbered = dict[Hashable, tuple[int, dict[str, Any]]]  # what a line is of -> its number, and the line
 STATE = ("position", "velocity", "angle", "angular_velocity")
-HITS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
+COLLISIONS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
 
 
 @dataclass(frozen=True)
@@ -168,20 +168,21 @@ def stored_scene(folder: Path, name: str) -> Path:
 
 
 def packed(trajectory: Trajectory, small: bool = False) -> bytes:
-    """An .npz with the arrays of `Trajectory`; its hits as collision_t, _i, _j, _impulse. A small one takes longer."""
+    """An .npz with the arrays of `Trajectory`; its collisions as collision_t, _i, _j, _impulse. A small one takes
+    longer."""
     arrays = {name: getattr(trajectory, name) for name in ("t", *STATE)}
-    hits = {key: getattr(trajectory.collisions, name) for name, key in HITS.items()}
+    collisions = {key: getattr(trajectory.collisions, name) for name, key in COLLISIONS.items()}
     file = io.BytesIO()
-    (np.savez_compressed if small else np.savez)(file, **arrays, **hits)
+    (np.savez_compressed if small else np.savez)(file, **arrays, **collisions)
     return file.getvalue()
 
 
 def load_trajectory(file: Path | BinaryIO) -> Trajectory:
     """What `packed` put into a file."""
     with np.load(file) as saved:
-        hits = Collisions(**{name: frozen(saved[key], saved[key].dtype) for name, key in HITS.items()})
+        collisions = Collisions(**{name: frozen(saved[key], saved[key].dtype) for name, key in COLLISIONS.items()})
         t, position, velocity, angle, angular_velocity = (frozen(saved[name]) for name in ("t", *STATE))
-        return Trajectory(t, position, velocity, angle, angular_velocity, hits)
+        return Trajectory(t, position, velocity, angle, angular_velocity, collisions)
 
 
 def parts_of(state: State) -> list[np.ndarray]:
@@ -190,7 +191,7 @@ def parts_of(state: State) -> list[np.ndarray]:
 
 
 def from_trail(trail: bytes, scenario: Scenario) -> Trajectory | None:
-    """The samples whose `parts_of` a trail holds, without hits; None if it holds not even the start."""
+    """The samples whose `parts_of` a trail holds, without collisions; None if it holds not even the start."""
     n = scenario.scene.n
     k = len(trail) // (6 * n * 8)
     if not k:

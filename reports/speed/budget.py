@@ -23,14 +23,16 @@ from reports.speed.ladder import held
 from scenarios.model import Array, Scenario, Trajectory
 
 TIME, INTERPLAY, SUM, ALL, TOTAL, UNEXPLAINED = (
-    "time of hits", "interplay", "sum", "all", "engine", "unexplained",
+    "time of collisions", "interplay", "sum", "all", "engine", "unexplained",
 )  # fmt: skip
 TOTALS = (SUM, ALL, TOTAL)
 COLUMNS = [
     "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "part", "position_radii",
     "energy", "share", "off_engine_radii", "off_reference_radii", "off_apart_radii", "closed_apart_radii", "note",
 ]  # fmt: skip
-LIMIT = 0.5  # radii by which late hits alone may put a disk off: where all is far off, no part adds up to anything
+LIMIT = (
+    0.5  # radii by which late collisions alone may put a disk off: where all is far off, no part adds up to anything
+)
 
 
 class NotPlayed(Exception):
@@ -73,7 +75,7 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
     part changes, the energy in parts of that at hand; share, by which it makes up the position's total (1 in all;
     negative: it makes up for others); off_engine_radii, off_reference_radii and off_apart_radii: what switching it off
     changes in the engine, in the reference with all the rest, and how far these two are apart; closed_apart_radii: how
-    far the flight's part is from its closed form up to the first hit; note: why there are no numbers.
+    far the flight's part is from its closed form up to the first collision; note: why there are no numbers.
     """
     at = followed(scene, seed, substeps)
     scenario, dt = at.scenario, at.dt
@@ -97,7 +99,7 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
 
 
 def followed(scene: str, seed: int, substeps: int) -> Followed:
-    """The scene up to where late hits alone put a disk farther off than `LIMIT`."""
+    """The scene up to where late collisions alone put a disk farther off than `LIMIT`."""
     scenario, truth = held(scene, seed)
     whole = Followed(scenario, truth, scenario.dt(substeps))
     late = whole.played(with_habits([])).trajectory
@@ -105,7 +107,7 @@ def followed(scene: str, seed: int, substeps: int) -> Followed:
     off = (laws.deviation(late, truth, scenario.scene) / scenario.scene.radius).max(axis=1)
     last = max(int(np.append(np.flatnonzero(off > LIMIT), len(off))[0]) - 1, 1)
     shorter = replace(scenario, duration=last * scenario.sample_interval)
-    # All hits are kept: one just after the end is near to the last samples, too.
+    # All collisions are kept: one just after the end is near to the last samples, too.
     return Followed(shorter, replace(cut(truth, last + 1), collisions=truth.collisions), whole.dt)
 
 
@@ -132,7 +134,8 @@ class Followed:
         return run
 
     def offset(self, run: Run) -> Offset:
-        """How far it is from the truth; energies where no hit is near, as a step late is a whole hit late."""
+        """How far it is from the truth; energies where no collision is near, as a step late is a whole collision
+        late."""
         scene, truth, played = self.scenario.scene, self.truth, run.trajectory
         assert played is not None
         apart = laws.apart(played, truth, scene)[:, ~scene.static] / scene.radius[~scene.static, None]
@@ -141,7 +144,8 @@ class Followed:
         return Offset(apart, energy[calm] / (scales.energy(self.scenario) or 1.0))
 
     def flight_apart(self, part: Offset, alpha: float) -> float:
-        """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first hit; see `Row.alpha` of the engines."""
+        """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first collision; see `Row.alpha` of the
+        engines."""
         truth, scene = self.truth, self.scenario.scene
         calm = truth.t < truth.collisions.t.min(initial=np.inf)
         gained = (truth.velocity - truth.velocity[0])[calm][:, ~scene.static] / scene.radius[~scene.static, None]
@@ -158,7 +162,7 @@ class Budget:
     def parts(self) -> dict[str, Offset]:
         """What each habit changes, then interplay, what is unexplained, the sum, all at once, and the engine.
 
-        Each is switched on by itself in the reference with late hits, or on top of those it acts on; for what the
+        Each is switched on by itself in the reference with late collisions, or on top of those it acts on; for what the
         reference has no switch for, the engine is set against itself without it.
         """
         parts = {TIME: self.reference([])}

@@ -24,9 +24,9 @@ class Effort:
         budget: s of timing for one engine at one dt in one scene, beyond the first rounds.
         sizes: numbers of disks.
         patience: s a step may take before an engine drops out of the sizes.
-        dial_scenes: what iterations and substeps are turned up in: a stack, a crowd, a slide, and hits in a row.
-        feature_scenes: what changed engines are measured in: three disks, a hit that thresholds matter to, one disk
-            under gravity, many hits, and a stack at rest.
+        dial_scenes: what iterations and substeps are turned up in: a stack, a crowd, a slide, and collisions in a row.
+        feature_scenes: what changed engines are measured in: three disks, a collision that thresholds matter to, one
+            disk under gravity, many collisions, and a stack at rest.
         budget_scenes: those in which it is asked what the errors are made of.
     """
 
@@ -40,7 +40,7 @@ class Effort:
     dial_scenes: tuple[str, ...]
     budget_scenes: tuple[str, ...]
     feature_scenes: tuple[str, ...] = (
-        "disk_between_static_disks", "slow_hit", "bouncing_ball_e1", "line_gas", "column_of_ten",
+        "disk_between_static_disks", "slow_collision", "bouncing_ball_e1", "line_gas", "column_of_ten",
     )  # fmt: skip
 
     def seeds_of(self, scene: str, seed: int) -> list[int]:
@@ -56,14 +56,14 @@ class Effort:
 
 QUICK = Effort(
     scenes=(
-        "free_fall", "head_on_unequal_e09", "oblique_e09", "slow_hit", "bouncing_ball_e09", "box_billiard",
+        "free_fall", "head_on_unequal_e09", "oblique_e09", "slow_collision", "bouncing_ball_e09", "box_billiard",
         "disk_between_static_disks", "slide_on_incline", "column_of_ten", "line_gas", "cradle_with_gaps",
         "body_frame_thrust", "asteroids", "gas_of_100",
     ),
     seeds=6, most_steps=4_000, rounds=4, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000, 3000), patience=0.1,
     dial_scenes=("column_of_ten", "falling_box", "slide_on_incline"),
     budget_scenes=(
-        "free_fall", "head_on_equal_e09", "oblique_e1", "slow_hit", "mass_ratios", "wall_to_wall", "bouncing_ball_e1",
+        "free_fall", "head_on_equal_e09", "oblique_e1", "slow_collision", "mass_ratios", "wall_to_wall", "bouncing_ball_e1",
         "disk_between_static_disks", "line_gas", "cradle_with_gaps", "column_of_ten", "asteroids", "gas_of_100",
     ),
 )  # fmt: skip

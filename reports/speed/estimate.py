@@ -18,7 +18,7 @@ from scenarios.model import Scenario
 # as much.
 STEP, STEP_DISK, PUSH, WRAP_DISK = 1.0e-6, 0.17e-6, 16e-6, 0.75e-6
 READ, READ_DISK, READY = 20e-6, 1.5e-6, 1.5e-3
-LISTENING = 1.5  # times a step where hits are heard of, too
+LISTENING = 1.5  # times a step where collisions are heard of, too
 STARTING = 12.0  # s until the workers have imported and compiled
 APART = 0.2  # s, to take the error of one engine in one scene apart
 PAGE = 8.0  # s

@@ -1,4 +1,4 @@
-"""The cheapest model that answers a scenario: a closed form, from hit to hit, or step by step."""
+"""The cheapest model that answers a scenario: a closed form, from collision to collision, or step by step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from reports.speed.ladder import held
 from reports.speed.order import FINEST
 from scenarios.truth.exact import CLOSED_FORM, answered_by
 
-KINDS = {"event_driven": "hit to hit, float64"}
+KINDS = {"event_driven": "collision to collision, float64"}
 STEPS = "step by step"
 RUNS = 20
 

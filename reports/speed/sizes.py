@@ -17,7 +17,7 @@ from scenarios.model import Array, Scene
 Make = Callable[[], Engine]
 DT, RADIUS, COVERED = 1 / 240, 0.5, 0.3
 WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3  # of one sample: as many steps as fill 2 ms, less than a time slice
-FRESH = 400  # steps, after which a gas is begun again: where hits take energy it falls asleep, and costs nothing
+FRESH = 400  # steps, after which a gas is begun again: where collisions take energy it falls asleep, and costs nothing
 FIT_FROM = 100  # disks: below it the fixed cost of a step hides how it grows
 IDLE_STEPS = 1000
 STOPPED = "stopped: a step would take longer than {:g} s"

@@ -14,7 +14,7 @@ from reports.stability.players import Player
 from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_APART, SPRING_GROWS, STRAYS
 from scenarios.families.placing import lay_out
 from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
-from scenarios.truth.closed_forms import Hit, answer, bouncing, flight, pair
+from scenarios.truth.closed_forms import Collision, answer, bouncing, flight, pair
 
 FAMILY = "One disk, or two"
 RADIUS, G = 0.25, 10.0
@@ -45,7 +45,7 @@ def ball(x: float, run: int) -> Scenario:
         legs = bouncing(height, G, 1.0, t[-1])
         gap, speed = legs.at(t)
         position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + RADIUS, speed))
-        return answer(scene, t, (position, velocity), legs.wall_hits(0, (0,), 1.0, 1.0))
+        return answer(scene, t, (position, velocity), legs.wall_collisions(0, (0,), 1.0, 1.0))
 
     return Scenario(
         "ball", "Does it come back?", "the bouncing ball in closed form", scene, samples * interval, interval, (every,),
@@ -63,8 +63,8 @@ def scaled(x: float, _run: int) -> Scenario:
 
     def truth(t: Array) -> Trajectory:
         legs, impulse = pair(scene.position, scene.velocity, scene.radius, scene.mass, 1.0)
-        hits: list[Hit] = [(float(legs.start[1]), 0, 1, float(impulse[0]))]
-        return answer(scene, t, legs.at(t), hits)
+        collisions: list[Collision] = [(float(legs.start[1]), 0, 1, float(impulse[0]))]
+        return answer(scene, t, legs.at(t), collisions)
 
     return Scenario("scaled", "Is it the same scene?", "similarity", scene, 1.0, 1 / 60, (1,), truth=truth)
 

@@ -87,7 +87,7 @@ def mixture(x: float, run: int) -> Scenario:
 
 
 def thermometer(x: float, run: int) -> Scenario:
-    """x = packing of 100 disks, 4000 steps; seen more often than they hit."""
+    """x = packing of 100 disks, 4000 steps; seen more often than they collision."""
     return gas(x, run, rows=10, columns=10, steps=4000, every=20)
 
 
@@ -118,14 +118,14 @@ def reversed_order(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
 
 def renumbered(played: Trajectory, n: int) -> Trajectory:
     """The trajectory with disk i for disk n - 1 - i."""
-    hits = played.collisions
-    i, j = n - 1 - hits.i, np.where(hits.j < 0, hits.j, n - 1 - hits.j)
+    collisions = played.collisions
+    i, j = n - 1 - collisions.i, np.where(collisions.j < 0, collisions.j, n - 1 - collisions.j)
     low, high = np.where(j < 0, i, np.minimum(i, j)), np.where(j < 0, j, np.maximum(i, j))
     return replace(
         played,
         position=played.position[:, ::-1], velocity=played.velocity[:, ::-1], angle=played.angle[:, ::-1],
         angular_velocity=played.angular_velocity[:, ::-1],
-        collisions=Collisions(hits.t, frozen(low, np.int64), frozen(high, np.int64), hits.impulse),
+        collisions=Collisions(collisions.t, frozen(low, np.int64), frozen(high, np.int64), collisions.impulse),
     )  # fmt: skip
 
 
@@ -150,8 +150,8 @@ def restarted(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
         frozen(np.concatenate([getattr(before, name)[:half], getattr(after, name)]))
         for name in ("position", "velocity", "angle", "angular_velocity")
     )
-    hits = Collisions(frozen(late.t + half * scenario.sample_interval), late.i, late.j, late.impulse)
-    joined = Trajectory(before.t, position, velocity, angle, spin, hits)
+    collisions = Collisions(frozen(late.t + half * scenario.sample_interval), late.i, late.j, late.impulse)
+    joined = Trajectory(before.t, position, velocity, angle, spin, collisions)
     return against(whole, replace(rest, trajectory=joined), scenario)
 
 
@@ -196,7 +196,7 @@ GAS = (
         by_chance=BY_CHANCE,
     ),
     Case(
-        "thermometer", FAMILY, "Has a gas the speeds, the rate of hits and the wall pressure of the literature?",
+        "thermometer", FAMILY, "Has a gas the speeds, the rate of collisions and the wall pressure of the literature?",
         "packing", "1", (0.2, 0.3, 0.4, 0.5, 0.6), thermometer, WRONG_GAS, runs=SEEDS, refines=False,
         by_chance=BY_CHANCE, quick_values=(0.2, 0.6),
     ),

@@ -13,7 +13,7 @@ from reports.stability.limits import NOT_KNOWN, Limit
 from reports.stability.players import play_as
 from reports.stability.predicates import judge
 from reports.stability.search import Search
-from reports.stability.twins import HITS_WAIT, told
+from reports.stability.twins import COLLISIONS_WAIT, told
 from reports.stability.vary import at_offset, at_scale, at_tempo
 from scenarios.model import Scenario
 
@@ -98,8 +98,8 @@ CURES = {
         "[pb]*", "*", "too large for a length of the engine's own (cap on the way in a step, slop)",
         "32 times as small, at the same speeds", smaller,
     ),
-    "in_order": Cure("reference:[el]*", "*", HITS_WAIT, "as reference:ordered", player="reference:ordered"),
-    "finer": Cure("*", "[!d]*", f"{HITS_WAIT}, and the step is too coarse for that", "in steps of an eighth", finer),
+    "in_order": Cure("reference:[el]*", "*", COLLISIONS_WAIT, "as reference:ordered", player="reference:ordered"),
+    "finer": Cure("*", "[!d]*", f"{COLLISIONS_WAIT}, and the step is too coarse for that", "in steps of an eighth", finer),
     **{
         f"{box}_swept": Cure(f"{box}:matched", "*", "disks are not swept against each other",
                              f"as {box}:matched+bullets", player=f"{box}:matched+bullets")

@@ -15,7 +15,9 @@ from reports.stability.reasons import Reason, reason_of
 from reports.stability.search import Search
 from reports.stability.twins import LATE, told, twin_of
 
-NEAR = 1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a hit lost by degrees
+NEAR = (
+    1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a collision lost by degrees
+)
 
 
 def tried_out(search: Search, limit: Limit) -> Limit:

@@ -1,4 +1,5 @@
-"""Keeps of the first failing run at a limit what is shown: the samples around the failure, and the hits among them."""
+"""Keeps of the first failing run at a limit what is shown: the samples around the failure, and the collisions among
+them."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.page.replay import HITS
+from reports.page.replay import COLLISIONS
 from reports.run.archive import STATE, load_trajectory, packed
 from reports.stability.limits import Limit, Trial
 from reports.stability.search import Search
@@ -51,14 +52,17 @@ def kept_failure(limit: Limit, folder: Path, scenario: Scenario) -> tuple[Trajec
 
 def of_scenario(one: Trajectory, scenario: Scenario, most: int) -> bool:
     """Whether arrays that were read back are those of at most so many samples of the scenario."""
-    k, n, hits = len(np.atleast_1d(one.t)), scenario.scene.n, one.collisions
+    k, n, collisions = len(np.atleast_1d(one.t)), scenario.scene.n, one.collisions
     shapes = {"t": (k,), "position": (k, n, 2), "velocity": (k, n, 2), "angle": (k, n), "angular_velocity": (k, n)}
-    columns = [hits.t, hits.i, hits.j, hits.impulse]
+    columns = [collisions.t, collisions.i, collisions.j, collisions.impulse]
     return (
         k <= most
         and all(getattr(one, name).shape == shape for name, shape in shapes.items())
-        and all(column.shape == hits.t.shape == (hits.t.size,) and column.dtype.kind in "iuf" for column in columns)
-        and bool(((hits.i >= 0) & (hits.i < n) & (hits.j < n)).all())
+        and all(
+            column.shape == collisions.t.shape == (collisions.t.size,) and column.dtype.kind in "iuf"
+            for column in columns
+        )
+        and bool(((collisions.i >= 0) & (collisions.i < n) & (collisions.j < n)).all())
     )
 
 
@@ -85,12 +89,13 @@ def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
 
 
 def part_of(whole: Trajectory, shown: NDArray[np.int64], scenario: Scenario) -> Trajectory:
-    """A trajectory at the samples `shown` that it has, and what it hits meanwhile, if that is few enough to show."""
+    """A trajectory at the samples `shown` that it has, and what it collisions meanwhile, if that is few enough to
+    show."""
     first, last = shown[0], shown[-1]
     t, x, v, angle, spin = (frozen(getattr(whole, name)[first : last + 1]) for name in ("t", *STATE))
-    hits = whole.collisions
+    collisions = whole.collisions
     low, high = (k * scenario.sample_interval for k in (first - 0.5, last + 0.5))
-    among = (hits.t >= low) & (hits.t <= high)
-    among &= among.sum() <= HITS
-    columns = [getattr(hits, name)[among] for name in ("t", "i", "j", "impulse")]
+    among = (collisions.t >= low) & (collisions.t <= high)
+    among &= among.sum() <= COLLISIONS
+    columns = [getattr(collisions, name)[among] for name in ("t", "i", "j", "impulse")]
     return Trajectory(t, x, v, angle, spin, Collisions(*columns))

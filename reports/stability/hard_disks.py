@@ -1,4 +1,5 @@
-"""What the literature says of a gas of equal hard disks: pressure and rate of hits, in the bulk and between walls."""
+"""What the literature says of a gas of equal hard disks: pressure and rate of collisions, in the bulk and between
+walls."""
 
 from __future__ import annotations
 
@@ -46,7 +47,7 @@ def bulk_packing(packing: float, radius: float, size: np.ndarray) -> float:
 
 
 class Gas(NamedTuple):
-    """Force on the four walls together in N, and hits between disks a second."""
+    """Force on the four walls together in N, and collisions between disks a second."""
 
     force: float
     rate: float
@@ -56,9 +57,9 @@ def gas_in_box(n: int, radius: float, size: np.ndarray, temperature: float, mass
     """What `n` equal disks in a box of `size` (2,) m do at kT = `temperature` J, e = 1.
 
     Across a cut through the box acts the pressure of the bulk, less the line tension of the two walls that are cut
-    (scaled particle theory: Helfand, Frisch & Lebowitz, J. Chem. Phys. 34, 1037, 1961). The virials of walls and hits
-    add up to 2 N kT, whatever the gas is like, and a hit has the mean impulse sqrt(pi m kT): this gives the rate, which
-    is Enskog's, 4 / sqrt(pi) (Z - 1) a disk, where there are no walls.
+    (scaled particle theory: Helfand, Frisch & Lebowitz, J. Chem. Phys. 34, 1037, 1961). The virials of walls and
+    collisions add up to 2 N kT, whatever the gas is like, and a collision has the mean impulse sqrt(pi m kT): this
+    gives the rate, which is Enskog's, 4 / sqrt(pi) (Z - 1) a disk, where there are no walls.
     """
     bulk = bulk_packing(n * pi * radius**2 / size.prod(), radius, size)
     density = bulk / (pi * radius**2)

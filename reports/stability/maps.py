@@ -12,8 +12,8 @@ import numpy as np
 
 from adapters.engines import ENGINES
 from adapters.play import Run, play
+from reports.stability.cases_collisions import flyby
 from reports.stability.cases_gas import gas
-from reports.stability.cases_hits import flyby
 from reports.stability.cases_stacks import column
 from reports.stability.players import Switched, play_as
 from reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
@@ -102,20 +102,20 @@ def with_iterations(player: str, scenario: Scenario, _ratio: float, count: float
         engine.close()
 
 
-def hit_at(x: float, y: float, run: int) -> Scenario:
+def collision_at(x: float, y: float, run: int) -> Scenario:
     """x = dt over 1/64 s, y = closing speed in m/s: `flyby` in other units of time would be the same scene."""
     return flyby(y, run, dt=x / 64)
 
 
-HITS_X = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0)
-HITS_Y = (0.01, 0.1, 0.5, 2.0, 8.0, 32.0, 128.0, 512.0)
+COLLISIONS_X = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0)
+COLLISIONS_Y = (0.01, 0.1, 0.5, 2.0, 8.0, 32.0, 128.0, 512.0)
 
 MAPS = {
     one.name: one
     for one in (
         Map(
-            "dt_and_speed", "Is a head-on hit of disks of 0.25 m at e = 1 elastic, whatever the step and the speed?",
-            "dt (1/64 s)", "closing speed (m/s)", HITS_X, HITS_Y, hit_at, RESTITUTION_OFF,
+            "dt_and_speed", "Is a head-on collision of disks of 0.25 m at e = 1 elastic, whatever the step and the speed?",
+            "dt (1/64 s)", "closing speed (m/s)", COLLISIONS_X, COLLISIONS_Y, collision_at, RESTITUTION_OFF,
         ),
         Map(
             "mass_ratio_and_iterations", "How many iterations does a heavy disk need that stands on a light one?",

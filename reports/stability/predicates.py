@@ -70,26 +70,26 @@ def gain(trajectory: Trajectory) -> Array:
     return np.linalg.norm(trajectory.velocity[-1] - trajectory.velocity[0], axis=1)
 
 
-def _hits_missed(scenario: Scenario, played: Trajectory) -> Reading:
+def _collisions_missed(scenario: Scenario, played: Trajectory) -> Reading:
     true = truth_of(scenario)
     should, does = gain(true), gain(played)
     missed = int(((should > 0) & (does < 0.01 * should)).any())
     at = float(true.collisions.t[0])
-    return Reading(missed, at, "the hit is missed: the disks pass through each other")
+    return Reading(missed, at, "the collision is missed: the disks pass through each other")
 
 
-def _hits_invented(scenario: Scenario, played: Trajectory) -> Reading:
+def _collisions_invented(scenario: Scenario, played: Trajectory) -> Reading:
     change = np.linalg.norm(played.velocity - played.velocity[0], axis=2).max(axis=1)
     share = change / np.linalg.norm(scenario.scene.velocity, axis=1).max()
     at = first_above(played.t, share, 1e-3)
-    return Reading(float(share.max()), at, "a hit that never was: the disks do not touch")
+    return Reading(float(share.max()), at, "a collision that never was: the disks do not touch")
 
 
 def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
     closing, parting = (float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1]))
     e = -parting / closing
     off = abs(e - scenario.scene.restitution)
-    return Reading(off, float(truth_of(scenario).collisions.t[0]), f"the hit is played with e = {e + 0.0:.3g}")
+    return Reading(off, float(truth_of(scenario).collisions.t[0]), f"the collision is played with e = {e + 0.0:.3g}")
 
 
 def _strays(scenario: Scenario, played: Trajectory) -> Reading:
@@ -173,19 +173,23 @@ def apex_drift(scenario: Scenario, played: Trajectory) -> float:
 
 
 def first_bounce(scenario: Scenario) -> float:
-    """s, when a ball dropped over y = 0 hits for the first time."""
+    """s, when a ball dropped over y = 0 collisions for the first time."""
     scene = scenario.scene
     return float(np.sqrt(2 * (scene.position[0, 1] - scene.radius[0]) / -scene.gravity[1]))
 
 
-HITS_MISSED = Predicate("hits missed", "hits", 0.0, "a disk passes through another that it should hit", _hits_missed)
-HITS_INVENTED = Predicate(
-    "hits invented", "of the speed", 1e-3, "a disk is deflected that touches nothing", _hits_invented
+COLLISIONS_MISSED = Predicate(
+    "collisions missed", "collisions", 0.0, "a disk passes through another that it should collision", _collisions_missed
 )
-RESTITUTION_OFF = Predicate("restitution off", "1", 0.01, "the hit is not played with the scene's e", _restitution_off)
+COLLISIONS_INVENTED = Predicate(
+    "collisions invented", "of the speed", 1e-3, "a disk is deflected that touches nothing", _collisions_invented
+)
+RESTITUTION_OFF = Predicate(
+    "restitution off", "1", 0.01, "the collision is not played with the scene's e", _restitution_off
+)
 STRAYS = Predicate("strays", "of the way", 0.01, "a free disk has not gone its way", _strays)
 VELOCITY_OFF = Predicate(
-    "velocity off", "of the speed", 1e-3, "a disk leaves the hit with another velocity", _velocity_off
+    "velocity off", "of the speed", 1e-3, "a disk leaves the collision with another velocity", _velocity_off
 )
 SCALED_APART = Predicate(
     "apart", "radii", 0.25, "the path, scaled back, is not the one that the scene has at scale 1", _scaled_apart

@@ -66,12 +66,19 @@ def _temperatures_part(scenario: Scenario, played: Trajectory) -> Reading:
 
 
 def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
-    hits = played.collisions
+    collisions = played.collisions
     ought = literature(scenario)
     parts = _speeds(played)
-    parts.append(_beside("rate", counted(played, hits.j >= 0, np.ones(len(hits))), ought.rate, "Enskog's rate of hits"))
-    if not np.isnan(hits.impulse).any():  # Box2D 3.1 does not tell with what impulse it hits
-        pushed = counted(played, hits.j < 0, hits.impulse)
+    parts.append(
+        _beside(
+            "rate",
+            counted(played, collisions.j >= 0, np.ones(len(collisions))),
+            ought.rate,
+            "Enskog's rate of collisions",
+        )
+    )
+    if not np.isnan(collisions.impulse).any():  # Box2D 3.1 does not tell with what impulse it collisions
+        pushed = counted(played, collisions.j < 0, collisions.impulse)
         parts.append(_beside("pressure", pushed, ought.force, "the pressure of the virial series"))
     return max(parts, key=lambda part: part.value)._replace(at=float(played.t[len(played) // 10]))
 
@@ -85,7 +92,7 @@ def literature(scenario: Scenario) -> Gas:
 
 
 def counted(played: Trajectory, which: NDArray[np.bool_], weights: Array) -> Array:
-    """(`BLOCKS`,) sums of the weights of some hits, a second, in as many stretches after the first tenth."""
+    """(`BLOCKS`,) sums of the weights of some collisions, a second, in as many stretches after the first tenth."""
     edges = np.linspace(0.1 * played.t[-1], played.t[-1], BLOCKS + 1)
     return np.histogram(played.collisions.t[which], edges, weights=weights[which])[0] / np.diff(edges)
 

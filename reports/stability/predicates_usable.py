@@ -1,4 +1,4 @@
-"""Whether a scene at large can be used as it was played: it is whole, and no hit is wrong."""
+"""Whether a scene at large can be used as it was played: it is whole, and no collision is wrong."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LEAST_WAY = 0.01  # radii between two samples, less of which is rounding
 
 def _usable(scenario: Scenario, played: Trajectory) -> Reading:
     parts = [part for part in (_rise(scenario, played), _overlap(scenario, played), _escape(scenario, played),
-             _stuck(scenario, played), _wrong_hits(scenario, played)) if part is not None]  # fmt: skip
+             _stuck(scenario, played), _wrong_collisions(scenario, played)) if part is not None]  # fmt: skip
     return max(parts, key=lambda part: part.value, default=Reading(0.0))  # a disk alone can do nothing wrong
 
 
@@ -54,15 +54,15 @@ def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
 def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
     """A disk that keeps its velocity and does not go its way, as the last place of its position is too coarse.
 
-    Before its first hit only: two hits between two samples may leave it the velocity it had.
+    Before its first collision only: two collisions between two samples may leave it the velocity it had.
     """
-    scene, v, hits = scenario.scene, played.velocity, played.collisions
+    scene, v, collisions = scenario.scene, played.velocity, played.collisions
     if len(played) < 2 or scene.wrap is not None:
         return None
-    first_hit = np.full(scene.n, np.inf)
-    for disks in (hits.i, hits.j):
-        np.minimum.at(first_hit, disks[disks >= 0], hits.t[disks >= 0])
-    steady = (v[1:] == v[:-1]).all(axis=2) & ~scene.static & (played.t[1:, None] < first_hit)
+    first_collision = np.full(scene.n, np.inf)
+    for disks in (collisions.i, collisions.j):
+        np.minimum.at(first_collision, disks[disks >= 0], collisions.t[disks >= 0])
+    steady = (v[1:] == v[:-1]).all(axis=2) & ~scene.static & (played.t[1:, None] < first_collision)
     ought = np.linalg.norm(v[1:], axis=2) * scenario.sample_interval / scene.radius
     went = np.linalg.norm(np.diff(played.position, axis=0), axis=2) / scene.radius
     lost = np.where(steady & (ought > LEAST_WAY), 1 - went / np.where(ought > 0, ought, 1.0), 0.0)
@@ -71,7 +71,7 @@ def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
     return Reading(float(lost.max()) / MOST_LOST, float(played.t[k + 1]), event, "strays", disk=int(disk))
 
 
-def _wrong_hits(scenario: Scenario, played: Trajectory) -> Reading | None:
+def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
     scenario, true = answered(scenario)
     if true is None:
         return None
@@ -79,17 +79,18 @@ def _wrong_hits(scenario: Scenario, played: Trajectory) -> Reading | None:
     played, true = cut(played, k), cut(true, k)
     dt = scenario.dt(scenario.substeps[0])
     found = match(played.collisions, true.collisions, float(true.t[-1]), dt)
-    wrong = found.first_wrong or never_hit(played.collisions, true.collisions, float(true.t[-1]) - 3 * dt)
+    wrong = found.first_wrong or never_collision(played.collisions, true.collisions, float(true.t[-1]) - 3 * dt)
     if wrong is None:
         return None
     at, what = wrong
     kind, pair = what.split(maxsplit=1)
     count = len(found.missed) + len(found.invented)
-    return Reading(2.0 * max(count, 1), at, f"{kind} hit: {pair}", "hits", disk=int(pair.split("-")[0]))
+    return Reading(2.0 * max(count, 1), at, f"{kind} collision: {pair}", "collisions", disk=int(pair.split("-")[0]))
 
 
-def never_hit(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
-    """The first true hit up to `end` s of a pair that never hits in the run; `match` lets those pass that are close."""
+def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
+    """The first true collision up to `end` s of a pair that never collisions in the run; `match` lets those pass that
+    are close."""
     hard = (true.impulse > 0) & (true.t < end)
     missed = np.flatnonzero(hard & ~np.isin(pair_keys(true), pair_keys(played)))
     return (float(true.t[missed[0]]), f"missed {who(true.i[missed[0]], true.j[missed[0]])}") if len(missed) else None
@@ -97,6 +98,6 @@ def never_hit(played: Collisions, true: Collisions, end: float) -> tuple[float, 
 
 USABLE = Predicate(
     "unusable", "of the bound", 1.0,
-    "not finite, through a wall, 5 % more energy, an overlap of a tenth of a radius, half a way lost, a wrong hit",
+    "not finite, through a wall, 5 % more energy, an overlap of a tenth of a radius, half a way lost, a wrong collision",
     _usable,
 )  # fmt: skip

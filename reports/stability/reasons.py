@@ -41,7 +41,7 @@ EULER_OUT = (
 QUARTER = "nothing turns by more than pi/2 a step"
 MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES"
 SWEEP = "restitution is one sweep after the substeps, so a disk that touches two others in a step loses energy"
-FINDS_LATE = "a hit is found up to a step late, and each one lasts about a step longer than it should"
+FINDS_LATE = "a collision is found up to a step late, and each one lasts about a step longer than it should"
 
 
 def growth_limit(share: float) -> float:
@@ -50,7 +50,7 @@ def growth_limit(share: float) -> float:
 
 
 REASONS = (
-    # One hit.
+    # One collision.
     *(
         Reason(
             case, player, DISCRETE, GEOMETRY, limit, f"{player}+bullets" if player.startswith("box2d") else "", LATE
@@ -64,7 +64,7 @@ REASONS = (
     ),
     Reason("tunnelling_*", "*", DISCRETE + "; disks are not swept unless one is a bullet", "Box2D manual, bullets",
            habit=LATE),
-    Reason("grazing", "*", DISCRETE + "; the chord of a grazing hit is shorter than v dt", GEOMETRY,
+    Reason("grazing", "*", DISCRETE + "; the chord of a grazing collision is shorter than v dt", GEOMETRY,
            habit=LATE),
     Reason(
         "near_miss", "box2d_v3:*", "a contact counts from a gap of four slops on, with a normal fixed before the step",
@@ -72,7 +72,7 @@ REASONS = (
     ),
     *(
         Reason(case, f"{box}:shipped", THRESHOLD, source, limit, f"{box}:matched", RESTITUTION)
-        for case, limit in (("slow_hit", 1.0), ("scale_down", 0.25))
+        for case, limit in (("slow_collision", 1.0), ("scale_down", 0.25))
         for box, source in THRESHOLDS.items()
     ),
     Reason(
@@ -150,17 +150,17 @@ REASONS = (
         for player in ("event_driven:*", "reference:ordered")
     ),
     # What every exact method refuses.
-    Reason("*", "event_driven:*", "it refuses what has no single continuation: overlaps, and hits that accumulate",
+    Reason("*", "event_driven:*", "it refuses what has no single continuation: overlaps, and collisions that accumulate",
            "adapters/event_driven/events.py"),
     # Stacks.
     *(
-        Reason(case, "reference:ordered", "the hits of a step are bounded, and what is left shows as overlap",
+        Reason(case, "reference:ordered", "the collisions of a step are bounded, and what is left shows as overlap",
                "reference_impl/ordered.py")
         for case in ("column", "heavy_on_light", "pile_comes_to_rest")
     ),
-    Reason("dt_*", "reference:ordered", "the hits of a step are bounded, and what is left shows as overlap",
+    Reason("dt_*", "reference:ordered", "the collisions of a step are bounded, and what is left shows as overlap",
            "reference_impl/ordered.py"),
-    Reason("overlap_recovery", "reference:ordered", "overlaps that no hit made are not pushed out",
+    Reason("overlap_recovery", "reference:ordered", "overlaps that no collision made are not pushed out",
            "reference_impl/ordered.py"),
     Reason("column", "reference:*", "each pair is projected once a step, without regard to the others",
            "exercise 11, task 2", habit=PUSH_OUT),
@@ -211,8 +211,8 @@ REASONS = (
            "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp", habit=IMPULSE),
     Reason("*_gas", "*", "sequential impulses do not solve a cluster of contacts in a step",
            "Catto, Iterative dynamics with temporal coherence, 2005", habit=IMPULSE),
-    Reason("thermometer", "*", FINDS_LATE, "penetration and return: one dt a hit", habit=LATE),
-    Reason("equipartition", "*", "energy is lost at unequal rates by light and heavy disks", "e < 1 in some hits"),
+    Reason("thermometer", "*", FINDS_LATE, "penetration and return: one dt a collision", habit=LATE),
+    Reason("equipartition", "*", "energy is lost at unequal rates by light and heavy disks", "e < 1 in some collisions"),
     Reason("insertion_order", "*", "sums and contacts are taken in the order of insertion, and chaos magnifies it",
            "Lyapunov exponent of the gas"),
     Reason("restart", "*", "the impulses and contacts of the last step are not part of the state that can be read",

@@ -1,4 +1,5 @@
-"""Which law a player follows where touching disks are hit, and how far they must be apart until the question is gone.
+"""Which law a player follows where touching disks are struck, and how far they must be apart until the question is
+gone.
 
 Named, never scored: where disks touch, no limit of small gaps decides; where they do not, the exact answer does.
 """
@@ -12,15 +13,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reports.stability.cases_hits import LEAD, RADIUS
+from reports.stability.cases_collisions import LEAD, RADIUS
 from reports.stability.players import play_as
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario
 from scenarios.truth.exact import with_oracle
 
 NEAR = 0.02  # of the incoming speed: a player whose velocities are farther from every law follows none of them
-SPEED, DT = 8.0, 1 / 1024  # a radius in 32 steps: where a hit is found late, its normal is off; above any threshold
-AFTER = 24  # steps after the hit: a player may take a step a contact
+SPEED, DT = (
+    8.0,
+    1 / 1024,
+)  # a radius in 32 steps: where a collision is found late, its normal is off; above any threshold
+AFTER = 24  # steps after the collision: a player may take a step a contact
 PAIRS, AT_ONCE = "pair after pair", "all contacts at once"
 
 
@@ -29,7 +33,7 @@ GAPS = (0.0, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0)  # radii
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """A scene at e = 1 in which disk 0 hits disks that touch each other.
+    """A scene at e = 1 in which disk 0 strikes disks that touch each other.
 
     Attributes:
         asks: what happens, in a sentence.
@@ -86,7 +90,7 @@ class LawOf:
 
 
 def cradle(n: int) -> Touching:
-    """A disk hits a row of n - 1."""
+    """A disk collisions a row of n - 1."""
     row = np.stack([2.0 * np.arange(n) - 2, np.zeros(n)], axis=-1)
     apart = np.stack([np.maximum(0.0, np.arange(n) - 1), np.zeros(n)], axis=-1)
     last, together = np.zeros((n, 2)), np.zeros((n, 2))
@@ -94,7 +98,7 @@ def cradle(n: int) -> Touching:
     together[:, 0] = 2 / n
     together[0, 0] -= 1
     return Touching(
-        f"A disk hits a row of {n - 1}.", row, apart, {PAIRS: [last], AT_ONCE: [together]},
+        f"A disk collisions a row of {n - 1}.", row, apart, {PAIRS: [last], AT_ONCE: [together]},
         "equal masses swap velocities pair by pair; or e = 1 is asked of every contact in one solve",
     )  # fmt: skip
 
@@ -105,7 +109,7 @@ TOUCHING = {
     "touching_cradle_of_3": cradle(3),
     "touching_cradle_of_5": cradle(5),
     "touching_break": Touching(
-        "A disk hits two, in their middle.",
+        "A disk collisions two, in their middle.",
         np.array([[-sqrt(3), 0], [0, 1], [0, -1]]),
         np.array([[0.0, 0], [0, 0], [sqrt(3) / 2, -1 / 2]]),
         {
@@ -118,7 +122,7 @@ TOUCHING = {
 
 
 def scene_of(one: Touching, gap: float) -> Scenario:
-    """Disk 0 flies in and is there in the middle of its fourth step; seen until the last hit is long over."""
+    """Disk 0 flies in and is there in the middle of its fourth step; seen until the last collision is long over."""
     position = (one.position + gap * one.parted) * RADIUS
     position[0, 0] -= SPEED * DT * (LEAD + 0.5)
     n = len(position)

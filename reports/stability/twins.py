@@ -1,7 +1,7 @@
 """Which habits of a player suffice for its limit: the reference with these alone works and fails where the player does.
 
-What an engine does otherwise than exact flight with late hits is a table of habits (`adapters.mechanisms.habits`),
-each of them a switch of `adapters.mechanisms.ablated_reference`.
+What an engine does otherwise than exact flight with late collisions is a table of habits
+(`adapters.mechanisms.habits`), each of them a switch of `adapters.mechanisms.ablated_reference`.
 A twin is the reference with some; one that has the player's limit shows the cause.
 """
 
@@ -32,21 +32,21 @@ from reports.stability.predicates import Reading, judge
 from reports.stability.search import Search
 from scenarios.model import Scenario
 
-LATE = "late hits"  # a twin without any habit
-HITS_WAIT = "a hit waits for the end of its step"
+LATE = "late collisions"  # a twin without any habit
+COLLISIONS_WAIT = "a collision waits for the end of its step"
 MOST = 300  # disks: the switched solver asks all pairs
 NEAR = 2.0  # where a player works nowhere, its twin must read as much as it does, to this factor
 
 B2_SETTINGS, B2_TYPES = "Box2D 2.3 Common/b2Settings.h: ", "Box2D 3.1 src/types.c: "
-THRESHOLD = "hits that close at less than 1 m/s are played as inelastic"
+THRESHOLD = "collisions that close at less than 1 m/s are played as inelastic"
 THRESHOLDS = {"box2d": B2_SETTINGS + "b2_velocityThreshold", "box2d_v3": B2_TYPES + "restitutionThreshold"}
 PRODUCT = "the elasticities of the two shapes are multiplied: e on every shape gives e²"
 OF_PYMUNK = "Munk2D src/cpArbiter.c, cpArbiterUpdate"
 TOGETHER = "the contacts of a step get their impulses together, in the engine's own order of stages"
 OWN_ORDER = "adapters/mechanisms/switched.py, from the engine's own step"
-AT_ONCE = "an overlap is undone at once, so that disks move that have hit nothing yet"
+AT_ONCE = "an overlap is undone at once, so that disks move that have struck nothing yet"
 SENTENCES = (
-    (LATE, "*", HITS_WAIT, "contacts are looked for once a step"),
+    (LATE, "*", COLLISIONS_WAIT, "contacts are looked for once a step"),
     (FLIGHT, "*", "under a push a step of flight goes another way than v dt + a dt² / 2", "alpha of ENGINES"),
     (RESTITUTION, "pymunk:*", PRODUCT, OF_PYMUNK),
     (RESTITUTION, "box2d:*", THRESHOLD, THRESHOLDS["box2d"]),
@@ -65,7 +65,7 @@ SENTENCES = (
 def twin_of(search: Search, limit: Limit) -> str:
     """The fewest habits whose twin has the limit, as text; `LATE` for none of them; "" if no twin has it, or none is.
 
-    First late hits alone, then every habit by itself (with those it acts on), then all less what is not needed.
+    First late collisions alone, then every habit by itself (with those it acts on), then all less what is not needed.
     """
     twins = Twins.of(search, limit)
     if twins is None:
@@ -146,8 +146,8 @@ def told(limit: Limit) -> tuple[str, str, str]:
     rows = [next(row for row in SENTENCES if row[0] == name and fnmatch(limit.player, row[1])) for name in names]
     text, source = ("; ".join(dict.fromkeys(row[k] for row in rows)) for k in (2, 3))
     if limit.twin == LATE:
-        return text, source, "the reference with late hits and nothing else has this limit"
-    tested = f"the reference with late hits and the player's {listed(names)} has this limit"
+        return text, source, "the reference with late collisions and nothing else has this limit"
+    tested = f"the reference with late collisions and the player's {listed(names)} has this limit"
     return text, source, tested
 
 

@@ -91,12 +91,12 @@ def similar(
 
     def changed(t: Array) -> Trajectory:
         was = truth(t * tempo)
-        hits = was.collisions
+        collisions = was.collisions
         return replace(
             was, t=was.t / tempo, position=was.position * size + by, velocity=was.velocity * (size * tempo),
             angular_velocity=was.angular_velocity * tempo, valid_until=was.valid_until / tempo,
             error_bound=was.error_bound * size,
-            collisions=Collisions(frozen(hits.t / tempo), hits.i, hits.j, frozen(hits.impulse * (size * tempo))),
+            collisions=Collisions(frozen(collisions.t / tempo), collisions.i, collisions.j, frozen(collisions.impulse * (size * tempo))),
         )  # fmt: skip
 
     return changed

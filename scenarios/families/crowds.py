@@ -29,8 +29,8 @@ def simbenchmark_bouncing() -> Scenario:
         gap, speed = legs.at(t)
         position = np.stack(np.broadcast_arrays(x, (gap + radius)[:, None]), axis=-1)
         velocity = np.stack(np.broadcast_arrays(0.0, np.tile(speed[:, None], n)), axis=-1)
-        hits = [hit for disk in range(n) for hit in legs.wall_hits(disk, (0,), mass, 1.0)]
-        return answer(scene, t, (position, velocity), hits)
+        collisions = [collision for disk in range(n) for collision in legs.wall_collisions(disk, (0,), mass, 1.0)]
+        return answer(scene, t, (position, velocity), collisions)
 
     return Scenario(
         name="simbenchmark_bouncing",
@@ -60,7 +60,7 @@ def gas_of_100(seed: int = 0) -> Scenario:
     )
     question = Scenario(
         name="gas_of_100",
-        asks="Does a gas of a hundred disks keep its energy over hundreds of hits?",
+        asks="Does a gas of a hundred disks keep its energy over hundreds of collisions?",
         source="the hard-disk gas (Alder & Wainwright, J. Chem. Phys. 31, 459, 1959)",
         scene=scene,
         duration=5.0,

@@ -26,7 +26,7 @@ def asteroids(seed: int = 0) -> Scenario:
     """The ship at rest among twenty asteroids, drawn as the exercise draws them but for overlaps."""
     question = Scenario(
         name="asteroids",
-        asks="Do the engines agree on where a ship and twenty asteroids are after 10 s of hits?",
+        asks="Do the engines agree on where a ship and twenty asteroids are after 10 s of collisions?",
         source=f"{SOURCE}; overlapping draws are drawn again",
         scene=asteroid_field(seed),
         duration=10.0,

@@ -55,7 +55,7 @@ def ping_pong() -> Scenario:
         legs = to_and_fro(scene.position[0, 1] - low, 1.0, high - low, 1.0, t[-1])
         y, speed = legs.at(t)
         position, velocity = (np.stack([np.zeros_like(y), a], axis=-1)[:, None] for a in (y + low, speed))
-        return answer(scene, t, (position, velocity), legs.wall_hits(0, (1, 0), 1.0, 1.0))
+        return answer(scene, t, (position, velocity), legs.wall_collisions(0, (1, 0), 1.0, 1.0))
 
     return Scenario(
         name="ping_pong",
@@ -84,7 +84,7 @@ def falling_box(seed: int = 0) -> Scenario:
     )
     question = Scenario(
         name="falling_box",
-        asks="Do thirty disks that fall in a box stay inside it and apart, and lose energy only by hits?",
+        asks="Do thirty disks that fall in a box stay inside it and apart, and lose energy only by collisions?",
         source=f"{SOURCE}, parts 3 and 4, in two dimensions",
         scene=scene,
         duration=2.0,

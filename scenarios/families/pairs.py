@@ -1,4 +1,4 @@
-"""Two disks that hit once, or just not: head-on, oblique, unequal, slow, near."""
+"""Two disks that collision once, or just not: head-on, oblique, unequal, slow, near."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.closed_forms import Hit, Motion, answer, pair
+from scenarios.truth.closed_forms import Collision, Motion, answer, pair
 
 SOURCE = "momentum, and Newton's restitution along the line of centres (Landau & Lifshitz, Mechanics, 17)"
 TAG = {0.0: "e0", 0.5: "e05", 0.9: "e09", 1.0: "e1"}
@@ -34,14 +34,14 @@ def _pairs(
 
     def truth(t: Array) -> Trajectory:
         motions: list[Motion] = []
-        hits: list[Hit] = []
+        collisions: list[Collision] = []
         for i in range(0, len(m), 2):
             two = slice(i, i + 2)
             legs, impulse = pair(x[two], v[two], r[two], m[two], restitution)
             motions.append(legs.at(t))
-            hits += [(float(at), i, i + 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)]
+            collisions += [(float(at), i, i + 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)]
         position, velocity = (np.concatenate(part, axis=1) for part in zip(*motions))
-        return answer(scene, t, (position, velocity), hits)
+        return answer(scene, t, (position, velocity), collisions)
 
     return Scenario(name, asks, SOURCE, scene, duration, 1 / 60, truth=truth)
 
@@ -50,7 +50,7 @@ def head_on_equal(restitution: float) -> Scenario:
     """Two equal disks, both moving, on one line."""
     return _pairs(
         f"head_on_equal_{TAG[restitution]}",
-        f"Do two equal disks part from a head-on hit as e = {restitution:g} says?",
+        f"Do two equal disks part from a head-on collision as e = {restitution:g} says?",
         position=[[-1.7, 0], [1.9, 0]],
         velocity=[[1.1, 0], [-0.7, 0]],
         mass=[1, 1],
@@ -63,7 +63,7 @@ def head_on_unequal(restitution: float) -> Scenario:
     """A light disk and one of seven times its mass, both moving, on one line."""
     return _pairs(
         f"head_on_unequal_{TAG[restitution]}",
-        f"Do a light and a heavy disk share momentum in a head-on hit as e = {restitution:g} says?",
+        f"Do a light and a heavy disk share momentum in a head-on collision as e = {restitution:g} says?",
         position=[[-1.11, 0], [1.87, 0]],
         velocity=[[1.3, 0], [-0.6, 0]],
         mass=[1, 7],
@@ -73,7 +73,7 @@ def head_on_unequal(restitution: float) -> Scenario:
 
 
 def oblique(restitution: float) -> Scenario:
-    """Two spinning disks that meet off centre: without friction the hit leaves the spin alone."""
+    """Two spinning disks that meet off centre: without friction the collision leaves the spin alone."""
     return _pairs(
         f"oblique_{TAG[restitution]}",
         f"Do two disks that meet off centre part at the angles of e = {restitution:g}, their spin untouched?",
@@ -90,12 +90,12 @@ def mass_ratios() -> Scenario:
     """Seven lanes, in each a disk of mass 1 and one of mass 1, 10, ... 1e6."""
     lanes = np.arange(7)
     y = 2.0 * (lanes - 3)
-    # A little farther away in each lane, so that the seven hits fall at different phases of a step.
+    # A little farther away in each lane, so that the seven collisions fall at different phases of a step.
     light = np.stack([-1.442 - 0.0499 * lanes, y], axis=-1)
     heavy = np.stack([1.3 + 0.0 * lanes, y], axis=-1)
     return _pairs(
         "mass_ratios",
-        "Up to which mass ratio does a head-on hit still keep momentum and energy?",
+        "Up to which mass ratio does a head-on collision still keep momentum and energy?",
         position=np.stack([light, heavy], axis=1).reshape(-1, 2),
         velocity=np.tile([[0.5, 0], [-1, 0]], (7, 1)),
         mass=np.stack([np.ones(7), 10.0**lanes], axis=-1).ravel(),
@@ -104,11 +104,11 @@ def mass_ratios() -> Scenario:
     )
 
 
-def slow_hit() -> Scenario:
-    """Half a metre a second: slower than the threshold below which some engines make every hit dead."""
+def slow_collision() -> Scenario:
+    """Half a metre a second: slower than the threshold below which some engines make every collision dead."""
     return _pairs(
-        "slow_hit",
-        "Is a hit at 0.5 m/s as elastic as a fast one, or is it below a threshold?",
+        "slow_collision",
+        "Is a collision at 0.5 m/s as elastic as a fast one, or is it below a threshold?",
         position=[[-0.63, 0], [0.583, 0]],
         velocity=[[0.37, 0], [-0.13, 0]],
         mass=[1, 1],
@@ -122,7 +122,7 @@ def near_miss() -> Scenario:
     radius = 0.25
     return _pairs(
         "near_miss",
-        "Who invents a hit when a fast disk passes another at 1.005 times the touching distance?",
+        "Who invents a collision when a fast disk passes another at 1.005 times the touching distance?",
         position=[[-6, 1.005 * 2 * radius], [0.03, 0]],
         velocity=[[12, 0], [0, 0]],  # 0.2 radii per step of 1/240 s
         mass=[1, 1],
@@ -146,6 +146,6 @@ PAIRS = (
     partial(oblique, 0.9),
     partial(oblique, 1.0),
     mass_ratios,
-    slow_hit,
+    slow_collision,
     near_miss,
 )

@@ -1,4 +1,4 @@
-"""Disks on one line that hit each other in turn: the line gas, Galperin's billiard, the cradle."""
+"""Disks on one line that collide in turn: the line gas, Galperin's billiard, the cradle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.truth.closed_forms import Motion, answer
 from scenarios.truth.exact import with_oracle
-from scenarios.truth.lines import galperin, galperin_hits, row, row_hits
+from scenarios.truth.lines import galperin, galperin_collisions, row, row_collisions
 
 EPS = float(np.finfo(float).eps)
 
@@ -24,7 +24,7 @@ def _on_line(x: Array, v: Array) -> Motion:
 def line_gas() -> Scenario:
     """Fifteen equal disks between two walls."""
     n, radius, length = 15, 0.25, 12.0
-    # As irregular as a random draw, without one; plain multiples i sqrt(2) would make simultaneous hits.
+    # As irregular as a random draw, without one; plain multiples i sqrt(2) would make simultaneous collisions.
     squares = np.arange(1, n + 2) ** 2
     gap = 0.2 + (squares * np.sqrt(5)) % 1
     v = 4 * ((squares[:n] * np.sqrt(2)) % 1) - 2
@@ -40,22 +40,22 @@ def line_gas() -> Scenario:
     )
 
     def truth(t: Array) -> Trajectory:
-        hits = row_hits(x, v, radius, length, 1.0, t[-1])
-        return answer(scene, t, _on_line(*row(x, v, radius, length, t)), hits)
+        collisions = row_collisions(x, v, radius, length, 1.0, t[-1])
+        return answer(scene, t, _on_line(*row(x, v, radius, length, t)), collisions)
 
     return Scenario(
         name="line_gas",
-        asks="How does the error grow over hundreds of hits where there is no chaos?",
+        asks="How does the error grow over hundreds of collisions where there is no chaos?",
         source="Tonks, Phys. Rev. 50, 955 (1936); Jepsen, J. Math. Phys. 6, 405 (1965)",
         scene=scene,
-        duration=9.15,  # 278 hits
+        duration=9.15,  # 278 collisions
         sample_interval=1 / 60,
         truth=truth,
     )
 
 
-def counting_pi(hits: int, ratio: float, duration: float, ladder: tuple[int, ...]) -> Scenario:
-    """A wall, a light disk and one 100^k times as heavy, whose hits count out pi."""
+def counting_pi(collisions: int, ratio: float, duration: float, ladder: tuple[int, ...]) -> Scenario:
+    """A wall, a light disk and one 100^k times as heavy, whose collisions count out pi."""
     radius, speed = np.array([0.25, 0.5]), 0.25
     mass = np.array([1.0, ratio])
     gap = np.array([1.0, 1.4246])
@@ -75,11 +75,11 @@ def counting_pi(hits: int, ratio: float, duration: float, ladder: tuple[int, ...
         room, rate = galperin(gap, speed, mass, t)
         # The unfolding angle, up to pi, is rounded; its lever is the heavy disk's weighted distance.
         bound = 4 * EPS * float(np.sqrt(mass[1] / mass[0])) * float(np.abs(gap[1] - speed * t).max())
-        return answer(scene, t, _on_line(room + shift, rate), galperin_hits(gap, speed, mass), error_bound=bound)
+        return answer(scene, t, _on_line(room + shift, rate), galperin_collisions(gap, speed, mass), error_bound=bound)
 
     return Scenario(
-        name=f"galperin_{hits}",
-        asks=f"Do a wall, a light disk and a heavy one hit each other exactly {hits} times?",
+        name=f"galperin_{collisions}",
+        asks=f"Do a wall, a light disk and a heavy one collide exactly {collisions} times?",
         source="Galperin, Playing pool with pi, Regul. Chaotic Dyn. 8, 375 (2003)",
         scene=scene,
         duration=duration,
@@ -97,14 +97,14 @@ def _cradle(position: Array) -> Scene:
 
 
 def cradle_with_gaps() -> Scenario:
-    """Two disks come in, two go out, one hit after the other."""
+    """Two disks come in, two go out, one collision after the other."""
     x = np.array([-2.355, -1.8447, 0.0, 0.5169, 1.0317])
     scene = _cradle(x)
 
     def truth(t: Array) -> Trajectory:
         v = scene.velocity[:, 0]
-        hits = row_hits(x, v, 0.25, np.inf, 1.0, t[-1])
-        return answer(scene, t, _on_line(*row(x, v, 0.25, np.inf, t)), hits)
+        collisions = row_collisions(x, v, 0.25, np.inf, 1.0, t[-1])
+        return answer(scene, t, _on_line(*row(x, v, 0.25, np.inf, t)), collisions)
 
     return Scenario(
         name="cradle_with_gaps",
@@ -122,7 +122,7 @@ def cradle_touching() -> Scenario:
     question = Scenario(
         name="cradle_touching",
         asks="Do two disks leave a cradle when two come in, if its disks touch?",
-        source="the limit of small gaps, which is the same in whatever order the hits come",
+        source="the limit of small gaps, which is the same in whatever order the collisions come",
         scene=_cradle(np.array([-2.2587890625, -1.7587890625, 0.0, 0.5, 1.0])),
         duration=4.0,
         sample_interval=1 / 60,
@@ -134,7 +134,7 @@ ROWS = (
     line_gas,
     partial(counting_pi, 3, 1.0, 12.0, (1, 2, 4, 8)),
     partial(counting_pi, 31, 1e2, 15.0, (1, 2, 4, 8)),
-    partial(counting_pi, 314, 1e4, 31.0, (1, 4, 16, 64)),  # its hits follow each other by 0.4 ms
+    partial(counting_pi, 314, 1e4, 31.0, (1, 4, 16, 64)),  # its collisions follow each other by 0.4 ms
     cradle_with_gaps,
     cradle_touching,
 )

@@ -175,7 +175,7 @@ def coming_to_rest(rng: np.random.Generator, r: float, v: float) -> Scenario:
         legs = bouncing(height, g, restitution, t[-1])
         gap, speed = legs.at(t)
         position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + r, speed))
-        return answer(asked.scene, t, (position, velocity), legs.wall_hits(0, (0,), 1.0, restitution))
+        return answer(asked.scene, t, (position, velocity), legs.wall_collisions(0, (0,), 1.0, restitution))
 
     return replace(asked, truth=truth)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.truth.closed_forms import Hit, answer, at_rest, bouncing, flight, offset_growth, to_and_fro
+from scenarios.truth.closed_forms import Collision, answer, at_rest, bouncing, flight, offset_growth, to_and_fro
 
 G = 9.81
 FLOOR = [[[-10, 0], [10, 0]]]
@@ -30,9 +30,9 @@ def _ball(name: str, asks: str, height: float, restitution: float, duration: flo
         legs = bouncing(height, G, restitution, t[-1])
         gap, speed = legs.at(t)
         lasting = int((np.diff(legs.start)[1:] > least).sum())
-        hits = legs.wall_hits(0, (0,), mass, restitution)[:lasting]
+        collisions = legs.wall_collisions(0, (0,), mass, restitution)[:lasting]
         position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + radius, speed))
-        return answer(scene, t, (position, velocity), hits)
+        return answer(scene, t, (position, velocity), collisions)
 
     source = "the bouncing ball in closed form, to rest and after"
     return Scenario(name, asks, source, scene, duration, 1 / 60, truth=truth)
@@ -78,7 +78,7 @@ def wall_to_wall() -> Scenario:
         legs = to_and_fro(scene.position[0, 0] + reach, scene.velocity[0, 0], 2 * reach, restitution, t[-1])
         x, speed = legs.at(t)
         position, velocity = (np.stack([a, 0 * a], axis=-1)[:, None] for a in (x - reach, speed))
-        return answer(scene, t, (position, velocity), legs.wall_hits(0, (1, 0), mass, restitution))
+        return answer(scene, t, (position, velocity), legs.wall_collisions(0, (1, 0), mass, restitution))
 
     return Scenario(
         name="wall_to_wall",
@@ -111,8 +111,8 @@ def box_billiard() -> Scenario:
             for x, v, a, b in zip(scene.position[0], scene.velocity[0], low + radius, high - radius)
         ]
         position, velocity = (np.stack(part, axis=-1)[:, None] for part in zip(*(leg.at(t) for leg in legs)))
-        hits = legs[0].wall_hits(0, (2, 0), mass, 1.0) + legs[1].wall_hits(0, (3, 1), mass, 1.0)
-        return answer(scene, t, (position + low + radius, velocity), hits)
+        collisions = legs[0].wall_collisions(0, (2, 0), mass, 1.0) + legs[1].wall_collisions(0, (3, 1), mass, 1.0)
+        return answer(scene, t, (position + low + radius, velocity), collisions)
 
     return Scenario(
         name="box_billiard",
@@ -146,13 +146,13 @@ def disk_between_static_disks() -> Scenario:
         position, velocity = np.tile(scene.position, (len(t), 1, 1)), np.zeros((len(t), 3, 2))
         position[:, 0], velocity[:, 0] = np.outer(x - reach, along), np.outer(v, along)
         kick = 2 * mass * speed * 5
-        hits = [(float(at), 0, 2 - k % 2, kick) for k, at in enumerate(legs.start[1:])]
+        collisions = [(float(at), 0, 2 - k % 2, kick) for k, at in enumerate(legs.start[1:])]
         # A rounding of one part in 2^52 grows to 1e-9 m in that many bounces, in any float64 player.
         growth = offset_growth(10 * reach, radius + static)
         bounces = int(np.log(1e-9 / (EPS * centre * 5)) / np.log(growth))
-        horizon = float(legs.start[min(bounces, len(hits))])
+        horizon = float(legs.start[min(bounces, len(collisions))])
         bound, reason = 4 * EPS * centre * 5, "there a rounding has grown to 1e-9 m on the unstable orbit"
-        return answer(scene, t, (position, velocity), hits, None, horizon, bound, reason)
+        return answer(scene, t, (position, velocity), collisions, None, horizon, bound, reason)
 
     return Scenario(
         name="disk_between_static_disks",
@@ -239,7 +239,7 @@ def column_of_ten() -> Scenario:
     )
 
 
-def _touching(scene: Scene) -> list[Hit]:
+def _touching(scene: Scene) -> list[Collision]:
     """The contacts of disks stacked on wall 0: they push from t = 0, by a force, so with no impulse."""
     return [(0.0, 0, -1, 0.0), *((0.0, i, i + 1, 0.0) for i in range(scene.n - 1))]
 

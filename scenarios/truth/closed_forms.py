@@ -1,4 +1,4 @@
-"""Closed forms of flights, bounces, single hits and pushes: exact answers without any stepping.
+"""Closed forms of flights, bounces, single collisions and pushes: exact answers without any stepping.
 
 SI units, float64; right to 1e-13 of the lengths and speeds of a scene (tests/scenarios/test_closed_forms.py).
 """
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from scenarios.model import Array, Collisions, Scene, Thrust, Trajectory, frozen
 
-Hit = tuple[float, int, int, float]
+Collision = tuple[float, int, int, float]
 """t s, disk, other disk or -1 - wall, impulse N s."""
 Motion = tuple[Array, Array]
 """Position and velocity at k instants, (k, ...) m and m/s; or angle and angular velocity, rad and rad/s."""
@@ -23,7 +23,7 @@ def answer(
     scene: Scene,
     t: Array,
     motion: Motion,
-    hits: Iterable[Hit] = (),
+    collisions: Iterable[Collision] = (),
     turning: Motion | None = None,
     valid_until: float = np.inf,
     error_bound: float = 0.0,
@@ -32,7 +32,7 @@ def answer(
     """An exact motion as the `Trajectory` of `scene` at the times t (k,) s, cut at `valid_until` s.
 
     motion: position and velocity (k, n, 2) m, m/s. turning: angle and angular velocity (k, n) rad, rad/s;
-    left out where nothing turns a disk: it keeps its spin. hits: those after the last sample are dropped.
+    left out where nothing turns a disk: it keeps its spin. collisions: those after the last sample are dropped.
     reason: why it is valid no longer.
     """
     angle, angular_velocity = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
@@ -43,17 +43,17 @@ def answer(
         velocity=frozen(motion[1][kept]),
         angle=frozen(angle[kept]),
         angular_velocity=frozen(angular_velocity[kept]),
-        collisions=Collisions.of([hit for hit in hits if kept.any() and hit[0] <= t[kept][-1]]),
+        collisions=Collisions.of([collision for collision in collisions if kept.any() and collision[0] <= t[kept][-1]]),
         valid_until=valid_until,
         error_bound=error_bound,
         reason=reason,
     )
 
 
-def at_rest(scene: Scene, t: Array, hits: Iterable[Hit] = ()) -> Trajectory:
+def at_rest(scene: Scene, t: Array, collisions: Iterable[Collision] = ()) -> Trajectory:
     """The disks stay where they are (a stack whose supports carry it), at the times t (k,) s."""
     position = np.broadcast_to(scene.position, (len(t), scene.n, 2))
-    return answer(scene, t, (position, np.zeros_like(position)), hits)
+    return answer(scene, t, (position, np.zeros_like(position)), collisions)
 
 
 def flight(t: Array, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike = 0.0) -> Motion:
@@ -64,10 +64,10 @@ def flight(t: Array, position: ArrayLike, velocity: ArrayLike, acceleration: Arr
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """A motion made of flights, each from one hit to the next.
+    """A motion made of flights, each from one collision to the next.
 
     Attributes:
-        start: (s,) s, increasing, from 0; all but the first are hits.
+        start: (s,) s, increasing, from 0; all but the first are collisions.
         position, velocity, acceleration: (s, ...) at the start of each flight, m, m/s, m/s2.
     """
 
@@ -82,8 +82,8 @@ class Legs:
         since = (t - self.start[leg]).reshape(-1, *[1] * (self.position.ndim - 1))
         return flight(since, self.position[leg], self.velocity[leg], self.acceleration[leg])
 
-    def wall_hits(self, disk: int, walls: Sequence[int], mass: float, restitution: float) -> list[Hit]:
-        """Hits of a motion along one axis: on walls[0], walls[1] ... in turn, m (1 + e) |v| N s each."""
+    def wall_collisions(self, disk: int, walls: Sequence[int], mass: float, restitution: float) -> list[Collision]:
+        """Collisions of a motion along one axis: on walls[0], walls[1] ... in turn, m (1 + e) |v| N s each."""
         before = np.abs(self.velocity[1:]) / restitution
         impulse = mass * (1 + restitution) * before
         return [
@@ -136,7 +136,7 @@ def to_and_fro(place: float, velocity: float, length: float, restitution: float,
 
 
 def pair(position: Array, velocity: Array, radius: Array, mass: Array, restitution: float) -> tuple[Legs, Array]:
-    """Two disks that fly freely and hit once or never: their legs (s, 2, 2) and the impulses (s - 1,) N s.
+    """Two disks that fly freely and collision once or never: their legs (s, 2, 2) and the impulses (s - 1,) N s.
 
     position, velocity (2, 2) m, m/s; radius, mass (2,) m, kg. Contact at |r + u t| = R = r_1 + r_2:
     t = c / (-b + sqrt(d)), c = r.r - R^2, b = r.u, d = b^2 - u.u c = u.u R^2 - (r x u)^2; impulse

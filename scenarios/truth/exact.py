@@ -1,4 +1,5 @@
-"""The exact answer to scenes without a closed form: hit by hit in many digits, and no further than it is right."""
+"""The exact answer to scenes without a closed form: collision by collision in many digits, and no further than it is
+right."""
 
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ MOST_DISKS = 200
 WORK = 40_000  # steps of the event loop for one attempt, some twenty seconds; few attempts get so far
 HEAVY = 4096  # bits that make a step twice as dear as one of few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
-CLOSED_FORM, HIT_BY_HIT, NOTHING = "closed form", "hit by hit, in many digits", "nothing"
+CLOSED_FORM, COLLISION_BY_COLLISION, NOTHING = "closed form", "collision by collision, in many digits", "nothing"
 COARSE = 0.45  # of the time that is left for both of two precisions: the finer one takes a little longer
 ACCURACY = 1e-12  # radii of the smallest disk, and s; two precisions that differ by more have parted
 
@@ -75,7 +76,7 @@ def answered_by(scenario: Scenario) -> str:
     """The cheapest model that answers it and is no player, which the harness takes for its truth: one of the three."""
     if scenario.truth is None:
         return NOTHING
-    return HIT_BY_HIT if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
+    return COLLISION_BY_COLLISION if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
 
 
 def with_oracle(scenario: Scenario) -> Scenario:
@@ -210,7 +211,7 @@ def _out_of_scale(scenario: Scenario) -> str:
     """What is too small or too large for `Numbers.tie`, which takes numbers to be of the order of 1; or ""."""
     scene = scenario.scene
     if not (scene.radius >= 1 / LARGEST).all():
-        return f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a hit from a touch"
+        return f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a collision from a touch"
     sizes = {
         "radius": scene.radius, "position": scene.position, "wall": scene.walls, "velocity": scene.velocity,
         "gravity": scene.gravity, "duration": np.array([scenario.duration]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.model import Array
-from scenarios.truth.closed_forms import Hit, Motion
+from scenarios.truth.closed_forms import Collision, Motion
 
 
 def fold(place: Array, length: float) -> tuple[Array, Array]:
@@ -40,8 +40,8 @@ def row(x: Array, v: Array, radius: float, length: float, t: Array) -> Motion:
     )
 
 
-def row_hits(x: Array, v: Array, radius: float, length: float, mass: float, until: float) -> list[Hit]:
-    """The hits of `row` up to `until` s; wall 0 is the one at 0, wall 1 the one at `length` m.
+def row_collisions(x: Array, v: Array, radius: float, length: float, mass: float, until: float) -> list[Collision]:
+    """The collisions of `row` up to `until` s; wall 0 is the one at 0, wall 1 the one at `length` m.
 
     Two free points meet where one meets the other or its mirror image; the meeting disks are
     those whose ranks the two points hold.
@@ -50,7 +50,7 @@ def row_hits(x: Array, v: Array, radius: float, length: float, mass: float, unti
     walled = np.isfinite(room)
     laps = int(until * np.abs(v).max() / room) + 2 if walled else 0
     shift = np.arange(-laps, laps + 1) * (room if walled else 0.0)
-    hits: list[Hit] = []
+    collisions: list[Collision] = []
     for a, b in zip(*np.triu_indices(len(z), 1)):
         for mirror in (1, -1) if walled else (1,):
             closing = v[a] - mirror * v[b]
@@ -60,13 +60,13 @@ def row_hits(x: Array, v: Array, radius: float, length: float, mass: float, unti
                 if 0 < t <= until:
                     points, _ = fold(z + v * t, room)
                     rank = int((np.delete(points, [a, b]) < points[a]).sum())
-                    hits.append((float(t), rank, rank + 1, float(mass * abs(closing))))
+                    collisions.append((float(t), rank, rank + 1, float(mass * abs(closing))))
     for a in np.flatnonzero(v) if walled else ():
         for lap, t in zip(range(-laps, laps + 1), (shift - z[a]) / v[a]):
             if 0 < t <= until:
                 disk, wall = (0, 0) if lap % 2 == 0 else (len(z) - 1, 1)
-                hits.append((float(t), disk, -1 - wall, float(2 * mass * abs(v[a]))))
-    return hits
+                collisions.append((float(t), disk, -1 - wall, float(2 * mass * abs(v[a]))))
+    return collisions
 
 
 def galperin(gap: Array, speed: float, mass: Array, t: Array) -> Motion:
@@ -92,8 +92,8 @@ def galperin(gap: Array, speed: float, mass: Array, t: Array) -> Motion:
     )
 
 
-def galperin_hits(gap: Array, speed: float, mass: Array) -> list[Hit]:
-    """All hits of `galperin`, ceil(pi / wedge) - 1: of the light disk 0 with disk 1 and wall 0 in turn.
+def galperin_collisions(gap: Array, speed: float, mass: Array) -> list[Collision]:
+    """All collisions of `galperin`, ceil(pi / wedge) - 1: of the light disk 0 with disk 1 and wall 0 in turn.
 
     The straight line crosses the k-th image of the wedge's sides at the angle k wedge, where it loses
     2 sqrt(M) V sin(k wedge) of its mass-weighted velocity.

@@ -1,4 +1,5 @@
-"""The truth record: an exact motion in float64 as flights and bounces, with its hits, its end and what is left open."""
+"""The truth record: an exact motion in float64 as flights and bounces, with its collisions, its end and what is left
+open."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
-from scenarios.truth.closed_forms import Hit, answer, world_pushes
+from scenarios.truth.closed_forms import Collision, answer, world_pushes
 from scenarios.truth.horizon import ASTRAY, horizon
 from scenarios.truth.oracle.path import Event, Path
 
@@ -27,15 +28,16 @@ class TruthRecord:
         legs: (l, 12) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2, and where the disk bounces on for good beside that:
             normal nx, ny, speed m/s after the first bounce, fall m/s2; else 0. Disk by disk in order of time.
         events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle |v_n| / |v|; an
-            impulse of 0 is no hit: from there on the disk rests on the other.
+            impulse of 0 is no collision: from there on the disk rests on the other.
         valid_until: s; nothing is said of what comes later.
         error_bound: m.
         bits: of the numbers it was computed with.
         method: "closed form", "two-precision" (the same with half as many bits) or "certified" (interval arithmetic).
         reason: why it ends where it does.
         followed_until: s; until then a float64 engine can be held to it, see `horizon.py`.
-        outcomes: (o, 4) outcome, disk, vx, vy m/s: where the order of simultaneous hits matters, all ends it may have.
-        orders: (p, 3) outcome, disk, other: the hits, in one order, that lead to each.
+        outcomes: (o, 4) outcome, disk, vx, vy m/s: where the order of simultaneous collisions matters, all ends it may
+            have.
+        orders: (p, 3) outcome, disk, other: the collisions, in one order, that lead to each.
         remains: what can still be said after the end, a sentence each.
     """
 
@@ -61,14 +63,14 @@ class TruthRecord:
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
         turning = world_pushes(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
         # What lies there from the start counts as a contact that begins with no impulse; later ones began before.
-        hits: list[Hit] = [
+        collisions: list[Collision] = [
             (float(at), int(i), int(j), float(kick)) for at, i, j, kick, _ in self.events if kick or not at
         ]
         angles = turning.angle, turning.angular_velocity
         until, reason = self.valid_until, self.reason
         if self.followed_until < until:
             until, reason = self.followed_until, "from there on the rounding of float64 leads any player elsewhere"
-        return answer(scene, t, (position, velocity), hits, angles, until, self.error_bound, reason)
+        return answer(scene, t, (position, velocity), collisions, angles, until, self.error_bound, reason)
 
 
 def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
@@ -101,12 +103,12 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
     end = min(path.end, scenario.duration) if path.reason else np.inf
     legs = legs_of(path, end)
     rows = [_row(event) for event in path.events if float(event.t) < end]
-    rows += [hit for leg, stop in bouncing(legs, end) for hit in bounces(scenario.scene, leg, stop)]
+    rows += [collision for leg, stop in bouncing(legs, end) for collision in bounces(scenario.scene, leg, stop)]
     outcomes = [
         [k, i, *map(float, v)] for k, one in enumerate(path.outcomes) for i, v in one.velocities.items()
         if i < scenario.scene.n
     ]  # fmt: skip
-    orders = [[k, *pair] for k, hits in enumerate(path.named) for pair in hits]
+    orders = [[k, *pair] for k, collisions in enumerate(path.named) for pair in collisions]
     return TruthRecord(
         legs=frozen(legs),
         events=frozen(np.array(sorted(rows, key=lambda row: row[:3])).reshape(-1, 5)),

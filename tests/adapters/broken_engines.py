@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from adapters.engine import Engine, Hit, Row, Unsupported
+from adapters.engine import Collision, Engine, Row, Unsupported
 from adapters.engines import ENGINES
 from adapters.reference import Reference
 from reference_impl import exercise, ordered
@@ -23,14 +23,14 @@ class Sound(Reference):
 
 
 class LeaksMomentum(Sound):
-    """A millionth of a disk's velocity is lost in every hit."""
+    """A millionth of a disk's velocity is lost in every collision."""
 
     def step(self, count=1):
         for _ in range(count):
             before = len(self.log)
             super().step()
-            for hit in self.log[before:]:
-                self.disks.velocity[hit.i] *= 1 - 1e-6
+            for collision in self.log[before:]:
+                self.disks.velocity[collision.i] *= 1 - 1e-6
 
 
 class GivesLiveView(Sound):
@@ -63,7 +63,7 @@ class SquaresRestitution(Sound):
         super().load(replace(scene, restitution=scene.restitution**2), dt)
 
 
-class StopsSlowHits(Sound):
+class StopsSlowCollisions(Sound):
     """Everything that closes at less than 1 m/s is inelastic."""
 
     def load(self, scene, dt):
@@ -89,7 +89,7 @@ class PushLasts(Sound):
         super().step(count)
 
 
-class LoadKeepsHits(Sound):
+class LoadKeepsCollisions(Sound):
     """The log of the last scene is still there."""
 
     def load(self, scene, dt):
@@ -177,43 +177,46 @@ class StaticGivesWay(Sound):
         super().load(replace(scene, mass=np.where(scene.static, 1e6, scene.mass), inertia=None), dt)
 
 
-class TellsNoHits(Sound):
+class TellsNoCollisions(Sound):
     """The contact listener was never registered."""
 
-    def hits(self):
+    def collisions(self):
         return []
 
 
 class NumbersWallsFromTheEnd(Sound):
     """Walls are known by the engine's list, which is the scene's reversed."""
 
-    def hits(self):
-        return [Hit(h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse) for h in self.log]
+    def collisions(self):
+        return [
+            Collision(h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse)
+            for h in self.log
+        ]
 
 
 class CountsStepsFromOne(Sound):
-    """The step counter is raised before the hits are logged."""
+    """The step counter is raised before the collisions are logged."""
 
-    def hits(self):
-        return [hit._replace(step=hit.step + 1) for hit in self.log]
+    def collisions(self):
+        return [collision._replace(step=collision.step + 1) for collision in self.log]
 
 
 class TellsImpulsePerSecond(Sound):
     """A contact force is told where an impulse is asked for."""
 
-    def hits(self):
-        return [hit._replace(impulse=hit.impulse / self.dt) for hit in self.log]
+    def collisions(self):
+        return [collision._replace(impulse=collision.impulse / self.dt) for collision in self.log]
 
 
 class RubsSidewise(Sound):
-    """The default friction is on: a hit turns a part of the spin into sideways speed."""
+    """The default friction is on: a collision turns a part of the spin into sideways speed."""
 
     def step(self, count=1):
         for _ in range(count):
             before = len(self.log)
             super().step()
-            for hit in self.log[before:]:
-                for disk in (hit.i, hit.j):
+            for collision in self.log[before:]:
+                for disk in (collision.i, collision.j):
                     self.disks.velocity[disk, 1] += 0.01 * self.disks.angular_velocity[disk]
 
 
@@ -305,7 +308,7 @@ CAUGHT_BY: dict[type[Engine], str] = {
     ReadsFloat32: "order_and_shapes",
     WrapsAngles: "order_and_shapes",
     GivesLiveView: "read_copies",
-    LoadKeepsHits: "load_forgets",
+    LoadKeepsCollisions: "load_forgets",
     LoadKeepsPush: "load_forgets",
     SharesOneWorld: "worlds_are_apart",
     IgnoresCount: "counts_are_steps",
@@ -315,16 +318,16 @@ CAUGHT_BY: dict[type[Engine], str] = {
     MassFromDensity: "mass_by_push",
     SolidDiskInertia: "inertia_by_push",
     VelocityHalfAStepOff: "same_instant",
-    TellsNoHits: "hits_are_told",
+    TellsNoCollisions: "collisions_are_told",
     NumbersWallsFromTheEnd: "walls_are_told",
-    CountsStepsFromOne: "hits_name_their_step",
+    CountsStepsFromOne: "collisions_name_their_step",
     TellsImpulsePerSecond: "impulse_is_told",
     StaticGivesWay: "static_stays",
     OtherOrderOfUpdates: "free_flight",
     FallsAsleep: "slow_flight",
     HasSpeedLimit: "fast_flight",
     LeaksMomentum: "pair_momentum",
-    StopsSlowHits: "restitution_0.5",
+    StopsSlowCollisions: "restitution_0.5",
     SquaresRestitution: "restitution_wall",
     RubsSidewise: "friction",
 }

@@ -37,7 +37,7 @@ def positions(engine: Any, scene: Scenario, dt: float) -> Array:
     "name", ["oblique_e09", "falling_box", "asteroids", "ship_thrust", "disk_between_static_disks"]
 )
 def test_with_nothing_switched_on_it_is_the_exercise_to_the_bit(name: str):
-    """Pairs, walls, the wrap, pushes, and disks that stand still; positions and hits."""
+    """Pairs, walls, the wrap, pushes, and disks that stand still; positions and collisions."""
     scene = scenario(name)
     plain, switched = (
         play(engine, "one:run", scene, scene.dt(scene.substeps[1])).trajectory
@@ -65,7 +65,7 @@ def test_free_flight_is_off_by_its_closed_form_in_any_order(order: tuple[str, ..
     assert np.abs(off - expected).max() <= 720 * 10 * FLOAT64
 
 
-def test_a_late_hit_is_off_by_the_change_of_velocity_times_its_delay():
+def test_a_late_collision_is_off_by_the_change_of_velocity_times_its_delay():
     """Equal disks head-on: each goes on for tau, so that it is (v' - v) tau off for ever after."""
     scene = scenario("head_on_equal_e1")
     dt, (a, b) = scene.dt(2), scene.scene.position
@@ -89,8 +89,8 @@ def test_a_ball_gains_speed_times_dt_of_height_where_it_bounces_off_a_velocity_a
     dt, g = scene.dt(4), -scene.scene.gravity[1]
     fall = scene.scene.position[0, 1] - scene.scene.radius[0]
     heights = positions(Switched(order), scene, dt)[:, 0, 1]
-    hit = int(np.sqrt(2 * fall / g) / scene.sample_interval)
-    apex = heights[hit + 2 : 3 * hit].max() - heights[: hit // 2].max()
+    collision = int(np.sqrt(2 * fall / g) / scene.sample_interval)
+    apex = heights[collision + 2 : 3 * collision].max() - heights[: collision // 2].max()
     speed = np.sqrt(2 * g * fall)
 
     # The apex is read off samples, and off a step that is up to a whole one away from it.
@@ -109,7 +109,7 @@ def run_of(name: str, scene: Scenario, dt: float) -> Run:
     ("name", "scene", "samples", "bound"),
     [
         # Bounds of rounding, in m: of float64 where the engine keeps that, else of so many steps of up to some metres.
-        ("reference:exercise", "falling_box", 25, 1e-11),  # 135 hits, or 351, hand on what rounding does
+        ("reference:exercise", "falling_box", 25, 1e-11),  # 135 collisions, or 351, hand on what rounding does
         # Ten iterations end before the impulses do, so that the order of the contacts decides the last digits.
         ("pymunk:matched", "gas_of_100", 58, 1e-5),
         ("pymunk:shipped", "oblique_e09", 240, 1e-12),
@@ -117,7 +117,7 @@ def run_of(name: str, scene: Scenario, dt: float) -> Run:
         ("box2d:shipped", "box_billiard", 1200, 4800 * 4 * FLOAT32),
         ("box2d:shipped", "rest_on_floor", 300, 1200 * FLOAT32),
         ("box2d:matched", "bouncing_ball_e1", 600, 2400 * FLOAT32),
-        ("box2d_v3:shipped", "slow_hit", 240, 960 * FLOAT32),
+        ("box2d_v3:shipped", "slow_collision", 240, 960 * FLOAT32),
         ("box2d_v3:matched", "oblique_e09", 240, 960 * FLOAT32),
         ("box2d_v3:matched", "bouncing_ball_e1", 600, 2400 * FLOAT32),
     ],
@@ -143,7 +143,7 @@ def test_with_all_its_habits_the_reference_is_the_engine(name: str, scene: str, 
     [
         ("pymunk:shipped", "oblique_e09", RESTITUTION),
         ("pymunk:matched", "bouncing_ball_e09", PUSH_OUT),
-        ("box2d_v3:shipped", "slow_hit", RESTITUTION),
+        ("box2d_v3:shipped", "slow_collision", RESTITUTION),
         ("box2d:shipped", "box_billiard", "friction"),
     ],
 )
@@ -192,7 +192,7 @@ for order in (EXERCISE, BOX2D, PYMUNK, BOX2D_V3):
     engine = Switched(order, **on)
     engine.load(scene, 0.01)
     engine.step(300)
-    assert len(engine.hits()) > 20
+    assert len(engine.collisions()) > 20
     sys.stdout.buffer.write(engine.read().position.tobytes() + engine.read().velocity.tobytes())
 """
 

@@ -42,12 +42,12 @@ def played(name, scenario, dt):
 
 def arrays(trajectory):
     """Every array of a trajectory as bytes."""
-    hits = trajectory.collisions
+    collisions = trajectory.collisions
     return [
         array.tobytes()
         for array in (
             trajectory.t, trajectory.position, trajectory.velocity, trajectory.angle, trajectory.angular_velocity,
-            hits.t, hits.i, hits.j, hits.impulse,
+            collisions.t, collisions.i, collisions.j, collisions.impulse,
         )
     ]  # fmt: skip
 
@@ -121,7 +121,7 @@ def test_a_disk_that_leaves_the_box_is_set_onto_the_opposite_edge_and_keeps_its_
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_disks_do_not_see_each_other_across_the_edge_but_meet_after_it(name):
-    """Nothing happens while their images overlap; a hit once both are on the same side."""
+    """Nothing happens while their images overlap; a collision once both are on the same side."""
     scene = Scene(
         position=[[4.9, 0.0], [-4.2, 0.0]], velocity=[[2.0, 0.0], [0.0, 0.0]], radius=[0.25, 0.25], mass=[1.0, 1.0],
         restitution=1.0, wrap=BOX,
@@ -286,7 +286,7 @@ def test_box2d_tells_its_own_sleep_setting(name):
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_an_engine_repeats_itself_bit_for_bit(name):
-    """Twenty-one disks that spin, hit and wrap, with a thrust on one of them."""
+    """Twenty-one disks that spin, collide and wrap, with a thrust on one of them."""
     scenario = replace(from_catalogue("asteroids", 1), thrusts=[Thrust(0, 0.11, 0.63, [0.2, 0.1], torque=0.05)])
     scenario = replace(scenario, duration=20 * scenario.sample_interval)
     once, again = (played(name, scenario, scenario.sample_interval / 2) for _ in range(2))

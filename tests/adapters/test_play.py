@@ -6,20 +6,27 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.engine import Hit
-from adapters.play import first_hits
+from adapters.engine import Collision
+from adapters.play import first_collisions
 
 
-def test_weight_in_consecutive_steps_is_one_collision_and_hits_are_each_their_own():
-    """Pushes no stronger than weight go on with the one before; a stronger one is a hit again, a step later or not."""
-    hits = [Hit(3, 1, 0, 2.0), Hit(4, 0, 1, 1.0), Hit(5, 1, 0, 1.0), Hit(7, 0, 1, 4.0), Hit(4, -1, 0, 8.0)]
-    found = first_hits(hits, 0.5, weight=1.0)
-    assert len(first_hits(hits, 0.5)) == 5
-    assert len(first_hits([*hits, Hit(9, 0, 1, 1e-9)], 0.5)) == 5  # a rounding of the impulses above
+def test_weight_in_consecutive_steps_is_one_collision_and_collisions_are_each_their_own():
+    """Pushes no stronger than weight go on with the one before; a stronger one is a collision again, a step later or
+    not."""
+    collisions = [
+        Collision(3, 1, 0, 2.0),
+        Collision(4, 0, 1, 1.0),
+        Collision(5, 1, 0, 1.0),
+        Collision(7, 0, 1, 4.0),
+        Collision(4, -1, 0, 8.0),
+    ]
+    found = first_collisions(collisions, 0.5, weight=1.0)
+    assert len(first_collisions(collisions, 0.5)) == 5
+    assert len(first_collisions([*collisions, Collision(9, 0, 1, 1e-9)], 0.5)) == 5  # a rounding of the impulses above
     assert found.t.tolist() == [2.0, 2.5, 4.0]
     assert list(zip(found.i.tolist(), found.j.tolist())) == [(0, 1), (0, -1), (0, 1)]
     assert found.impulse.tolist() == [2.0, 8.0, 4.0]
-    assert len(first_hits([], 0.5)) == 0
+    assert len(first_collisions([], 0.5)) == 0
 
 
 @settings(derandomize=True)
@@ -27,7 +34,7 @@ def test_weight_in_consecutive_steps_is_one_collision_and_hits_are_each_their_ow
 def test_collisions_are_the_beginnings_of_runs_of_pushes(pushes):
     """Counted the slow way: a push whose pair did not push in the step before."""
     rows = sorted((step, pair) for step, pair in pushes)
-    found = first_hits([Hit(step, *pair, 1.0) for step, pair in rows], 1.0, weight=1.0)
+    found = first_collisions([Collision(step, *pair, 1.0) for step, pair in rows], 1.0, weight=1.0)
     begins = {(step + 1.0, *pair) for step, pair in pushes if (step - 1, pair) not in pushes}
     assert set(zip(found.t.tolist(), found.i.tolist(), found.j.tolist())) == begins
     assert (np.diff(found.t) >= 0).all()

@@ -24,15 +24,16 @@ SLICES = 50  # short ones, so that on a busy machine some are undisturbed
 ROWS = ((1000, 0.3, 1_000_000), (100, 0.3, 1_000_000), (10_000, 0.3, 1_000_000), (1000, 0.5, 1_000_000))
 
 
-def rate(n: int, packing: float, hits: int) -> tuple[float, float]:
-    """Hits of two disks a second on a torus, e = 1, after 50 hits a disk: the best and the median of many slices."""
+def rate(n: int, packing: float, collisions: int) -> tuple[float, float]:
+    """Collisions of two disks a second on a torus, e = 1, after 50 collisions a disk: the best and the median of many
+    slices."""
     scene, torus = gas(n, packing)
     engine = EventEngine(scene, torus)
     at = 0.0
-    while len(engine.hits) < 25 * n:
+    while len(engine.collisions) < 25 * n:
         at += 1.0
         engine.advance(at)
-    span = at * hits / len(engine.hits) / SLICES
+    span = at * collisions / len(engine.collisions) / SLICES
     rates = []
     for _ in range(SLICES):
         engine.kept.clear()
@@ -40,7 +41,7 @@ def rate(n: int, packing: float, hits: int) -> tuple[float, float]:
         at += span
         engine.advance(at)
         seconds = perf_counter() - started
-        rates.append(len(engine.hits) / seconds)
+        rates.append(len(engine.collisions) / seconds)
     return max(rates), float(np.median(rates))
 
 
@@ -54,7 +55,8 @@ def in_a_box(n: int, packing: float) -> Scene:
 
 
 def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, float]:
-    """Seconds of `billiards` and of the engine for the same box, how many hits, and how long both list the same, s."""
+    """Seconds of `billiards` and of the engine for the same box, how many collisions, and how long both list the same,
+    s."""
     import billiards
 
     (left, bottom), (right, top) = scene.walls.min(axis=(0, 1)), scene.walls.max(axis=(0, 1))
@@ -77,11 +79,11 @@ def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, fl
         started = perf_counter()
         engine.advance(until)
         fast = min(fast, perf_counter() - started)
-    ours = [tuple(hit) for hit in engine.hits[engine.hits[:, 2] >= 0][:, :3].tolist()]
+    ours = [tuple(collision) for collision in engine.collisions[engine.collisions[:, 2] >= 0][:, :3].tolist()]
     same = 0
     while same < min(len(ours), len(theirs)) and {*ours[same][1:]} == {*map(float, theirs[same][1:3])}:
         same += 1
-    return slow, fast, len(engine.hits), ours[same - 1][0] if same else 0.0
+    return slow, fast, len(engine.collisions), ours[same - 1][0] if same else 0.0
 
 
 def alone(code: str, **environment: str) -> float:
@@ -121,20 +123,20 @@ def compile_time() -> float:
 def main() -> None:
     """Print the table."""
     print(f"{'what':58}{'measured':>14}  floor")
-    for n, packing, hits in ROWS:
-        best, median = rate(n, packing, hits)
+    for n, packing, collisions in ROWS:
+        best, median = rate(n, packing, collisions)
         floor = "1.8" if (n, packing) == (1000, 0.3) else ""
-        print(f"{f'torus, N = {n}, packing {packing}: M hits/s, best':58}{best / 1e6:14.2f}  {floor}")
+        print(f"{f'torus, N = {n}, packing {packing}: M collisions/s, best':58}{best / 1e6:14.2f}  {floor}")
         print(f"{'    median of ' + str(SLICES) + ' slices':58}{median / 1e6:14.2f}")
     print(f"{'compile all kernels, empty cache: s':58}{compile_time():14.1f}  10 at most")
     print(f"{'N = 100 000: MB':58}{memory():14.0f}  300 at most")
     try:
-        slow, fast, hits, same = against_billiards(in_a_box(100, 0.3), 5.0)
+        slow, fast, collisions, same = against_billiards(in_a_box(100, 0.3), 5.0)
     except ModuleNotFoundError:
         print("billiards is not installed: `uv pip install billiards==0.5.0`")
         return
-    print(f"{f'box, N = 100, {hits} hits: billiards over this engine, seconds':58}{slow / fast:14.0f}  100")
-    print(f"{'    the same hits in the same order until: s':58}{same:14.2f}")
+    print(f"{f'box, N = 100, {collisions} collisions: billiards over this engine, seconds':58}{slow / fast:14.0f}  100")
+    print(f"{'    the same collisions in the same order until: s':58}{same:14.2f}")
 
 
 if __name__ == "__main__":

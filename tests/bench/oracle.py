@@ -29,7 +29,7 @@ FLOORS = {60.0: 0.2, 600.0: 3.0}  # s, for a certified answer of the box at e = 
 FALLS = {0.5: range(4), 0.8: range(4), 0.9: range(2)}  # restitution and seeds
 FALL = 10.0  # s, of the falling boxes
 COLUMNS = (
-    "scene", "duration_s", "method", "bits", "hits", "rests", "first_rest_s", "horizon_s", "ends_because", "seconds",
+    "scene", "duration_s", "method", "bits", "collisions", "rests", "first_rest_s", "horizon_s", "ends_because", "seconds",
 )  # fmt: skip
 Row = dict[str, str | float | int]
 
@@ -64,7 +64,7 @@ def said(one: Scenario, record: TruthRecord) -> Row:
     """What does not depend on the machine."""
     rests = record.events[record.events[:, 3] == 0, 0]
     return {
-        "method": record.method, "bits": record.bits, "hits": len(record.events) - len(rests), "rests": len(rests),
+        "method": record.method, "bits": record.bits, "collisions": len(record.events) - len(rests), "rests": len(rests),
         "first_rest_s": round(float(rests[0]), 6) if len(rests) else "",
         "horizon_s": round(min(record.valid_until, one.duration), 6), "ends_because": record.reason,
     }  # fmt: skip

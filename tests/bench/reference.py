@@ -1,9 +1,10 @@
 """How fast the reference is beside the engines: `python -m tests.bench.reference` prints and writes its figures.
 
 A gas of equal disks between walls (area fraction 0.3, e = 1, dt 1/240 s, kT = m = diameter = 1), played by every engine
-in turn, round by round in shuffled order: nothing is read and no hit is told while the clock runs, and Python calls the
-engine once a step where it cannot take many. Each engine's own state goes on from round to round. The clock is that of
-the thread, which does not run while others have the processor; they still take its caches: leave the machine alone.
+in turn, round by round in shuffled order: nothing is read and no collision is told while the clock runs, and Python
+calls the engine once a step where it cannot take many. Each engine's own state goes on from round to round. The clock
+is that of the thread, which does not run while others have the processor; they still take its caches: leave the machine
+alone.
 
 The figures go to tests/data/reference_figures.csv, each with the least or the most that is demanded of it;
 `uv run pytest tests/bench/test_reference_figures.py` holds them to it, and with `-m slow` measures some ratios anew.
@@ -54,7 +55,7 @@ class Figure(NamedTuple):
 
 
 def reference(variant, scene: Scene, dt: float) -> Step:
-    """The compiled solver, whose hits are counted but not handed to Python."""
+    """The compiled solver, whose collisions are counted but not handed to Python."""
     engine = Reference(variant)
     engine.load(scene, dt)
     return lambda count: silent(variant)(engine.disks, engine.world, dt, count)
@@ -62,7 +63,7 @@ def reference(variant, scene: Scene, dt: float) -> Step:
 
 @cache
 def silent(variant):
-    """The variant's `advance`, which returns how many hits there were."""
+    """The variant's `advance`, which returns how many collisions there were."""
     advance = variant.advance
     return njit(lambda disks, world, dt, count: len(advance(disks, world, dt, count)))
 
@@ -85,7 +86,8 @@ def box2d(profile: str, scene: Scene, dt: float) -> Step:
 
 
 def box2d_v3(profile: str, scene: Scene, dt: float) -> Step:
-    """The world, whose hit events nobody collects; its unit of length is global, so it is set before each round."""
+    """The world, whose collision events nobody collects; its unit of length is global, so it is set before each
+    round."""
     import pyb2d3
 
     engine = Box2DV3(profile)

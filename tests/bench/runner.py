@@ -92,19 +92,19 @@ def overhead_of_large() -> None:
 
 def overhead_of_small() -> None:
     """ms a cell beside the engine, of 500 cells of two disks and 241 samples, one worker, its start taken off."""
-    slow_hit = {"slow_hit": scenario("slow_hit")}
+    slow_collision = {"slow_collision": scenario("slow_collision")}
     for name in ("pymunk:matched", "box2d:matched", "box2d_v3:matched"):
         rounds = []
         for _ in range(ROUNDS):
             costs = []
             for count in (1, 501):
-                cells = [Cell("slow_hit", seed, name, 1) for seed in range(count)]
+                cells = [Cell("slow_collision", seed, name, 1) for seed in range(count)]
                 with tempfile.TemporaryDirectory() as folder:
-                    costs.append(played(slow_hit, cells, 1, Path(folder)))
+                    costs.append(played(slow_collision, cells, 1, Path(folder)))
             rounds.append([(more - one) / 500 * 1e3 for one, more in zip(*costs)])
         wall = min(wall - inside for wall, inside, _ in rounds)
         all_of_it = min(processor for _, _, processor in rounds)
-        stepping, reading = (1e3 * s for s in least(name, slow_hit["slow_hit"], 1))
+        stepping, reading = (1e3 * s for s in least(name, slow_collision["slow_collision"], 1))
         print(
             f"small cells, {name:<16} {wall:5.2f} ms a cell beside the engine; processor {all_of_it:.2f} ms: "
             f"{stepping:.2f} the engine, {reading:.2f} the reading of the samples that the scene asks for, "
@@ -143,10 +143,10 @@ def many_cells(folder: Path) -> None:
     """5560 cells, 139 scenes of two disks, 10 engines, 4 steps: played, and their tables made once more; in processes
     of their own, whose memory can be told."""
     for number in range(139):
-        one = scenario("slow_hit")
+        one = scenario("slow_collision")
         scene = replace(one.scene, velocity=one.scene.velocity * (1 + number / 100))
-        path = folder / f"hit-{number}.toml"
-        write_scene_file(replace(one, name=f"hit-{number}", scene=scene, duration=1.0, truth=None), path)
+        path = folder / f"collision-{number}.toml"
+        write_scene_file(replace(one, name=f"collision-{number}", scene=scene, duration=1.0, truth=None), path)
     for what in (play_many, tables_again):
         words = [sys.executable, "-m", "tests.bench.runner", what.__name__, str(folder)]
         print(subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout.strip())

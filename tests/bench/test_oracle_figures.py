@@ -46,7 +46,8 @@ def test_falling_boxes_are_answered_beyond_their_first_rest():
 @pytest.mark.skipif(not has_balls(), reason="python-flint is an extra: without it no row is certified")
 @pytest.mark.parametrize(("name", "one"), [(name, one) for name, _, one in questions()])
 def test_the_figures_are_what_is_computed(name: str, one: Scenario):
-    """The same hits, rests and horizon to the microsecond they are written with; nothing overlaps, energy falls."""
+    """The same collisions, rests and horizon to the microsecond they are written with; nothing overlaps, energy
+    falls."""
     record, written = computed(one), row_of(name, one.duration)
     found, truth, scene = said(one, record), record.sampled(one.scene, [], one.times), one.scene
     energy = (scene.mass * ((truth.velocity**2).sum(-1) / 2 - truth.position @ scene.gravity)).sum(axis=1)

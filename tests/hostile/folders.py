@@ -19,7 +19,7 @@ SCENE = {"two.toml": TWO}
 OUT: dict[str, tuple[str, ...]] = {
     "run": ("run", "two.toml", "--engine", "pymunk:shipped", "--out"),
     "speed": ("speed", "free_fall", "--engine", "pymunk:shipped", "--out"),
-    "stability": ("stability", "slow_hit", "--engine", "pymunk:shipped", "--out"),
+    "stability": ("stability", "slow_collision", "--engine", "pymunk:shipped", "--out"),
     "tune": ("tune", "pymunk", "--out"),
     "lesson": ("lesson", "--export"),
 }
@@ -161,13 +161,13 @@ NO_RUN: dict[str, tuple[tuple[str, ...], dict[str, str | bytes], str]] = {
     "resume: an empty journal": (("run", "--resume", "out"), {"out/journal.jsonl": ""}, "out"),
     "resume: a journal without a header": (("run", "--resume", "out"), {"out/journal.jsonl": "{}\n"}, "out"),
     "resume: a part with a diary": (("run", "--resume", "out"), {"out.part/journal.jsonl": "dear diary"}, "out"),
-    "resume: with scenes beside it": (("run", "slow_hit", "--resume", "out"), {}, "takes no scenarios"),
+    "resume: with scenes beside it": (("run", "slow_collision", "--resume", "out"), {}, "takes no scenarios"),
     "resume: with another place": (("run", "--resume", "out", "--out", "b"), {}, "takes no scenarios"),
     "speed --resume: somebody's part": (
         ("speed", "free_fall", "--resume", "--out", "out"), {"out.part/journal.jsonl": "dear diary\n"}, "out.part",
     ),
     "stability --resume: somebody's part": (
-        ("stability", "slow_hit", "--resume", "--out", "out"), {"out.part/journal.jsonl": "[1]\n"}, "out.part",
+        ("stability", "slow_collision", "--resume", "--out", "out"), {"out.part/journal.jsonl": "[1]\n"}, "out.part",
     ),
     "report: nothing there": (("report", "out"), {}, "journal.jsonl"),
     "report: a file": (("report", "two.toml"), SCENE, "two.toml"),

@@ -126,12 +126,12 @@ LINES: dict[str, tuple[str, tuple[int, ...], str]] = {
     "list: nobody reads at all": ("$crosscheck list | true", (0,), ""),
     "run: nobody reads at all": (f"$crosscheck {' '.join(RUN)} | true; test -e out/report.html", (0,), ""),
     "run: a folder that is gone": (f"mkdir a; cd a; rmdir ../a; $crosscheck {' '.join(RUN)}", (2,), ""),
-    "truth: a folder that is gone": ("mkdir a; cd a; rmdir ../a; $crosscheck truth slow_hit", (0,), "horizon"),
+    "truth: a folder that is gone": ("mkdir a; cd a; rmdir ../a; $crosscheck truth slow_collision", (0,), "horizon"),
     "check: a folder that is gone": ("mkdir a; cd a; rmdir ../a; $crosscheck check plain.py", (2,), ""),
     "run: files of no more than 100 kB": (f"ulimit -f 100; $crosscheck {' '.join(RUN)}", (1, 2), ""),
     "truth: three files at once": ("ulimit -n 12; $crosscheck truth two.toml", (0, 1, 2), ""),
     "truth: told to stop": ("timeout -s TERM 0.3 $crosscheck truth two.toml; test $? -eq 124", (0,), ""),
-    "a command by its module": ("cd /; $python -m reports truth slow_hit", (0,), "horizon"),
+    "a command by its module": ("cd /; $python -m reports truth slow_collision", (0,), "horizon"),
 }  # fmt: skip
 STREAMS = [
     Input(what, files=FILES, shell=line.replace("$python", '"$(dirname $crosscheck)/python"'), codes=codes, says=says,

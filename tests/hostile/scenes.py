@@ -99,7 +99,7 @@ SHAPES: dict[str, tuple[str, str, str]] = {
     "a name that acts on a terminal": ('"two-disks"', '"\\u001b[2J\\u0007"', "name = "),
     "a name in markup": ('"two-disks"', '"[/nope]"', "name = \"[/nope]\""),
     "a key that acts on a terminal": ("asks =", '"\\u001b[31m" =', "unknown key"),
-    "a question that is a number": ('"Does a head-on hit keep momentum?"', "42", "asks = 42"),
+    "a question that is a number": ('"Does a head-on collision keep momentum?"', "42", "asks = 42"),
 }  # fmt: skip
 
 

@@ -13,7 +13,7 @@ CORRECT = Path(__file__).parent.parent / "solvers" / "correct"
 PY, JS = (CORRECT / "plain.py").read_text(), (CORRECT / "plain.js").read_text()
 TWO = WALLED[: WALLED.index("[[wall]]")]  # the exercise's functions know no walls
 PLAYED = ("run", "two.toml", "--dt", "0.02", "--workers", "1", "--timeout", "5", "--out", "out", "--engine")
-STEP, HIT = "def integrate(sphere, dt):\n", "def sphereSphereCollisionHandling(sphereA, sphereB):\n"
+STEP, COLLISION = "def integrate(sphere, dt):\n", "def sphereSphereCollisionHandling(sphereA, sphereB):\n"
 JS_STEP = "function integrate(sphere, dt) {\n"
 
 
@@ -62,7 +62,7 @@ LOADING: dict[str, tuple[str, str | bytes, str]] = {
     "no function at all": ("mine.py", "x = 1\n", "no function integrate"),
     "functions that are numbers": ("mine.py", "integrate = sphereSphereCollisionHandling = 7\n", "integrate"),
     "functions that take nothing": (
-        "mine.py", PY.replace(STEP, "def integrate():\n").replace(HIT, "def sphereSphereCollisionHandling():\n"), "",
+        "mine.py", PY.replace(STEP, "def integrate():\n").replace(COLLISION, "def sphereSphereCollisionHandling():\n"), "",
     ),
     "page in JavaScript": ("mine.js", f"document.write('x');\n{JS}", "document is not defined"),
     "modules in JavaScript": ("mine.js", f"import {{ a }} from './b.js';\n{JS}", "no modules"),
@@ -75,7 +75,7 @@ CALLED: dict[str, tuple[str, str, str]] = {
     "an endless loop in a call in JavaScript": ("mine.js", within("for (;;);", head=JS_STEP), "does not come back"),
     "a call that calls itself": ("mine.py", within("integrate(sphere, dt)"), "calls itself without end"),
     "os._exit in a call": ("mine.py", within("import os; os._exit(0)"), "ended its own process"),
-    "abort in a call": ("mine.py", within("import os; os.abort()", head=HIT), "SIGABRT"),
+    "abort in a call": ("mine.py", within("import os; os.abort()", head=COLLISION), "SIGABRT"),
     "all memory in a call": ("mine.py", within("x = [0] * 10**10"), "memory"),
     "an exception that is none in a call": ("mine.py", within("raise KeyboardInterrupt"), "KeyboardInterrupt"),
     "nan": ("mine.py", within("sphere.velocity.x = float('nan')"), "NaN"),

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.independent
 Record = Callable[[str, object], None]
 
 SCENES = (
-    "free_fall", "head_on_equal_e09", "oblique_e05", "mass_ratios", "slow_hit", "near_miss", "bouncing_ball_e09",
+    "free_fall", "head_on_equal_e09", "oblique_e05", "mass_ratios", "slow_collision", "near_miss", "bouncing_ball_e09",
     "box_billiard", "disk_between_static_disks", "slide_on_incline", "column_of_ten", "galperin_31", "cradle_touching",
     "spin_under_torque", "body_frame_thrust", "ship_thrust", "asteroids", "falling_box",
 )  # fmt: skip
@@ -67,8 +67,8 @@ def test_an_adapter_plays_what_its_engine_plays_when_called_directly(player: str
         ("pymunk:matched", "falling_box", "iterations", 7),
         ("pymunk:matched", "head_on_equal_e09", "elasticity", 0.9),
         ("box2d:matched", "falling_box", "velocity, position iterations", "7, 3"),
-        ("box2d:matched", "slow_hit", "unit of time in s", 1.0),
-        ("box2d_v3:matched", "slow_hit", "restitution threshold in m/s", 1.0),
+        ("box2d:matched", "slow_collision", "unit of time in s", 1.0),
+        ("box2d_v3:matched", "slow_collision", "restitution threshold in m/s", 1.0),
         ("box2d_v3:matched", "near_miss", "length unit in m", 1.0),
     ],
 )

@@ -1,8 +1,8 @@
 """Numbers of the table from the trajectories alone, each as its line in `crosscheck list metrics` says.
 
 Left out: what is judged in collision-free samples (velocity, energy error and loss, momentum and energy apart), the
-hits that are matched to those of another (missed, invented, delay), and disks through walls. To add one, write it from
-its line and give it a row in `OWN`.
+collisions that are matched to those of another (missed, invented, delay), and disks through walls. To add one, write it
+from its line and give it a row in `OWN`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.independent
 Record = Callable[[str, object], None]
 
 SCENES = (
-    "free_fall", "ping_pong", "head_on_equal_e1", "head_on_unequal_e05", "oblique_e09", "mass_ratios", "slow_hit",
+    "free_fall", "ping_pong", "head_on_equal_e1", "head_on_unequal_e05", "oblique_e09", "mass_ratios", "slow_collision",
     "wall_to_wall", "bouncing_ball_e09", "disk_between_static_disks", "column_of_ten", "galperin_31",
     "cradle_touching", "spin_under_torque", "ship_thrust", "asteroids", "falling_box",
 )  # fmt: skip

@@ -22,15 +22,15 @@ for solver, side, steps in ((exercise, 4, 600), (lesson, 4, 600), (ordered, 4, 6
     )
     disks = make_disks(grid, velocity, 0.3 + 0.1 * np.sin(n), mass, angular_velocity=np.cos(n))
     disks.force[3], disks.torque[7] = [0.3, 0.2], 0.05
-    hits = solver.advance(disks, world, 0.01, steps)
-    assert {min(j, 0) for _, _, j, _ in hits} == {0, -1, -2} and len(hits) > 100
+    collisions = solver.advance(disks, world, 0.01, steps)
+    assert {min(j, 0) for _, _, j, _ in collisions} == {0, -1, -2} and len(collisions) > 100
     assert solver is not crowd or len(n) >= crowd.CROWD
-    sys.stdout.buffer.write(b"".join(array.tobytes() for array in disks) + np.array(hits).tobytes())
+    sys.stdout.buffer.write(b"".join(array.tobytes() for array in disks) + np.array(collisions).tobytes())
 """
 
 
 def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
-    """A crowd with hits, two walls, gravity, wrap, spin, pushes and a static disk, through every variant."""
+    """A crowd with collisions, two walls, gravity, wrap, spin, pushes and a static disk, through every variant."""
     outputs = [
         subprocess.run(
             [sys.executable, "-c", SCENE], capture_output=True, check=True, cwd=Path(__file__).parents[2],

@@ -31,7 +31,7 @@ def overlapping_pairs(draw):
 
 
 def before_and_after(solver, disks, world, pair=(0, 1)):
-    """Velocities before and after one hit, the unit normal from the first disk to the second, and the impulse."""
+    """Velocities before and after one collision, the unit normal from the first disk to the second, and the impulse."""
     apart = disks.position[1] - disks.position[0]
     before = disks.velocity.copy()
     impulse = solver.collide(disks, *pair, world)
@@ -39,7 +39,8 @@ def before_and_after(solver, disks, world, pair=(0, 1)):
 
 
 def tolerance(disks, velocity):
-    """m/s: a hit rounds about 16 times, and what is little to the heavy disk is more to the light one by the ratio."""
+    """m/s: a collision rounds about 16 times, and what is little to the heavy disk is more to the light one by the
+    ratio."""
     ratio = disks.mass.max() / disks.mass.min()
     return 16 * ROUNDING * (np.abs(velocity).max() + 1e-300) * ratio
 
@@ -58,7 +59,7 @@ def tolerance(disks, velocity):
         ((np.inf, 1), 0.5, (0, -2), (0, 1)),
     ],
 )
-def test_head_on_hits_of_the_textbook(solver, mass, e, before, after):
+def test_head_on_collisions_of_the_textbook(solver, mass, e, before, after):
     """All numbers are short in binary, so the answers are exact."""
     disks = make_disks([[-0.5, 0], [0.4, 0]], [[before[0], 0], [before[1], 0]], [0.5, 0.5], mass)
     solver.collide(disks, 0, 1, World(restitution=e))
@@ -82,7 +83,7 @@ def test_one_step_from_rest_tells_the_order_of_the_updates(solver, way):
 @both
 @steady
 @given(pair=overlapping_pairs())
-def test_a_hit_keeps_the_momentum(solver, pair):
+def test_a_collision_keeps_the_momentum(solver, pair):
     """m1 dv1 = -m2 dv2, to rounding of the velocities."""
     disks, world = pair
     before, after, _, _ = before_and_after(solver, disks, world)
@@ -93,7 +94,7 @@ def test_a_hit_keeps_the_momentum(solver, pair):
 @both
 @steady
 @given(pair=overlapping_pairs())
-def test_a_hit_reverses_the_normal_speed_by_e_and_leaves_the_tangential(solver, pair):
+def test_a_collision_reverses_the_normal_speed_by_e_and_leaves_the_tangential(solver, pair):
     """A pair that parts already is left alone."""
     disks, world = pair
     before, after, n, impulse = before_and_after(solver, disks, world)
@@ -186,7 +187,7 @@ def test_the_equations_of_the_lesson_equal_the_impulse_of_the_exercise(pair):
 @steady
 @given(pair=overlapping_pairs(), static=st.integers(0, 1))
 def test_a_static_disk_never_moves(solver, pair, static):
-    """Hit, pushed, pulled by gravity, or overlapped by another static disk: to the bit."""
+    """Collision, pushed, pulled by gravity, or overlapped by another static disk: to the bit."""
     disks, world = pair
     disks.mass[static], disks.velocity[static] = np.inf, 0.0
     disks.force[...], disks.torque[...] = 3.0, 2.0
@@ -227,12 +228,12 @@ def test_only_the_exercise_sets_a_disk_back_onto_the_wall():
 
 @both
 def test_a_wall_ends_where_it_ends(solver):
-    """Beside its end nothing is hit; over its end the normal points from the end to the centre."""
+    """Beside its end nothing is struck; over its end the normal points from the end to the centre."""
     world = World(restitution=1.0, walls=np.array([[[0.0, 0.0], [-1.0, 0.0]]]))
     past = make_disks([[1.5, 0.5]], [[0, -1]], [1], [1])
     assert solver.advance(past, world, 0.25, 4) == []
     corner = make_disks([[0.75, 0.75]], [[-1, -1]], [1], [1])
-    assert [hit[:3] for hit in solver.advance(corner, world, 0.0625, 1)] == [(0, 0, -1)]
+    assert [collision[:3] for collision in solver.advance(corner, world, 0.0625, 1)] == [(0, 0, -1)]
     assert corner.velocity[0] == pytest.approx([1, 1], abs=4 * ROUNDING)
 
 
@@ -263,8 +264,8 @@ def test_coincident_centres_give_no_nan(solver):
 
 
 @both
-def test_a_hit_leaves_the_spin_alone(solver):
-    """The exercise has no friction and no coupling of spin to hits."""
+def test_a_collision_leaves_the_spin_alone(solver):
+    """The exercise has no friction and no coupling of spin to collisions."""
     disks = make_disks([[0, 0.1], [0.9, 0]], [[1, 0], [-1, 0]], [0.5, 0.5], [1, 3], angular_velocity=[4.0, -7.0])
     assert solver.advance(disks, World(), 0.01, 5)
     assert disks.angular_velocity.tolist() == [4.0, -7.0]

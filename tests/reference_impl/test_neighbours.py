@@ -54,16 +54,17 @@ def copy_of(disks):
 
 @njit
 def by_list(disks, world, dt, count):
-    """As `crowd.advance`, however few the disks are; the hits, and in how many steps all pairs had to be asked."""
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]
-    return hits, crowd.advance_listed(disks, world, dt, count, hits)
+    """As `crowd.advance`, however few the disks are; the collisions, and in how many steps all pairs had to be
+    asked."""
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]
+    return collisions, crowd.advance_listed(disks, world, dt, count, collisions)
 
 
 @njit
 def until_astray(disks, world, near):
     """In which step of one the list of near pairs ends to hold: 0, or 1 if it lasts."""
-    hits = [(0, 0, 0, 0.0) for _ in range(0)]
-    return crowd.play(disks, world, DT, 1, hits, crowd.pull_on(disks, world, DT), near, 0, 0, 0)[0]
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]
+    return crowd.play(disks, world, DT, 1, collisions, crowd.pull_on(disks, world, DT), near, 0, 0, 0)[0]
 
 
 def same(a, b):
@@ -73,15 +74,15 @@ def same(a, b):
 
 @steady
 @given(scene=scenes(), count=st.integers(1, 40))
-def test_a_list_gives_the_bits_and_the_hits_of_all_pairs(scene, count):
-    """Positions, velocities, angles, and every hit in its order with its impulse."""
+def test_a_list_gives_the_bits_and_the_collisions_of_all_pairs(scene, count):
+    """Positions, velocities, angles, and every collision in its order with its impulse."""
     disks, world = scene
     other = copy_of(disks)
-    hits = exercise.advance(disks, world, DT, count)
+    collisions = exercise.advance(disks, world, DT, count)
     told, unlisted = by_list(other, world, DT, count)
-    event(f"by list: {np.sign(count - unlisted)}, by all pairs: {np.sign(unlisted)}, hits: {len(hits) > 0}")
+    event(f"by list: {np.sign(count - unlisted)}, by all pairs: {np.sign(unlisted)}, collisions: {len(collisions) > 0}")
     assert same(disks, other)
-    assert told == hits
+    assert told == collisions
 
 
 def heap(n=300, fill=3.0):
@@ -95,7 +96,7 @@ def heap(n=300, fill=3.0):
 def test_a_disk_pushed_off_its_leash_in_mid_step_is_looked_after_at_once():
     """In a heap the list is out of date before the first step ends; kept to its end, it would miss pairs."""
     world, first, other, stale = World(), heap(), heap(), heap()
-    hits = exercise.advance(first, world, DT, 1)
+    collisions = exercise.advance(first, world, DT, 1)
     exercise.integrate(other, world, DT)
     near = look_around(other, world, DT, 1)
     assert near.listed
@@ -103,7 +104,7 @@ def test_a_disk_pushed_off_its_leash_in_mid_step_is_looked_after_at_once():
 
     told, _ = by_list(renewed := heap(), world, DT, 1)
     assert same(first, renewed)
-    assert told == hits
+    assert told == collisions
 
     exercise.integrate(stale, world, DT)
     kept = look_around(stale, world, DT, 1)._replace(leash=np.inf)
@@ -142,12 +143,12 @@ def test_a_disk_lost_in_space_leaves_no_list_but_the_same_bits(far):
     world, disks = World(walls=np.array([[[-1.0, -1.0], [30.0, -1.0]]])), heap(80, 0.7)
     disks.position[7] = [far, 0.0]
     other = copy_of(disks)
-    hits = exercise.advance(disks, world, DT, 5)
+    collisions = exercise.advance(disks, world, DT, 5)
     told, unlisted = by_list(other, world, DT, 5)
     assert unlisted == 5
-    assert hits
+    assert collisions
     assert same(disks, other)
-    assert told == hits
+    assert told == collisions
 
 
 def test_disks_all_in_one_place_are_not_listed():

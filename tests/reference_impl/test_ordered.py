@@ -1,4 +1,5 @@
-"""`reference:ordered` against exact answers: right to rounding where hits can be told apart, bounded elsewhere."""
+"""`reference:ordered` against exact answers: right to rounding where collisions can be told apart, bounded
+elsewhere."""
 
 from __future__ import annotations
 
@@ -67,22 +68,24 @@ def dense_box():
 
 
 @pytest.mark.parametrize("gravity", [0.0, -2.0])
-def test_all_the_hits_of_one_long_step_come_in_their_order(gravity):
-    """One step of 0.6 s: a hit, whom it sends where, and the walls, a static disk and a curved flight besides."""
+def test_all_the_collisions_of_one_long_step_come_in_their_order(gravity):
+    """One step of 0.6 s: a collision, whom it sends where, and the walls, a static disk and a curved flight besides."""
     scene = replace(dense_box(), gravity=np.array([0.0, gravity]))
     events = EventEngine(scene)
     events.advance(0.6)
     engine = played(scene, 0.6, 1)
-    told = np.array([(i, j, J) for _, i, j, J in engine.hits()])
+    told = np.array([(i, j, J) for _, i, j, J in engine.collisions()])
     assert len(told) >= 8
-    assert [sorted(pair) for pair in told[:, :2].tolist()] == [sorted(pair) for pair in events.hits[:, 1:3].tolist()]
-    # Every hit multiplies what rounding did before it by about a free path over a radius.
-    assert told[:, 2] == pytest.approx(events.hits[:, 3], rel=1e-11)
+    assert [sorted(pair) for pair in told[:, :2].tolist()] == [
+        sorted(pair) for pair in events.collisions[:, 1:3].tolist()
+    ]
+    # Every collision multiplies what rounding did before it by about a free path over a radius.
+    assert told[:, 2] == pytest.approx(events.collisions[:, 3], rel=1e-11)
     assert np.abs(engine.read().position - events.look(0.6)[0]).max() < 1e-11
 
 
 @pytest.mark.parametrize("gravity", [0.0, -9.8])
-def test_a_disk_that_passes_through_another_a_wall_or_its_end_within_a_step_has_hit_it(gravity):
+def test_a_disk_that_passes_through_another_a_wall_or_its_end_within_a_step_has_struck_it(gravity):
     """At the end of the step they are far apart again, so the end alone would show nothing."""
     scene = Scene(
         position=[[0.0, 0.0], [1.0, 0.1], [0.0, 5.0], [0.0, 9.0]], 
@@ -93,7 +96,7 @@ def test_a_disk_that_passes_through_another_a_wall_or_its_end_within_a_step_has_
     events = EventEngine(scene)
     events.advance(0.1)
     engine = played(scene, 0.1, 1)
-    assert sorted(hit[1:3] for hit in engine.hits()) == [(0, 1), (2, -1), (3, -2)]
+    assert sorted(collision[1:3] for collision in engine.collisions()) == [(0, 1), (2, -1), (3, -2)]
     # A place rounds at 10 m; over a radius of 0.1 m that turns the normal, and with it 4 m of flight: 400 times it.
     assert np.abs(engine.read().position - events.look(0.1)[0]).max() < 400 * 10 * ROUNDING
 
@@ -119,20 +122,21 @@ def test_a_ball_that_bounces_ever_lower_comes_to_rest_when_it_should_and_carries
     """t = sqrt(2 h / g) (1 + e) / (1 - e) after infinitely many bounces; here after a few."""
     dt, rest = 1 / 60, np.sqrt(0.2) * 3
     engine = played(falling(), dt, int(rest / dt) + 2)
-    bounces = len(engine.hits())
+    bounces = len(engine.collisions())
     engine.step(100)
     state = engine.read()
     assert 5 < bounces < 30
     # The last bounce is 1/16 of a step long at most, so it is g (dt / 32)2 / 2 high, and is cut off.
     assert abs(state.position[0, 1] - 0.25) < 10 * (dt / 32) ** 2 / 2
     assert abs(state.velocity[0, 1]) < 10 * dt / 32
-    weights = [hit.impulse for hit in engine.hits()[bounces:]]
+    weights = [collision.impulse for collision in engine.collisions()[bounces:]]
     assert sum(weights) == pytest.approx(100 * 2.0 * 10.0 * dt, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_heap_takes_a_bounded_number_of_hits_a_step_and_shows_what_it_leaves_as_overlap(seed):
-    """Thirty disks that fall onto each other: no order of hits has an end; nothing blows up, and nothing is hidden."""
+def test_a_heap_takes_a_bounded_number_of_collisions_a_step_and_shows_what_it_leaves_as_overlap(seed):
+    """Thirty disks that fall onto each other: no order of collisions has an end; nothing blows up, and nothing is
+    hidden."""
     rng = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(np.arange(6), np.arange(5)), -1).reshape(-1, 2)
     scene = Scene(
@@ -141,7 +145,7 @@ def test_a_heap_takes_a_bounded_number_of_hits_a_step_and_shows_what_it_leaves_a
         walls=box([0.0, 0.0], [6.6, 20.0]),
     )  # fmt: skip
     engine = played(scene, 1 / 60, 300)
-    a_step = np.bincount([hit.step for hit in engine.hits()])
+    a_step = np.bincount([collision.step for collision in engine.collisions()])
     state = engine.read()
     assert a_step.max() <= ordered.MOST * 30
     assert np.isfinite(state.position).all()

@@ -73,7 +73,7 @@ FAULTS = [
     ('name = "two-disks"', "", "name: missing; must be at most 100 of a-z, 0-9, '_' and '-'"),
     ('"two-disks"', '"Two disks"', "name = \"Two disks\": must be at most 100 of a-z, 0-9, '_' and '-'"),
     ('"two-disks"', '"two\\n"', "name = \"two\\n\": must be at most 100 of a-z, 0-9, '_' and '-'"),
-    ("asks = ", "ask = ", 'ask = "Does a head-on hit keep momentum?": unknown key; did you mean asks?'),
+    ("asks = ", "ask = ", 'ask = "Does a head-on collision keep momentum?": unknown key; did you mean asks?'),
     ("asks = ", "a.b = ", "a = {...}: unknown key; must be one of name, asks, duration,"),
     ("restitution = 0.9", "restitution = 1.5", "restitution = 1.5: must be from 0 to 1"),
     ("restitution = 0.9", "restitution = -0.1", "restitution = -0.1: must be from 0 to 1"),

@@ -8,18 +8,18 @@ import pytest
 
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.truth import exact as oracle
-from scenarios.truth.exact import CLOSED_FORM, HIT_BY_HIT, NOTHING, answered_by, computed
+from scenarios.truth.exact import CLOSED_FORM, COLLISION_BY_COLLISION, NOTHING, answered_by, computed
 
 MODELS = {name: answered_by(scenario(name)) for name in SCENARIOS}
 
 
 def never(*_: object) -> None:
     """Stands for the oracle where it must not be asked."""
-    raise AssertionError("followed hit by hit")
+    raise AssertionError("followed collision by collision")
 
 
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model == CLOSED_FORM])
-def test_a_scene_that_names_a_closed_form_is_answered_without_following_a_hit(
+def test_a_scene_that_names_a_closed_form_is_answered_without_following_a_collision(
     name: str, monkeypatch: pytest.MonkeyPatch
 ):
     """Neither computed nor looked up."""
@@ -31,16 +31,16 @@ def test_a_scene_that_names_a_closed_form_is_answered_without_following_a_hit(
     assert len(one.truth(one.times)) >= 2
 
 
-def test_a_scene_that_is_followed_hit_by_hit_says_so(monkeypatch: pytest.MonkeyPatch):
+def test_a_scene_that_is_followed_collision_by_collision_says_so(monkeypatch: pytest.MonkeyPatch):
     """Negative control: there the oracle is asked, and there are such scenes."""
     monkeypatch.setattr(oracle, "look_up", never)
-    followed = [name for name, model in MODELS.items() if model == HIT_BY_HIT]
+    followed = [name for name, model in MODELS.items() if model == COLLISION_BY_COLLISION]
 
     assert {"asteroids", "gas_of_100", "cradle_touching"} <= set(followed)
     for name in followed:
         one = scenario(name)
         assert one.truth is not None
-        with pytest.raises(AssertionError, match="followed hit by hit"):
+        with pytest.raises(AssertionError, match="followed collision by collision"):
             one.truth(one.times)
 
 
@@ -50,7 +50,7 @@ def test_every_scene_names_a_model():
 
 
 @pytest.mark.parametrize("name", ["head_on_unequal_e09", "bouncing_ball_e1", "cradle_with_gaps", "line_gas"])
-def test_the_closed_form_is_cheaper_than_following_the_hits(name: str):
+def test_the_closed_form_is_cheaper_than_following_the_collisions(name: str):
     """By more than a busy machine can hide: each at its fastest of three."""
     one = scenario(name)
     assert one.truth is not None

@@ -142,7 +142,7 @@ def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_pa
 def test_an_answer_with_any_bit_turned_is_what_was_written_or_none(tmp_path: Path):
     """Nothing but the answer is ever read, and no bit ends in an error: its sums tell, or its header cannot be read."""
     path = tmp_path / "answer.npz"
-    put_answer(path, Answer(record_of(scenario("slow_hit")), "ok", "", 60.0))
+    put_answer(path, Answer(record_of(scenario("slow_collision")), "ok", "", 60.0))
     whole, data = read_answer(path), path.read_bytes()
     assert whole is not None
     told = 0

@@ -8,7 +8,7 @@ import pytest
 from scenarios.catalogue import DRAWN, SCENARIOS, scenario
 
 ANSWERED = [name for name in SCENARIOS if scenario(name).truth]
-# Among the hundreds of hits of a drawn scene some fall on a step, in every draw.
+# Among the hundreds of collisions of a drawn scene some fall on a step, in every draw.
 MOVING = [name for name in ANSWERED if name not in (*DRAWN, "rest_on_floor", "slide_on_incline", "column_of_ten")]
 
 
@@ -66,7 +66,7 @@ def test_truth_starts_as_the_scene(name):
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_truth_has_one_state_a_sample_up_to_its_horizon(name):
-    """All arrays have the shapes of `Trajectory`; no hit lies beyond the last sample."""
+    """All arrays have the shapes of `Trajectory`; no collision lies beyond the last sample."""
     run = scenario(name)
     truth, n = run.truth(run.times), run.scene.n
     k = int((run.times <= truth.valid_until).sum())
@@ -75,10 +75,12 @@ def test_truth_has_one_state_a_sample_up_to_its_horizon(name):
     assert truth.angle.shape == truth.angular_velocity.shape == (k, n)
     for field in ("position", "velocity", "angle", "angular_velocity"):
         assert np.isfinite(getattr(truth, field)).all()
-    hits = truth.collisions
-    assert ((hits.t >= 0) & (hits.t <= truth.t[-1])).all()
-    assert ((hits.i >= 0) & (hits.i < n) & (hits.j < n) & (hits.j >= -len(run.scene.walls))).all()
-    assert (hits.impulse >= 0).all()
+    collisions = truth.collisions
+    assert ((collisions.t >= 0) & (collisions.t <= truth.t[-1])).all()
+    assert (
+        (collisions.i >= 0) & (collisions.i < n) & (collisions.j < n) & (collisions.j >= -len(run.scene.walls))
+    ).all()
+    assert (collisions.impulse >= 0).all()
 
 
 @pytest.mark.parametrize("name", ANSWERED)
@@ -91,15 +93,15 @@ def test_truth_never_penetrates(name):
 
 
 @pytest.mark.parametrize("name", MOVING)
-def test_no_hit_falls_on_a_step(name):
+def test_no_collision_falls_on_a_step(name):
     """What is measured is late detection at some phase of a step, not the luck of a tie."""
     run = scenario(name)
-    hits = run.truth(run.times).collisions.t
+    collisions = run.truth(run.times).collisions.t
     for substeps in run.substeps:
-        phase = hits / run.dt(substeps) % 1
+        phase = collisions / run.dt(substeps) % 1
         # Far above the rounding of a clock that adds up steps, 1e5 times 1e-16 of the time.
         assert ((phase > 1e-4) & (phase < 1 - 1e-4)).all()
-        if len(hits) <= 20:  # few hits, so each one's phase shows in the result
+        if len(collisions) <= 20:  # few collisions, so each one's phase shows in the result
             assert ((phase > 0.04) & (phase < 0.96)).all()
 
 

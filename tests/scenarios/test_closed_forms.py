@@ -18,15 +18,15 @@ FLYING = [name for name in ANSWERED if name not in (*PUSHED, *RESTING)]
 
 
 def exact(name):
-    """A scenario, its truth, and until when hits can be told apart (a ball settles after infinitely many)."""
+    """A scenario, its truth, and until when collisions can be told apart (a ball settles after infinitely many)."""
     run = scenario(name)
     truth = run.truth(run.times)
     return run, truth, 8.0 if name == "bouncing_ball_e09" else truth.t[-1]
 
 
-def between(hits, until):
-    """An instant between each two hits, those that coincide (49 balls on one floor) taken as one."""
-    apart = np.append(0, hits)[np.diff(np.append(0, hits), append=np.inf) > 1e-6]
+def between(collisions, until):
+    """An instant between each two collisions, those that coincide (49 balls on one floor) taken as one."""
+    apart = np.append(0, collisions)[np.diff(np.append(0, collisions), append=np.inf) > 1e-6]
     return (apart + np.append(apart[1:], until)) / 2
 
 
@@ -40,13 +40,13 @@ def wall_frames(scene):
 
 
 def next_events(scene: Scene, x, v):
-    """The earliest hit ahead: (time, disk, other disk or -1 - wall)."""
+    """The earliest collision ahead: (time, disk, other disk or -1 - wall)."""
     found = [(np.inf, 0, 0)]
     a, b = np.triu_indices(scene.n, 1)
     dr, dv, reach = x[b] - x[a], v[b] - v[a], scene.radius[a] + scene.radius[b]
     closing, gap = (dr * dv).sum(1), (dr**2).sum(1) - reach**2
     disc = closing**2 - (dv**2).sum(1) * gap
-    # After a hit at e = 0 nothing closes in; what is computed is the rounding of 1 m/s.
+    # After a collision at e = 0 nothing closes in; what is computed is the rounding of 1 m/s.
     can = (closing < -1e-14) & (disc > 0)
     if can.any():
         t = np.full(len(a), np.inf)
@@ -67,7 +67,7 @@ def next_events(scene: Scene, x, v):
 
 
 def simulate(scene: Scene, until):
-    """State after each hit up to `until`: a list of (t, position, velocity), the first one at 0."""
+    """State after each collision up to `until`: a list of (t, position, velocity), the first one at 0."""
     t, x, v = 0.0, np.array(scene.position), np.array(scene.velocity)
     g, w = np.where(scene.static[:, None], 0.0, scene.gravity), 1 / scene.mass
     path = [(t, x, v)]
@@ -86,14 +86,15 @@ def simulate(scene: Scene, until):
 
 @pytest.mark.parametrize("name", FLYING)
 def test_truth_is_what_an_event_by_event_simulation_finds(name):
-    """Same hits at the same times, same states between them."""
+    """Same collisions at the same times, same states between them."""
     run, truth, until = exact(name)
     path = simulate(run.scene, until)
-    hits = truth.collisions.t[truth.collisions.t <= until]
-    # Rounding of the simulation, 1e-16 a hit over hundreds of hits; on the two-disk orbit it grows to 1e-9 m.
+    collisions = truth.collisions.t[truth.collisions.t <= until]
+    # Rounding of the simulation, 1e-16 a collision over hundreds of collisions; on the two-disk orbit it grows to 1e-9
+    # m.
     tolerance = 1e-8 if name == "disk_between_static_disks" else 1e-10
-    np.testing.assert_allclose([t for t, _, _ in path[1:]], hits, rtol=0, atol=tolerance)
-    times = between(hits, until)
+    np.testing.assert_allclose([t for t, _, _ in path[1:]], collisions, rtol=0, atol=tolerance)
+    times = between(collisions, until)
     answer = run.truth(times)
     last = np.searchsorted([t for t, _, _ in path], times) - 1
     g = np.where(run.scene.static[:, None], 0.0, run.scene.gravity)
@@ -114,25 +115,25 @@ def contact(scene, position, i, j):
 
 
 @pytest.mark.parametrize("name", FLYING)
-def test_hits_lie_at_touching_distance_and_their_impulse_is_the_change_of_momentum(name):
-    """Each listed hit is one: contact, restitution, action and reaction."""
+def test_collisions_lie_at_touching_distance_and_their_impulse_is_the_change_of_momentum(name):
+    """Each listed collision is one: contact, restitution, action and reaction."""
     run, truth, until = exact(name)
-    scene, hits = run.scene, truth.collisions
+    scene, collisions = run.scene, truth.collisions
     gravity = np.where(scene.static[:, None], 0.0, scene.gravity)
-    times = between(hits.t[hits.t <= until], until)
-    around, at = run.truth(times), run.truth(np.append(hits.t, until))
-    for k in np.flatnonzero(hits.t <= until):
-        i, j, step = hits.i[k], hits.j[k], np.searchsorted(times, hits.t[k])
+    times = between(collisions.t[collisions.t <= until], until)
+    around, at = run.truth(times), run.truth(np.append(collisions.t, until))
+    for k in np.flatnonzero(collisions.t <= until):
+        i, j, step = collisions.i[k], collisions.j[k], np.searchsorted(times, collisions.t[k])
         gap, normal = contact(scene, at.position[k], i, j)
         # Positions and paths of 10 m have a last place of 2e-15; Galperin's weighted axis adds two digits.
         assert abs(gap) < 1e-13
-        before, after = (around.velocity[s] + gravity * (hits.t[k] - times[s]) for s in (step - 1, step))
+        before, after = (around.velocity[s] + gravity * (collisions.t[k] - times[s]) for s in (step - 1, step))
         approach, parting = (((v[j] if j >= 0 else 0) - v[i]) @ normal for v in (before, after))
         # The same of velocities up to 25 m/s.
         assert parting == pytest.approx(-scene.restitution * approach, abs=1e-13)
         for disk, sign in ((i, -1), (j, 1)):
             if disk >= 0:
-                kick = sign * hits.impulse[k] * normal / scene.mass[disk]
+                kick = sign * collisions.impulse[k] * normal / scene.mass[disk]
                 np.testing.assert_allclose(after[disk] - before[disk], kick, rtol=0, atol=1e-13)
 
 
@@ -188,7 +189,7 @@ def test_velocity_and_spin_change_by_the_pushes_as_quadrature_has_it(name):
         ("simbenchmark_bouncing", 490),
     ],
 )
-def test_number_of_hits(name, count):
+def test_number_of_collisions(name, count):
     """Known counts: pi, all pairs of a cradle, ten bounces of 49 balls."""
     _, truth, _ = exact(name)
     assert len(truth.collisions) == count
@@ -201,7 +202,7 @@ def test_energy_is_kept_at_restitution_one(name):
     mass, g = np.where(run.scene.static, 0, run.scene.mass), run.scene.gravity
     kinetic = (mass * (truth.velocity**2).sum(axis=2)).sum(axis=1) / 2
     energy = kinetic - (mass * (truth.position @ g)).sum(axis=1)
-    # Rounding of one hit's velocities and of a sum of at most 49 terms.
+    # Rounding of one collision's velocities and of a sum of at most 49 terms.
     np.testing.assert_allclose(energy, energy[0], rtol=4e-15)
 
 

@@ -89,7 +89,7 @@ CHANGES: dict[str, Scenario] = {
     "a disk that is thrust off the floor": asked(
         lay_out(**ALONE, gravity=DOWN, walls=FLOOR, restitution=0.125), 2.0, (Thrust(0, 1.25, 1.75, [1.0, 30.0]),),
     ),
-    "a hit on a disk that lies": asked(
+    "a collision on a disk that lies": asked(
         lay_out(
             position=[[-0.125, 1.5], [0, 0.5]], velocity=[[0, -1], [0, 0]], radius=[0.25, 0.5], mass=[1, 1],
             gravity=DOWN, walls=FLOOR, restitution=0.9375,
@@ -100,7 +100,7 @@ CHANGES: dict[str, Scenario] = {
     ),
     "many": asked(boxed(3), 3.0),
 }  # fmt: skip
-LYING = {"a hit on a disk that lies": 1}
+LYING = {"a collision on a disk that lies": 1}
 
 
 @pytest.mark.parametrize("name", CHANGES)
@@ -126,7 +126,7 @@ def test_the_derivatives_of_these_motions_pass_every_kind_of_change():
     assert any(leg.hop for leg in paths["bounces that die out on a ramp"].legs[0])
     assert [bool(leg.held) for leg in paths["a slide over the end of a wall"].legs[0]][-2:] == [True, False]
     assert [bool(leg.held) for leg in paths["a disk that is thrust off the floor"].legs[0]].count(True) == 1
-    assert not all(event.new for event in paths["a hit on a disk that lies"].events)
+    assert not all(event.new for event in paths["a collision on a disk that lies"].events)
     assert len(paths["many"].events) > 10
 
 

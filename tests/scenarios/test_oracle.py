@@ -52,7 +52,7 @@ def records() -> dict[str, TruthRecord]:
 
 @pytest.mark.parametrize("name", [*FLYING, "ship_thrust", "spin_under_torque"])
 def test_it_finds_what_the_closed_form_says(name: str):
-    """Same positions, same hits with the same impulses, to 1e-12."""
+    """Same positions, same collisions with the same impulses, to 1e-12."""
     one = scenario(name)
     record = computed(one)
     expected, found = one.truth(one.times), states(one, record)
@@ -63,22 +63,26 @@ def test_it_finds_what_the_closed_form_says(name: str):
     )  # an accumulation ends the oracle, not the closed form; an unstable orbit the latter
     np.testing.assert_allclose(found.position[:k], expected.position[:k], rtol=0, atol=ACCURACY)
     np.testing.assert_allclose(found.angle[:k], expected.angle[:k], rtol=0, atol=ACCURACY)
-    hits, others = (sorted(zip(c.collisions.i, c.collisions.j, c.collisions.t, c.collisions.impulse)) for c in
+    collisions, others = (sorted(zip(c.collisions.i, c.collisions.j, c.collisions.t, c.collisions.impulse)) for c in
                     (found, expected))  # fmt: skip
     if name in ("bouncing_ball_e09", "disk_between_static_disks"):  # one lists no bounces below 1e-4 s, one ends early
-        until = min(max(hit[2] for hit in each) for each in (hits, others)) + ACCURACY
-        hits, others = ([hit for hit in each if hit[2] <= until] for each in (hits, others))
-    assert [hit[:2] for hit in hits] == [hit[:2] for hit in others]
-    # The closed form of Galperin's hits divides by tangents of up to pi.
-    times = [[hit[2] for hit in each] for each in (hits, others)]
+        until = min(max(collision[2] for collision in each) for each in (collisions, others)) + ACCURACY
+        collisions, others = (
+            [collision for collision in each if collision[2] <= until] for each in (collisions, others)
+        )
+    assert [collision[:2] for collision in collisions] == [collision[:2] for collision in others]
+    # The closed form of Galperin's collisions divides by tangents of up to pi.
+    times = [[collision[2] for collision in each] for each in (collisions, others)]
     np.testing.assert_allclose(*times, rtol=2e-13 if name == "galperin_314" else 0, atol=ACCURACY)
     # Impulses of 2e6 N s in the heaviest lane.
-    np.testing.assert_allclose([hit[3] for hit in hits], [hit[3] for hit in others], rtol=1e-12)
+    np.testing.assert_allclose(
+        [collision[3] for collision in collisions], [collision[3] for collision in others], rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_the_drawn_scenes_are_answered_to_their_end(name: str, records: dict[str, TruthRecord]):
-    """No reason to stop, no overlap at any sample, as many hits as ever."""
+    """No reason to stop, no overlap at any sample, as many collisions as ever."""
     one, record = scenario(name), records[name]
     truth = states(one, record)
 
@@ -92,14 +96,14 @@ def test_the_drawn_scenes_are_answered_to_their_end(name: str, records: dict[str
 
 @given(seed=st.integers(0, 10**6), restitution=st.sampled_from([1.0, 0.9, 0.5]), gravity=st.sampled_from([0.0, -3]))
 @settings(max_examples=25, deadline=None)
-def test_it_finds_the_hits_of_a_float64_simulation(seed: int, restitution: float, gravity: float):
-    """All pairs, no records, no filter: the same first ten hits, before float64 loses its digits."""
+def test_it_finds_the_collisions_of_a_float64_simulation(seed: int, restitution: float, gravity: float):
+    """All pairs, no records, no filter: the same first ten collisions, before float64 loses its digits."""
     gravity = gravity if restitution > 0.5 else 0.0  # what comes to rest stops the clock of the simulation
     one = asked(drawn(seed, 4, restitution, gravity), 1.0)
     found = states(one, computed(one)).collisions.t[:10]
     path = simulate(one.scene, float(found[-1]) + 1e-9 if len(found) else 1.0)[1:]
 
-    # Ten hits lose at most as many digits: 1e-16 times 10^6 or so.
+    # Ten collisions lose at most as many digits: 1e-16 times 10^6 or so.
     np.testing.assert_allclose(found, [t for t, _, _ in path], rtol=0, atol=1e-9)
 
 
@@ -157,7 +161,7 @@ def test_time_runs_backwards_at_restitution_one():
     back = asked(replace(one.scene, position=truth.position[-1], velocity=-truth.velocity[-1]), 3.0)
     start = states(back, computed(back)).at(-1)
 
-    # The end is rounded by 1e-16, and some forty hits enlarge that.
+    # The end is rounded by 1e-16, and some forty collisions enlarge that.
     np.testing.assert_allclose(start.position, one.scene.position, rtol=0, atol=1e-6)
     np.testing.assert_allclose(start.velocity, -one.scene.velocity, rtol=0, atol=1e-5)
 
@@ -178,10 +182,10 @@ def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
     assert np.hypot(*(at - [0, 0.5])) == pytest.approx(0.75, abs=1e-15 * 4)
     # Onto the end of a wall, from the side: blamed on the wall.
     edge = replace(bumper, position=[[1.0 - 0.1, 0.0], [-5, 0]], velocity=np.zeros((2, 2)))
-    hit = computed(asked(edge, 1.2)).events[0]
+    collision = computed(asked(edge, 1.2)).events[0]
     drop = np.sqrt(2 * (3 - np.sqrt(0.25**2 - 0.1**2)) / 9.81)
-    assert hit[:3].tolist() == [pytest.approx(drop, rel=1e-15), 0, -1]
-    assert hit[4] == pytest.approx(np.sqrt(1 - 0.16), rel=1e-14)
+    assert collision[:3].tolist() == [pytest.approx(drop, rel=1e-15), 0, -1]
+    assert collision[4] == pytest.approx(np.sqrt(1 - 0.16), rel=1e-14)
 
 
 def test_pushes_carry_a_disk_into_a_wall():
@@ -223,7 +227,7 @@ def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_stale_record_taken_for_fresh_is_caught(monkeypatch: pytest.MonkeyPatch, records: dict[str, TruthRecord]):
-    """The bug of the first prototype: two precisions agree on a wrong motion, the gaps and the hits do not."""
+    """The bug of the first prototype: two precisions agree on a wrong motion, the gaps and the collisions do not."""
     monkeypatch.setattr(oracle_events.Motion, "stale", lambda _self, _record: False)
     one = scenario("asteroids")
     wrong = computed(one, mpfr)

@@ -55,9 +55,13 @@ SEAM = lay_out(position=[[1.5, 0], [-1.8, 0.1]], velocity=[[1, 0], [0, 0]], radi
 @pytest.mark.parametrize(
     ("scene", "until", "reason"),
     [
-        (BREAK, 2.0, "disks 0, 1, 2 touch at once and the outcome depends on the order of their hits (2 outcomes)"),
+        (
+            BREAK,
+            2.0,
+            "disks 0, 1, 2 touch at once and the outcome depends on the order of their collisions (2 outcomes)",
+        ),
         # The upper one falls 1.25 m onto the lower one, which rests since sqrt(1.5 / 9.81) 1.1 / 0.9 s.
-        (BALL, np.sqrt(2.5 / 9.81), "disks 0, 1 touch at once and their hits do not end"),
+        (BALL, np.sqrt(2.5 / 9.81), "disks 0, 1 touch at once and their collisions do not end"),
         (SEAM, 0.5, "disk 0 re-enters over the edge of the wrap onto disk 1 at t = 0.5 s"),
     ],
 )
@@ -112,8 +116,8 @@ def row(speeds: list[float], mass: list[float], restitution: float = 1.0, gaps: 
     )  # fmt: skip
 
 
-def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_hits():
-    """The cue ends with (-1/8, -+0.2165); the second target, hit first, with (3/4, 0.433)."""
+def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_collisions():
+    """The cue ends with (-1/8, -+0.2165); the second target, collision first, with (3/4, 0.433)."""
     one = asked(BREAK, 4.0)
     record = computed(one)
     found = sorted(ends(record), key=lambda end: end[0][1])
@@ -147,8 +151,8 @@ def test_a_cradle_that_loses_energy_has_many_outcomes(coming: int, outcomes: tup
     assert spread == pytest.approx({1: 3e-5, 2: 4e-3}[coming], rel=0.3)
 
 
-def test_taking_the_hits_of_a_chain_as_they_come_is_caught(monkeypatch: pytest.MonkeyPatch):
-    """The planted bug: each hit by itself. It ends in one of the eight, as if there were no others."""
+def test_taking_the_collisions_of_a_chain_as_they_come_is_caught(monkeypatch: pytest.MonkeyPatch):
+    """The planted bug: each collision by itself. It ends in one of the eight, as if there were no others."""
     one = asked(row([1.0, 0, 0, 0, 0], [1] * 5, 0.9, (1.0,)), 2.0)
     assert len(ends(computed(one))) == 8
     monkeypatch.setattr(oracle_ahead.Ahead, "alone", lambda *_: True)

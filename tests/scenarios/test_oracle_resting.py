@@ -1,4 +1,4 @@
-"""What comes to rest, what rests, and hits on what rests: against closed forms, simulations, and symmetries."""
+"""What comes to rest, what rests, and collisions on what rests: against closed forms, simulations, and symmetries."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ def rests(record: TruthRecord) -> list[tuple[float, int, int]]:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", ["bouncing_ball_e09", "rest_on_floor", "slide_on_incline", "column_of_ten"])
 def test_what_has_a_closed_form_is_found_to_the_bound_claimed(name: str, kind):
-    """To its end, states and hits, in digits and in balls; every contact at rest begins at the start or is told."""
+    """To its end, states and collisions, in digits and in balls; every contact at rest begins at the start or is
+    told."""
     one = scenario(name)
     record = computed(one, kind)
     expected, found = one.truth(one.times), states(one, record)
@@ -75,20 +76,22 @@ def test_a_ball_on_a_slope_rests_when_its_bounces_end_and_slides_from_then_on(re
     ("restitution", "heavy", "upper", "lower"),
     [(1.0, 1, 1.0, 0.0), (0.8, 1, 0.638, 0.0144), (0.5, 1, 0.21875, 0.046875)],
 )
-def test_a_hit_on_a_resting_disk_is_the_limit_of_small_gaps(restitution: float, heavy: int, upper: float, lower: float):
-    """The two alternate with the floor until they part; speeds in those of the hit (ground truth, section 5)."""
+def test_a_collision_on_a_resting_disk_is_the_limit_of_small_gaps(
+    restitution: float, heavy: int, upper: float, lower: float
+):
+    """The two alternate with the floor until they part; speeds in those of the collision (ground truth, section 5)."""
     scene = lay_out(
         position=[[0, 0.25], [0, 1.5]], velocity=[[0, 0], [0, -1]], radius=[0.25, 0.25], mass=[1, heavy],
         restitution=restitution, walls=FLOOR, gravity=[0, -1e-3],
     )  # fmt: skip
     record = computed(asked(scene, 1.0))
-    hit = record.events[record.events[:, 3] > 0][0, 0]
-    after = [record.legs[(record.legs[:, 0] == i) & (record.legs[:, 1] >= hit - 1e-9)][0] for i in range(2)]
+    collision = record.events[record.events[:, 3] > 0][0, 0]
+    after = [record.legs[(record.legs[:, 0] == i) & (record.legs[:, 1] >= collision - 1e-9)][0] for i in range(2)]
     speed = np.sqrt(1 + 2 * 1e-3 * 0.75)
 
     assert rests(record)[0] == (0.0, 0, -1)
     np.testing.assert_allclose([leg[5] + leg[10] for leg in after], [lower * speed, upper * speed], rtol=0, atol=1e-15)
-    # The same with a gap of 1e-9 m and nothing to pull the lower disk down: hit by hit, no contact lasts.
+    # The same with a gap of 1e-9 m and nothing to pull the lower disk down: collision by collision, no contact lasts.
     gapped = asked(replace(scene, position=[[0, 0.25 + 1e-9], [0, 1.5]], gravity=[0, 0]), 1.0)
     limit = states(gapped, computed(gapped))
     np.testing.assert_allclose(limit.velocity[-1, :, 1], [lower, upper], rtol=0, atol=1e-15)
@@ -134,7 +137,8 @@ def test_a_simulation_that_never_rests_comes_near_as_its_hops_shrink():
     assert truth.collisions.t[truth.collisions.j == 1].min() > rests(record)[0][0]
     errors = [np.abs(hopping(scene, 1.0, least) - truth.position[-1]).max() for least in (0.05, 0.01)]
 
-    # Late by a step of 2e-4 s at 5 m/s is 1 mm; the larger hops lift the lower disk by up to 0.1 mm, turning the hit.
+    # Late by a step of 2e-4 s at 5 m/s is 1 mm; the larger hops lift the lower disk by up to 0.1 mm, turning the
+    # collision.
     assert errors[1] < 5e-3
     assert errors[1] <= errors[0] + 1e-3
 
@@ -223,7 +227,7 @@ def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
         assert (states(asked(scene, 2.0), record).position == scene.position).all()
     aside = replace(balanced, position=[[0, 0], [0.03125, 0.75], [0, 3]])
     # Beside the top it bounces down the round: rule Z1 is for lines.
-    assert "the hits of disk 1 on disk 0 accumulate" in computed(asked(aside, 0.1)).reason
+    assert "the collisions of disk 1 on disk 0 accumulate" in computed(asked(aside, 0.1)).reason
 
 
 def test_a_push_lifts_a_resting_disk_and_lets_it_fall():
@@ -256,7 +260,7 @@ def test_a_disk_in_the_corner_of_a_tilted_box_rests_on_both_walls_or_is_refused(
     np.testing.assert_allclose(at.position[-1, 0], [-0.1, 0.7], rtol=0, atol=1e-14)
     assert not at.velocity[-1].any()
     blunt = computed(asked(replace(square, velocity=[[0.1, 0]], walls=[[[-4, 3], [0, 0]], [[0, 0], [4, 3]]]), 8.0))
-    assert "the hits of disk 0 on wall 0 and wall 1 accumulate" in blunt.reason
+    assert "the collisions of disk 0 on wall 0 and wall 1 accumulate" in blunt.reason
 
 
 def test_a_settling_box_is_answered_far_beyond_its_first_rest():
@@ -267,7 +271,7 @@ def test_a_settling_box_is_answered_far_beyond_its_first_rest():
     assert first == pytest.approx(0.670262, abs=1e-6)
     assert record.valid_until > 2 * first
     assert len(rests(record)) == 26
-    assert "the hits of disk 9 on disk 17 and wall 1 accumulate at t = 1.57837" in record.reason
+    assert "the collisions of disk 9 on disk 17 and wall 1 accumulate at t = 1.57837" in record.reason
 
 
 def test_round_the_end_of_a_wall_no_momentum_is_said_to_stay():

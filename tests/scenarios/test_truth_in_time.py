@@ -45,7 +45,7 @@ mass = 1.0
 
 
 def boxed(speed: float = 1.1) -> Scenario:
-    """Two disks that cross a box for some hundred hits."""
+    """Two disks that cross a box for some hundred collisions."""
     scene = lay_out(
         position=[[0.3, 0.4], [0.7, 0.6]], velocity=[[speed, 0.7], [-0.4, 0.9]], radius=[0.05, 0.05], mass=[1.0, 1.0],
         walls=box([0.0, 0.0], [1.0, 1.0]), restitution=1.0,

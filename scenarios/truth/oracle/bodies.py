@@ -77,7 +77,7 @@ class Bodies:
     def __init__(self, scene: Scene, k: Numbers) -> None:
         self.k, self.scene, exact = k, scene, k.exact
         ends = np.unique(scene.walls.reshape(-1, 2), axis=0)
-        # The wall that is blamed for a hit on its end: the first that has it.
+        # The wall that is blamed for a collision on its end: the first that has it.
         self.owner = [int(np.argmax((scene.walls == end).all(axis=2).any(axis=1))) for end in ends]
         nought, still = exact(0.0), ~scene.static
         positions = np.concatenate([scene.position, ends])
@@ -137,7 +137,7 @@ class Bodies:
         return self.state_at(i, now)[2:]
 
     def fly(self, i: int, now: Number, v: Velocity, beside: Contact | None = None) -> None:
-        """Body i goes on from here with velocity v, held by what holds it; set exactly beside a wall it has hit."""
+        """Body i goes on from here with velocity v, held by what holds it; set exactly beside a wall it has struck."""
         x, y, _, _ = self.state_at(i, now)
         if beside is not None:
             x, y = self.beside(beside, x, y)
@@ -196,13 +196,13 @@ class Bodies:
         self.pull[i] = kind
         return ax, ay
 
-    def remember(self, touches: Sequence[Touch], hit: set[int]) -> None:
-        """After the hits of one instant: these contacts touch, exactly, and do not approach."""
+    def remember(self, touches: Sequence[Touch], collision: set[int]) -> None:
+        """After the collisions of one instant: these contacts touch, exactly, and do not approach."""
         for contact, _, _ in touches:
             if contact.kind == "body":
                 i, j = sorted((contact.i, contact.j))
                 self.parted[i, j] = self.count[i], self.count[j]
-            elif contact.i in hit or not hit:
+            elif contact.i in collision or not collision:
                 self.leaning[contact.i].add(contact)
 
     def height(self, contact: Contact, x: Number, y: Number) -> Number:

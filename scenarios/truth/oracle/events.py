@@ -1,4 +1,4 @@
-"""The event loop: exact flights between hits, in any numbers, from one next event per disk.
+"""The event loop: exact flights between collisions, in any numbers, from one next event per disk.
 
 Each body keeps its motion since its own last event; each moving disk keeps a record of what it touches first. A
 record is stale when a partner has had an event since; it is then made anew when its turn comes. Every pair is covered
@@ -21,7 +21,7 @@ from scenarios.truth.oracle.resting import lie_down, next_in_line, press, settle
 from scenarios.truth.oracle.ties import Blow, Contact, Outcome, Touch
 from scenarios.truth.oracle.work import Work
 
-MOST_IDLE = 100  # contacts on end without a hit: their signs contradict each other
+MOST_IDLE = 100  # contacts on end without a collision: their signs contradict each other
 
 
 class Motion:
@@ -183,7 +183,7 @@ class Motion:
         disks = sorted({i for touch in touches for i in touch.contact.disks})
         v = {i: bodies.velocity_at(i, self.now) for i in disks}
         if alone:
-            after, blow = bodies.matter.hit(touches[0], v)
+            after, blow = bodies.matter.collision(touches[0], v)
             outcome = Outcome(after, [blow], frozenset(contacts if bodies.matter.sticks else ()))
         else:
             resting = frozenset(c for held in bodies.held for c in held)
@@ -204,7 +204,7 @@ class Motion:
         self.go_on(outcome, touches, touched)
 
     def go_on(self, outcome: Outcome, touches: Sequence[Touch], touched: set[int]) -> None:
-        """New legs after the hits of one instant; a bounce off a wall may be the first of the last ones."""
+        """New legs after the collisions of one instant; a bounce off a wall may be the first of the last ones."""
         bodies = self.bodies
         walls = [blow.contact for blow in outcome.blows if blow.contact.kind == "wall"]
         bounce = walls[0] if len(outcome.blows) == 1 and walls else None
@@ -215,7 +215,7 @@ class Motion:
                 v = bodies.slide(still, *v)
             bodies.fly(i, self.now, v, bounce)
         bodies.remember(touches, touched)
-        # What was carried by a disk that is hit is carried no longer.
+        # What was carried by a disk that is struck is carried no longer.
         dropped = {i for i, held in enumerate(bodies.held) if i not in touched and any(c.disks & touched for c in held)}
         for i in sorted(dropped):
             bodies.hold(i, self.now, (), bodies.velocity_at(i, self.now))
@@ -227,7 +227,7 @@ class Motion:
             self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
 
     def log(self, blow: Blow, new: bool) -> None:
-        """Write a hit down; refuse where those of a disk pile up."""
+        """Write a collision down; refuse where those of a disk pile up."""
         contact, j = blow.contact, self.bodies.partner(blow.contact)
         self.path.events.append(Event(self.now, contact.i, j, blow.impulse, float(blow.cosine), new))
         self.recent.add(contact.i, float(self.now), self.bodies.name(contact))

@@ -1,4 +1,4 @@
-"""What the event loop finds: legs, hits, and the reason where the motion has no answer any more."""
+"""What the event loop finds: legs, collisions, and the reason where the motion has no answer any more."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from scenarios.truth.oracle.bodies import Leg
 from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact, Outcome
 
-CROWDED = 64  # hits of one disk ...
+CROWDED = 64  # collisions of one disk ...
 INSTANT = 1e-9  # ... within so many s: they pile up towards a point in time
-PILE = 1e-5  # s before it; whom it hit in between takes part
+PILE = 1e-5  # s before it; whom it collision in between takes part
 
 
 class Ends(Exception):
@@ -27,8 +27,8 @@ class Ends(Exception):
 
 
 class Event(NamedTuple):
-    """A hit: t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle; new: they come together now,
-    and did not touch before."""
+    """A collision: t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle; new: they come together
+    now, and did not touch before."""
 
     t: Number
     i: int
@@ -39,7 +39,8 @@ class Event(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What a disk touches first (several contacts if at once), when, and how often each partner had been hit then."""
+    """What a disk touches first (several contacts if at once), when, and how often each partner had been struck
+    then."""
 
     t: Number
     contacts: tuple[Contact, ...]
@@ -48,8 +49,8 @@ class Record(NamedTuple):
 
 @dataclass
 class Path:
-    """What was found: the legs of each disk, the hits; until when (s), why no further, whom it concerns,
-    how it may go on, and by which hits (disk, other disk or -1 - wall)."""
+    """What was found: the legs of each disk, the collisions; until when (s), why no further, whom it concerns,
+    how it may go on, and by which collisions (disk, other disk or -1 - wall)."""
 
     legs: list[list[Leg]]
     events: list[Event] = field(default_factory=list)
@@ -61,24 +62,26 @@ class Path:
 
 
 class Recent:
-    """The latest hits of each of n disks."""
+    """The latest collisions of each of n disks."""
 
     def __init__(self, n: int) -> None:
-        self.hits: list[deque[tuple[float, str]]] = [deque(maxlen=4 * CROWDED) for _ in range(n)]
+        self.collisions: list[deque[tuple[float, str]]] = [deque(maxlen=4 * CROWDED) for _ in range(n)]
 
     def add(self, i: int, t: float, other: str) -> None:
-        """Disk i hits `other` at t s. Raises `Ends` where its hits pile up towards an instant."""
-        hits = self.hits[i]
-        hits.append((t, other))
-        if len(hits) < CROWDED or t - hits[-CROWDED][0] > INSTANT:
+        """Disk i collisions `other` at t s. Raises `Ends` where its collisions pile up towards an instant."""
+        collisions = self.collisions[i]
+        collisions.append((t, other))
+        if len(collisions) < CROWDED or t - collisions[-CROWDED][0] > INSTANT:
             return
-        others = sorted({name for at, name in hits if at > t - PILE})
+        others = sorted({name for at, name in collisions if at > t - PILE})
         disks = [i, *(int(name[5:]) for name in others if name.startswith("disk"))]
-        raise Ends(hits[-CROWDED][0], f"the hits of disk {i} on {' and '.join(others)} accumulate", disks)
+        raise Ends(collisions[-CROWDED][0], f"the collisions of disk {i} on {' and '.join(others)} accumulate", disks)
 
 
 def ambiguous(disks: str, ends: Sequence[Outcome]) -> str:
     """Why a simultaneous contact has no answer."""
     if not ends[-1].velocities:
-        return f"disks {disks} touch at once and their hits do not end"
-    return f"disks {disks} touch at once and the outcome depends on the order of their hits ({len(ends)} outcomes)"
+        return f"disks {disks} touch at once and their collisions do not end"
+    return (
+        f"disks {disks} touch at once and the outcome depends on the order of their collisions ({len(ends)} outcomes)"
+    )

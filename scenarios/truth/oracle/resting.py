@@ -24,9 +24,9 @@ FAR = 1e-12  # of the largest coordinate, the same
 
 
 def settle(ahead: Ahead, contact: Contact, now: Number, thrusts: Sequence[Thrust]) -> Number | None:
-    """Let a disk that has just hit a wall bounce on for good, if nothing can touch it; when it rests (s), or None.
+    """Let a disk that has just struck a wall bounce on for good, if nothing can touch it; when it rests (s), or None.
 
-    It must be on its leg after the hit, e < 1.
+    It must be on its leg after the collision, e < 1.
     """
     bodies, k, i = ahead.bodies, ahead.k, contact.i
     leg, wall = bodies.legs[i], bodies.walls[contact.j]

@@ -1,4 +1,4 @@
-"""Hits: one contact at a time, and contacts that touch at the same instant, resolved in every order there is."""
+"""Collisions: one contact at a time, and contacts that touch at the same instant, resolved in every order there is."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from scenarios.truth.oracle.numbers import Number, Numbers
 
-MOST_ORDERS = 3000  # hits tried in all orders together
-LONGEST = 200  # hits of one order at one instant; more do not end
+MOST_ORDERS = 3000  # collisions tried in all orders together
+LONGEST = 200  # collisions of one order at one instant; more do not end
 
 
 class Contact(NamedTuple):
@@ -38,7 +38,7 @@ class Touch(NamedTuple):
 
 
 class Blow(NamedTuple):
-    """A hit that was carried out: its impulse N s, and the cosine of the impact angle, |v_n| / |v|."""
+    """A collision that was carried out: its impulse N s, and the cosine of the impact angle, |v_n| / |v|."""
 
     contact: Contact
     impulse: Number
@@ -51,7 +51,8 @@ Velocities = dict[int, Velocity]
 
 
 class Outcome(NamedTuple):
-    """How a simultaneous contact may end: velocities, the hits in one order, contacts with no speed across, exactly."""
+    """How a simultaneous contact may end: velocities, the collisions in one order, contacts with no speed across,
+    exactly."""
 
     velocities: Velocities
     blows: list[Blow]
@@ -60,7 +61,8 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Matter:
-    """What a hit needs to know of the bodies: 1 / mass (b,) 1/kg and the restitution, in numbers; whether that is 0."""
+    """What a collision needs to know of the bodies: 1 / mass (b,) 1/kg and the restitution, in numbers; whether that is
+    0."""
 
     numbers: Numbers
     inverse_mass: Sequence[Number]
@@ -82,8 +84,8 @@ class Matter:
         contact = touch.contact
         return v[contact.i], v[contact.j] if contact.kind == "body" else (nought, nought)
 
-    def hit(self, touch: Touch, v: Velocities) -> tuple[Velocities, Blow]:
-        """The velocities after the hit, and the hit.
+    def collision(self, touch: Touch, v: Velocities) -> tuple[Velocities, Blow]:
+        """The velocities after the collision, and the collision.
 
         q = -(1 + e) b / (dr.dr (w_i + w_j)) times dr: no root, which in float64 would make energy drift.
         """
@@ -108,9 +110,9 @@ class Matter:
     ) -> tuple[list[Outcome], int]:
         """Every different end that resolving the approaching contacts in some order can have, with one such order.
 
-        And how many hits were tried for that.
+        And how many collisions were tried for that.
 
-        still: contacts with no speed across, exactly. upright: whether a hit on one contact leaves the other so.
+        still: contacts with no speed across, exactly. upright: whether a collision on one contact leaves the other so.
         The last element has no velocities where some order does not end.
         """
         sign, ends = self.numbers.sign, list[Outcome]()
@@ -122,11 +124,11 @@ class Matter:
             if len(blows) > LONGEST:
                 break
             closing = [touch for touch in touches if touch.contact not in still and sign(self.approach(touch, now)) < 0]
-            # Hits that die out towards the tie do not end: with more digits there would be more of them.
+            # Collisions that die out towards the tie do not end: with more digits there would be more of them.
             if blows and not self.numbers.proves and any(abs(self.approach(t, now)) < self.faint for t in closing):
                 break
             for touch in closing:
-                after, blow = self.hit(touch, now)
+                after, blow = self.collision(touch, now)
                 kept = {c for c in still if not c.disks & touch.contact.disks or upright(c, touch.contact)}
                 kept |= {touch.contact} if self.sticks else set()
                 waiting.append(Outcome(after, [*blows, blow], frozenset(kept)))

@@ -7,7 +7,7 @@ from time import monotonic
 
 from scenarios.truth.oracle.path import Ends
 
-MOST_STEPS = 60_000  # hits, edges crossed, records made anew, orders of simultaneous hits tried
+MOST_STEPS = 60_000  # collisions, edges crossed, records made anew, orders of simultaneous collisions tried
 
 
 class Clock:

@@ -37,10 +37,10 @@ class EventTruth:
     def __call__(self, t: Array) -> Trajectory:
         """The answer at the times t (k,) s, increasing."""
         scene, thrusts = self.scenario.scene, self.scenario.thrusts
-        motion, hits, _, _ = self.play(scene, np.asarray(t)[np.asarray(t) <= self.valid_until])
+        motion, collisions, _, _ = self.play(scene, np.asarray(t)[np.asarray(t) <= self.valid_until])
         reached = np.asarray(t)[: len(motion[0])]
         turned = world_pushes(scene, thrusts, reached)
-        rows = [(float(at), int(i), int(j), float(impulse)) for at, i, j, impulse in hits]
+        rows = [(float(at), int(i), int(j), float(impulse)) for at, i, j, impulse in collisions]
         turning = (turned.angle, turned.angular_velocity)
         return answer(scene, reached, motion, rows, turning, self.valid_until, ERROR_BOUND)
 
@@ -75,7 +75,8 @@ class EventTruth:
         return float(times[agree - 1]), "float64 cannot tell: a start one unit in the last place away leads elsewhere"
 
     def play(self, scene: Scene, t: Array) -> tuple[Motion, Array, float, str]:
-        """Position and velocity (k, n, 2) at as many of the times as are reached, hits (h, 4); when and why it ends."""
+        """Position and velocity (k, n, 2) at as many of the times as are reached, collisions (h, 4); when and why it
+        ends."""
         engine = EventEngine(scene)
         edges = {edge for push in self.scenario.thrusts for edge in (push.start, push.stop)}
         seen: list[tuple[Array, Array]] = []
@@ -90,7 +91,7 @@ class EventTruth:
             end, reason = refusal.at, str(refusal)
         shape = (len(seen), scene.n, 2)
         position, velocity = (np.array([look[part] for look in seen]).reshape(shape) for part in range(2))
-        return (position, velocity), engine.hits, end, reason
+        return (position, velocity), engine.collisions, end, reason
 
     def push(self, engine: EventEngine, scene: Scene, at: float) -> None:
         """Give every pushed disk the acceleration it has from `at` s on."""

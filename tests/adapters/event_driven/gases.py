@@ -55,9 +55,9 @@ def boxed_asteroids(seed: int, restitution: float = 1.0, gravity: float = 0.0) -
     )  # fmt: skip
 
 
-def hits_of(engine):
-    """(t, i, j) of all hits, the lower disk first."""
-    return [(t, *((i, j) if j < 0 or i < j else (j, i))) for t, i, j in engine.hits[:, :3].tolist()]
+def collisions_of(engine):
+    """(t, i, j) of all collisions, the lower disk first."""
+    return [(t, *((i, j) if j < 0 or i < j else (j, i))) for t, i, j in engine.collisions[:, :3].tolist()]
 
 
 def state_after(scene, until, torus=None, cell=0.0):

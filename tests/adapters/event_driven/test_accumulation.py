@@ -193,7 +193,7 @@ def test_many_collisions_in_a_short_time_are_followed():
     one = counting_pi(31415, 1e8, 31.0, (1,))
     engine = EventEngine(one.scene)
     engine.advance(31.0)
-    assert len(engine.hits) == 31415
+    assert len(engine.collisions) == 31415
 
 
 def test_what_would_take_for_ever_is_refused_though_it_is_no_collision():
@@ -216,8 +216,8 @@ def test_the_loop_comes_back_to_python_and_goes_on_as_if_it_had_not(monkeypatch)
     whole.advance(5.0)
     monkeypatch.setattr(events, "EVENTS", 7)
     parts.advance(5.0)
-    assert len(whole.hits) > 500
-    assert (whole.hits == parts.hits).all()
+    assert len(whole.collisions) > 500
+    assert (whole.collisions == parts.collisions).all()
 
 
 def test_ctrl_c_is_taken_within_a_moment():
@@ -258,7 +258,7 @@ def test_accumulation_in_plain_python_is_the_same(monkeypatch):
     ("right", "wrong"),
     [
         ("if held == 0.0 or", "if True or"),  # nothing lies still in a corner
-        ("if run.hits < HITS:", "if True:"),  # what rattles is not noticed
+        ("if run.collisions < COLLISIONS:", "if True:"),  # what rattles is not noticed
         ("if abs(gap) < ROUNDING", "if gap < ROUNDING"),  # a wall's end lifts a disk to its face
         ("fall_into(walls, a, w, k) > 0.0", "False"),  # it is left to the first of its two walls
     ],

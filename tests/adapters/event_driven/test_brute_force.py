@@ -16,7 +16,7 @@ from adapters.event_driven.events import EventEngine
 from scenarios.families.placing import box, scatter
 from scenarios.model import Scene
 from scenarios.no_truth import NoTruth
-from tests.adapters.event_driven.gases import hits_of
+from tests.adapters.event_driven.gases import collisions_of
 
 # A second algorithm: all contacts as polynomials, all roots by numpy, nothing kept from one event to the next.
 
@@ -52,12 +52,12 @@ def contacts(scene, x, v, a, images):
 
 
 def brute_force(scene, side, count):
-    """Up to `count` hits as (t, i, j) within 5 s, and when it stopped and where; side: of the torus, or 0."""
+    """Up to `count` collisions as (t, i, j) within 5 s, and when it stopped and where; side: of the torus, or 0."""
     x, v, w = scene.position.copy(), scene.velocity.copy(), 1 / scene.mass
     a = np.where(scene.static[:, None], 0.0, scene.gravity)
     images = [np.array([k, m]) * side for k in (-1, 0, 1) for m in (-1, 0, 1)] if side else [np.zeros(2)]
-    now, hits = 0.0, []
-    while len(hits) < count:
+    now, collisions = 0.0, []
+    while len(collisions) < count:
         if side:
             x = np.mod(x, side)
         t, i, j, normal = min(contacts(scene, x, v, a, images), key=lambda c: c[0], default=(np.inf, 0, 0, None))
@@ -73,8 +73,8 @@ def brute_force(scene, side, count):
         v[i] -= w[i] * kick
         if j >= 0:
             v[j] += w[j] * kick
-        hits.append((now, i, j))
-    return hits, now, x
+        collisions.append((now, i, j))
+    return collisions, now, x
 
 
 def random_scene(seed):
@@ -97,17 +97,17 @@ def random_scene(seed):
 
 
 def compare(seed):
-    """A random scene by the engine and by brute force: the first eight hits, and the positions after them."""
+    """A random scene by the engine and by brute force: the first eight collisions, and the positions after them."""
     scene, side = random_scene(seed)
     try:
         engine = EventEngine(scene, [[0, 0], [side, side]] if side else None)
     except NoTruth:  # a disk lies across the edge of the torus, or on a wall, and on another disk
         return
-    hits, now, x = brute_force(scene, side, 8)
+    collisions, now, x = brute_force(scene, side, 8)
     engine.advance(now + 1e-9)
-    found = hits_of(engine)[: len(hits)]
-    # Eight hits of disks a tenth as large as their paths: each may take a digit from the sixteen there are.
-    np.testing.assert_allclose(np.array(found).reshape(-1, 3), np.array(hits).reshape(-1, 3), rtol=0, atol=1e-7)
+    found = collisions_of(engine)[: len(collisions)]
+    # Eight collisions of disks a tenth as large as their paths: each may take a digit from the sixteen there are.
+    np.testing.assert_allclose(np.array(found).reshape(-1, 3), np.array(collisions).reshape(-1, 3), rtol=0, atol=1e-7)
     apart = engine.look(now)[0] - x
     apart -= side * np.round(apart / side) if side else 0
     assert np.abs(apart).max() < 1e-7
@@ -121,7 +121,7 @@ def compare_all(seeds):
 
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1))
-def test_a_brute_force_algorithm_finds_the_same_hits(seed):
+def test_a_brute_force_algorithm_finds_the_same_collisions(seed):
     """All pairs, all images, all walls and their ends; all roots at once."""
     compare(seed)
 
@@ -164,7 +164,7 @@ def test_the_kernels_as_plain_python_find_the_same(monkeypatch):
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_a_planted_bug_is_caught_by_brute_force(bug, monkeypatch):
-    """Each by a wrong list of hits in one of forty scenes."""
+    """Each by a wrong list of collisions in one of forty scenes."""
     monkeypatch.setattr(events, "event_loop", plain_kernels(*BUGS[bug]))
     with pytest.raises((AssertionError, NoTruth)):
         compare_all(range(40))

@@ -14,7 +14,7 @@ from scenarios.model import Scenario, Scene, Thrust
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import OracleTruth
 from tests.adapters.event_driven.event_truth import float64_truth
-from tests.adapters.event_driven.gases import gas, hits_of, state_after
+from tests.adapters.event_driven.gases import collisions_of, gas, state_after
 
 REFUSED = {
     "column_of_ten": "accumulate",
@@ -25,7 +25,7 @@ ANSWERED = [name for name in SCENARIOS if scenario(name).truth and name not in R
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_the_closed_forms_are_met_up_to_the_horizon(name):
-    """States and lists of hits, to a few roundings, which chaos makes a thousand: far within the 1e-9 m claimed.
+    """States and lists of collisions, to a few roundings, which chaos makes a thousand: far within the 1e-9 m claimed.
 
     The truth is the closed form, or the oracle in many digits, which shares no algorithm with the event engine.
     """
@@ -38,10 +38,10 @@ def test_the_closed_forms_are_met_up_to_the_horizon(name):
     for field, tolerance in (("position", 1e-12), ("velocity", 2e-12), ("angle", 1e-14), ("angular_velocity", 1e-14)):
         np.testing.assert_allclose(getattr(found, field)[:k], getattr(exact, field)[:k], rtol=0, atol=chaos * tolerance)
     told, listed = found.collisions, exact.collisions
-    last = min(found.t[k - 1], 8.0 if name == "bouncing_ball_e09" else np.inf)  # it lists only hits 1e-4 s apart
+    last = min(found.t[k - 1], 8.0 if name == "bouncing_ball_e09" else np.inf)  # it lists only collisions 1e-4 s apart
     h = int((listed.t <= last).sum())
     assert h == (told.t <= last).sum()
-    pairs = [sorted(zip(np.round(c.t[:h], 8), c.i[:h], c.j[:h])) for c in (told, listed)]  # 49 balls hit at once
+    pairs = [sorted(zip(np.round(c.t[:h], 8), c.i[:h], c.j[:h])) for c in (told, listed)]  # 49 balls collision at once
     assert pairs[0] == pairs[1]
     np.testing.assert_allclose(told.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=chaos * 1e-12)
 
@@ -101,9 +101,9 @@ def test_a_start_that_is_none_is_refused_and_says_what_would_cure_it(scene, toru
 
 
 def test_touching_disks_that_part_are_allowed():
-    """And never hit."""
+    """And never collision."""
     engine, x, _ = state_after(two(gap=0.0, closing=-1.0), 1.0)
-    assert len(engine.hits) == 0
+    assert len(engine.collisions) == 0
     assert x.tolist() == [[-1.0, 0.0], [1.0, 0.0]]
 
 
@@ -130,7 +130,7 @@ def test_the_wrap_is_an_event_and_a_reentry_on_top_of_a_disk_ends_the_answer():
         )  # fmt: skip
         if free:
             engine, x, v = state_after(scene, 1.0)
-            assert hits_of(engine) == [(0.75, 0, 1)]
+            assert collisions_of(engine) == [(0.75, 0, 1)]
             assert x.tolist() == [[-4.5, 0.0], [-3.0, 0.0]]
             assert v.tolist() == [[0.0, 0.0], [2.0, 0.0]]
         else:
@@ -138,7 +138,7 @@ def test_the_wrap_is_an_event_and_a_reentry_on_top_of_a_disk_ends_the_answer():
                 state_after(scene, 1.0)
 
 
-def test_a_pushed_disk_hits_a_resting_one_at_the_root_of_the_gap():
+def test_a_pushed_disk_strikes_a_resting_one_at_the_root_of_the_gap():
     """From rest under 2 m/s2: a gap of 1 m is closed after 1 s at 2 m/s; equal masses swap."""
     scene = two(gap=1.0, closing=0.0, restitution=1.0)
     run = Scenario("pushed", "", "", scene, 4.0, 0.125, thrusts=[Thrust(0, 0.5, 1.5, [2.0, 0.0])])
@@ -149,15 +149,15 @@ def test_a_pushed_disk_hits_a_resting_one_at_the_root_of_the_gap():
 
 
 def test_the_log_and_the_epochs_change_nothing():
-    """Hits are told in full over many epochs of the clock, whatever the stops on the way."""
+    """Collisions are told in full over many epochs of the clock, whatever the stops on the way."""
     scene, torus = gas(16, 0.05)
     at_once, x, _ = state_after(scene, 5.0, torus)
     often = EventEngine(scene, torus)
     for at in np.linspace(0, 5, 777):
         often.advance(at)
-    assert (often.hits == at_once.hits).all()
+    assert (often.collisions == at_once.collisions).all()
     assert (often.look(5.0)[0] == x).all()
     long, _, end = state_after(scene, 20000.0, torus)
-    assert len(long.hits) > 2 * events.LOG_ROWS
-    assert (np.diff(long.hits[:, 0]) >= 0).all()
+    assert len(long.collisions) > 2 * events.LOG_ROWS
+    assert (np.diff(long.collisions[:, 0]) >= 0).all()
     assert (end**2).sum() == pytest.approx((scene.velocity**2).sum(), rel=1e-12)

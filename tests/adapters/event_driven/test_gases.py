@@ -1,4 +1,5 @@
-"""Gases of hard disks by the event engine: pressure, rate of hits and speeds of the literature; nothing drifts."""
+"""Gases of hard disks by the event engine: pressure, rate of collisions and speeds of the literature; nothing
+drifts."""
 
 from __future__ import annotations
 
@@ -19,15 +20,15 @@ def check(row, tolerance):
 
 
 def test_a_gas_has_the_pressure_energy_and_momentum_of_the_literature():
-    """A million hits of 1024 disks at packing 0.3; 0.6 % is three times the statistical error."""
-    check(measured(0.3, hits=1_000_000), 0.006)
+    """A million collisions of 1024 disks at packing 0.3; 0.6 % is three times the statistical error."""
+    check(measured(0.3, collisions=1_000_000), 0.006)
 
 
 @pytest.mark.parametrize("packing", PACKINGS)
 def test_the_committed_figures_are_those_of_the_literature(packing):
     """Within four standard errors, told by the blocks; Z is off by (Z - 1) / N at first order, by the next one too."""
     row = read()[packing]
-    assert row["hits"] > 9.9e6
+    assert row["collisions"] > 9.9e6
     for name in ("Z", "rate"):
         assert (
             abs(row[name] - row[f"{name}_reference"]) < 4 * row[f"{name}_error"] + row[f"{name}_reference"] / 1024**1.5

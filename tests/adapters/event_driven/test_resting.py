@@ -65,24 +65,24 @@ def test_bounces_down_an_incline_end_in_a_slide():
             assert v[0] @ normal == pytest.approx(0.0, abs=1e-14)
 
 
-# One of unit speed hits one that lies on the floor: speeds after A-B, B-floor, A-B, ... until nothing closes in.
+# One of unit speed collisions one that lies on the floor: speeds after A-B, B-floor, A-B, ... until nothing closes in.
 ON_A_LYING_DISK = {0.8: (0.638, 0.0144), 0.5: (0.21875, 0.046875)}
 
 
 @pytest.mark.parametrize("e", ON_A_LYING_DISK)
-def test_a_hit_on_a_lying_disk_is_the_limit_of_small_gaps(e):
+def test_a_collision_on_a_lying_disk_is_the_limit_of_small_gaps(e):
     """By hand for equal masses: at e = 0.8, (-1, 0), (-.1, -.9), (-.1, .72), (.638, -.018), (.638, .0144)."""
     start = np.sqrt(1 - 2 * G * 0.045)
     engine, at = EventEngine(disks([[0.0, 0.5], [0.0, 1.545]], [[0, 0], [0, -start]], e)), (1 - start) / G
     engine.advance(at + 1e-9)
     _, v = engine.look(at + 1e-9)
     assert v[::-1, 1] == pytest.approx(np.array(ON_A_LYING_DISK[e]) - G * 1e-9, abs=1e-9)
-    assert len(engine.hits) == 5  # and the floor, which bears the lower one from the start
+    assert len(engine.collisions) == 5  # and the floor, which bears the lower one from the start
 
 
 @pytest.mark.parametrize(("e", "mass"), [(0.0, 1.0), (0.1, 1.0), (0.5, 10.0)])
-def test_a_hit_on_a_lying_disk_that_does_not_end_is_refused(e, mass):
-    """As many hits at one instant as there are: when and whose."""
+def test_a_collision_on_a_lying_disk_that_does_not_end_is_refused(e, mass):
+    """As many collisions at one instant as there are: when and whose."""
     scene = disks([[0.0, 0.5], [0.0, 2.0]], [[0, 0], [0, -1.0]], e, mass=[1.0, mass])
     with pytest.raises(NoTruth, match=r"the collisions of disk [01] on disk [01]( and wall 0)? accumulate at 0\.2316"):
         EventEngine(scene).advance(1.0)
@@ -90,7 +90,7 @@ def test_a_hit_on_a_lying_disk_that_does_not_end_is_refused(e, mass):
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1))
-def test_a_hit_on_a_lying_disk_is_one_on_a_disk_just_above_the_floor(seed):
+def test_a_collision_on_a_lying_disk_is_one_on_a_disk_just_above_the_floor(seed):
     """From any side, of any masses and radii: without gravity and 1e-12 m up, where there is no rest, the same."""
     draw = np.random.default_rng(seed)
     radius, mass, angle = draw.uniform(0.3, 1, 2), draw.uniform(0.5, 2, 2), draw.uniform(0.3, np.pi - 0.3)
@@ -105,8 +105,8 @@ def test_a_hit_on_a_lying_disk_is_one_on_a_disk_just_above_the_floor(seed):
         engine.advance(3e-4)
         return engine.look(3e-4)[1]
 
-    # Between two hits the upper one moves 5 m/s times 1e-12 m over the slow speed of the lower one, some mm/s; and
-    # in 3e-4 s gravity changes a speed by 3e-9 m/s.
+    # Between two collisions the upper one moves 5 m/s times 1e-12 m over the slow speed of the lower one, some mm/s;
+    # and in 3e-4 s gravity changes a speed by 3e-9 m/s.
     assert played(0.0, 1e-5) == pytest.approx(played(1e-12, 0.0), abs=2e-7)
 
 
@@ -137,7 +137,7 @@ def test_a_push_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
         assert v[0] == pytest.approx([2.0, max(upward, 0.0)], abs=1e-14)
 
 
-def test_lying_disks_hit_each_other_along_the_floor_and_stay_on_it():
+def test_lying_disks_collide_along_the_floor_and_stay_on_it():
     """Head-on at e = 0.5, equal masses and radii: the normal is along the floor, to the last bit."""
     scene = disks([[0.0, 0.5], [3.0, 0.5]], [[1.0, 0.0], [-1.0, 0.0]], 0.5)
     x, v = after(scene, 3.0)
@@ -190,7 +190,7 @@ def test_while_a_box_settles_energy_only_falls_and_nothing_overlaps(seed):
 
 
 def test_a_settling_row_does_not_depend_on_order_or_handedness():
-    """Disks that drop onto a floor, come to rest and hit each other on it: shuffled, and in a mirror."""
+    """Disks that drop onto a floor, come to rest and collide on it: shuffled, and in a mirror."""
     draw = np.random.default_rng(5)
     n = 8
     x = np.column_stack([np.arange(n) * 1.7, draw.uniform(0.6, 1.2, n)])
@@ -211,7 +211,7 @@ def test_nothing_comes_to_rest_at_restitution_one():
     engine = EventEngine(disks([[0.0, 1.5]], [[0.0, 0.0]], 1.0))
     engine.advance(1790.0)
     x, v = engine.look(1790.0)
-    assert len(engine.hits) == int((1790.0 / np.sqrt(2 / G) + 1) / 2)
+    assert len(engine.collisions) == int((1790.0 / np.sqrt(2 / G) + 1) / 2)
     assert v[0, 1] ** 2 / 2 + G * (x[0, 1] - 0.5) == pytest.approx(G, rel=1e-12)
     assert (engine.arena.disks.wall == -1).all()
 

@@ -10,7 +10,7 @@ import pytest
 from adapters.event_driven.events import EventEngine
 from scenarios.catalogue import scenario
 from tests.adapters.event_driven.event_truth import float64_truth
-from tests.adapters.event_driven.gases import gas, hits_of, state_after
+from tests.adapters.event_driven.gases import collisions_of, gas, state_after
 
 
 def changed(scene, order=slice(None), x=lambda a: a, v=lambda a: a):
@@ -39,28 +39,34 @@ def test_order_and_mirror_do_not_matter(name, until):
 
 
 def test_time_runs_back_at_restitution_one():
-    """Half a second, 160 hits, and half a second back."""
+    """Half a second, 160 collisions, and half a second back."""
     scene = scenario("gas_of_100").scene
     engine, x, v = state_after(scene, 0.45)
     _, back, speed = state_after(replace(scene, position=x, velocity=-v), 0.45)
-    assert len(engine.hits) > 100
+    assert len(engine.collisions) > 100
     np.testing.assert_allclose(back, scene.position, rtol=0, atol=1e-8)
     np.testing.assert_allclose(-speed, scene.velocity, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", ["gas_of_100", "asteroids", "falling_box"])
-def test_coarse_and_fine_cells_find_the_same_hits(name):
+def test_coarse_and_fine_cells_find_the_same_collisions(name):
     """From cells of one diameter to three by three."""
     scene = scenario(name).scene
     until = 0.7 * float64_truth(scenario(name)).valid_until
-    lists = [[hit[1:] for hit in hits_of(state_after(scene, until, cell=cell)[0])] for cell in (0.0, 0.37, 9.0)]
+    lists = [
+        [collision[1:] for collision in collisions_of(state_after(scene, until, cell=cell)[0])]
+        for cell in (0.0, 0.37, 9.0)
+    ]
     assert lists[0] == lists[1] == lists[2]
 
 
 def test_coarse_and_fine_cells_agree_on_a_torus():
     """As above, where three cells make the next image a neighbour on both sides."""
     scene, torus = gas(64, 0.3)
-    lists = [[hit[1:] for hit in hits_of(state_after(scene, 4.0, torus, cell)[0])] for cell in (0.0, 1.9, 99.0)]
+    lists = [
+        [collision[1:] for collision in collisions_of(state_after(scene, 4.0, torus, cell)[0])]
+        for cell in (0.0, 1.9, 99.0)
+    ]
     assert len(lists[0]) > 200
     assert lists[0] == lists[1] == lists[2]
 

@@ -18,7 +18,7 @@ ON_GRID = 1e-6  # of a step: a collision that is as near to the end of one was f
 
 
 def the_same(w: int, _x: Array, _walls: Array, _truth: bool) -> Sequence[int]:
-    """The wall that was hit is the wall that is hit."""
+    """The wall that was struck is the wall that is struck."""
     return (w,)
 
 
@@ -30,7 +30,8 @@ class Change:
         length, time, mass: m, s and kg in the new units.
         turn: rad; flip: -1 for the mirror image (y -> -y, before the turn).
         shift: m; boost: m/s, both in the new frame and units.
-        order: for n disks, which comes where; walls: those of a scene -> new ones; wall: of each hit -> the new walls.
+        order: for n disks, which comes where; walls: those of a scene -> new ones; wall: of each collision -> the new
+            walls.
         thrusts: of a scenario -> new ones.
     """
 
@@ -119,10 +120,14 @@ class Change:
 
     def collisions(self, old: Trajectory, one: Scenario, dt: float | None) -> Collisions:
         """The collisions of what was played; those that the end of a step has found are found there again."""
-        hits, rows, number = old.collisions, [], np.argsort(self.order(one.scene.n))
-        asked = one.truth if dt is None and len(hits) else None
-        where = asked(hits.t).position if asked else old.position[np.searchsorted(old.t, hits.t).clip(max=len(old) - 1)]
-        for t, i, j, impulse, x in zip(hits.t, hits.i, hits.j, hits.impulse, where):
+        collisions, rows, number = old.collisions, [], np.argsort(self.order(one.scene.n))
+        asked = one.truth if dt is None and len(collisions) else None
+        where = (
+            asked(collisions.t).position
+            if asked
+            else old.position[np.searchsorted(old.t, collisions.t).clip(max=len(old) - 1)]
+        )
+        for t, i, j, impulse, x in zip(collisions.t, collisions.i, collisions.j, collisions.impulse, where):
             steps = round(t / dt) if dt else 0
             found = dt is not None and abs(steps - t / dt) < ON_GRID
             now = steps * (self.time * dt) if dt and found else self.time * t

@@ -1,4 +1,4 @@
-"""The judge of hits judged: which played hit answers which true one, and who is not blamed."""
+"""The judge of collisions judged: which played collision answers which true one, and who is not blamed."""
 
 from itertools import combinations
 
@@ -9,15 +9,15 @@ from reports.compare.collisions import closest_in_order, match
 from scenarios.model import Collisions
 
 
-def hits(*times: float) -> Collisions:
-    """Hits of disks 0 and 1 at these times."""
+def collisions(*times: float) -> Collisions:
+    """Collisions of disks 0 and 1 at these times."""
     return Collisions.of([(t, 0, 1, 1.0) for t in times])
 
 
-def test_a_missing_hit_is_missed_and_an_extra_hit_is_invented():
-    """The hit that is left over is the one whose absence makes the others match."""
-    missed = match(hits(1.01, 3.01), hits(1, 2, 3), 10, 0.01)
-    invented = match(hits(1.01, 2.5, 3.01), hits(1, 3), 10, 0.01)
+def test_a_missing_collision_is_missed_and_an_extra_collision_is_invented():
+    """The collision that is left over is the one whose absence makes the others match."""
+    missed = match(collisions(1.01, 3.01), collisions(1, 2, 3), 10, 0.01)
+    invented = match(collisions(1.01, 2.5, 3.01), collisions(1, 3), 10, 0.01)
 
     assert missed.missed == [(2.0, 0, 1)]
     assert missed.invented == []
@@ -26,34 +26,35 @@ def test_a_missing_hit_is_missed_and_an_extra_hit_is_invented():
     np.testing.assert_allclose(invented.delay, 0.01)
 
 
-def test_a_player_that_drifts_late_keeps_its_hits_until_it_is_half_a_gap_late():
-    """Hits that come later and later are delays; beyond half the time between true hits nobody knows which is which."""
+def test_a_player_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_late():
+    """Collisions that come later and later are delays; beyond half the time between true collisions nobody knows which
+    is which."""
     true = np.arange(1.0, 9.0)
-    late = match(hits(*(true + 0.06 * true)), hits(*true), 100, 0.01)
-    too_late = match(hits(9.0), hits(1.0), 100, 0.01)
+    late = match(collisions(*(true + 0.06 * true)), collisions(*true), 100, 0.01)
+    too_late = match(collisions(9.0), collisions(1.0), 100, 0.01)
 
     assert late.first_wrong is None
     np.testing.assert_allclose(late.delay, 0.06 * true)
     assert (too_late.missed, too_late.invented) == ([(1.0, 0, 1)], [(9.0, 0, 1)])
 
 
-def test_a_hit_that_the_end_cuts_off_is_not_blamed():
-    """A true hit less than `WINDOW` dt before the end may fall behind it for a late player."""
-    assert match(hits(1.0), hits(1.0, 9.98), 10.0, 0.01).missed == []
-    assert match(hits(1.0), hits(1.0, 9.96), 10.0, 0.01).missed == [(9.96, 0, 1)]
+def test_a_collision_that_the_end_cuts_off_is_not_blamed():
+    """A true collision less than `WINDOW` dt before the end may fall behind it for a late player."""
+    assert match(collisions(1.0), collisions(1.0, 9.98), 10.0, 0.01).missed == []
+    assert match(collisions(1.0), collisions(1.0, 9.96), 10.0, 0.01).missed == [(9.96, 0, 1)]
 
 
-def test_hits_that_no_step_can_tell_apart_are_not_blamed():
+def test_collisions_that_no_step_can_tell_apart_are_not_blamed():
     """Of ever faster bounces those closer together than 2 dt are left out, with what the player makes of them."""
     true = 2.0 - 0.5 ** np.arange(12.0)
     played = [t for t in true if t < 1.97]
-    found = match(hits(*played, 1.99, 2.01), hits(*true), 10.0, 0.01)
+    found = match(collisions(*played, 1.99, 2.01), collisions(*true), 10.0, 0.01)
 
     assert found.first_wrong is None
 
 
-def test_weight_on_a_contact_at_rest_is_no_hit():
-    """A pair that rests from the start (a true hit without impulse) is not counted."""
+def test_weight_on_a_contact_at_rest_is_no_collision():
+    """A pair that rests from the start (a true collision without impulse) is not counted."""
     resting = Collisions.of([(0.0, 0, -1, 0.0)])
     weight = Collisions.of([(0.1, 0, -1, 0.3), (0.5, 0, -1, 0.3)])
 

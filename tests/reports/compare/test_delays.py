@@ -55,10 +55,10 @@ def test_gravity_hides_no_error_of_an_integrator():
     one, truth = truth_of("bouncing_ball_e1")
     dt = one.dt(1)
     gravity = np.linalg.norm(one.scene.gravity)
-    hits = truth.collisions.t
+    collisions = truth.collisions.t
     played = replace(truth, velocity=truth.velocity - one.scene.gravity * dt)
     apart = beside_truth(one, dt, played, truth).velocity_apart[1:, 0]
-    near = np.abs(truth.t[1:, None] - hits).min(axis=1) < WINDOW * dt
+    near = np.abs(truth.t[1:, None] - collisions).min(axis=1) < WINDOW * dt
 
     assert near.sum() > 20
     np.testing.assert_allclose(apart[near & np.isfinite(apart)], gravity * dt, rtol=1e-9)  # digits of v - g dt
@@ -70,8 +70,8 @@ def test_a_disk_that_is_late_may_keep_falling(steps: float):
     one, truth = truth_of("bouncing_ball_e1")
     dt = one.dt(1)
     velocity = truth.velocity.copy()
-    for hit, impulse in zip(truth.collisions.t, truth.collisions.impulse):
-        since = truth.t - hit
+    for collision, impulse in zip(truth.collisions.t, truth.collisions.impulse):
+        since = truth.t - collision
         # `steps` dt after the bounce the player has not met the floor.
         velocity[(since >= 0) & (since <= steps * dt), 0, 1] -= impulse / one.scene.mass[0]
 
@@ -85,12 +85,12 @@ def test_a_sample_at_the_instant_of_a_collision_may_have_the_velocity_before_it_
     one, truth = truth_of(name)
     assert one.truth is not None
     jumps = jumps_of(truth, one)
-    hits = jumps.t[np.diff(jumps.t, prepend=-1) > 1e-6]
-    if not len(hits):
+    collisions = jumps.t[np.diff(jumps.t, prepend=-1) > 1e-6]
+    if not len(collisions):
         pytest.skip("nothing collides here")
-    at = one.truth(hits)
+    at = one.truth(collisions)
     for shift in (-1e-9, 1e-9):  # s
-        played = replace(at, velocity=one.truth(hits + shift).velocity)
+        played = replace(at, velocity=one.truth(collisions + shift).velocity)
         apart = np.abs(nearest_velocity(played, at, jumps, 1e-7) - played.velocity)
         assert apart.max() < 1e-7  # m/s: gravity for a nanosecond
     wrong = replace(at, velocity=at.velocity * 1.01 + 0.01)

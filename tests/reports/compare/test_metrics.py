@@ -30,7 +30,8 @@ def value(metric: str, view: View) -> float:
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
 def test_the_truth_against_itself_is_zero(name: str):
-    """Every error of the truth measured against the truth is 0, it never leaves the 1 % band, it misses no hit."""
+    """Every error of the truth measured against the truth is 0, it never leaves the 1 % band, it misses no
+    collision."""
     one, truth = truth_of(name)
     view = beside_truth(one, one.dt(1), truth, truth)
 
@@ -155,7 +156,7 @@ def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
 
 def test_a_run_that_diverged_earns_a_status_and_no_score():
     """A player that gives NaN at step 7 was right before it, for a scene that nobody else played so short."""
-    one = scenario("slow_hit")
+    one = scenario("slow_collision")
     run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
     good = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", one, one.dt(1))
     table = compare(one, [run, good]).table
@@ -168,7 +169,7 @@ def test_a_run_that_diverged_earns_a_status_and_no_score():
 
 def test_to_refuse_a_scene_does_not_help_in_the_ranking():
     """Who has no result in a scene is last in it, and who has none in half of them is not ranked first."""
-    one, two = scenario("slow_hit"), scenario("near_miss")
+    one, two = scenario("slow_collision"), scenario("near_miss")
     runs = {
         name: [play(ENGINES[name].make(), name, each, each.dt(4)) for each in (one, two)]
         for name in ("reference:exercise", "box2d:shipped")
@@ -218,7 +219,7 @@ def test_falling_through_a_wrap_is_no_energy_error():
 
 
 def test_comparison_stops_where_the_other_ends():
-    """Samples and hits beyond the truth's horizon are cut off."""
+    """Samples and collisions beyond the truth's horizon are cut off."""
     _, truth = truth_of("line_gas")
     short = cut(truth, 100)
 

@@ -95,10 +95,10 @@ def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
     assert runs[0] is not None
     assert runs[1] is not None
     view = View(one, one.dt(1), runs[0], runs[1])
-    hits = np.append(runs[0].collisions.t, runs[1].collisions.t)
-    near = np.abs(view.played.t[:, None] - hits).min(axis=1) < WINDOW * one.dt(1)
+    collisions = np.append(runs[0].collisions.t, runs[1].collisions.t)
+    near = np.abs(view.played.t[:, None] - collisions).min(axis=1) < WINDOW * one.dt(1)
 
-    assert len(hits) == 2
+    assert len(collisions) == 2
     assert (view.judged == (~near & (view.played.t > 0))[:, None]).all()
     assert view.carried == f"{view.judged.sum()} of {2 * one.samples} samples of a disk"
 
@@ -109,10 +109,10 @@ def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisio
     found = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)).trajectory
     assert found is not None
     times = np.arange(0.0, one.duration, 2 * one.dt(1))
-    hits = replace(
+    collisions = replace(
         found.collisions, t=times, i=np.zeros(len(times), int), j=np.full(len(times), -1), impulse=np.ones(len(times))
     )
-    view = View(one, one.dt(1), replace(found, collisions=hits), found)
+    view = View(one, one.dt(1), replace(found, collisions=collisions), found)
     value = METRICS["velocity_max"].of(view)
 
     assert view.share < LEAST_SHARE

@@ -23,8 +23,8 @@ def sliding(change: float, speed: float = 0.5, e: float = 0.5) -> tuple[Trajecto
     down, up = -change / (1 + e), change * e / (1 + e)
     velocity = np.array([[[speed, down]], [[speed, down]], [[speed, up]], [[speed, up]]])
     still = np.zeros((4, 1))
-    hits = Collisions.of([(1.5, 0, -1, np.nan)])
-    return Trajectory(t, np.zeros((4, 1, 2)), velocity, still, still, hits), scene
+    collisions = Collisions.of([(1.5, 0, -1, np.nan)])
+    return Trajectory(t, np.zeros((4, 1, 2)), velocity, still, still, collisions), scene
 
 
 @pytest.mark.parametrize("rounding", [FLOAT32, FLOAT64])
@@ -64,7 +64,8 @@ def read(name: str, engine: str, substeps: int) -> dict[str, Value | None]:
 
 @pytest.mark.parametrize(("name", "substeps"), [("gas_of_100", 1), ("box_billiard", 1), ("box_billiard", 2)])
 def test_a_contact_that_lasts_is_no_collision(name: str, substeps: int):
-    """Box2D 3.1 as shipped lets a slow disk stick to a wall, and tells of a hit whenever it comes nearer again."""
+    """Box2D 3.1 as shipped lets a slow disk stick to a wall, and tells of a collision whenever it comes nearer
+    again."""
     found = read(name, "box2d_v3:shipped", substeps)["restitution_error"]
 
     assert found is None or found.value < 1 or found.note.startswith(NOT_JUDGED)

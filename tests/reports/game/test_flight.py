@@ -196,8 +196,9 @@ def test_looking_at_every_step_near_an_edge_changes_no_bit():
         assert {name: array.tobytes() for name, array in vars(end.at(-1)).items()} == state
 
 
-def test_the_marker_names_the_first_hit():
-    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it parts at the first hit; the oracle names it."""
+def test_the_marker_names_the_first_collision():
+    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it parts at the first collision; the oracle names
+    it."""
     flight = flown(["reference:exercise", "pymunk:shipped", "pymunk:matched"], 64, [])
     scenario = flight.saved()
     ghost, matched = flight.flyers[1:]
@@ -205,10 +206,10 @@ def test_the_marker_names_the_first_hit():
     t, i, j = truth.collisions.t[0], truth.collisions.i[0], truth.collisions.j[0]
 
     assert ghost.parting is not None
-    assert (ghost.parting.hit.i, ghost.parting.hit.j) in ((i, j), (j, i))
-    assert ghost.parting.hit.frame == int(t / FRAME)
+    assert (ghost.parting.collision.i, ghost.parting.collision.j) in ((i, j), (j, i))
+    assert ghost.parting.collision.frame == int(t / FRAME)
     assert ghost.parting.shared
-    assert matched.parting is None or matched.parting.hit.frame > ghost.parting.hit.frame
+    assert matched.parting is None or matched.parting.collision.frame > ghost.parting.collision.frame
 
 
 def read_truth(scenario):  # type: ignore[no-untyped-def]

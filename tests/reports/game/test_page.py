@@ -110,24 +110,25 @@ def test_a_scripted_flight_wins(page: Page):
     assert page.locator("#banner.won").inner_text() == "You won"
 
 
-def test_ghosts_part_after_the_first_hit_and_the_marker_names_the_pair(page: Page, tmp_path: Path):
-    """pymunk as shipped makes e2 of e: it parts at the first hit, whose pair and instant the exact answer tells."""
+def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(page: Page, tmp_path: Path):
+    """pymunk as shipped makes e2 of e: it parts at the first collision, whose pair and instant the exact answer
+    tells."""
     fly(page, 16)
     together = [flyer["apart"] for flyer in page.evaluate("game.now.flyers")]
     page.locator("#stop").check()
     page.locator("#pause").click()  # fly on, until it stops by itself
     page.wait_for_function("() => game.paused && game.now.frame > 16", timeout=20_000)
     scenario = read_scene_file(saved(page, tmp_path))
-    hits = scenario.truth(scenario.times).collisions  # type: ignore[misc]
+    collisions = scenario.truth(scenario.times).collisions  # type: ignore[misc]
     parted = page.evaluate("game.now.flyers[1].parted")
     story = page.locator("tr[data-engine='pymunk:shipped'] [data-cell=parted]").inner_text()
     marks = page.evaluate("game.sky.last[3]")
 
     # A step at the edge: stepping engines set what wraps onto it, and lose what it flew on beyond.
     assert max(together) < 0.71 * FRAME / 16
-    assert {parted["i"], parted["j"]} == {hits.i[0], hits.j[0]}
-    assert 0 <= parted["t"] - hits.t[0] <= 2 * FRAME
-    assert f"{parted['i']} × {parted['j']}: both hit, and part differently" in story
+    assert {parted["i"], parted["j"]} == {collisions.i[0], collisions.j[0]}
+    assert 0 <= parted["t"] - collisions.t[0] <= 2 * FRAME
+    assert f"{parted['i']} × {parted['j']}: both collide, and part differently" in story
     assert marks[0]["name"] == "pymunk:shipped"
     assert page.evaluate("game.now.flyers[1].apart") > 1e-3
 

@@ -20,7 +20,7 @@ from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson, play_once
 from reports.lessons.mechanisms import SWITCHED
-from reports.lessons.meeting import hit_of_the_reference, two
+from reports.lessons.meeting import collision_of_the_reference, two
 from reports.page.style import TRUTH
 from scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened, overhang, served
@@ -46,7 +46,7 @@ def test_with_nothing_switched_on_the_switches_give_the_reference(name: str):
 @pytest.mark.parametrize(
     ("name", "engine", "on", "off", "bound"),
     [
-        # Float32 rounds e of a hit a few times; at 1 m/s the threshold of Box2D.
+        # Float32 rounds e of a collision a few times; at 1 m/s the threshold of Box2D.
         ("threshold", "box2d:shipped", (3, 1), (2, 1), 8 * FLOAT32),
         ("mixing", "pymunk:shipped", (4,), (3,), 8 * 2.0**-53),
         ("order", "pymunk:matched", (1, 0), (0, 0), 1e-12),
@@ -93,7 +93,7 @@ def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name:
 
 
 def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
-    """Equal disks, e = 1, hit at one end: all orders of the hits give everything to the last disk."""
+    """Equal disks, e = 1, collision at one end: all orders of the collisions give everything to the last disk."""
     curves = {curve.name: np.asarray(curve.y) for curve in LESSONS["row"].at((0, 3, 2)).charts[0].curves}
 
     assert curves[TRUTH].tolist() == [0, 0, 0, 0, 0, 5]
@@ -101,10 +101,10 @@ def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
     assert np.abs(curves["box2d:matched"] - curves[TRUTH]).max() > 1.0
 
 
-def test_the_numbers_of_a_hit_are_those_of_the_solver():
+def test_the_numbers_of_a_collision_are_those_of_the_solver():
     """The impulse that lesson 4 writes out is the one the solver tells, and momentum is kept."""
     scene = two(0.9, 10.0, 1.0).scene
-    before, after, told = hit_of_the_reference(scene, 1 / 64)
+    before, after, told = collision_of_the_reference(scene, 1 / 64)
     steps = dict(LESSONS["meeting"].at((2, 2, 2, 0)).steps)
     kick = scene.mass[0] * np.hypot(*(after.velocity[0] - before.velocity[0]))
 

@@ -27,7 +27,7 @@ def at(case: str, player: str, place: int) -> tuple[int, int, int]:
     return NAMES.index(case), PLAYERS.index(player), place
 
 
-@pytest.mark.parametrize("name", ["slow_hit", "spin", "far_from_origin"])
+@pytest.mark.parametrize("name", ["slow_collision", "spin", "far_from_origin"])
 def test_the_brackets_are_those_of_the_atlas(name: str):
     """Searched here and now they hold the limits of the full form."""
     rows = {row.player: row for row in kept() if row.case == name}
@@ -41,7 +41,7 @@ def test_the_brackets_are_those_of_the_atlas(name: str):
 
 def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
     """The limit of Box2D is not typed in: what is given its name without the threshold does not fail."""
-    place = at("slow_hit", "box2d:shipped", 5)
+    place = at("slow_collision", "box2d:shipped", 5)
     limits_of.cache_clear()
     with monkeypatch.context() as patch:
         patch.setitem(players.PLAYERS, "box2d:shipped", Player("box2d:shipped", changed_box2d))
@@ -57,8 +57,8 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.parametrize(
     ("case", "player", "place", "fails"),
     [
-        ("slow_hit", "box2d:shipped", 1, False), ("slow_hit", "box2d:shipped", 3, True),
-        ("slow_hit", "box2d:matched", 3, False), ("tunnelling_thin_wall", "pymunk:matched", 3, False),
+        ("slow_collision", "box2d:shipped", 1, False), ("slow_collision", "box2d:shipped", 3, True),
+        ("slow_collision", "box2d:matched", 3, False), ("tunnelling_thin_wall", "pymunk:matched", 3, False),
         ("tunnelling_thin_wall", "pymunk:matched", 5, True), ("tunnelling_thin_wall", "event_driven:float64", 8, False),
         ("spin", "box2d:matched", 8, True), ("near_miss", "box2d_v3:shipped", 7, True),
     ],
@@ -99,6 +99,6 @@ def test_every_case_has_its_values_within_the_atlas():
 
 def test_the_slider_says_the_parameter_of_its_case():
     """With its unit: what the same place means depends on the case."""
-    said = [LESSON.at(at(name, "pymunk:matched", 3)).said["place"] for name in ("slow_hit", "tunnelling_head_on")]
+    said = [LESSON.at(at(name, "pymunk:matched", 3)).said["place"] for name in ("slow_collision", "tunnelling_head_on")]
 
     assert said == ["closing speed = 0.275 m/s", "v dt / R = 1"]

@@ -44,7 +44,7 @@ class Controlled:
     def read(self):
         return State(self.position.copy(), self.velocity.copy(), self.start.angle, self.start.angular_velocity)
 
-    def hits(self):
+    def collisions(self):
         return []
 
     def settings(self):

@@ -16,7 +16,13 @@ PLAYERS = ("pymunk:shipped", "pymunk:matched")
 def make(folder: Path, scene_file: Path) -> Path:
     """Its folder, complete but for its tables: every kind of line is in its journal."""
     plan = Plan(
-        ["slow_hit", str(scene_file)], {name: ENGINES[name] for name in PLAYERS}, 0, [], False, 0, "made by a test"
+        ["slow_collision", str(scene_file)],
+        {name: ENGINES[name] for name in PLAYERS},
+        0,
+        [],
+        False,
+        0,
+        "made by a test",
     )
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
     cells = [task for task in tasks_of(plan, scenarios) if isinstance(task, Cell)]

@@ -10,7 +10,7 @@ import pandas as pd
 
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, wait_for
 
-SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference:exercise", "--engine", "pymunk"]  # 24 cells of ms
+SMALL = ["run", "slow_collision", "near_miss", "--engine", "reference:exercise", "--engine", "pymunk"]  # 24 cells of ms
 LONG = ["run", "asteroids"]  # 24 cells of 0.4 s
 LONG += [word for name in ("reference:exercise", "reference:lesson", "pymunk", "box2d") for word in ("--engine", name)]
 

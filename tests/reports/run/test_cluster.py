@@ -58,7 +58,7 @@ def test_a_scheduler_that_goes_is_one_clear_message_and_the_run_can_be_resumed_h
 )
 def test_an_address_where_no_scheduler_is_is_one_clear_message(tmp_path: Path, address: str, said: str):
     """Exit 2, in one line; nothing is written."""
-    done = crosscheck("run", "slow_hit", "--scheduler", address, cwd=tmp_path)
+    done = crosscheck("run", "slow_collision", "--scheduler", address, cwd=tmp_path)
 
     assert done.returncode == 2
     assert done.stderr.startswith(said)

@@ -23,7 +23,7 @@ from reports.run.tables import seal_of
 from reports.terminal.progress import Progress
 
 PLAN = Plan(
-    ["slow_hit", "near_miss"], {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")},
+    ["slow_collision", "near_miss"], {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")},
     seed=0, dts=[], full=False, timings=1, command="test",
 )  # fmt: skip
 
@@ -194,8 +194,8 @@ def test_the_interval_holds_the_true_median_as_often_as_it_says():
 def test_a_scene_that_is_not_judged_any_more_is_worse(before: Path, after: Path):
     """Its exact answer took too long: its numbers are gone, which no other row would tell; the other way is better."""
     table = pd.read_csv(after / "deviations.csv", dtype=str, keep_default_na=False)
-    judged = table[(table.scenario != "slow_hit") | (table.versus != "truth")]
-    runs = table[table.scenario == "slow_hit"].drop_duplicates(["engine", "profile", "dt_s"])
+    judged = table[(table.scenario != "slow_collision") | (table.versus != "truth")]
+    runs = table[table.scenario == "slow_collision"].drop_duplicates(["engine", "profile", "dt_s"])
     why = "not judged: the exact answer took longer than 60 s (--timeout)"
     lost = runs.assign(metric="status", value="", unit="", versus="truth", at_s="", note=why)
     put_table(pd.concat([judged, lost]), after)

@@ -30,8 +30,8 @@ from reports.terminal.exits import FolderTaken
 from scenarios.catalogue import scenario
 from tests.reports.run.test_journal_edits import WRONG, edited, places
 
-SCENES, NAME = {"slow_hit": scenario("slow_hit")}, "reference:exercise"
-HEADER = {"scenes": ["slow_hit"], "files": {}, "engines": [NAME], "effort": {"rounds": 1}, "whole": False} | {
+SCENES, NAME = {"slow_collision": scenario("slow_collision")}, "reference:exercise"
+HEADER = {"scenes": ["slow_collision"], "files": {}, "engines": [NAME], "effort": {"rounds": 1}, "whole": False} | {
     key: value for key, value in about("", 0).items() if key in ("seed", "versions", "machine")
 }
 SAMPLE = 60  # edits whose pages are made in the long test
@@ -41,15 +41,15 @@ SAMPLE = 60  # edits whose pages are made in the long test
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The journal of a measurement: a ladder, what its error is made of, times and a closed form."""
     place = tmp_path_factory.mktemp("measured")
-    player = Player(SCENE, "slow_hit", 0, NAME, PLAIN, row_of(NAME).make, (1, 2, 4))
+    player = Player(SCENE, "slow_collision", 0, NAME, PLAIN, row_of(NAME).make, (1, 2, 4))
     with Journal(place) as journal:
         kept = Kept(journal, HEADER, False, SCENES)
         kept.add(player.task, player.errors())
-        kept.add(("budget", "slow_hit", NAME), budget.budget_of("slow_hit", 0, NAME, 2))
+        kept.add(("budget", "slow_collision", NAME), budget.budget_of("slow_collision", 0, NAME, 2))
         often = {"rounds": 1, "budget": 0.0}
-        kept.add(("time", SCENE, "slow_hit"), scene_rows(SCENE, "slow_hit", 0, in_turns([player]), often))
-        kept.add(("time", "truth", "slow_hit"), models.closed_form("slow_hit", 0))
-    assert ladder.held("slow_hit", 0).scenario.name == "slow_hit"
+        kept.add(("time", SCENE, "slow_collision"), scene_rows(SCENE, "slow_collision", 0, in_turns([player]), often))
+        kept.add(("time", "truth", "slow_collision"), models.closed_form("slow_collision", 0))
+    assert ladder.held("slow_collision", 0).scenario.name == "slow_collision"
     return place
 
 
@@ -171,7 +171,7 @@ def test_a_line_that_is_there_twice_counts_once(journal: tuple, tmp_path: Path):
 @pytest.mark.parametrize(
     ("fixture", "number", "at", "value", "said"),
     [
-        ("measured", 1, ("result", 0, "scenario"), "other", "result[0].scenario = 'other': must be 'slow_hit'"),
+        ("measured", 1, ("result", 0, "scenario"), "other", "result[0].scenario = 'other': must be 'slow_collision'"),
         ("measured", 1, ("result", 0, "error_radii"), -1.0, "result[0].error_radii = -1.0: must be a number that is"),
         ("measured", 1, ("result", 0, "dt_s"), 0.5, "result[0].dt_s = 0.5: must divide"),
         ("measured", 1, ("result", 0, "substeps"), 3, "must have a row for each step that the task names"),

@@ -26,7 +26,7 @@ ENGINES = {name: CONTROLS[name] for name in ("aborts:control", "turnstonan:contr
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of one good engine and two bad ones, at one step."""
     folder = tmp_path_factory.mktemp("run")
-    plan = Plan(["slow_hit"], ENGINES, seed=0, dts=[1 / 60], full=False, timings=0, command="test")
+    plan = Plan(["slow_collision"], ENGINES, seed=0, dts=[1 / 60], full=False, timings=0, command="test")
     with Journal(folder) as journal, Progress() as progress:
         carry_out(plan, Means(workers=2), journal, progress)
     return folder

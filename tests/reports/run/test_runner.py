@@ -30,7 +30,7 @@ from tests.reports.run.control_engines import (
     row,
 )  # fmt: skip
 
-SCENE = "slow_hit"  # 240 samples of 1/60 s; at one step a sample the 100th step is due after 99 of them
+SCENE = "slow_collision"  # 240 samples of 1/60 s; at one step a sample the 100th step is due after 99 of them
 GOOD = {f"good{i}:control": row(Controlled) for i in range(24)}
 
 
@@ -139,7 +139,7 @@ def test_an_engine_that_leaves_state_gets_a_process_a_cell():
 @pytest.mark.parametrize("name", ENGINES)
 def test_no_engine_remembers_what_it_played(name: str):
     """After other scenes in the same process a cell has the bits it has as the first, so no row has `leaves_state`."""
-    first, *others = ("slow_hit", "line_gas", "falling_box")
+    first, *others = ("slow_collision", "line_gas", "falling_box")
     tasks = {
         key: partial(play_here, Cell(scene, 0, name, 1), ENGINES[name], replace(scenario(scene), truth=None))
         for key, scene in (("before", first), *((other, other) for other in others), ("after", first))
@@ -167,7 +167,7 @@ def test_a_cluster_without_its_extra_is_one_clear_sentence(monkeypatch: pytest.M
 
 
 def test_a_trajectory_comes_back_from_its_file_bit_for_bit(tmp_path: Path):
-    """The .npz holds every array of the trajectory and its hits."""
+    """The .npz holds every array of the trajectory and its collisions."""
     here = play_cell(
         Cell("line_gas", 0, "pymunk:matched", 1), ENGINES["pymunk:matched"], scenario("line_gas")
     ).trajectory

@@ -43,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of two engines in a scene with thrusts and one without an answer."""
     folder = tmp_path_factory.mktemp("tables")
     engines = {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")}
-    plan = Plan(["slow_hit", "cradle_touching"], engines, seed=0, dts=[], full=False, timings=0, command="test")
+    plan = Plan(["slow_collision", "cradle_touching"], engines, seed=0, dts=[], full=False, timings=0, command="test")
     with Journal(folder) as journal, Progress() as progress:
         carry_out(plan, Means(workers=1), journal, progress)
     return folder
@@ -153,22 +153,22 @@ def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
 ):
     """It says what was raised, in the worker; the scene is held to no answer; nothing of it is kept."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
-    for path in (copy / "compared").glob("slow_hit*.csv"):
+    for path in (copy / "compared").glob("slow_collision*.csv"):
         path.unlink()
     monkeypatch.setattr(shares, "share_of", fails)
     archive = Archive.read(copy)
     made = make_tables(archive, silent)
     table = pd.read_csv(copy / "deviations.csv")
-    said = table[table.scenario == "slow_hit"]
+    said = table[table.scenario == "slow_collision"]
     one, other = comparisons_of(archive, made)
 
-    assert made.unjudged == {"slow_hit": WHY}
+    assert made.unjudged == {"slow_collision": WHY}
     assert set(said.metric) == {"status"}
     assert set(said.note) == {f"not judged: {WHY}"}
     assert len(said) == len(one.runs)
     assert (one.truth, one.scenario.without_truth) == (None, WHY)
     assert len(other.table) == (table.scenario == "cradle_touching").sum() > len(other.runs)
-    assert not list((copy / "compared").glob("slow_hit*.csv"))
+    assert not list((copy / "compared").glob("slow_collision*.csv"))
 
 
 WHY = "the comparison could not be made: error: ZeroDivisionError: of a metric"
@@ -179,18 +179,18 @@ def test_what_took_too_long_is_had_again_only_with_more_time(folder: Path, tmp_p
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     whole = (copy / "deviations.csv").read_bytes() if (copy / "deviations.csv").exists() else b""
     archive = replace(Archive.read(copy), records=[r | {"timeout_s": 5.0} for r in Archive.read(copy).records])
-    (records,) = [records for scene, records in tables.ordered(archive).items() if scene == "slow_hit"]
+    (records,) = [records for scene, records in tables.ordered(archive).items() if scene == "slow_collision"]
     put_answer(answer_file(copy, records), no_answer(Failure("timeout", "stopped after 5 s"), 5.0))
     without = make_tables(archive, silent)
     table = pd.read_csv(copy / "deviations.csv")
-    said = table[(table.scenario == "slow_hit") & (table.metric == "status")]
+    said = table[(table.scenario == "slow_collision") & (table.metric == "status")]
     again = make_tables(replace(archive, records=[r | {"timeout_s": 6.0} for r in archive.records]), silent)
 
-    assert without.unjudged == {"slow_hit": "the exact answer took longer than 5 s (--timeout)"}
+    assert without.unjudged == {"slow_collision": "the exact answer took longer than 5 s (--timeout)"}
     assert set(said.versus) == {"truth"}
     assert len(said) == len(records)
-    assert "truth" not in set(table[(table.scenario == "slow_hit") & (table.metric != "status")].versus)
-    assert len(table[(table.scenario == "slow_hit") & (table.metric != "status")])  # laws and engines are judged
+    assert "truth" not in set(table[(table.scenario == "slow_collision") & (table.metric != "status")].versus)
+    assert len(table[(table.scenario == "slow_collision") & (table.metric != "status")])  # laws and engines are judged
     assert again.unjudged == {}
     assert whole in (b"", (copy / "deviations.csv").read_bytes())
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Hit
+from adapters.engine import Collision
 from scenarios.model import Array, Scene, State
 
 
 class Sleeper:
-    """Takes a fixed time a step, and much longer to build, to read, and to hear of hits; it moves nothing."""
+    """Takes a fixed time a step, and much longer to build, to read, and to hear of collisions; it moves nothing."""
 
     listening, wrapping = True, 0.0
 
@@ -38,7 +38,7 @@ class Sleeper:
         """Must not be called while time is taken."""
         raise AssertionError("read while timed")
 
-    def hits(self) -> list[Hit]:
+    def collisions(self) -> list[Collision]:
         """None."""
         return []
 

@@ -101,7 +101,7 @@ def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
     assert rows.loc[UNEXPLAINED].position_radii <= 1e-12
 
 
-def test_every_engine_is_explained_to_a_thousandth_in_a_hit_and_a_bounce():
+def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce():
     """All eight with known habits; float32 alone leaves less than a thousandth of an engine's error."""
     scenes = ("head_on_equal_e09", "wall_to_wall")
     rows = pd.DataFrame([row for scene in scenes for name in HABITS for row in budget_of(scene, 0, name, 4)])
@@ -113,8 +113,8 @@ def test_every_engine_is_explained_to_a_thousandth_in_a_hit_and_a_bounce():
     assert (wide[DIGITS].dropna() > 0).all()
 
 
-def test_a_scene_is_followed_while_late_hits_alone_are_near_the_truth():
-    """The asteroids are not played to the end of their truth; one hit head-on is."""
+def test_a_scene_is_followed_while_late_collisions_alone_are_near_the_truth():
+    """The asteroids are not played to the end of their truth; one collision head-on is."""
     at, whole = followed("asteroids", 0, 20), followed("head_on_equal_e09", 0, 4)
 
     assert 0 < at.truth.t[-1] < 9
@@ -141,9 +141,9 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(monkeypatch
 def test_tables_have_the_largest_part_and_bars_by_decades():
     """Bars: full at a radius, empty at a millionth; a part that is nothing for anybody has no column."""
     rows = pd.DataFrame(
-        [row for name in ("pymunk:shipped", "box2d:matched") for row in budget_of("slow_hit", 0, name, 4)]
+        [row for name in ("pymunk:shipped", "box2d:matched") for row in budget_of("slow_collision", 0, name, 4)]
     )
-    table, overview = budget_tables.of_scene(rows, "slow_hit"), budget_tables.overview(rows)
+    table, overview = budget_tables.of_scene(rows, "slow_collision"), budget_tables.overview(rows)
     bars: Array = np.array([budget_tables.cell(value).bar for value in (2.0, 1.0, 1e-3, 1e-6, 1e-9, 0.0, np.nan)])
 
     assert bars == pytest.approx([1, 1, 0.5, 0, 0, 0, 0])

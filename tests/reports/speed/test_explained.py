@@ -69,7 +69,7 @@ def test_the_budget_itself_tells_how_far_it_goes():
 
 def test_a_row_has_the_error_and_what_is_left_of_the_budget():
     """As the parts have them."""
-    rows = pd.DataFrame(budget_of("slow_hit", 0, "box2d:matched", 4), columns=budget.COLUMNS)
+    rows = pd.DataFrame(budget_of("slow_collision", 0, "box2d:matched", 4), columns=budget.COLUMNS)
     parts = rows.set_index("part").position_radii
     row = explained.explained(rows).iloc[0]
 

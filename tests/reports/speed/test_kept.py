@@ -23,15 +23,15 @@ from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 
-TASK = ("error", "scene", "slow_hit", 0, "reference:exercise", "", 1)
+TASK = ("error", "scene", "slow_collision", 0, "reference:exercise", "", 1)
 FAILED = {
-    "scenario": "slow_hit", "seed": 0, "engine": "reference", "profile": "exercise", "dt_s": scenario("slow_hit").dt(1),
-    "substeps": 1, "status": "error", "reason": "no", "until_s": 0.5, "duration_s": scenario("slow_hit").duration,
+    "scenario": "slow_collision", "seed": 0, "engine": "reference", "profile": "exercise", "dt_s": scenario("slow_collision").dt(1),
+    "substeps": 1, "status": "error", "reason": "no", "until_s": 0.5, "duration_s": scenario("slow_collision").duration,
     "error_radii": np.inf, "change_radii": np.nan,
 }  # fmt: skip
-SCENES = {"slow_hit": scenario("slow_hit")}
+SCENES = {"slow_collision": scenario("slow_collision")}
 HEADER: dict[str, Any] = {
-    "scenes": ["slow_hit"], "files": {}, "engines": ["reference:exercise"], "effort": {}, "whole": False, "seed": 0,
+    "scenes": ["slow_collision"], "files": {}, "engines": ["reference:exercise"], "effort": {}, "whole": False, "seed": 0,
     "versions": {}, "machine": {"system": "", "architecture": "", "processor": "", "cores": 1},
 }  # fmt: skip
 
@@ -62,7 +62,7 @@ def test_what_was_measured_of_a_solver_that_was_saved_since_is_of_something_else
     """Its rows would stand beside those of another text under one name."""
     solver = tmp_path / "solver.js"
     solver.write_text("function integrate(sphere, dt) {}")
-    plan = Plan(("slow_hit",), [f"{solver}:own"], QUICK, 0, 1, whole=False)
+    plan = Plan(("slow_collision",), [f"{solver}:own"], QUICK, 0, 1, whole=False)
     header: dict[str, Any] = {key: HEADER[key] for key in ("seed", "versions", "machine")}
     read_row(f"{solver}:own")
     with Journal(tmp_path) as journal:
@@ -89,7 +89,7 @@ def test_a_log_gets_a_line_now_and_then(
     with Progress() as progress:
         progress.start(2, 2, "error")
         progress.done("error: free_fall")
-        progress.done("error: slow_hit")
+        progress.done("error: slow_collision")
 
     assert capsys.readouterr().err.count(" of 2, ") == lines
 

@@ -28,7 +28,7 @@ DT = 0.01 / np.array(RUNGS)
 
 
 def measured(order: int, **how: float):
-    """dt, errors and changes of a method of known error, played through a scene without hits in between."""
+    """dt, errors and changes of a method of known error, played through a scene without collisions in between."""
     rows = ladder.errors_of("near_miss", 0, "late:own", partial(Late, order, **how), RUNGS)
     columns = (np.array([row[name] for row in rows]) for name in ("dt_s", "error_radii", "change_radii"))
     dt, errors, changes = columns
@@ -85,7 +85,7 @@ def test_too_few_points_are_no_order():
 
 
 def test_the_slope_of_many_draws_has_an_interval_that_holds_the_order():
-    """Errors c dt with c drawn anew for every seed and dt, as the phase of a hit in its step is."""
+    """Errors c dt with c drawn anew for every seed and dt, as the phase of a collision in its step is."""
     rng = np.random.default_rng(0)
     errors = rng.uniform(0.2, 1.8, (64, len(DT))) * DT
     found = order_of(DT, errors, np.full(errors.shape, 1.0))

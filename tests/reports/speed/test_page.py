@@ -27,7 +27,7 @@ from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
-from scenarios.truth.exact import CLOSED_FORM, HIT_BY_HIT
+from scenarios.truth.exact import CLOSED_FORM, COLLISION_BY_COLLISION
 from tests.reports.page.browsing import opened, overhang
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
@@ -102,7 +102,7 @@ def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Result
 
 
 def test_the_front_of_a_chart_is_the_event_driven_player(results: Results):
-    """In a head-on hit it is both cheapest and exact, so that nobody else is on the front."""
+    """In a head-on collision it is both cheapest and exact, so that nobody else is on the front."""
     points = results.points[results.points.scenario == SCENES[0]]
     drawn = {trace.name: trace for trace in charts.speed(points).data}
     front, steps = drawn[charts.FRONT], drawn[charts.FRONT_OF_STEPS]
@@ -185,13 +185,13 @@ def test_a_line_a_dial_goes_over_all_its_values_from_cheap_to_dear(results: Resu
 
 
 def test_the_cheapest_model_is_named_for_every_scene(results: Results):
-    """A closed form where the truth is one; the asteroids are answered hit by hit."""
+    """A closed form where the truth is one; the asteroids are answered collision by collision."""
     models = results.models.set_index("scenario")
 
     assert models.loc[SCENES[0]].truth == CLOSED_FORM
-    assert models.loc["asteroids"].truth == HIT_BY_HIT
+    assert models.loc["asteroids"].truth == COLLISION_BY_COLLISION
     assert models.loc["asteroids"].player == "event_driven:float64"
-    assert set(models.model) <= {"closed form", "hit to hit, float64"}
+    assert set(models.model) <= {"closed form", "collision to collision, float64"}
 
 
 def test_figures_come_back_as_they_were_kept(results: Results, tmp_path: Path):

@@ -32,7 +32,7 @@ def table(samples: list[Sample]) -> pd.DataFrame:
 
 
 def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
-    """Loading takes five times as long as a step, and hearing of hits fifty times: neither is in it."""
+    """Loading takes five times as long as a step, and hearing of collisions fifty times: neither is in it."""
     held = ladder.held("near_miss", 0).scenario
     steps = held.samples
     samples = ladder.times_of("near_miss", 0, {("sleeper:own", 1, 0): partial(Sleeper, EACH)}, 3, 1.0)

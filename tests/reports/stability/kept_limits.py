@@ -86,7 +86,7 @@ def agrees(one: Kept | Limit, other: Kept | Limit) -> bool:
 IN_README = {
     "tunnelling_head_on": "step displacement / radius, head-on collision",
     "tunnelling_thin_wall": "the same, thin wall",
-    "slow_hit": "closing speed at e = 1, m/s",
+    "slow_collision": "closing speed at e = 1, m/s",
     "scale_down": "a scene made smaller",
     "far_from_origin": "distance from the origin, m",
     "spin": "rotation in a step, rad",

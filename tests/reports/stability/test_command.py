@@ -24,7 +24,7 @@ from tests.reports.terminal.command_line import crosscheck
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
 ROOT = Path(__file__).parents[3]
-ASKED = ("slow_hit", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_break")
+ASKED = ("slow_collision", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_break")
 
 
 @pytest.fixture(scope="module")
@@ -43,10 +43,10 @@ def test_the_table_of_limits_is_a_file(atlas: Path):
     table = pd.read_csv(atlas / "limits.csv")
 
     assert list(table.columns) == list(COLUMNS)
-    assert set(table.case) == {"slow_hit", "tunnelling_thin_wall", "scenes/two.toml:speed"}
-    row = table[(table.case == "slow_hit") & (table.engine == "box2d")].iloc[0]
+    assert set(table.case) == {"slow_collision", "tunnelling_thin_wall", "scenes/two.toml:speed"}
+    row = table[(table.case == "slow_collision") & (table.engine == "box2d")].iloc[0]
     assert row.fails_at < 1.0 < row.works_at
-    assert (row.unit, row.predicate, row.seeds) == ("m/s", "restitution off", CASES["slow_hit"].runs)
+    assert (row.unit, row.predicate, row.seeds) == ("m/s", "restitution off", CASES["slow_collision"].runs)
     assert set(pd.read_csv(atlas / "maps.csv")["map"]) == {"dt_and_speed"}
 
 
@@ -54,8 +54,8 @@ def test_the_first_failing_run_is_kept(atlas: Path):
     """A file for each limit, none where nothing failed."""
     found = {path.name for path in (atlas / "trajectories").iterdir()}
 
-    assert "slow_hit.box2d-shipped.npz" in found
-    assert "slow_hit.pymunk-matched.npz" not in found
+    assert "slow_collision.box2d-shipped.npz" in found
+    assert "slow_collision.pymunk-matched.npz" not in found
 
 
 def test_the_same_journal_gives_the_same_table(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -71,15 +71,17 @@ def test_the_same_journal_gives_the_same_table(atlas: Path, tmp_path: Path, monk
 def test_what_has_ended_is_not_played_again(atlas: Path, monkeypatch: pytest.MonkeyPatch):
     """Of an interrupted run of the same versions all is kept; of another version nothing."""
     monkeypatch.chdir(ROOT / "tests" / "data")  # where its scene file is
-    plan = Plan(["slow_hit", "grazing"], ["dt_and_speed"], [], ["box2d:shipped", "pymunk:matched"], "quick", 1, "")
+    plan = Plan(
+        ["slow_collision", "grazing"], ["dt_and_speed"], [], ["box2d:shipped", "pymunk:matched"], "quick", 1, ""
+    )
     had, done = done_before(atlas, plan)
 
     kept = {(task.name, task.player) for task in done}
-    assert ("slow_hit", "box2d:shipped") in kept
+    assert ("slow_collision", "box2d:shipped") in kept
     assert ("dt_and_speed", "pymunk:matched") in kept
     assert all(task.name != "grazing" for task in done)
     assert set(done) < set(tasks_of(plan))
-    assert Task("limit", "slow_hit", "box2d:shipped", "full") not in done
+    assert Task("limit", "slow_collision", "box2d:shipped", "full") not in done
     journal = (atlas / "journal.jsonl").read_text().splitlines()
     header = json.loads(journal[0])
     header["header"]["versions"]["pymunk"] = "6"
@@ -95,7 +97,7 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
     shutil.copytree(atlas, part)
     before = (part / JOURNAL).read_bytes()
     players = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
-    again = crosscheck("stability", "slow_hit", *players, "--out", "out", cwd=tmp_path)
+    again = crosscheck("stability", "slow_collision", *players, "--out", "out", cwd=tmp_path)
     other = crosscheck("stability", "spin", *players, "--out", "out", "--resume", cwd=tmp_path)
 
     assert (again.returncode, other.returncode) == (2, 2)
@@ -107,12 +109,15 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["slow_hits"], "case 'slow_hits' is not known; did you mean slow_hit"),
+        (["slow_collisions"], "case 'slow_collisions' is not known; did you mean slow_collision"),
         (["scenes/two.toml", "--vary", "mass"], "--vary 'mass' is not known; did you mean mass_ratio?"),
         (["--vary", "dt"], "--vary dt: varies a scene file, and none is named; name FILE.toml"),
         (["nowhere.toml"], "nowhere.toml: no such file or directory"),
         (["--engine", "bullet"], "engine 'bullet' is not known"),
-        (["slow_hit", "--engine", "solvers/correct/plain.py"], "a file is not driven to its limits: crosscheck check"),
+        (
+            ["slow_collision", "--engine", "solvers/correct/plain.py"],
+            "a file is not driven to its limits: crosscheck check",
+        ),
         (["scenes/still.toml", "--vary", "mass_ratio"], "still.toml: --vary mass_ratio: no disk moves"),
         (["scenes/still.toml", "--vary", "dt"], "still.toml: --vary dt: it lasts less than ten steps of an eighth"),
     ],
@@ -148,7 +153,7 @@ def test_a_failure_is_one_click_away_and_opens_just_before_it(page: Page):
     )
 
     assert opens < event <= end
-    assert "the hit is missed" in section.locator(".says").inner_text()
+    assert "the collision is missed" in section.locator(".says").inner_text()
     page.evaluate("() => players['tunnelling_thin_wall'].seek(players['tunnelling_thin_wall'].until)")
     truth, played = page.evaluate(
         "() => ['truth', 'pymunk:matched'].map((name) => players['tunnelling_thin_wall'].positions(name)[0][0])"
@@ -181,7 +186,7 @@ def test_every_case_of_the_issue_is_there():
     """The names under which the eighteen cases stand."""
     wanted = {
         "tunnelling_head_on", "tunnelling_offset", "tunnelling_thin_wall", "tunnelling_thick_wall", "near_miss",
-        "dt_gas_of_100", "bounce_drift", "slow_hit", "scale_up", "scale_down", "far_from_origin", "dense_gas",
+        "dt_gas_of_100", "bounce_drift", "slow_collision", "scale_up", "scale_down", "far_from_origin", "dense_gas",
         "long_gas", "long_wrapped_gas",
         "mass_ratio", "heavy_on_light", "heavy_in_gas", "column", "overlap_energy", "overlap_recovery", "overfull_box",
         "pile_comes_to_rest", "ball_comes_to_rest", "grazing", "spin", "stiff_push", "insertion_order", "restart",

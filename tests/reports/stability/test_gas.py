@@ -60,7 +60,7 @@ def test_the_virial_series_is_that_of_clisby_and_mccoy(packing: float, z: float)
 
 
 def test_in_a_large_box_the_rate_is_enskogs_and_the_pressure_that_of_the_bulk():
-    """4 / sqrt(pi) (Z - 1) sqrt(kT / m) / sigma hits a disk; a wall of a million diameters is no matter."""
+    """4 / sqrt(pi) (Z - 1) sqrt(kT / m) / sigma collisions a disk; a wall of a million diameters is no matter."""
     radius, packing, n = 0.5, 0.3, 10**12
     size = np.full(2, sqrt(n * pi * radius**2 / packing))
     found, z = gas_in_box(n, radius, size, 1.0), compressibility(packing)
@@ -79,9 +79,9 @@ def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literat
     for run in range(2):
         scenario = gas(packing, run, rows=10, columns=10, steps=8000, every=80)
         one, ought = played(EXACT, scenario), literature(scenario)
-        hits = one.collisions
-        rates.append(counted(one, hits.j >= 0, np.ones(len(hits))) / ought.rate)
-        forces.append(counted(one, hits.j < 0, hits.impulse) / ought.force)
+        collisions = one.collisions
+        rates.append(counted(one, collisions.j >= 0, np.ones(len(collisions))) / ought.rate)
+        forces.append(counted(one, collisions.j < 0, collisions.impulse) / ought.force)
     scene = scenario.scene
     size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
     temperature = (scene.velocity**2).sum() / 2 / scene.n
@@ -96,7 +96,7 @@ def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literat
 
 
 def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
-    """All of it, for two draws; a gas hotter by a fifth hits more often by a tenth."""
+    """All of it, for two draws; a gas hotter by a fifth collisions more often by a tenth."""
     for run in range(2):
         scenario = CASES["thermometer"].scene(0.4, run)
         assert not judge(WRONG_GAS, scenario, play_as(EXACT, scenario)).failed
@@ -154,14 +154,15 @@ def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_
         assert verdict(MOMENTUM_DRIFTS, scenario, replace(one, velocity=frozen(velocity))).failed
 
 
-def test_finding_hits_late_costs_a_dense_gas_its_rate_and_its_pressure():
-    """At packing 0.6 an engine that waits for the end of a step hits a tenth too seldom; in order within it, not."""
+def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
+    """At packing 0.6 an engine that waits for the end of a step collisions a tenth too seldom; in order within it,
+    not."""
     scenario = CASES["thermometer"].scene(0.6, 0)
     late, in_order = (judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in LATE_AND_NOT)
     ought, one = literature(scenario), played(LATE_AND_NOT[0], scenario)
-    hits = one.collisions
-    rate = counted(one, hits.j >= 0, np.ones(len(hits))).mean() / ought.rate
-    pressure = counted(one, hits.j < 0, hits.impulse).mean() / ought.force
+    collisions = one.collisions
+    rate = counted(one, collisions.j >= 0, np.ones(len(collisions))).mean() / ought.rate
+    pressure = counted(one, collisions.j < 0, collisions.impulse).mean() / ought.force
 
     assert rate == pytest.approx(0.9, abs=0.02)
     assert pressure == pytest.approx(0.9, abs=0.02)
@@ -189,7 +190,7 @@ def test_pymunk_loses_energy_by_impulses_that_a_contact_inherits():
 
 
 @pytest.mark.parametrize("profile", ["shipped", "matched"])
-def test_what_pymunk_tells_of_its_hits_is_what_it_gives_only_if_it_forgets_contacts(profile: str):
+def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets_contacts(profile: str):
     """A heavy disk drives a light one against a wall: in all, impulses of twice the heavy one's momentum, once each."""
     scenario = SCENARIOS["galperin_314"]()
     dt = scenario.dt(4)
@@ -197,8 +198,8 @@ def test_what_pymunk_tells_of_its_hits_is_what_it_gives_only_if_it_forgets_conta
     for steps in (3, 1):
         run = play(Pymunk(profile, collision_persistence=steps), "pymunk:changed", scenario, dt)
         assert run.trajectory is not None
-        hits, velocity = run.trajectory.collisions, run.trajectory.velocity[:, :, 0]
-        told[steps] = hits.impulse[hits.j >= 0].sum() / (scenario.scene.mass[1] * np.ptp(velocity[:, 1]))
+        collisions, velocity = run.trajectory.collisions, run.trajectory.velocity[:, :, 0]
+        told[steps] = collisions.impulse[collisions.j >= 0].sum() / (scenario.scene.mass[1] * np.ptp(velocity[:, 1]))
 
     assert told[1] == pytest.approx(1.0, abs=1e-9)
     assert told[3] > 10

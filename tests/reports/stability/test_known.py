@@ -42,7 +42,7 @@ def assert_fails_at(case: str, player: str, value: float, slack: float = 1.0) ->
     ("case", "value"),
     [("tunnelling_head_on", 2.0), ("tunnelling_offset", 2 * sqrt(1 - 0.7**2)), ("tunnelling_thin_wall", 1.0)],
 )
-def test_a_hit_is_missed_from_where_a_step_may_jump_over_the_approach(case: str, value: float, player: str):
+def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(case: str, value: float, player: str):
     """v dt > 2R between disks head-on, 2R sqrt(1 - (b/2R)2) off centre, R at a thin wall."""
     assert_fails_at(case, player, value)
 
@@ -61,7 +61,7 @@ def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
     )
 
 
-def test_only_the_speculative_margin_invents_hits():
+def test_only_the_speculative_margin_invents_collisions():
     """Box2D 3.1, within four slops: as shipped 0.02 m, 0.04 of the sum of the radii; nobody else."""
     found = {player: limit("near_miss", player).verdict for player in (*DISCRETE, *PARTNERS)}
 
@@ -74,9 +74,9 @@ def test_only_the_speculative_margin_invents_hits():
 @pytest.mark.parametrize("box", ["box2d", "box2d_v3"])
 def test_the_threshold_is_1_m_per_s_and_goes_with_the_matched_profile(box: str):
     """Closing slower than that is played as inelastic; a scene of a quarter of the size closes at it."""
-    assert_fails_at("slow_hit", f"{box}:shipped", 1.0)
+    assert_fails_at("slow_collision", f"{box}:shipped", 1.0)
     assert_fails_at("scale_down", f"{box}:shipped", 0.25)
-    assert limit("slow_hit", f"{box}:matched").verdict == "does not fail"
+    assert limit("slow_collision", f"{box}:matched").verdict == "does not fail"
     assert limit("scale_down", f"{box}:matched").verdict == "does not fail"
 
 
@@ -175,7 +175,7 @@ def test_a_pair_keeps_its_velocities_up_to_a_mass_ratio_of_1e8():
 
 def test_a_wrong_threshold_would_be_noticed():
     """The negative control: a scene that closes at twice the speed does not fail at 1 m/s."""
-    case = CASES["slow_hit"]
+    case = CASES["slow_collision"]
     faster = replace(case, scene=lambda x, run: case.scene(2 * x, run))
     found = Search(faster, "box2d:shipped", QUICK).limit()
 
@@ -199,7 +199,7 @@ GAPS_TRIED = (0.0, 0.01, 0.1)
         ("touching_break", "box2d_v3:matched", ("none", "none", PAIRS)),
     ],
 )
-def test_touching_disks_are_hit_after_the_law_that_the_engine_is_known_for(scene: str, player: str, words: tuple):
+def test_touching_disks_are_struck_after_the_law_that_the_engine_is_known_for(scene: str, player: str, words: tuple):
     """engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to neither.
 
     From a gap on that is wider than the way in a step, a thirty-second of a radius, everybody plays pair after pair.

@@ -14,7 +14,7 @@ from reports.stability.search import Search
 from tests.reports.stability.kept_limits import Kept, agrees, in_words, kept
 
 KEPT = kept()
-FAST = ("slow_hit", "scale_up", "scale_down", "far_from_origin", "spin", "near_miss", "restitution",
+FAST = ("slow_collision", "scale_up", "scale_down", "far_from_origin", "spin", "near_miss", "restitution",
         "tunnelling_head_on", "tunnelling_thin_wall")  # fmt: skip
 CHANGED = (
     "the quick form is wrong, or an engine or a case has changed: look at it, then keep the new limits: "
@@ -74,7 +74,7 @@ def test_every_limit_has_a_reason_and_an_untested_one_is_called_likely():
 @pytest.mark.parametrize("factor", [0.8, 1.25])
 def test_an_engine_that_fails_earlier_or_later_is_noticed(factor: float):
     """The negative control: a limit moved by a quarter either way, and one that is gone."""
-    row = next(row for row in KEPT if (row.case, row.player) == ("slow_hit", "box2d:shipped"))
+    row = next(row for row in KEPT if (row.case, row.player) == ("slow_collision", "box2d:shipped"))
     now = quick(row.case, row.player)
 
     assert agrees(now, row)
@@ -109,7 +109,7 @@ def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(player:
 
 def test_a_limit_that_is_not_the_only_edge_is_marked():
     """In a table the first failure, and a star."""
-    row = next(row for row in KEPT if row.case == "slow_hit" and row.player == "box2d:shipped")
+    row = next(row for row in KEPT if row.case == "slow_collision" and row.player == "box2d:shipped")
 
     assert row.monotone
     assert in_words(row._replace(monotone=False)) == in_words(row) + "*"

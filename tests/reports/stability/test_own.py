@@ -42,7 +42,7 @@ def found(what: str, player: str, scene: str = "two.toml") -> Limit:
         ("offset", "box2d_v3:matched", "positions are float32"),
         ("scale", "box2d:shipped", "threshold of restitution"),
         ("scale", "box2d_v3:shipped", "cap on speed"),
-        ("speed", "reference:exercise", "a hit waits for the end of its step"),
+        ("speed", "reference:exercise", "a collision waits for the end of its step"),
     ],
 )
 def test_a_reason_is_what_the_failing_run_works_without(what: str, player: str, tells: str):
@@ -55,22 +55,24 @@ def test_a_reason_is_what_the_failing_run_works_without(what: str, player: str, 
 
 
 def test_a_threshold_shows_where_the_scene_closes_at_it():
-    """Disks that meet at 2 m/s meet at less than 1 m/s in a scene half as large; later a hit is missing for it."""
+    """Disks that meet at 2 m/s meet at less than 1 m/s in a scene half as large; later a collision is missing for
+    it."""
     assert 0 < found("scale", "box2d:shipped").fails_at < 0.5
     assert found("scale", "box2d:matched").verdict == "does not fail"
 
 
 def test_where_nothing_cures_it_a_twin_may_tell_and_else_it_is_called_not_known():
-    """Where the step is what is varied, a finer one is no proof: late hits alone have the limit. Or nothing helps."""
+    """Where the step is what is varied, a finer one is no proof: late collisions alone have the limit. Or nothing
+    helps."""
     path = str(SCENES / "two.toml")
     search = Search(case_of_file(path, "dt"), "pymunk:matched", QUICK)
     [limit] = explained([tried_out(search, replace(search.limit(), case=f"{path}:dt"))])
-    assert limit.why == "a hit waits for the end of its step"
-    assert limit.tested == "the reference with late hits and nothing else has this limit"
+    assert limit.why == "a collision waits for the end of its step"
+    assert limit.tested == "the reference with late collisions and nothing else has this limit"
 
     failing = limit.failing
     assert failing is not None
-    nothing = replace(limit, case="x.toml:speed", twin="", trials=(replace(failing, broken="hits"),))
+    nothing = replace(limit, case="x.toml:speed", twin="", trials=(replace(failing, broken="collisions"),))
     reason, _, tested = why_played(nothing, "speed")
     assert reason.startswith(NOT_KNOWN)
     assert "in steps of an eighth" in reason
@@ -126,13 +128,14 @@ def test_every_change_is_tried_on_somebody():
         assert any(cure.fits(player, what) for player in players for what in ("dt", "speed", "offset")), name
 
 
-def test_a_hit_that_nobody_makes_fails_however_near_to_the_start_it_is():
-    """Within two steps of the start `match` lets it pass; a pair that should hit, and never does, is a wrong hit."""
+def test_a_collision_that_nobody_makes_fails_however_near_to_the_start_it_is():
+    """Within two steps of the start `match` lets it pass; a pair that should collision, and never does, is a wrong
+    collision."""
     path = str(SCENES / "two.toml")
     search = Search(case_of_file(path, "speed"), "reference:exercise", QUICK)
     fast = search.trial(1000.0)
 
-    assert (fast.works, fast.broken) == (False, "hits")
+    assert (fast.works, fast.broken) == (False, "collisions")
     assert search.trial(1.0).works
     assert Search(case_of_file(path, "speed"), "event_driven:float64", QUICK).trial(1000.0).works
 
@@ -149,7 +152,7 @@ def test_a_disk_that_float32_keeps_where_it_is_fails():
 
 
 @pytest.mark.parametrize("x", [0.00294, 0.0167])
-def test_a_disk_that_is_hit_twice_between_two_samples_is_not_called_stuck(x: float):
+def test_a_disk_that_is_struck_twice_between_two_samples_is_not_called_stuck(x: float):
     """In the cradle it leaves as it came, at rest or not, and has gone less than that."""
     trial = Search(CASES["dt_cradle_with_gaps"], "box2d_v3:matched", FULL).trial(x)
     assert trial.works, trial.event

@@ -22,8 +22,8 @@ from reports.run.runner import run_all
 from reports.run.worker_process import Failure
 from reports.stability.atlas import Task, failed, limit_from, row_of
 from reports.stability.cases import CASES
+from reports.stability.cases_collisions import at_speed
 from reports.stability.cases_gas import gas
-from reports.stability.cases_hits import at_speed
 from reports.stability.explain import explained
 from reports.stability.failures import AFTER, BEFORE, keep_failure, kept_failure, near, part_of
 from reports.stability.limits import FULL, QUICK, Case, Limit, Trial
@@ -202,7 +202,8 @@ def test_a_value_is_left_at_its_first_failure_but_at_the_limit_all_is_played():
 
 
 def test_one_phase_alone_would_overlook_the_limit():
-    """The negative control of the phases: with hits in the middle of a step alone, tunnelling begins at 4, not 2."""
+    """The negative control of the phases: with collisions in the middle of a step alone, tunnelling begins at 4, not
+    2."""
     one = CASES["tunnelling_head_on"]
     blind = replace(one, scene=lambda x, _run: at_speed(x, 1), runs=1)
 
@@ -212,7 +213,7 @@ def test_one_phase_alone_would_overlook_the_limit():
 
 def test_a_worker_that_dies_is_a_row_of_the_table():
     """The case is then known to have no result, and why."""
-    task = Task("limit", "slow_hit", "pymunk:matched", "quick")
+    task = Task("limit", "slow_collision", "pymunk:matched", "quick")
     [(_, failure)] = run_all({task: abort}, workers=1)
     assert isinstance(failure, Failure)
     limit = failed(task, failure)
@@ -232,8 +233,8 @@ def test_a_limit_comes_back_from_the_journal_as_it_was():
 
 def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
     """A prediction outside the bracket, or a switch that gets no farther, tests nothing."""
-    slow = Search(CASES["slow_hit"], "box2d:shipped", QUICK).limit()
-    free = Search(CASES["slow_hit"], "box2d:matched", QUICK).limit()
+    slow = Search(CASES["slow_collision"], "box2d:shipped", QUICK).limit()
+    free = Search(CASES["slow_collision"], "box2d:matched", QUICK).limit()
     elsewhere = replace(slow, works_at=4.0, fails_at=3.9)
     [both, _], [alone], [wrong, _] = explained([slow, free]), explained([slow]), explained([elsewhere, slow])
 
@@ -244,7 +245,8 @@ def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
 
 
 def test_of_a_failing_run_only_what_is_shown_is_kept_and_it_shows_the_same(tmp_path: Path):
-    """Of 4000 samples the 160 around the failure, with the hits among them; packed for the page as the whole would."""
+    """Of 4000 samples the 160 around the failure, with the collisions among them; packed for the page as the whole
+    would."""
     scenario = gas(0.3, 0, rows=3, columns=3, steps=4000, every=1)
     run = play_as("reference:exercise", scenario)
     whole = run.trajectory

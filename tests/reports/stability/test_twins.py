@@ -16,7 +16,7 @@ from reports.stability.explain import explained
 from reports.stability.limits import QUICK, Limit, Trial
 from reports.stability.players import PLAYERS, Player, play_as
 from reports.stability.search import Search
-from reports.stability.twins import HITS_WAIT, LATE, Twins, told, twin_of
+from reports.stability.twins import COLLISIONS_WAIT, LATE, Twins, told, twin_of
 from scenarios.catalogue import scenario
 
 
@@ -30,13 +30,13 @@ def found(case: str, player: str) -> tuple[Search, Limit]:
 @pytest.mark.parametrize(
     ("case", "player", "habits"),
     [
-        ("dt_head_on_equal_e09", "pymunk:matched", LATE),  # one hit, nothing pulls
+        ("dt_head_on_equal_e09", "pymunk:matched", LATE),  # one collision, nothing pulls
         ("dt_head_on_equal_e09", "box2d_v3:matched", LATE),
         ("dt_wall_to_wall", "reference:lesson", LATE),
         ("dt_wall_to_wall", "reference:exercise", PUSH_OUT),  # each time it is set onto the wall
         ("dt_wall_to_wall", "pymunk:shipped", RESTITUTION),
-        ("slow_hit", "box2d:shipped", RESTITUTION),  # its threshold of 1 m/s
-        ("slow_hit", "box2d_v3:shipped", RESTITUTION),
+        ("slow_collision", "box2d:shipped", RESTITUTION),  # its threshold of 1 m/s
+        ("slow_collision", "box2d_v3:shipped", RESTITUTION),
         ("restitution", "pymunk:shipped", RESTITUTION),  # e2 for e
         ("far_from_origin", "box2d:matched", "float32"),
         ("bounce_drift", "reference:exercise", FLIGHT),  # symplectic Euler
@@ -49,8 +49,8 @@ def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, player: str, h
 
 
 def test_a_twin_without_the_cause_does_not_have_the_limit():
-    """Negative control: neither late hits alone, nor all of the engine's habits but the threshold."""
-    search, limit = found("slow_hit", "box2d:shipped")
+    """Negative control: neither late collisions alone, nor all of the engine's habits but the threshold."""
+    search, limit = found("slow_collision", "box2d:shipped")
     twins = Twins.of(search, limit)
     assert twins is not None
     others = [habit for habit in twins.habits if habit.name != RESTITUTION]
@@ -71,7 +71,7 @@ def test_a_cause_that_no_habit_names_gives_no_twin(monkeypatch: pytest.MonkeyPat
         return engine
 
     monkeypatch.setitem(PLAYERS, "pymunk:matched", Player("pymunk:matched", halved))
-    search = Search(CASES["slow_hit"], "pymunk:matched", QUICK)
+    search = Search(CASES["slow_collision"], "pymunk:matched", QUICK)
     limit = search.limit()
 
     assert limit.verdict == "never works"
@@ -92,7 +92,7 @@ def test_where_a_player_works_nowhere_a_twin_must_read_as_much_as_it_does():
 
 @pytest.mark.parametrize("player", ["reference:ordered", "event_driven:float64"])
 def test_of_a_player_whose_habits_nobody_knows_there_is_no_twin(player: str):
-    """Late hits would be no news of one whose hits are not late."""
+    """Late collisions would be no news of one whose collisions are not late."""
     search = Search(CASES["overlap_recovery"], player, QUICK)
     assert twin_of(search, search.limit()) == ""
 
@@ -106,7 +106,7 @@ def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_twin():
     )
 
     assert "pushed out by a share a step" in kept.reason
-    assert kept.tested == "the reference with late hits and the player's flight and push-out has this limit"
+    assert kept.tested == "the reference with late collisions and the player's flight and push-out has this limit"
     assert other.reason == "friction takes speed along the contact"
     assert other.source == "the engine's default"
     assert untested.why.startswith("likely: overlaps are pushed out")
@@ -118,10 +118,10 @@ def test_every_habit_has_words(player: str):
     one = scenario("head_on_equal_e09")
     settings = play_as(player, replace(one, substeps=(4,))).settings
     names = [habit.name for habit in habits_of(player, settings, one.scene, one.dt(4)) if habit.switches]
-    limit = Limit("slow_hit", player, "quick", "never works", nan, 1.0, ())
+    limit = Limit("slow_collision", player, "quick", "never works", nan, 1.0, ())
 
-    assert told(replace(limit, twin=LATE))[0] == HITS_WAIT
+    assert told(replace(limit, twin=LATE))[0] == COLLISIONS_WAIT
     assert len(names) >= 2
     for name in names:
-        assert told(replace(limit, twin=name))[0] not in ("", HITS_WAIT)
+        assert told(replace(limit, twin=name))[0] not in ("", COLLISIONS_WAIT)
     assert told(replace(limit, twin=", ".join(names)))[0].count("; ") >= len(names) - 1

@@ -18,7 +18,17 @@ from scenarios.catalogue import SCENARIOS
 from tests.reports.terminal.command_line import crosscheck, process
 
 SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
-SMALL = ["run", "slow_hit", "near_miss", "--engine", "reference", "--engine", "pymunk:matched", "--dt", str(1 / 60)]
+SMALL = [
+    "run",
+    "slow_collision",
+    "near_miss",
+    "--engine",
+    "reference",
+    "--engine",
+    "pymunk:matched",
+    "--dt",
+    str(1 / 60),
+]
 
 
 @pytest.fixture(scope="module")
@@ -104,13 +114,13 @@ def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
     ("words", "said"),
     [
         (["run", "head_on_equl_e1"], "scenario 'head_on_equl_e1' is not known; did you mean head_on_equal_e1"),
-        (["run", "slow_hit", "--engine", "pymonk"], "engine 'pymonk' is not known; did you mean pymunk"),
-        (["run", "slow_hit", "--engine", "box2d:mached"], "did you mean box2d:matched"),
-        (["run", "slow_hit", "--dt", "0.007"], "--dt 0.007 does not fit slow_hit"),
-        (["run", "slow_hit", "--dt", "-1"], "--dt -1 does not fit slow_hit"),
-        (["run", "slow_hit", "--dt", "nan"], "--dt nan does not fit slow_hit"),
+        (["run", "slow_collision", "--engine", "pymonk"], "engine 'pymonk' is not known; did you mean pymunk"),
+        (["run", "slow_collision", "--engine", "box2d:mached"], "did you mean box2d:matched"),
+        (["run", "slow_collision", "--dt", "0.007"], "--dt 0.007 does not fit slow_collision"),
+        (["run", "slow_collision", "--dt", "-1"], "--dt -1 does not fit slow_collision"),
+        (["run", "slow_collision", "--dt", "nan"], "--dt nan does not fit slow_collision"),
         (["run", "nowhere.toml"], "nowhere.toml"),
-        (["run", "slow_hit", "--seed", "-1"], "--seed"),
+        (["run", "slow_collision", "--seed", "-1"], "--seed"),
         (["list", "engine"], "did you mean engines"),
         (["truth", "asteroid"], "scenario 'asteroid' is not known; did you mean asteroids"),
         (["truth", "nowhere.toml"], "nowhere.toml"),
@@ -129,14 +139,14 @@ def test_bad_input_is_one_clear_message_and_exit_2(words: list[str], said: str, 
 
 
 def test_truth_prints_the_exact_answer(tmp_path: Path):
-    """For people with the ends of its list of hits, for programs as JSON with all of them."""
+    """For people with the ends of its list of collisions, for programs as JSON with all of them."""
     told, listed = (crosscheck("truth", "line_gas", *more, cwd=tmp_path).stdout for more in ([], ["--events"]))
     for word in ("closed form", "horizon", "error bound", "258 more: --events"):
         assert word in told
     assert len(listed.splitlines()) > 272
     answer = json.loads(crosscheck("truth", "asteroids", "--json", cwd=tmp_path).stdout)
     assert answer["method"] in ("certified", "two-precision")
-    assert (answer["valid_until_s"], answer["reason"], len(answer["hits"])) == (10.0, "", 20)
+    assert (answer["valid_until_s"], answer["reason"], len(answer["collisions"])) == (10.0, "", 20)
 
 
 def test_truth_says_why_there_is_none(tmp_path: Path):
@@ -198,7 +208,7 @@ def test_all_faults_of_all_scene_files_come_at_once(tmp_path: Path):
 
 def test_a_scene_file_may_not_take_a_name_that_is_taken(tmp_path: Path):
     """Two scenes of one name would be one row in the table."""
-    (tmp_path / "mine.toml").write_text((SCENES / "two.toml").read_text().replace('"two-disks"', '"slow_hit"'))
+    (tmp_path / "mine.toml").write_text((SCENES / "two.toml").read_text().replace('"two-disks"', '"slow_collision"'))
     done = crosscheck("run", "mine.toml", cwd=tmp_path)
 
     assert done.returncode == 2
@@ -222,7 +232,11 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
     ("words", "file", "said"),
     [
         (SMALL, "limits.csv", "holds limits.csv, and no made.json says that crosscheck run made it"),
-        (["stability", "slow_hit"], "runs.csv", "holds runs.csv, and no made.json says that crosscheck stability made"),
+        (
+            ["stability", "slow_collision"],
+            "runs.csv",
+            "holds runs.csv, and no made.json says that crosscheck stability made",
+        ),
     ],
 )
 def test_a_folder_of_another_command_is_left_alone(words: list[str], file: str, said: str, tmp_path: Path):

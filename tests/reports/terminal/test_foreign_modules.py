@@ -56,7 +56,10 @@ def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
 def in_a_worker() -> Any:
     """How a cell ended that was played in a worker started here."""
     task = partial(
-        play_here, Cell("slow_hit", 0, "good:control", 1), row(Controlled), replace(scenario("slow_hit"), truth=None)
+        play_here,
+        Cell("slow_collision", 0, "good:control", 1),
+        row(Controlled),
+        replace(scenario("slow_collision"), truth=None),
     )
     [(_, ended)] = run_all({"one": task}, workers=1)
     return ended

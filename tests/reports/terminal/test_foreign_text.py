@@ -58,7 +58,7 @@ def test_the_console_prints_markup_as_it_is(capsys: pytest.CaptureFixture[str]):
 @pytest.mark.parametrize("what", ["[/nope]", "\\u001b[31mred", "\\u0007", ":boom: [bold]"])
 def test_the_question_of_a_scene_is_printed_as_it_is(tmp_path: Path, what: str):
     """`truth` and a refusal show `asks` and a bad value, whatever they hold."""
-    (tmp_path / "x.toml").write_text(SCENE.read_text().replace("Does a head-on hit", f"{what} Does a hit"))
+    (tmp_path / "x.toml").write_text(SCENE.read_text().replace("Does a head-on collision", f"{what} Does a collision"))
     done = crosscheck("truth", "x.toml", cwd=tmp_path)
     (tmp_path / "x.toml").write_text(SCENE.read_text().replace('"two-disks"', f'"{what}"'))
     refused = crosscheck("truth", "x.toml", cwd=tmp_path)

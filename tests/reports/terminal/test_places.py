@@ -61,7 +61,7 @@ def test_a_stream_that_takes_nothing_is_one_sentence(tmp_path: Path, line: str, 
 @pytest.mark.parametrize("stream", [">/dev/full", ">&-", "| head -0; exit ${PIPESTATUS[0]}", "2>/dev/full", "2>&- >&-"])
 def test_what_was_computed_is_kept_whatever_becomes_of_the_streams(tmp_path: Path, stream: str):
     """The run is whole in its place; a closed number of a stream is not taken by the journal and printed into."""
-    done = shell(f"$C run slow_hit --engine pymunk:matched --out out --workers 1 {stream}", tmp_path)
+    done = shell(f"$C run slow_collision --engine pymunk:matched --out out --workers 1 {stream}", tmp_path)
 
     assert done.returncode == (0 if stream == "2>/dev/full" else 1)
     assert b"Traceback" not in done.stderr

@@ -45,7 +45,7 @@ velocity = [-1.0, 0.0]
 radius = 0.5
 mass = 1.0
 """
-TWO = ["run", "two.toml", "slow_hit", "--engine", "pymunk:shipped", "--out", "out"]
+TWO = ["run", "two.toml", "slow_collision", "--engine", "pymunk:shipped", "--out", "out"]
 SOCKET = (  # RFC 6455, 1.2: a page opens its socket
     "GET /fly HTTP/1.1\r\nHost: localhost:PORT\r\nOrigin: http://localhost:PORT\r\nUpgrade: websocket\r\n"
     "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
@@ -182,7 +182,7 @@ def test_what_takes_too_long_is_said_and_the_other_scene_is_judged(place: Path):
     assert set(rows.scenario) == {"two"}
     assert set(rows.note) == {"not judged: the exact answer took longer than 2 s (--timeout)"}
     assert len(rows) == 2
-    assert "truth" in set(table[table.scenario == "slow_hit"].versus)
+    assert "truth" in set(table[table.scenario == "slow_collision"].versus)
     assert (report.returncode, said in report.stderr) == (1, True)
     assert truth.process.wait(120) == 1
     assert "two: the exact answer took longer than 2 s (--timeout)\n" in truth.errors.read_text()

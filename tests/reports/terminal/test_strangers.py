@@ -28,7 +28,7 @@ AGAIN = ("run", "my.toml", *ONE, "--out", "out")
 COMMANDS = {
     "run": AGAIN,
     "speed": ("speed", "free_fall", "--engine", "reference:exercise", "--out", "out"),
-    "stability": ("stability", "slow_hit", "--out", "out"),
+    "stability": ("stability", "slow_collision", "--out", "out"),
     "tune": ("tune", "pymunk", "--out", "out"),
     "lesson": ("lesson", "--export", "out"),
 }
@@ -191,7 +191,9 @@ def test_where_there_is_no_current_folder_any_more_it_is_said(tmp_path: Path, co
     gone = (
         "import os, sys; os.mkdir('gone'); os.chdir('gone'); os.rmdir('../gone'); os.execv(sys.argv[1], sys.argv[1:])"
     )
-    words = [word if word != "my.toml" else "slow_hit" for word in COMMANDS[command] if word not in ("--dt", "0.02")]
+    words = [
+        word if word != "my.toml" else "slow_collision" for word in COMMANDS[command] if word not in ("--dt", "0.02")
+    ]
     done = subprocess.run(
         [sys.executable, "-c", gone, CROSSCHECK, *words], cwd=tmp_path, capture_output=True, text=True
     )

@@ -1,4 +1,4 @@
-"""A pair before a hit and what the hit changed, as the laws of impact take it."""
+"""A pair before a collision and what the collision changed, as the laws of impact take it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from reports.check.questions import Ball, direction
 from scenarios.model import Array
 
 
-class Hit(NamedTuple):
+class Collision(NamedTuple):
     """A pair before the call, m, m/s, kg: u = vA - vB, n from B to A, distance d, sum of sizes s; shifts of A and B."""
 
     va: Array
@@ -40,15 +40,15 @@ class Hit(NamedTuple):
         return 1 / (1 / self.ma + 1 / self.mb)
 
 
-def hit_of(balls: tuple[Ball, ...], after: list[Ball]) -> Hit:
+def collision_of(balls: tuple[Ball, ...], after: list[Ball]) -> Collision:
     """A pair and how it was displaced."""
     a, b = balls
     n, d = direction(a, b)
     shifts = (np.subtract(y.x, x.x) for x, y in zip(balls, after))
-    return Hit(np.array(a.v), np.array(b.v), n, d, a.r + b.r, a.m, b.m, *shifts)
+    return Collision(np.array(a.v), np.array(b.v), n, d, a.r + b.r, a.m, b.m, *shifts)
 
 
-Impulse = Callable[[Hit, float], Array]
+Impulse = Callable[[Collision, float], Array]
 """What A gets from B by a law, N s, from a pair and the restitution."""
 
 

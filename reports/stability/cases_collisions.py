@@ -1,4 +1,4 @@
-"""Cases of one hit: missed, invented, grazed, slow, between unequal masses."""
+"""Cases of one collision: missed, invented, grazed, slow, between unequal masses."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from reports.stability.limits import Case
 from reports.stability.phases import phase
-from reports.stability.predicates import HITS_INVENTED, HITS_MISSED, RESTITUTION_OFF, VELOCITY_OFF
+from reports.stability.predicates import COLLISIONS_INVENTED, COLLISIONS_MISSED, RESTITUTION_OFF, VELOCITY_OFF
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.truth.closed_forms import answer, flight, pair
 
-FAMILY = "One hit"
+FAMILY = "One collision"
 RADIUS, DT = 0.25, 1 / 64
-LEAD, AFTER = 3, 6  # whole steps before the step of the hit, and after it
+LEAD, AFTER = 3, 6  # whole steps before the step of the collision, and after it
 PHASES = 32  # runs at a value, each with the collision elsewhere in its step: a run is a millisecond
 SOURCE = "momentum, and Newton's restitution along the line of centres (Landau & Lifshitz, Mechanics, 17)"
 FAST = (0.125, 0.25, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0, 5.66, 8.0, 11.3, 16.0, 22.6, 32.0)
@@ -41,14 +41,14 @@ def flyby(
 
     def truth(t: Array) -> Trajectory:
         legs, impulse = pair(scene.position, scene.velocity, scene.radius, scene.mass, e)
-        hits = [(float(at), 0, 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)]
-        return answer(scene, t, legs.at(t), hits)
+        collisions = [(float(at), 0, 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)]
+        return answer(scene, t, legs.at(t), collisions)
 
-    asks = "Is the hit found?" if offset < 1 else "Is a hit invented?"
+    asks = "Is the collision found?" if offset < 1 else "Is a collision invented?"
     return stepped("flyby", asks, scene, dt, truth)
 
 
-def wall_hit(speed: float, run: int) -> Scenario:
+def wall_collision(speed: float, run: int) -> Scenario:
     """A disk flies at a wall, a segment without thickness through the origin."""
     start = -RADIUS - speed * DT * (LEAD + phase(run))
     scene = lay_out(
@@ -63,7 +63,7 @@ def wall_hit(speed: float, run: int) -> Scenario:
         v[..., 0] = np.where(beyond, -speed, speed)
         return answer(scene, t, (x, v), [((-RADIUS - start) / speed, 0, -1, 2 * speed)])
 
-    return stepped("wall-hit", "Is the wall found?", scene, DT, truth)
+    return stepped("wall-collision", "Is the wall found?", scene, DT, truth)
 
 
 def stepped(name: str, asks: str, scene: Scene, dt: float, truth: Callable[[Array], Trajectory]) -> Scenario:
@@ -84,7 +84,7 @@ def thick_wall(x: float, run: int) -> Scenario:
 
 def wall_at_speed(x: float, run: int) -> Scenario:
     """x = v dt / R."""
-    return wall_hit(x * RADIUS / DT, run)
+    return wall_collision(x * RADIUS / DT, run)
 
 
 def grazing(x: float, run: int) -> Scenario:
@@ -103,50 +103,50 @@ def slow(x: float, run: int) -> Scenario:
 
 
 def unequal(x: float, run: int) -> Scenario:
-    """A disk of mass 1 hits one of mass x that rests, at v dt / R = 0.1."""
+    """A disk of mass 1 collisions one of mass x that rests, at v dt / R = 0.1."""
     return flyby(0.1 * RADIUS / DT, run, mass=x)
 
 
 def with_restitution(x: float, run: int) -> Scenario:
-    """A head-on hit at e = x and 4 m/s."""
+    """A head-on collision at e = x and 4 m/s."""
     return flyby(4.0, run, e=x)
 
 
-HITS = (
+COLLISIONS = (
     Case(
         "tunnelling_head_on", FAMILY, "How far may a disk fly in a step without missing a disk head-on?",
-        "v dt / R", "1", FAST, at_speed, HITS_MISSED, runs=PHASES, also=BULLETS,
+        "v dt / R", "1", FAST, at_speed, COLLISIONS_MISSED, runs=PHASES, also=BULLETS,
     ),
     Case(
         "tunnelling_offset", FAMILY, "And off centre, by 0.7 of the sum of the radii?",
-        "v dt / R", "1", FAST, partial(at_speed, offset=0.7), HITS_MISSED, runs=PHASES, also=BULLETS,
+        "v dt / R", "1", FAST, partial(at_speed, offset=0.7), COLLISIONS_MISSED, runs=PHASES, also=BULLETS,
     ),
     Case(
         "tunnelling_thin_wall", FAMILY, "How far may a disk fly in a step without missing a wall?",
-        "v dt / R", "1", FAST, wall_at_speed, HITS_MISSED, runs=PHASES, also=BULLETS,
+        "v dt / R", "1", FAST, wall_at_speed, COLLISIONS_MISSED, runs=PHASES, also=BULLETS,
     ),
     Case(
         "tunnelling_thick_wall", FAMILY, "And if the wall is ten radii thick, a static disk?",
-        "v dt / R", "1", FAST, thick_wall, HITS_MISSED, runs=PHASES, also=BULLETS,
+        "v dt / R", "1", FAST, thick_wall, COLLISIONS_MISSED, runs=PHASES, also=BULLETS,
     ),
     Case(
-        "grazing", FAMILY, "How near to grazing may a hit at v dt / R = 0.2 be and still be found?",
-        "1 - b / 2R", "1", (0.5, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4), grazing, HITS_MISSED,
+        "grazing", FAMILY, "How near to grazing may a collision at v dt / R = 0.2 be and still be found?",
+        "1 - b / 2R", "1", (0.5, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4), grazing, COLLISIONS_MISSED,
         runs=PHASES, also=BULLETS,
     ),
     Case(
-        "near_miss", FAMILY, "How near may a disk pass at v dt / R = 0.2 without being hit?",
+        "near_miss", FAMILY, "How near may a disk pass at v dt / R = 0.2 without being collision?",
         "b / 2R - 1", "1", (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
         near_miss,
-        HITS_INVENTED, runs=PHASES,
+        COLLISIONS_INVENTED, runs=PHASES,
     ),
     Case(
-        "slow_hit", FAMILY, "How slow may a hit at e = 1 be and still be elastic?",
+        "slow_collision", FAMILY, "How slow may a collision at e = 1 be and still be elastic?",
         "closing speed", "m/s", (8.0, 4.0, 2.0, 1.41, 0.7, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3), slow, RESTITUTION_OFF,
         runs=PHASES,
     ),
     Case(
-        "restitution", FAMILY, "Is a hit at 4 m/s played with the e that the scene states?",
+        "restitution", FAMILY, "Is a collision at 4 m/s played with the e that the scene states?",
         "1 - e", "1", (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0),
         lambda x, run: with_restitution(1 - x, run), RESTITUTION_OFF, runs=PHASES,
     ),
