@@ -31,8 +31,8 @@ def make() -> None:
 def check() -> list[str]:
     """What has drifted since the figures were kept; every ratio is printed."""
     print(f"the cost of a step against reference:exercise, the fastest of {ROUNDS} rounds", flush=True)
-    players = {name: row.make for name, row in ENGINES.items()}
-    samples, _ = sizes.costs(players, figures.GATED, ROUNDS, BUDGET, PATIENCE, seed=0)
+    engines = {name: row.make for name, row in ENGINES.items()}
+    samples, _ = sizes.costs(engines, figures.GATED, ROUNDS, BUDGET, PATIENCE, seed=0)
     rows = [
         dict(zip(("engine", "profile"), sample.key[0].split(":")), at=sample.key[1], **sample._asdict())
         for sample in samples

@@ -1,4 +1,4 @@
-"""The table of players: a row an engine and profile. To add one, write its file and its row."""
+"""The table of engines: a row an engine and profile. To add one, write its file and its row."""
 
 from __future__ import annotations
 

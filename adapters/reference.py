@@ -1,4 +1,4 @@
-"""The hand-written solver of `reference_impl` as a player."""
+"""The hand-written solver of `reference_impl` as an engine."""
 
 from __future__ import annotations
 

@@ -234,7 +234,7 @@ def stability(
     ),
     workers: Workers = 0,
 ) -> None:
-    """Find where every player fails: limits, with the first failing run of each to look at."""
+    """Find where every engine fails: limits, with the first failing run of each to look at."""
     from reports.stability.command import find_limits
 
     command = "crosscheck " + shlex.join(sys.argv[1:])

@@ -171,7 +171,7 @@ class Scenario:
         source: where the scene or its formula comes from.
         scene: the initial state and the physics.
         duration: s, a whole number of sample intervals.
-        sample_interval: s; every player is sampled at i * sample_interval.
+        sample_interval: s; every engine is sampled at i * sample_interval.
         substeps: the dt ladder, dt = sample_interval / k, coarse to fine; the middle one is the page's.
         thrusts: piecewise-constant pushes.
         truth: times (k,) s -> the exact `Trajectory` there, up to its horizon, or `NoTruth` (see `truth_at`); or None.
@@ -268,7 +268,7 @@ NO_COLLISIONS = Collisions.of([])
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """States at k instants, from a player or from the truth.
+    """States at k instants, from an engine or from the truth.
 
     Attributes:
         t: (k,) s.
@@ -277,7 +277,7 @@ class Trajectory:
         angle: (k, n) rad, unwrapped.
         angular_velocity: (k, n) rad/s.
         collisions: the collisions up to t[-1].
-        valid_until: s, the horizon up to which players are held to a truth: no sample lies beyond it.
+        valid_until: s, the horizon up to which engines are held to a truth: no sample lies beyond it.
         reason: why the truth ends there; "" if it does not.
         error_bound: m, how far a truth may be off before it; 0: a closed form, right to a few roundings.
     """

@@ -47,7 +47,7 @@ class Habit:
 
 
 def habits_of(name: str, settings: Mapping[str, tuple[Any, Any]], scene: Scene, dt: float) -> list[Habit]:
-    """The habits of a player in `HABITS`, in this scene at this dt; `settings` are those it told once loaded."""
+    """The habits of an engine in `HABITS`, in this scene at this dt; `settings` are those it told once loaded."""
     # What cannot be read back is as it was asked for.
     resolved = {setting: asked if used in NOT_TOLD else used for setting, (asked, used) in settings.items()}
     flight = Habit(FLIGHT, {"alpha": row_of(name).alpha})
@@ -175,4 +175,4 @@ HABITS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Habit]]] = {
     "box2d_v3:shipped": _box2d_v3_shipped,
     "box2d_v3:matched": _box2d_v3_matched,
 }
-"""The players whose habits are known."""
+"""The engines whose habits are known."""

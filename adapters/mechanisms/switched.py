@@ -1,4 +1,4 @@
-"""The hand-written solver with switches, as a player: the exercise's, or what an engine does instead."""
+"""The hand-written solver with switches, as an engine: the exercise's, or what an engine does instead."""
 
 from __future__ import annotations
 

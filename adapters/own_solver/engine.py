@@ -1,4 +1,4 @@
-"""Somebody's own solver file as a player: an Exercise.js or a solver.py, driven step by step in its own process."""
+"""Somebody's own solver file as an engine: an Exercise.js or a solver.py, driven step by step in its own process."""
 
 from __future__ import annotations
 

@@ -36,9 +36,9 @@ def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = EN
         archive = Archive.read(found(Path(os.path.abspath(out))))
         record = record_of(archive, name)
         scenario = played_scenario(archive.folder, record)
-        player = f"{record['engine']}:{record['profile']}"
-        go_where_files_are(archive.header, [player])
-        row = engines.get(player) or (read_row if player.endswith(OWN) else row_of)(player)
+        engine = f"{record['engine']}:{record['profile']}"
+        go_where_files_are(archive.header, [engine])
+        row = engines.get(engine) or (read_row if engine.endswith(OWN) else row_of)(engine)
         before = recorded(archive, record)
     except FolderTaken as fault:
         refuse([str(fault)])
@@ -46,9 +46,9 @@ def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = EN
         refuse([f"{gone.args[0]} was played, but is not known to this version"])
     except (OSError, ValueError) as fault:
         refuse([str(fault)])
-    cell = Cell(record["scene"], record["seed"], player, record["substeps"])
+    cell = Cell(record["scene"], record["seed"], engine, record["substeps"])
     if row.source and record["cell"] != cell.key(record["scene_hash"], row.source):
-        say(f"{player.removesuffix(OWN)} or a version has changed since: what is played is what is there now")
+        say(f"{engine.removesuffix(OWN)} or a version has changed since: what is played is what is there now")
     k = len(before) - 1 if before is not None and record["status"] != "ok" else 0
     substeps = record["substeps"]
     show(f"{record['scenario']}  {record['engine']}:{record['profile']}  dt {record['dt_s']:.4g} s")

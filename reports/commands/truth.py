@@ -104,7 +104,7 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
         "precision": precision(record),
         "horizon": ends,
         "ends because": record.reason or "it is asked for no longer" * (record.valid_until >= scenario.duration),
-        "players held to it": f"up to {number(min(record.followed_until, record.valid_until, scenario.duration), 6)} s",
+        "engines held to it": f"up to {number(min(record.followed_until, record.valid_until, scenario.duration), 6)} s",
         "error bound": f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64",
         "still known": "\n".join(record.remains),
         "collisions": str(int((record.events[:, 3] != 0).sum())),

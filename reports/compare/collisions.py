@@ -1,4 +1,4 @@
-"""Which collisions of the truth a player found, which it missed, which it invented, and how late it was."""
+"""Which collisions of the truth an engine found, which it missed, which it invented, and how late it was."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HALF = 0.26**0.5  # of the time to the nearest other true collision: so late it 
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Collisions of a player set against collisions of the truth.
+    """Collisions of an engine set against collisions of the truth.
 
     Attributes:
         delay: (m,) s, played time less true time of each collision found.
@@ -49,7 +49,7 @@ def who(i: int, j: int) -> str:
 
 
 def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matched:
-    """Match collisions pair by pair, in order, up to `end` s, for a player with steps of `dt` s.
+    """Match collisions pair by pair, in order, up to `end` s, for an engine with steps of `dt` s.
 
     Where a pair has struck more often on one side, those collisions are left over whose absence brings the others
     closest in time; the earlier if two are as close. A match is no match if it is further off than `HALF` the time to
@@ -57,9 +57,9 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
     one invented.
 
     Three kinds of collisions are not judged: of a pair at rest against each other from the start (a true collision
-    without impulse), as what a player reports there is weight; true collisions of a pair closer together than `CROWDED`
-    dt, as no step can tell them apart, with all that a player makes of them; and collisions within `WINDOW` dt of
-    `end`, which may be cut off.
+    without impulse), as what an engine reports there is weight; true collisions of a pair closer together than
+    `CROWDED` dt, as no step can tell them apart, with all that an engine makes of them; and collisions within `WINDOW`
+    dt of `end`, which may be cut off.
     """
     resting = pair_keys(true)[true.impulse == 0]
     mine, its = (by_pair(collisions, resting, end - SAME * dt) for collisions in (played, true))
@@ -194,7 +194,7 @@ def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, 
     One can be read if neither disk has another in the same sample interval or the next, and none of them
     changes its spin (friction): then the change of velocity points along the normal n, and e = -(dv'.n) / (dv.n).
     Two disks must also change their momenta by as much, and a disk at a wall along the wall's normal: else
-    something was struck of which the player did not tell. Those closing slower than `slowest` m/s are left out.
+    something was struck of which the engine did not tell. Those closing slower than `slowest` m/s are left out.
 
     Those that change the velocities by no more than `FLOOR` times their rounding, which is relative, are below the
     floor: their normal, and with it e, would be noise. What gravity adds before and after is taken out with the

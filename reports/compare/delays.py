@@ -1,8 +1,8 @@
-"""The truth within the detection delay: what a player is held to that finds every collision, a little late or early.
+"""The truth within the detection delay: what an engine is held to that finds every collision, a little late or early.
 
-A player that steps finds a collision at the end of a step: for as long its velocities are those before it when the
+An engine that steps finds a collision at the end of a step: for as long its velocities are those before it when the
 truth's are those after. This delay is measured by itself (`collision_delay_dt`) and costs nothing here. All else does,
-at every sample: gravity and thrust act on what a player is held to as on the truth at that instant.
+at every sample: gravity and thrust act on what an engine is held to as on the truth at that instant.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ Law = TypeVar("Law", bound=Callable[..., Any])
 def once(law: Law) -> Law:
     """The law, worked out once for the same objects (or equal floats) and forgotten with the first of them.
 
-    A run is set against each other player at its dt: without this its energy would be added up some forty times.
+    A run is set against each other engine at its dt: without this its energy would be added up some forty times.
     """
     known: WeakKeyDictionary[Any, dict[tuple[float, ...], tuple[Any, Any]]] = WeakKeyDictionary()
 

@@ -177,7 +177,7 @@ def time_to_1pct_s(view: View) -> Value | None:
 
 
 def collision_count_error(view: View) -> Value | None:
-    """Collisions of the player less collisions of the other, whenever they come; pairs at rest from the start are not
+    """Collisions of the engine less collisions of the other, whenever they come; pairs at rest from the start are not
     counted."""
     resting = pair_keys(view.collisions[1])[view.collisions[1].impulse == 0]
     counted = (by_pair(collisions, resting, view.end - SAME * view.dt) for collisions in view.collisions)
@@ -186,12 +186,12 @@ def collision_count_error(view: View) -> Value | None:
 
 
 def collisions_missed(view: View) -> Value | None:
-    """Collisions of the other, of those that a step can tell apart, that the player does not have at their time."""
+    """Collisions of the other, of those that a step can tell apart, that the engine does not have at their time."""
     return Value(len(view.matched.missed), note=f"of {len(view.collisions[1])}")
 
 
 def collisions_invented(view: View) -> Value | None:
-    """Collisions of the player that the other does not have at their time."""
+    """Collisions of the engine that the other does not have at their time."""
     return Value(len(view.matched.invented))
 
 

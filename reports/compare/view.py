@@ -42,11 +42,11 @@ class View:
 
     Attributes:
         scenario: what was played.
-        dt: s, of the player.
-        played: the player's trajectory, cut to the samples the other has.
+        dt: s, of the engine.
+        played: the engine's trajectory, cut to the samples the other has.
         other: the truth, another engine's trajectory, or None: only the laws of physics.
         jumps: of `other` (delays.py) if it is the truth; None for an engine.
-        rounding: the relative rounding of the numbers that the player keeps.
+        rounding: the relative rounding of the numbers that the engine keeps.
     """
 
     scenario: Scenario
@@ -124,7 +124,7 @@ class View:
 
     @cached_property
     def energy_apart(self) -> Array:
-        """(k,) J that the player has more than the other, as `momentum_apart`."""
+        """(k,) J that the engine has more than the other, as `momentum_apart`."""
         assert self.other is not None
         if self.jumps is not None:
             energy, (low, high) = laws.energy(self.played, self.scenario.scene), self.energy_range
@@ -172,7 +172,7 @@ class View:
 
     @cached_property
     def collisions(self) -> tuple[Collisions, Collisions]:
-        """Of the player and of the other, by what a disk can tell apart (faces.py)."""
+        """Of the engine and of the other, by what a disk can tell apart (faces.py)."""
         assert self.other is not None
         return on_faces(self.played, self.scenario.scene), on_faces(self.other, self.scenario.scene)
 

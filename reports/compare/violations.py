@@ -17,7 +17,7 @@ def momentum(view: View) -> Array | None:
     """|P(t) - P(0) - impulse from outside| over the sum of m|v| at hand (scales.py).
 
     From outside come weight and world-frame thrust. Where walls, static disks or a turning thrust act, nobody
-    knows the impulse without asking the player.
+    knows the impulse without asking the engine.
     """
     if view.other is not None or not knows_impulses(view.scenario):
         return None
@@ -33,7 +33,7 @@ def angular_momentum(view: View) -> Array | None:
     """|L(t) - L(0) - angular impulse from outside| over the sum of m|x||v| + I|w| at hand, about the centre of mass.
 
     About that of the start, so that it does not matter where the origin is. The weight of the whole, at the centre of
-    mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts where its disk is, which only the player knows,
+    mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts where its disk is, which only the engine knows,
     and a wrap moves disks: there the law says nothing.
     """
     scene, played = view.scenario.scene, view.played

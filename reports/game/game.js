@@ -156,7 +156,7 @@ class Game {
     if (!flyer.parted) return "";
     const { t, i, j, shared, solid_only: mine } = flyer.parted;
     const solid = this.field.engines[this.now.solid];
-    const whose = shared ? "both collide, and part differently" : `only ${shortName(mine ? solid : name)} collisions`;
+    const whose = shared ? "both collide, and part differently" : `only ${shortName(mine ? solid : name)} collides`;
     return `${t.toFixed(2)} s, ${pairOf(i, j)}: ${whose}`;
   }
 

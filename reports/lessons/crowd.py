@@ -68,7 +68,7 @@ COST = Lesson(
         "step: ten times the disks, a hundred times the work. Whoever sorts the disks into cells or a tree first asks "
         "only neighbours: the cost grows about as the number does. <code>reference:exercise</code> does so where "
         "there are many, and gives the same bits as with every pair. For few disks a step is mostly the call itself.",
-        "The event-driven player has no steps to take: it uses cells, too, and its time goes with the number of collisions. "
+        "The event-driven engine has no steps to take: it uses cells, too, and its time goes with the number of collisions. "
         "Times are the least of five runs on this machine and as noisy as it is busy.",
     ),
     sliders=(
@@ -111,7 +111,7 @@ def show_horizon(settings: Settings) -> Shown:
 
 
 def growth(shown: Played, errors: list[Curve]) -> list[tuple[str, str]]:
-    """By what factor a collision makes a distance grow, fitted to the player whose errors begin at rounding."""
+    """By what factor a collision makes a distance grow, fitted to the engine whose errors begin at rounding."""
     assert shown.truth is not None
     found = next((curve for curve in errors if curve.name == "event_driven:float64"), None)
     if found is None:

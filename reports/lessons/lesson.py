@@ -42,7 +42,7 @@ class Slider:
 
 @dataclass(frozen=True)
 class Curve:
-    """name: whose (a player, `truth`, or `reference:switched` for the reference with a mechanism on); x, y: (k,).
+    """name: whose (an engine, `truth`, or `reference:switched` for the reference with a mechanism on); x, y: (k,).
 
     dots: whether its points are marked; faint: whether it stands back behind the others.
     """
@@ -184,7 +184,7 @@ class Played:
 
     @cached_property
     def film(self) -> Comparison:
-        """For the player of the page."""
+        """For the engine of the page."""
         return Comparison(self.scenario, self.truth, self.runs, pd.DataFrame())
 
     def curves(self, read: Callable[[Trajectory], Array]) -> list[Curve]:

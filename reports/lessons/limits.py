@@ -16,10 +16,10 @@ from reports.lessons.lesson import Chart, Curve, Lesson, Settings, Shown, Slider
 from reports.page.style import TRUTH, number
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
-from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, players_of
+from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, engines_of
 from reports.stability.overview import bracket, why
-from reports.stability.players import PLAYERS
 from reports.stability.search import Search
+from reports.stability.variants import VARIANTS
 from scenarios.model import Array, Scenario, Trajectory
 
 HARSHNESS = tuple(range(9))  # places from the gentlest value of a case to its harshest
@@ -65,33 +65,33 @@ SEEN = {
 
 @cache
 def limits_of(name: str) -> list[Limit]:
-    """The limits of a case on every player, searched now, with their reasons, which players with one switch test."""
+    """The limits of a case on every engine, searched now, with their reasons, which engines with one switch test."""
     case = CASES[name]
-    searches = [Search(case, player, QUICK) for player in players_of(case)]
+    searches = [Search(case, engine, QUICK) for engine in engines_of(case)]
     return explained([tried_out(search, search.limit()) for search in searches])
 
 
-def run_at(case: Case, player: str, value: float) -> tuple[Trial, Scenario, Run]:
-    """All runs of a player at a value, and of them the first that fails, or the first, which has the worst phase."""
-    search = Search(case, player, QUICK)
+def run_at(case: Case, engine: str, value: float) -> tuple[Trial, Scenario, Run]:
+    """All runs of an engine at a value, and of them the first that fails, or the first, which has the worst phase."""
+    search = Search(case, engine, QUICK)
     trial = search.trial(value, to_the_end=True)
-    return trial, *(search.seen.get(value) or case.play(PLAYERS[player], case.scene(value, 0)))
+    return trial, *(search.seen.get(value) or case.play(VARIANTS[engine], case.scene(value, 0)))
 
 
 def show_limits(settings: Settings) -> Shown:
-    """The run at this value beside the exact answer, and the readings of all players up to their limits."""
-    seen, player = SEEN[settings["case"]], settings["player"]
+    """The run at this value beside the exact answer, and the readings of all engines up to their limits."""
+    seen, engine = SEEN[settings["case"]], settings["engine"]
     case, value, limits = CASES[seen.case], seen.value(settings["place"]), limits_of(seen.case)
-    trial, scenario, run = run_at(case, player, value)
+    trial, scenario, run = run_at(case, engine, value)
     assert scenario.truth is not None
     truth = scenario.truth(scenario.times)
-    drawn = [(player, run.trajectory), (TRUTH, truth)]
+    drawn = [(engine, run.trajectory), (TRUTH, truth)]
     curves = [Curve(name, each.t, seen.read(each)) for name, each in drawn if each is not None]
-    found = next(limit for limit in limits if limit.player == player)
+    found = next(limit for limit in limits if limit.engine == engine)
     return Shown(
-        [Chart(seen.what, "time in s", seen.unit, curves), readings(case, limits, player, value)],
+        [Chart(seen.what, "time in s", seen.unit, curves), readings(case, limits, engine, value)],
         Comparison(scenario, truth, [run], pd.DataFrame()),
-        [(limit.player, in_words(limit, case)) for limit in limits if limit.player in ENGINES],
+        [(limit.engine, in_words(limit, case)) for limit in limits if limit.engine in ENGINES],
         in_numbers(case, trial, found),
         {"pace": scenario.duration / SECONDS} | event_of(trial),
         {"place": with_unit(f"{case.parameter} = {number(value)}", case)},
@@ -103,8 +103,8 @@ def event_of(trial: Trial) -> dict[str, Any]:
     return {} if trial.works or not isfinite(trial.at) else {"event": {"t": trial.at, "disk": trial.disk}}
 
 
-def readings(case: Case, limits: Sequence[Limit], player: str, value: float) -> Chart:
-    """What is read at every value tried, harsher to the right, the player before all others.
+def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> Chart:
+    """What is read at every value tried, harsher to the right, the engine before all others.
 
     Where a run can only fail or not, the share of runs that fail.
     """
@@ -115,8 +115,8 @@ def readings(case: Case, limits: Sequence[Limit], player: str, value: float) -> 
         return abs(trial.worst) if bound else trial.failed / trial.runs
 
     curves = [
-        Curve(each.player, [t.value for t in each.trials], [read(t) for t in each.trials], mine, not mine)
-        for mine in (False, True) for each in limits if each.player in ENGINES and mine == (each.player == player)
+        Curve(each.engine, [t.value for t in each.trials], [read(t) for t in each.trials], mine, not mine)
+        for mine in (False, True) for each in limits if each.engine in ENGINES and mine == (each.engine == engine)
     ]  # fmt: skip
     guides = [("x", value, "here"), *([("y", bound, "fails above")] if bound else [])]
     axis = case.parameter if case.unit == "1" else f"{case.parameter} in {case.unit}"
@@ -138,7 +138,7 @@ def in_words(limit: Limit, case: Case) -> str:
 
 
 def in_numbers(case: Case, trial: Trial, limit: Limit) -> list[tuple[str, str]]:
-    """What failing means, what these runs do, the player's bracket and the reason, with how that was tested."""
+    """What failing means, what these runs do, the engine's bracket and the reason, with how that was tested."""
     bound, read = "", trial.event
     if case.predicate.bound:
         bound = f", by more than {measured(case, case.predicate.bound)}"
@@ -146,7 +146,7 @@ def in_numbers(case: Case, trial: Trial, limit: Limit) -> list[tuple[str, str]]:
     told = [
         ("Failing means", f"{case.predicate.means}{bound}."),
         ("Here", f"{counted(trial)}{f': {read}' if read else ''}."),
-        (limit.player, f"{in_words(limit, case)}."),
+        (limit.engine, f"{in_words(limit, case)}."),
     ]
     if limit.verdict != NEVER_FAILS:
         tested = f" Tested: {limit.tested}." if limit.tested else ""
@@ -175,13 +175,13 @@ LIMITS = Lesson(
         "value from which on they <b>fail</b>: a collision is missed, a spin is cut, a place is rounded away. The search "
         "tries values from gentle to harsh, a collision at several moments of its step, stops at the first that fails, "
         f"and halves the gap to the last that works until the two are {QUICK.ratio - 1:.0%} apart.",
-        "A reason counts as tested if the limit follows from it, or if a player that differs in that one thing gets "
+        "A reason counts as tested if the limit follows from it, or if an engine that differs in that one thing gets "
         "farther; else it is called likely. These are the cases that take a second; "
         "<code>crosscheck stability</code> searches them all.",
     ),
     sliders=(
         Slider("case", "Case", tuple(SEEN)),
-        Slider("player", "Who plays", tuple(ENGINES), list(ENGINES).index("box2d:matched")),
+        Slider("engine", "Who plays", tuple(ENGINES), list(ENGINES).index("box2d:matched")),
         Slider("place", "How harsh", HARSHNESS, 5),
     ),
     names=(*ENGINES, TRUTH),

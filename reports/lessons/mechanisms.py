@@ -57,7 +57,7 @@ def told(runs: Sequence[Run], setting: str) -> list[tuple[str, str]]:
 
 
 def filmed(scenario: Scenario, runs: Sequence[Run]) -> Any:
-    """For the player of the page, which shows the runs at the step of the scenario, and the exact answer if any."""
+    """For the engine of the page, which shows the runs at the step of the scenario, and the exact answer if any."""
     seen = replace(scenario, substeps=(round(scenario.sample_interval / runs[0].dt),))
     seen, truth = answered(seen if seen.truth else with_oracle(seen))
     return Played(seen, runs, truth).film

@@ -170,7 +170,7 @@ BOX = Lesson(
         "<code>v' = −c_r v</code>: each collision keeps <code>c_r²</code> of that part of the energy, and nothing "
         "else may take "
         "any. Between two collisions the sum of <code>m v²/2 + m g y</code> must be level.",
-        "With <code>c_r = 1</code> the exact line is flat: what a player gains or loses is its own. The exact answer "
+        "With <code>c_r = 1</code> the exact line is flat: what an engine gains or loses is its own. The exact answer "
         "ends where the motion is no longer knowable in float64, or where a disk comes to rest.",
     ),
     sliders=(

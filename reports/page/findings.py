@@ -43,7 +43,7 @@ def closest(off: pd.DataFrame) -> str:
         return "No scene here has an exact answer, so nobody is scored: only laws and differences are shown."
     medians = off.median().sort_values()
     if np.isinf(medians.iloc[0]):
-        return "No player was played to its end in half of the scenes with an exact answer, so nobody is ranked."
+        return "No engine was played to its end in half of the scenes with an exact answer, so nobody is ranked."
     best, *others = (f"{name} ({value:.2g})" for name, value in medians.items())
     wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())  # within 1 % counts as equal
     ranking = f", then {', '.join(others[:2])}" + (f", last {others[-1]}" if len(others) > 2 else "") if others else ""

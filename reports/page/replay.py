@@ -43,7 +43,7 @@ def pack_layers(
 ) -> str:
     """The layers at the samples `shown` (all that are worth it), packed, as base64; "" if there are none.
 
-    more: goes into the head: `opens` s, where the player starts; `pace`, seconds in one at speed 1; `event`, what to
+    more: goes into the head: `opens` s, where the engine starts; `pace`, seconds in one at speed 1; `event`, what to
     mark: t s, disk.
     """
     if not layers:

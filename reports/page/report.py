@@ -28,7 +28,7 @@ class Report:
         comparisons: one a scenario, in reading order.
         runs: runs.csv.
         findings: the sentences on top.
-        untrusted: the players that broke the protocol: their rows are kept, but nothing is concluded from them.
+        untrusted: the engines that broke the protocol: their rows are kept, but nothing is concluded from them.
         unjudged: name of a scene -> why it is not held to its answer, or not compared at all, though it should be.
     """
 
@@ -61,8 +61,8 @@ def made_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, 
     say("writing the page")
     comparisons = comparisons_of(archive, tables)
     began = {run.name for comparison in comparisons for run in comparison.runs}  # an interrupt may come before
-    players = [name for name in header["engines"] if name in began and name in archive.conformance]
-    asked = [archive.conformance[name]["conformance"] for name in players]
+    engines = [name for name in header["engines"] if name in began and name in archive.conformance]
+    asked = [archive.conformance[name]["conformance"] for name in engines]
     known = sorted(
         (line["known_answer"] for line in archive.known_answers),
         key=lambda row: (row["column"], row["dt_s"], row["made_by"]),

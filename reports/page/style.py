@@ -43,7 +43,7 @@ class Look(NamedTuple):
         return ",".join(f"{length}px" for length in self.dash) or "solid"
 
 
-# (light, dark, shape). Against page and player each colour has more than 3 : 1, which WCAG 2 asks of graphics, and any
+# (light, dark, shape). Against page and engine each colour has more than 3 : 1, which WCAG 2 asks of graphics, and any
 # two of the four engines are 0.06 or more apart in OKLab, also as seen with protan-, deuteran- and tritanopia (matrices
 # of Machado et al., IEEE TVCG 15, 1291, 2009). Where colour is not seen at all, shape and dash tell them apart.
 ENGINE = {

@@ -13,7 +13,7 @@ import numpy as np
 
 from scenarios.model import Scenario
 
-PLAYERS = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")  # wherever in these folders a file lies
+ENGINES = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")  # wherever in these folders a file lies
 ROOT = Path(__file__).parents[2]
 DECIDING = ("pymunk", "box2d-py", "pyb2d3", "mini-racer", "numba", "numpy", "crosscheck2d")
 
@@ -46,7 +46,7 @@ class Cell:
 
 
 def content_key(*what: Hashable) -> str:
-    """16 hex digits of a hash over what decides a result: `what`, the versions, the players' source.
+    """16 hex digits of a hash over what decides a result: `what`, the versions, the engines' source.
 
     No file but of this program is read here: what was read when the command began is in `what`, as `Row.source`.
     """
@@ -81,6 +81,6 @@ def versions() -> dict[str, str]:
 
 @cache
 def source_hash(root: Path = ROOT) -> str:
-    """A hash over the players' source, so that a changed adapter is a changed cell."""
-    files = sorted(path for pattern in PLAYERS for path in root.glob(pattern))
+    """A hash over the engines' source, so that a changed adapter is a changed cell."""
+    files = sorted(path for pattern in ENGINES for path in root.glob(pattern))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]

@@ -195,7 +195,7 @@ def changed_numbers(before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]
     changes = []
     for row in both[differs].to_dict("records"):
         was, now = (float(row[key] or "nan") for key in ("value", "value_after"))
-        must = all((row["scenario"], name, float(row["dt_s"])) in equal for name in players_of(row))
+        must = all((row["scenario"], name, float(row["dt_s"])) in equal for name in engines_of(row))
         verdict = "worse" if must else verdict_of(row["metric"], row["versus"], was, now)
         what = f"{row['scenario']}  dt {float(row['dt_s']):.4g} s  {row['metric']} against {row['versus']}"
         note = " (same cell, other bits)" if must else ""
@@ -211,7 +211,7 @@ def said_of(value: str, note: str) -> str:
     return NOT_JUDGED if note.startswith(NOT_JUDGED) else value
 
 
-def players_of(row: Mapping[Hashable, Any]) -> list[str]:
+def engines_of(row: Mapping[Hashable, Any]) -> list[str]:
     """Who played for a number: an engine, or the two that are set against each other."""
     return [row["name"]] + ([row["versus"]] if ":" in row["versus"] else [])
 

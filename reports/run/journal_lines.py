@@ -24,7 +24,7 @@ def path(text: str) -> str:
     return text
 
 
-def player(text: str) -> str:
+def engine_profile(text: str) -> str:
     """`engine:profile`; raises `ValueError`."""
     if path(text).count(":") != 1 or text.startswith(":") or text.endswith(":"):
         raise ValueError("must be ENGINE:PROFILE")
@@ -33,7 +33,7 @@ def player(text: str) -> str:
 
 def engine(text: str) -> str:
     """What stands before the colon; raises `ValueError`."""
-    return player(f"{text}:any").removesuffix(":any")
+    return engine_profile(f"{text}:any").removesuffix(":any")
 
 
 def number(value: Any) -> Any:
@@ -67,7 +67,7 @@ def finite(value: Any) -> bool:
 
 Words = InstanceOf[str]  # not `str`, as pydantic takes no bytes of a path that are not UTF-8
 File = Annotated[Words, AfterValidator(path)]
-Player = Annotated[Words, AfterValidator(player)]
+EngineProfile = Annotated[Words, AfterValidator(engine_profile)]
 Engine = Annotated[Words, AfterValidator(engine)]
 Profile = Annotated[str, Field(pattern=r"\A[A-Za-z0-9_.-]{1,100}\z")]
 Name = Annotated[str, Field(pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z")]  # it becomes the name of a file

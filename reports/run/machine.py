@@ -18,7 +18,7 @@ def about(command: str, seed: int) -> dict[str, Any]:
         "command": command,
         "seed": seed,
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": {**versions(), "Python": platform.python_version(), "players' source": source_hash()},
+        "versions": {**versions(), "Python": platform.python_version(), "engines' source": source_hash()},
         "machine": {
             "system": f"{platform.system()} {platform.release()}",
             "architecture": platform.machine(),

@@ -64,7 +64,7 @@ def play_here(cell: Cell, row: Row, scenario: Scenario) -> Played:
     allow(LOADING)
     run = play_cell(cell, row, scenario, Begun(lambda state: leave(parts_of(state))))
     file, samples = (packed(run.trajectory), len(run.trajectory)) if run.trajectory else (b"", 0)
-    return Played(replace(run, trajectory=None), samples, file, player())
+    return Played(replace(run, trajectory=None), samples, file, engine())
 
 
 def time_here(cell: Cell, row: Row, scenario: Scenario) -> float:
@@ -84,6 +84,6 @@ def conform_here(name: str, row: Row) -> list[Finding]:
     return conform(name, row)
 
 
-def player() -> str:
+def engine() -> str:
     """By which source and versions this process plays."""
     return repr((versions(), source_hash()))

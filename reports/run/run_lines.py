@@ -11,13 +11,13 @@ from reports.run.journal_lines import (
     Count,
     Digest,
     Engine,
+    EngineProfile,
     File,
     Kinds,
     Line,
     Machine,
     Name,
     Number,
-    Player,
     Profile,
     Said,
     Seconds,
@@ -39,7 +39,7 @@ class Header(Line):
     versions: dict[Words, Words]
     machine: Machine
     scenes: list[File]
-    engines: list[Player]
+    engines: list[EngineProfile]
     dts: list[Step]
     full: bool
     timings: Annotated[int, Field(ge=0, le=MOST_ROUNDS)]
@@ -90,7 +90,7 @@ class ConformanceLine(Line):
     """What the probes found in an engine."""
 
     conformance: list[Probed]
-    of: Player
+    of: EngineProfile
     key: Literal[""] | Digest
 
     @model_validator(mode="after")

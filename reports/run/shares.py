@@ -50,7 +50,7 @@ class Gathering:
 
     def __init__(self, archive: Archive, missing: Iterable[Cell], timeout: float) -> None:
         """`timeout`: s that an exact answer may take; what has had less is tried again."""
-        self.folder, self.players, self.timeout = archive.folder, archive.header["engines"], timeout
+        self.folder, self.engines, self.timeout = archive.folder, archive.header["engines"], timeout
         self.missing = Counter(cell.scene for cell in missing)
         self.records: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
         self.scenes: dict[Path, str] = {}  # of the tasks that were given out
@@ -79,7 +79,7 @@ class Gathering:
         """The next task of a scene, if it is whole: its answer, then its share; each is given out once."""
         if self.missing[scene]:
             return
-        records = in_order(self.records[scene].values(), self.players)
+        records = in_order(self.records[scene].values(), self.engines)
         asked = answer_file(self.folder, records)
         answer = read_answer(asked)
         if asked not in self.scenes and (answer is None or answer.may_be_had(self.timeout)):
@@ -114,9 +114,9 @@ class Gathering:
             keep_share(path, result.csv)
 
 
-def in_order(records: Iterable[dict[str, Any]], players: Sequence[str]) -> list[dict[str, Any]]:
+def in_order(records: Iterable[dict[str, Any]], engines: Sequence[str]) -> list[dict[str, Any]]:
     """The lines of a scene's cells in the order of engines that was asked for, coarse dt first."""
-    return sorted(records, key=lambda record: (players.index(name_of(record)), record["substeps"]))
+    return sorted(records, key=lambda record: (engines.index(name_of(record)), record["substeps"]))
 
 
 def name_of(record: dict[str, Any]) -> str:

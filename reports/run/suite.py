@@ -22,7 +22,7 @@ from reports.run.journal import Journal, plain
 from reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.run.machine import about
 from reports.run.made import writing
-from reports.run.playing import Played, conform_here, play_here, player, time_here
+from reports.run.playing import Played, conform_here, engine, play_here, time_here
 from reports.run.runner import TIMEOUT, run_all
 from reports.run.scenes import open_scene, with_steps
 from reports.run.shares import Gathering
@@ -222,8 +222,8 @@ def keep_cell(
     """Write the trajectory of the cell of that `key`, then its line, which is returned."""
     played = failed(cell, scenario, result) if isinstance(result, Failure) else result
     run, samples = played.run, played.samples
-    if played.played_by != player():
-        raise OtherVersions("a worker has other versions or other source of the players than this machine")
+    if played.played_by != engine():
+        raise OtherVersions("a worker has other versions or other source of the engines than this machine")
     path = trajectory_file(journal.path.parent, key)
     if played.file:
         put_bytes(path, played.file)
@@ -260,7 +260,7 @@ def failed(cell: Cell, scenario: Scenario, failure: Failure) -> Played:
         f"; last good state: step {(samples - 1) * cell.substeps}, {scenario.times[samples - 1]:g} s" if samples else ""
     )
     run = Run(*cell.names, scenario.name, scenario.dt(cell.substeps), failure.status, failure.reason + last)
-    return Played(run, samples, packed(trajectory) if trajectory else b"", player())
+    return Played(run, samples, packed(trajectory) if trajectory else b"", engine())
 
 
 def take_timings(

@@ -139,8 +139,8 @@ def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
     by_scene: dict[str, list[dict[str, Any]]] = {scene: [] for scene in archive.header["scenes"]}
     for record in archive.records:
         by_scene[record["scene"]].append(record)
-    players = archive.header["engines"]
-    return {scene: in_order(records, players) for scene, records in by_scene.items() if records}
+    engines = archive.header["engines"]
+    return {scene: in_order(records, engines) for scene, records in by_scene.items() if records}
 
 
 def write_deviations(folder: Path, shares: Mapping[str, Path], unkept: Mapping[str, Comparison]) -> None:

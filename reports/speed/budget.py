@@ -68,7 +68,7 @@ class Offset(NamedTuple):
 
 
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
-    """A row a part of what puts player `name` of `HABITS` off in a scene, at this many steps a sample interval.
+    """A row a part of what puts engine `name` of `HABITS` off in a scene, at this many steps a sample interval.
 
     Of `COLUMNS`: until_s, how far the scene was followed, horizon_s, how far its exact answer goes, and duration_s, the
     scene itself; position_radii and energy, the root mean square of what the
@@ -153,7 +153,7 @@ class Followed:
 
 
 class Budget:
-    """The offset of one player, and its habits, each of which is played once with the same others."""
+    """The offset of one engine, and its habits, each of which is played once with the same others."""
 
     def __init__(self, at: Followed, habits: Sequence[Habit], total: Offset) -> None:
         self.at, self.habits, self.total = at, habits, total

@@ -39,7 +39,7 @@ class Table(NamedTuple):
 
 
 def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
-    """Root mean squares in radii, a row a player: engine, what is left unexplained, the parts, sum and all."""
+    """Root mean squares in radii, a row an engine: engine, what is left unexplained, the parts, sum and all."""
     here = budget[budget.scenario == scenario]
     parts = [part for part in causes(budget) if here[here.part == part].position_radii.max() > LEAST]  # of anybody
     columns = [TOTAL, UNEXPLAINED, *parts, INTERPLAY, SUM, ALL]
@@ -54,7 +54,7 @@ def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
 
 
 def causes(budget: pd.DataFrame) -> list[str]:
-    """The parts that are causes, of any player."""
+    """The parts that are causes, of any engine."""
     return [TIME, *(part for part in NAMES if part in set(budget.part))]
 
 

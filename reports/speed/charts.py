@@ -23,12 +23,12 @@ TALL, TALLEST, PER_ROW = 400, 520, 19  # px
 
 
 def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
-    """Error against cost, a line a player over its ladder; `points` of one scene, or pooled and then `tall`."""
+    """Error against cost, a line an engine over its ladder; `points` of one scene, or pooled and then `tall`."""
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis(COST, drawn.cost.to_numpy(float))
     y_axis = error_axis(drawn.error.to_numpy(float))
     traces = fronts(drawn, x_axis, y_axis)
-    for engine, profile, group in by_player(points):
+    for engine, profile, group in by_engine(points):
         fine = group[group.cost.notna() & np.isfinite(group.error)]
         spreads = {} if tall else {
             "error_x": bars(fine.cost, fine.low, fine.high),
@@ -51,7 +51,7 @@ def at_the_edge(
         return []
     top = edge(y_axis, FAILED) if np.isinf(lost.error).any() else np.nan
     traces = []
-    for engine, profile, group in by_player(lost):
+    for engine, profile, group in by_engine(lost):
         others = drawn[(drawn.engine == engine) & (drawn.profile == profile)]
         per_rung = float((others.cost / 2.0**others.rung).median()) if len(others) else np.nan
         cost = group.cost.where(group.cost.notna(), per_rung * 2.0**group.rung)
@@ -98,7 +98,7 @@ def dials(points: pd.DataFrame, relative: bool = False) -> go.Figure:
     y_axis = (log_axis("error / error as matched", drawn.error.to_numpy(float)) if relative
               else error_axis(drawn.error.to_numpy(float)))  # fmt: skip
     traces = []
-    for engine, profile, group in by_player(drawn):
+    for engine, profile, group in by_engine(drawn):
         what = profile.partition("+")[2]
         text = [turned(what, row, relative) for row in records(group)]
         error = group.error if relative else group.error.clip(lower=LOWEST)
@@ -123,7 +123,7 @@ def turned(what: str, row: dict[str, Any], relative: bool) -> str:
 
 
 def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
-    """What each accuracy costs, a mark a player; above, who never gets there."""
+    """What each accuracy costs, a mark an engine; above, who never gets there."""
     names = list(dict.fromkeys(zip(reached.engine, reached.profile)))
     y_axis = log_axis(COST, reached.cost.dropna().to_numpy(float))
     not_down = edge(y_axis, "not yet")
@@ -157,7 +157,7 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
     x_axis = log_axis("disks", np.append(costs.n.to_numpy(float), 10.0))
     traces = []
     stopped = edge(y_axis, "stopped") if (growth.stopped != "").any() else 0.0
-    for engine, profile, group in by_player(costs):
+    for engine, profile, group in by_engine(costs):
         text = [f"{row['n']:.0f} disks: {spread(row)} µs a step" for row in records(group)]
         traces.append(line(engine, profile, group.n, group.cost, text, {
             "error_y": bars(group.cost, group.low, group.high),
@@ -191,7 +191,7 @@ def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
         "type": "scatter", "x": [1, 1], "y": [-1, len(rows)], "mode": "lines", "hoverinfo": "skip", "name": "no change",
         "line": {"color": style.look(style.TRUTH).light, "width": 1.2, "dash": "dot"},
     }]  # fmt: skip
-    for engine, profile, group in by_player(table):
+    for engine, profile, group in by_engine(table):
         y = [rows.index((engine, profile, change)) for change in group.change]
         x = group[ratio].where(np.isfinite(group[ratio]) & (group[ratio] > 0))
         x = x.where(np.isfinite(group.error_radii), failed)
@@ -209,7 +209,7 @@ TICKS = [a * 10.0**b for b in range(-8, 9) for a in (1, 2, 5)]
 
 
 def line(engine: str, profile: str, x: Any, y: Any, text: Sequence[str], more: dict[str, Any] | None = None) -> dict:
-    """A trace in the look of its player, with what is said of each point."""
+    """A trace in the look of its engine, with what is said of each point."""
     look = style.look(engine, profile)
     return {
         "type": "scatter", "x": shortened(np.asarray(x, float), 5),
@@ -220,7 +220,7 @@ def line(engine: str, profile: str, x: Any, y: Any, text: Sequence[str], more: d
     } | (more or {})  # fmt: skip
 
 
-def by_player(table: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+def by_engine(table: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
     """(engine, profile, their rows), in the order of appearance."""
     for (engine, profile), group in table.groupby(["engine", "profile"], sort=False):
         yield str(engine), str(profile), group

@@ -9,11 +9,11 @@ from adapters.engines import ENGINES
 from adapters.mechanisms.habits import HABITS
 from reports.speed import ladder
 from reports.speed.effort import Effort
-from reports.speed.plan import SCENE, Plan, Player, Reach
+from reports.speed.plan import SCENE, Measurement, Plan, Reach
 from reports.speed.timing import FEWEST_ROUNDS, LEAST, WARM_UP
 from scenarios.model import Scenario
 
-# s, means over the players: of a step, of each disk in it, of pushing in Python, of wrapping each disk there; of
+# s, means over the measurements: of a step, of each disk in it, of pushing in Python, of wrapping each disk there; of
 # reading all and each disk once; of making ready for a sample. On the machine of `figures.csv`; elsewhere half or twice
 # as much.
 STEP, STEP_DISK, PUSH, WRAP_DISK = 1.0e-6, 0.17e-6, 16e-6, 0.75e-6
@@ -24,16 +24,18 @@ APART = 0.2  # s, to take the error of one engine in one scene apart
 PAGE = 8.0  # s
 
 
-def estimate(plan: Plan, players: Sequence[Player], reach: Reach) -> str:
+def estimate(plan: Plan, measurements: Sequence[Measurement], reach: Reach) -> str:
     """A sentence on how much there is to do and about how long it takes on an idle machine."""
     apart = APART * len(plan.budget_scenes) * len(set(plan.engines) & set(HABITS))
-    playing = (apart + sum(seconds_to_play(player, reach) for player in players)) / plan.workers
-    timed = [player for player in players if player.seed == plan.seed]
-    timing = sum(seconds_to_time(player, reach, plan.effort) for player in timed)
+    playing = (apart + sum(seconds_to_play(measurement, reach) for measurement in measurements)) / plan.workers
+    timed = [measurement for measurement in measurements if measurement.seed == plan.seed]
+    timing = sum(seconds_to_time(measurement, reach, plan.effort) for measurement in timed)
     timing += seconds_of_sizes(plan.effort) * plan.whole
     whole = STARTING + playing + timing + PAGE
     length = f"{ceil(whole / 60)} minutes" if whole > 90 else f"{ceil(whole / 10) * 10} s"
-    return f"{len(players)} ladders of steps to play and {len(timed)} to time: about {length} where nothing else runs"
+    return (
+        f"{len(measurements)} ladders of steps to play and {len(timed)} to time: about {length} where nothing else runs"
+    )
 
 
 def step_of(scenario: Scenario) -> float:
@@ -43,18 +45,24 @@ def step_of(scenario: Scenario) -> float:
     return STEP + n * STEP_DISK + (PUSH if scenario.thrusts else 0.0) + wrapping
 
 
-def seconds_to_play(player: Player, reach: Reach) -> float:
+def seconds_to_play(measurement: Measurement, reach: Reach) -> float:
     """s, of all rungs, read at every sample."""
-    scenario, samples = ladder.open_scene(player.scene, player.seed), reach[player.scene, player.seed]
-    reading = len(player.rungs) * samples * (READ + scenario.scene.n * READ_DISK)
-    return sum(player.rungs) * samples * LISTENING * step_of(scenario) + reading
+    scenario, samples = (
+        ladder.open_scene(measurement.scene, measurement.seed),
+        reach[measurement.scene, measurement.seed],
+    )
+    reading = len(measurement.rungs) * samples * (READ + scenario.scene.n * READ_DISK)
+    return sum(measurement.rungs) * samples * LISTENING * step_of(scenario) + reading
 
 
-def seconds_to_time(player: Player, reach: Reach, effort: Effort) -> float:
+def seconds_to_time(measurement: Measurement, reach: Reach, effort: Effort) -> float:
     """s, of all rounds of all rungs; the middle one is there twice on a ladder of a scene."""
-    scenario, samples = ladder.open_scene(player.scene, player.seed), reach[player.scene, player.seed]
-    rungs = [all_rounds(samples * k * step_of(scenario), effort) for k in player.rungs]
-    return sum(rungs) + (rungs[len(rungs) // 2] if player.kind == SCENE else 0.0)
+    scenario, samples = (
+        ladder.open_scene(measurement.scene, measurement.seed),
+        reach[measurement.scene, measurement.seed],
+    )
+    rungs = [all_rounds(samples * k * step_of(scenario), effort) for k in measurement.rungs]
+    return sum(rungs) + (rungs[len(rungs) // 2] if measurement.kind == SCENE else 0.0)
 
 
 def all_rounds(run: float, effort: Effort) -> float:

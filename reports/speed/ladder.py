@@ -56,7 +56,7 @@ def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int
 
     until_s is how far the exact answer, and so the run, goes of the duration_s of the scene; error_radii the largest
     distance of any disk from where it truly is, change_radii the largest from where the rung before had it; inf and
-    nan where it failed. A player that closes in on another motion changes less and less while its error stays.
+    nan where it failed. An engine that closes in on another motion changes less and less while its error stays.
     """
     scenario, truth = held(scene, seed)
     whole = open_scene(scene, seed).duration
@@ -84,11 +84,11 @@ def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int
 
 
 def times_of(
-    scene: str, seed: int, players: Mapping[tuple[Any, int, int], Make], rounds: int, budget: float
+    scene: str, seed: int, engines: Mapping[tuple[Any, int, int], Make], rounds: int, budget: float
 ) -> list[Sample]:
-    """Samples, s per simulated second, of players by (who, substeps, copy) over the whole length of the scene."""
+    """Samples, s per simulated second, of engines by (who, substeps, copy) over the whole length of the scene."""
     scenario = held(scene, seed).scenario
-    what = [Timed(key, Stepping(make, scenario, key[1]), scenario.duration) for key, make in players.items()]
+    what = [Timed(key, Stepping(make, scenario, key[1]), scenario.duration) for key, make in engines.items()]
     return interleaved(what, rounds, budget, seed)
 
 

@@ -11,12 +11,12 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 from adapters.play import STATUSES
 from reports.run.journal_lines import (
     Count,
+    EngineProfile,
     File,
     Kinds,
     Line,
     Machine,
     Number,
-    Player,
     Seconds,
     Seed,
     Step,
@@ -45,7 +45,7 @@ class Header(Line):
 
     scenes: list[File]
     files: dict[File, Words]
-    engines: list[Player]
+    engines: list[EngineProfile]
     effort: dict[Words, Any]
     whole: bool
     seed: Seed
@@ -68,7 +68,7 @@ class Row(Line):
 
     @property
     def name(self) -> str:
-        """Of the player."""
+        """Of the engine."""
         return f"{self.engine}:{self.profile}"
 
 
@@ -163,7 +163,7 @@ class SizesOf(Line):
 
     @model_validator(mode="after")
     def known(self) -> SizesOf:
-        """As of `Samples`; and each that stopped is a player, a number of disks and why."""
+        """As of `Samples`; and each that stopped is an engine, a number of disks and why."""
         Samples(result=self.samples)
         for name, n, why in self.stopped:
             if not (isinstance(name, str) and name.count(":") == 1 and type(n) is int and isinstance(why, str)):
@@ -224,9 +224,9 @@ class TaskLine(Line):
         if begins[0] == "error":
             here = [(row.seed, row.name, row.substeps) for row in found.result]
             if here != [(task[3], task[4], rung) for rung in task[6:]]:
-                raise ValueError("result: must have a row for each step that the task names, of its seed and player")
+                raise ValueError("result: must have a row for each step that the task names, of its seed and engine")
         if begins[0] == "budget" and any(row.name != task[2] for row in found.result):
-            raise ValueError("result: must be of the player that the task names")
+            raise ValueError("result: must be of the engine that the task names")
         if model is Samples and any(row.kind != begins[1] for row in found.result):
             raise ValueError("result: must be of the kind that the task names")
         return self

@@ -18,7 +18,7 @@ from reports.run.worker_process import Failure
 from reports.speed import budget, ladder, models, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept
-from reports.speed.plan import PLAIN, SCENE, Plan, Player, Reach, middle
+from reports.speed.plan import PLAIN, SCENE, Measurement, Plan, Reach, middle
 from reports.speed.timing import Sample
 from reports.terminal.progress import Progress
 
@@ -54,10 +54,10 @@ def measure(plan: Plan, progress: Progress, kept: Kept | None = None) -> Measure
     """Both passes of all that is planned; what is `kept` of an interrupted measurement is not done again."""
     measured = Measured()
     reach = find_reach(plan, measured, progress)
-    players = list(plan.players(reach))
-    if any(player.kind == SCENE for player in players):
-        progress.note(estimate(plan, players, reach))
-        played = measure_errors(plan, players, measured, progress, kept)
+    measurements = list(plan.measurements(reach))
+    if any(measurement.kind == SCENE for measurement in measurements):
+        progress.note(estimate(plan, measurements, reach))
+        played = measure_errors(plan, measurements, measured, progress, kept)
         measure_budget(plan, reach, measured, progress, kept)
         measure_times(plan, played, measured, progress, kept)
     return measured
@@ -77,35 +77,35 @@ def find_reach(plan: Plan, measured: Measured, progress: Progress) -> Reach:
 
 
 def measure_errors(
-    plan: Plan, players: Sequence[Player], measured: Measured, progress: Progress, kept: Kept | None
-) -> list[Player]:
-    """How far off all players are; returns those of the first seed, at the steps that they played to their end."""
-    tasks = {player.task: player.errors for player in players}
+    plan: Plan, measurements: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
+) -> list[Measurement]:
+    """How far off all engines are; returns those of the first seed, at the steps that they played to their end."""
+    tasks = {measurement.task: measurement.errors for measurement in measurements}
     results = dict(done(tasks, plan.workers, progress, "error", kept=kept))
     rows: list[dict[str, Any]] = []
     played = []
-    for player in players:
-        result = results[player.task]
-        found = rung_by_rung(player, plan.workers) if isinstance(result, Failure) else result
-        rows += ({"kind": player.kind, "change": player.change} | row for row in found)
-        if player.seed == plan.seed:
+    for measurement in measurements:
+        result = results[measurement.task]
+        found = rung_by_rung(measurement, plan.workers) if isinstance(result, Failure) else result
+        rows += ({"kind": measurement.kind, "change": measurement.change} | row for row in found)
+        if measurement.seed == plan.seed:
             well = tuple(row["substeps"] for row in found if row["status"] == "ok")
-            played.append(player._replace(rungs=well))
+            played.append(measurement._replace(rungs=well))
     measured.errors = pd.DataFrame(rows)
     return played
 
 
-def rung_by_rung(player: Player, workers: int) -> list[dict]:
+def rung_by_rung(measurement: Measurement, workers: int) -> list[dict]:
     """A ladder whose worker died or hung once more, each rung by itself, so that the others are kept."""
     rows: list[dict[str, Any]] = []
-    for k, result in run_all({k: player._replace(rungs=(k,)).errors for k in player.rungs}, workers, HANGS):
+    for k, result in run_all({k: measurement._replace(rungs=(k,)).errors for k in measurement.rungs}, workers, HANGS):
         if isinstance(result, Failure):
-            engine, profile = player.name.split(":")
-            scenario = ladder.open_scene(player.scene, player.seed)
+            engine, profile = measurement.name.split(":")
+            scenario = ladder.open_scene(measurement.scene, measurement.seed)
             result = [{
-                "scenario": scenario.name, "seed": player.seed, "engine": engine, "profile": profile,
+                "scenario": scenario.name, "seed": measurement.seed, "engine": engine, "profile": profile,
                 "dt_s": scenario.dt(k), "substeps": k, "status": result.status, "reason": result.reason,
-                "until_s": ladder.held(player.scene, player.seed).scenario.duration, "duration_s": scenario.duration,
+                "until_s": ladder.held(measurement.scene, measurement.seed).scenario.duration, "duration_s": scenario.duration,
                 "error_radii": float("inf"), "change_radii": float("nan"),
             }]  # fmt: skip
         rows += result
@@ -127,7 +127,7 @@ def measure_budget(plan: Plan, reach: Reach, measured: Measured, progress: Progr
 
 
 def measure_times(
-    plan: Plan, played: Sequence[Player], measured: Measured, progress: Progress, kept: Kept | None
+    plan: Plan, played: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
 ) -> None:
     """What everything costs that was played to its end: one process, one thing at a time."""
     measured.busy = busy_cores()
@@ -147,8 +147,8 @@ def measure_times(
     measured.samples, measured.truths = pd.DataFrame(rows), pd.DataFrame(truths)
 
 
-def timings(plan: Plan, played: Sequence[Player]) -> dict[tuple, Callable[[], Any]]:
-    """The tasks of the second pass: all players of a kind in a scene in one, as they are compared."""
+def timings(plan: Plan, played: Sequence[Measurement]) -> dict[tuple, Callable[[], Any]]:
+    """The tasks of the second pass: all measurements of a kind in a scene in one, as they are compared."""
     often: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
     makes = {name: row_of(name).make for name in plan.engines}
     tasks: dict[tuple, Callable[[], Any]] = {}
@@ -162,24 +162,26 @@ def timings(plan: Plan, played: Sequence[Player]) -> dict[tuple, Callable[[], An
     return tasks
 
 
-def in_turns(players: Sequence[Player]) -> dict[tuple[tuple[str, str], int, int], Callable]:
+def in_turns(measurements: Sequence[Measurement]) -> dict[tuple[tuple[str, str], int, int], Callable]:
     """((name, change), substeps, copy) -> engine.
 
     On a ladder of a scene each takes part twice at its middle dt, which gives the noise floor.
     """
     all_of_them = {}
-    for player in players:
-        for k in player.rungs:
-            twice = player.kind == SCENE and k == player.rungs[len(player.rungs) // 2]
+    for measurement in measurements:
+        for k in measurement.rungs:
+            twice = measurement.kind == SCENE and k == measurement.rungs[len(measurement.rungs) // 2]
             for copy in (0, 1) if twice else (0,):
-                all_of_them[(player.name, player.change), k, copy] = player.make
+                all_of_them[(measurement.name, measurement.change), k, copy] = measurement.make
     return all_of_them
 
 
-def scene_rows(kind: str, scene: str, seed: int, players: Mapping, often: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Rows of `Measured.samples` of players as `in_turns` gives them."""
+def scene_rows(
+    kind: str, scene: str, seed: int, measurements: Mapping, often: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """Rows of `Measured.samples` of measurements as `in_turns` gives them."""
     scenario, rows = ladder.open_scene(scene, seed), []
-    for sample in ladder.times_of(scene, seed, players, **often):
+    for sample in ladder.times_of(scene, seed, measurements, **often):
         (name, change), k, copy = sample.key
         told = {"scenario": scenario.name, "change": change, "dt_s": scenario.dt(k), "copy_of": copy}
         rows.append(sample_row(kind, name, sample, **told))

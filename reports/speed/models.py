@@ -25,7 +25,7 @@ def closed_form(scene: str, seed: int) -> dict[str, Any]:
     scenario = held(scene, seed).scenario
     if (model := answered_by(scenario)) != CLOSED_FORM or scenario.truth is None:
         return {"scenario": scenario.name, "truth": model, "closed_us": np.nan}
-    best, ends = np.inf, scenario.times[[0, -1]]  # a player is not read on the way either
+    best, ends = np.inf, scenario.times[[0, -1]]  # an engine is not read on the way either
     for _ in range(RUNS):
         started = perf_counter()
         scenario.truth(ends)
@@ -34,9 +34,9 @@ def closed_form(scene: str, seed: int) -> dict[str, Any]:
 
 
 def cheapest(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
-    """A row a scenario: truth, closed_us, and the cheapest player that is right to `FINEST` and to 1 % of a radius.
+    """A row a scenario: truth, closed_us, and the cheapest engine that is right to `FINEST` and to 1 % of a radius.
 
-    Columns model, player, cost_us for the first and loose_player, loose_us for the second; "" and nan where none is.
+    Columns model, engine, cost_us for the first and loose_engine, loose_us for the second; "" and nan where none is.
     """
     rows = []
     for row in truths.to_dict("records"):
@@ -46,7 +46,7 @@ def cheapest(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
         if np.isfinite(row["closed_us"]) and not row["closed_us"] > fine[1]:
             model = CLOSED_FORM
         rows.append(row | {
-            "model": model, "player": fine[0], "cost_us": fine[1], "loose_player": loose[0], "loose_us": loose[1],
+            "model": model, "engine": fine[0], "cost_us": fine[1], "loose_engine": loose[0], "loose_us": loose[1],
         })  # fmt: skip
     return pd.DataFrame(rows)
 

@@ -110,7 +110,7 @@ def section_of(results: Results, scene: str) -> Section:
     spread = f" The error is the median over {seeds} draws, its bar the 95 % bootstrap interval." if seeds > 1 else ""
     noise = results.noise_summary(scene)
     low, high = (style.number(noise.get(end, np.nan)) for end in ("low", "high"))
-    floor = f" Noise floor: half of the players read {low} to {high} against themselves." if noise["pairs"] else ""
+    floor = f" Noise floor: half of the engines read {low} to {high} against themselves." if noise["pairs"] else ""
     until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
     scored = f" Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends." if until < whole else ""
     wrapping = (points.wrapping > 0).any()

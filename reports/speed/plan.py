@@ -18,7 +18,7 @@ PLAIN = ""  # the change of an engine that is not changed
 Reach = Mapping[tuple[str, int], int]  # (scene, seed) -> how many sample intervals have an exact answer
 
 
-class Player(NamedTuple):
+class Measurement(NamedTuple):
     """An engine in a scene, drawn from a seed, at some steps of the sample interval (coarse to fine).
 
     kind: which question it is for: the ladders of all scenes, the features, or the dials. `change` is a row of
@@ -90,33 +90,35 @@ class Plan:
         draws = [(scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)]
         return draws + [(scene, self.seed) for scene in self.budget_scenes if scene not in scenes]
 
-    def players(self, reach: Reach) -> Iterator[Player]:
+    def measurements(self, reach: Reach) -> Iterator[Measurement]:
         """Everybody, in every draw that has an exact answer."""
         drawn = {draw for draw, samples in reach.items() if samples}
         for scene, seed in (draw for draw in self.draws if draw in drawn):
             if scene in self.scenes:
                 rungs = self.effort.ladder(ladder.open_scene(scene, seed))
-                yield from (Player(SCENE, scene, seed, name, PLAIN, row_of(name).make, rungs) for name in self.engines)
+                yield from (
+                    Measurement(SCENE, scene, seed, name, PLAIN, row_of(name).make, rungs) for name in self.engines
+                )
             if scene in self.feature_scenes and seed == self.seed:
                 yield from self.changed(scene)
             if scene in self.dial_scenes:
                 yield from self.turned(scene, seed)
 
-    def changed(self, scene: str) -> Iterator[Player]:
+    def changed(self, scene: str) -> Iterator[Measurement]:
         """Every changed engine, after those they are set against, at the dt the report shows."""
         rungs = (middle(scene),)
         for name in dict.fromkeys(feature.engine for feature in self.features):
-            yield Player(FEATURE, scene, self.seed, name, PLAIN, row_of(name).make, rungs)
+            yield Measurement(FEATURE, scene, self.seed, name, PLAIN, row_of(name).make, rungs)
         for one in self.features:
-            yield Player(FEATURE, scene, self.seed, one.engine, one.change, one.make, rungs)
+            yield Measurement(FEATURE, scene, self.seed, one.engine, one.change, one.make, rungs)
 
-    def turned(self, scene: str, seed: int) -> Iterator[Player]:
+    def turned(self, scene: str, seed: int) -> Iterator[Measurement]:
         """Every dial at every value at the dt the report shows, and its engine over a ladder of dt beside it."""
         here = middle(scene)
         for dial in self.dials:
-            yield Player(DIAL, scene, seed, dial.engine, PLAIN, row_of(dial.engine).make, around(here))
+            yield Measurement(DIAL, scene, seed, dial.engine, PLAIN, row_of(dial.engine).make, around(here))
             for value in dial.values:
-                yield Player(DIAL, scene, seed, dial.name, str(value), dial.at(value), (here,))
+                yield Measurement(DIAL, scene, seed, dial.name, str(value), dial.at(value), (here,))
 
 
 def around(here: int) -> tuple[int, ...]:

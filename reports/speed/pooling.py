@@ -43,13 +43,13 @@ def moved(values: Array, floor: float = 0.0) -> Array:
 
 
 def pooled(found: pd.DataFrame) -> pd.DataFrame:
-    """A row a player and rung that all scenarios have: error and cost, each `middle_half` over the scenarios.
+    """A row an engine and rung that all scenarios have: error and cost, each `middle_half` over the scenarios.
 
     Columns besides: error_low, error_high, low, high (quartiles); bare, of the cost less that of as many idle steps;
     of (how many scenarios), failed (in how many it did), timed (how many carry the cost); moved and cost_moved (by
     which factor leaving out one scenario changes error and cost at most), moved_by and cost_moved_by (which one).
-    A scenario that a player failed counts as infinitely wrong and infinitely dear; one that it played but was not timed
-    in is left out of the cost, and `timed` says so.
+    A scenario that an engine failed counts as infinitely wrong and infinitely dear; one that it played but was not
+    timed in is left out of the cost, and `timed` says so.
     """
     rungs = found.groupby("scenario").rung.max().min()
     rows = []

@@ -28,7 +28,7 @@ class Results:
 
     @property
     def names(self) -> list[str]:
-        """`engine:profile` of every player, in the order of `ENGINES`."""
+        """`engine:profile` of every engine, in the order of `ENGINES`."""
         return list(self.plan.engines)
 
     @property
@@ -84,7 +84,7 @@ class Results:
     def pooled_reached(self) -> pd.DataFrame:
         """As `reached`: the median over the scenarios where more than half get there, and how many do and do not.
 
-        A scenario in which a player does not get there is infinitely dear. Columns besides: of, how many scenarios;
+        A scenario in which an engine does not get there is infinitely dear. Columns besides: of, how many scenarios;
         got, in how many it gets there; never, at no dt; failed; untimed; in the others it does not down to the finest
         dt. lost: half or more are never or failed.
         """
@@ -163,7 +163,7 @@ class Results:
         return models.cheapest(self.measured.truths, self.points)
 
     def order_table(self, scene: str) -> pd.DataFrame:
-        """A row a player: order with interval and verdict, and for every accuracy (cost, dt, why) as columns."""
+        """A row an engine: order with interval and verdict, and for every accuracy (cost, dt, why) as columns."""
         orders = self.orders[self.orders.scenario == scene]
         reached = self.reached[self.reached.scenario == scene]
         wide = orders.assign(**{

@@ -35,7 +35,7 @@ def gas(n: int, seed: int) -> Scene:
     )  # fmt: skip
 
 
-def costs(players: Mapping[str, Make], sizes: Sequence[int], rounds: int, budget: float, patience: float,
+def costs(engines: Mapping[str, Make], sizes: Sequence[int], rounds: int, budget: float, patience: float,
           seed: int) -> tuple[list[Sample], dict[tuple[str, int], str]]:  # fmt: skip
     """Samples, s a step, by (name, n), from few disks to many; and who was not measured where, and why.
 
@@ -44,10 +44,10 @@ def costs(players: Mapping[str, Make], sizes: Sequence[int], rounds: int, budget
     """
     samples: list[Sample] = []
     left_out: dict[tuple[str, int], str] = {}
-    course: dict[str, list[tuple[int, float]]] = {name: [] for name in players}
+    course: dict[str, list[tuple[int, float]]] = {name: [] for name in engines}
     for n in sizes:
         awake: dict[str, _Going] = {}
-        for name, make in players.items():
+        for name, make in engines.items():
             if foreseen(course[name], n) > patience:
                 left_out[name, n] = STOPPED.format(patience)
                 continue
@@ -108,14 +108,14 @@ def exponent(n: Array, cost: Array) -> tuple[float, float, float]:
     return line_interval(np.log(n[many]), np.log(cost[many]))
 
 
-def driving(players: Mapping[str, Make], rounds: int, budget: float, seed: int) -> list[Sample]:
+def driving(engines: Mapping[str, Make], rounds: int, budget: float, seed: int) -> list[Sample]:
     """Samples, s a step, of a world with one static disk: by (name, True) step by step, by (name, False) in one call.
 
     What the second costs is the loop and the engine's own fixed cost of a step; what the first costs more is the call.
     """
     idle = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[np.inf], restitution=1.0)
     what: list[Timed] = []
-    for name, make in players.items():
+    for name, make in engines.items():
         what += [Timed((name, singly), _Idle(make, idle, singly), IDLE_STEPS) for singly in (True, False)]
     return interleaved(what, rounds, budget, seed)
 

@@ -20,7 +20,7 @@ from reports.speed.timing import summed_up
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario, player and dt: the columns of `summed`, and rung (0: coarsest)."""
+    """A row a scenario, engine and dt: the columns of `summed`, and rung (0: coarsest)."""
     found = summed(measured, SCENE, seed)
     return found.assign(rung=doublings(found))
 
@@ -70,7 +70,7 @@ def measurable(here: pd.DataFrame) -> pd.Series:
 
 
 def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
-    """A row a scenario, player, change and dt of one kind.
+    """A row a scenario, engine, change and dt of one kind.
 
     Columns: scenario, engine, profile, change, dt_s, substeps, until_s and duration_s (of the first
     seed, see `ladder.errors_of`), seeds, failed (how many), status and reason (of the
@@ -113,7 +113,7 @@ def in_us(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario and player: slope, low, high, verdict, see `order.Order`; coarsest_error and finest_error in
+    """A row a scenario and engine: slope, low, high, verdict, see `order.Order`; coarsest_error and finest_error in
     radii (medians over the seeds), the latter at finest_dt_s; steps, how many were played, and failed, at how many of
     them a draw failed: what failed has no part in slope and verdict.
     """
@@ -150,7 +150,7 @@ def ladders(measured: Measured) -> Iterator[tuple[tuple, np.ndarray, np.ndarray,
 
 
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
-    """A row a scenario, player and accuracy: accuracy (radii), cost (µs per simulated second), dt_s, why it is not, and
+    """A row a scenario, engine and accuracy: accuracy (radii), cost (µs per simulated second), dt_s, why it is not, and
     lost: it is not at any dt, or failed."""
     verdicts: dict[tuple, str] = dict(zip(zip(fitted.scenario, fitted.engine, fitted.profile), fitted.verdict))
     rows = []
@@ -167,7 +167,7 @@ def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
 
 
 def noise(measured: Measured) -> pd.DataFrame:
-    """A row a scenario and player: ratio of the median costs of an engine and its copy in the same rounds."""
+    """A row a scenario and engine: ratio of the median costs of an engine and its copy in the same rounds."""
     samples = measured.samples[measured.samples.kind == SCENE]
     both = (
         summed_up(samples, ["scenario", *WHO, "dt_s", "copy_of"])

@@ -1,4 +1,4 @@
-"""The atlas: every case on every player through the runner, journalled as each ends, with its table of limits."""
+"""The atlas: every case on every engine through the runner, journalled as each ends, with its table of limits."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from reports.run.worker_process import Failure
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
 from reports.stability.failures import keep_failure
-from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Trial, players_of
-from reports.stability.lines import KINDS, impossible, unknown_player
+from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Trial, engines_of
+from reports.stability.lines import KINDS, impossible, unknown_engine
 from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.search import Search
 from reports.stability.touching import TOUCHING, LawOf, law_of
@@ -37,7 +37,7 @@ COLUMNS = (
     "engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "seeds", "reason",
     "verdict", "failed_fraction", "runs", "monotone", "spacing", "tested", "source", "event", "form",
 )  # fmt: skip
-TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one player
+TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one engine
 SLOWEST_FIRST = (
     "long_gas",
     "long_wrapped_gas",
@@ -57,7 +57,7 @@ class Plan:
     cases: Sequence[str]
     maps: Sequence[str]
     touching: Sequence[str]
-    players: Sequence[str]
+    engines: Sequence[str]
     form: str
     workers: int
     command: str
@@ -65,11 +65,11 @@ class Plan:
 
 @dataclass(frozen=True)
 class Task:
-    """A case, a map or a scene of touching disks on a player: independent of every other."""
+    """A case, a map or a scene of touching disks on an engine: independent of every other."""
 
     kind: str
     name: str
-    player: str
+    engine: str
     form: str
 
     def __call__(self, folder: Path) -> Limit | MapOf | LawOf:
@@ -77,9 +77,9 @@ class Task:
         if self.kind == "limit":
             return found_limit(self, folder)
         if self.kind == "law":
-            return law_of(self.name, self.player)
+            return law_of(self.name, self.engine)
         started = process_time()
-        return replace(map_of(self.name, self.player), seconds=process_time() - started)
+        return replace(map_of(self.name, self.engine), seconds=process_time() - started)
 
 
 def case_named(name: str) -> Any:
@@ -90,7 +90,7 @@ def case_named(name: str) -> Any:
 def found_limit(task: Task, folder: Path) -> Limit:
     """Search, and save the first failing run next to the limit."""
     started = process_time()
-    search = Search(case_named(task.name), task.player, FORMS[task.form])
+    search = Search(case_named(task.name), task.engine, FORMS[task.form])
     limit = tried_out(search, replace(search.limit(), case=task.name))
     keep_failure(search, limit, folder)
     return replace(limit, seconds=process_time() - started)
@@ -113,19 +113,19 @@ def carry_out(plan: Plan, journal: Journal, done: Collection[Task], progress: Pr
             reason = result.reason if isinstance(result, Failure) else ""
             result = failed(task, result) if isinstance(result, Failure) else result
             journal.append({"task": asdict(task), task.kind: asdict(result)})
-            progress.done(f"{task.name}  {task.player}", result.status, reason)
+            progress.done(f"{task.name}  {task.engine}", result.status, reason)
     journal.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
 
 
 def tasks_of(plan: Plan) -> list[Task]:
     """All tasks, the slowest first, so that none is left over at the end."""
-    tasks = [Task("map", name, player, plan.form) for name in plan.maps for player in MAPS[name].players(plan.players)]
-    tasks += [Task("law", name, player, plan.form) for name in plan.touching for player in plan.players]
+    tasks = [Task("map", name, engine, plan.form) for name in plan.maps for engine in MAPS[name].engines(plan.engines)]
+    tasks += [Task("law", name, engine, plan.form) for name in plan.touching for engine in plan.engines]
     for name in plan.cases:
         tasks += [
-            Task("limit", name, player, plan.form)
-            for player in players_of(case_named(name))
-            if player.split("+")[0] in plan.players
+            Task("limit", name, engine, plan.form)
+            for engine in engines_of(case_named(name))
+            if engine.split("+")[0] in plan.engines
         ]
     rank = {name: k for k, name in enumerate(SLOWEST_FIRST)}
     return sorted(tasks, key=lambda task: rank.get(task.name, len(rank)))
@@ -134,12 +134,12 @@ def tasks_of(plan: Plan) -> list[Task]:
 def failed(task: Task, failure: Failure) -> Limit | MapOf | LawOf:
     """What is known of a task whose worker died or was stopped."""
     if task.kind == "map":
-        return MapOf(task.name, task.player, (), status=failure.status)
+        return MapOf(task.name, task.engine, (), status=failure.status)
     if task.kind == "law":
-        return LawOf(task.name, task.player, (), status=failure.status)
+        return LawOf(task.name, task.engine, (), status=failure.status)
     event = f"{failure.status}: {failure.reason}"
     trial = Trial(nan, 1, 1, nan, 0, nan, event, failure.status)
-    return Limit(task.name, task.player, task.form, NEVER_WORKS, nan, nan, (trial,), status=failure.status)
+    return Limit(task.name, task.engine, task.form, NEVER_WORKS, nan, nan, (trial,), status=failure.status)
 
 
 class Atlas(NamedTuple):
@@ -158,10 +158,10 @@ def read(folder: Path) -> Atlas:
     maps = [one for one in results.values() if isinstance(one, MapOf)]
     laws = [one for one in results.values() if isinstance(one, LawOf)]
     order = {name: k for k, name in enumerate(CASES)}
-    players = list(dict.fromkeys(player for case in CASES.values() for player in players_of(case)))
-    limits.sort(key=lambda limit: (order.get(limit.case, len(order)), limit.case, players.index(limit.player)))
-    maps.sort(key=lambda one: (list(MAPS).index(one.name), players.index(one.player)))
-    laws.sort(key=lambda one: (list(TOUCHING).index(one.name), players.index(one.player)))
+    engines = list(dict.fromkeys(engine for case in CASES.values() for engine in engines_of(case)))
+    limits.sort(key=lambda limit: (order.get(limit.case, len(order)), limit.case, engines.index(limit.engine)))
+    maps.sort(key=lambda one: (list(MAPS).index(one.name), engines.index(one.engine)))
+    laws.sort(key=lambda one: (list(TOUCHING).index(one.name), engines.index(one.engine)))
     return Atlas(explained(limits), maps, laws, headers[-1])
 
 
@@ -183,7 +183,7 @@ def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | M
             task = Task(**line["task"])
             result = made[task.kind](line[task.kind])
             files = headers[-1]["files"] if headers else {}
-            if fault := unknown_player(result, files) or wrong(result, files):
+            if fault := unknown_engine(result, files) or wrong(result, files):
                 raise ValueError(no_use(folder, number, fault, KINDS.missed))
             results[task] = result
     if results and not headers:
@@ -234,7 +234,7 @@ def table(limits: Sequence[Limit]) -> pd.DataFrame:
 def row_of(limit: Limit) -> dict[str, Any]:
     """The limit as a row of limits.csv."""
     case, failing = case_named(limit.case), limit.failing or (limit.trials[0] if limit.status != "ok" else None)
-    engine, profile = limit.player.split(":")
+    engine, profile = limit.engine.split(":")
     return {
         "engine": engine, "profile": profile, "case": limit.case, "parameter": case.parameter,
         "works_at": shortened(limit.works_at), "fails_at": shortened(limit.fails_at), "unit": case.unit,

@@ -10,8 +10,8 @@ from adapters.engine import Unsupported
 from adapters.play import Run, fault_of, gather
 from reports.stability.limits import Case
 from reports.stability.phases import EDGE, drawn, phase
-from reports.stability.players import Player
 from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_APART, SPRING_GROWS, STRAYS
+from reports.stability.variants import Variant
 from scenarios.families.placing import lay_out
 from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
 from scenarios.truth.closed_forms import Collision, answer, bouncing, flight, pair
@@ -104,9 +104,9 @@ def oscillator(x: float, _run: int) -> Scenario:
     return Scenario("oscillator", "Does it keep its swing?", "cos w t", scene, OSCILLATION * x, x, (1,), truth=truth)
 
 
-def on_spring(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
+def on_spring(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
     """Play a disk whose push -x N is read off its position before every step, as a user of an engine writes it."""
-    engine = player.make()
+    engine = variant.make()
     states: list[State] = []
     status, reason, settings = "ok", "", {}
     try:
@@ -124,7 +124,7 @@ def on_spring(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
         status, reason = "unsupported", str(refusal)
     finally:
         engine.close()
-    name, profile = player.name.split(":")
+    name, profile = variant.name.split(":")
     trajectory = gather(scenario, states, NO_COLLISIONS) if states else None
     return scenario, Run(
         name, profile, scenario.name, scenario.sample_interval, status, reason, trajectory, settings=settings

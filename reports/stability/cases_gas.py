@@ -9,8 +9,8 @@ from numpy.random import Generator, default_rng
 
 from adapters.play import Run
 from reports.stability.limits import RARELY, Case
-from reports.stability.players import Player, played
 from reports.stability.predicates_gas import ENERGY_DRIFTS, GAS_PARTS, MOMENTUM_DRIFTS, TEMPERATURES_PART, WRONG_GAS
+from reports.stability.variants import Variant, played
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
 
@@ -98,22 +98,22 @@ def steps_of_gas(x: float, run: int) -> Scenario:
 
 
 def against(other: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
-    """The scenario with another run of the same player in the place of the truth."""
+    """The scenario with another run of the same engine in the place of the truth."""
     if other.status != "ok" or other.trajectory is None:
         return scenario, other
     beside: Trajectory = other.trajectory
     return replace(scenario, truth=lambda _: beside), run
 
 
-def reversed_order(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
+def reversed_order(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
     """The same gas inserted in the opposite order, beside the gas in its own order."""
     scene = scenario.scene
     names = ("position", "velocity", "radius", "mass", "angle", "angular_velocity", "inertia")
     turned = replace(scenario, scene=replace(scene, **{name: getattr(scene, name)[::-1] for name in names}))
-    run = played(player, turned)
+    run = played(variant, turned)
     if run.trajectory is not None:
         run = replace(run, trajectory=renumbered(run.trajectory, scene.n))
-    return against(played(player, scenario), run, scenario)
+    return against(played(variant, scenario), run, scenario)
 
 
 def renumbered(played: Trajectory, n: int) -> Trajectory:
@@ -129,9 +129,9 @@ def renumbered(played: Trajectory, n: int) -> Trajectory:
     )  # fmt: skip
 
 
-def restarted(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
+def restarted(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
     """The gas stopped half way, read, and loaded into a new engine, beside the gas played through."""
-    whole = played(player, scenario)
+    whole = played(variant, scenario)
     if whole.status != "ok" or whole.trajectory is None:
         return scenario, whole
     half = scenario.samples // 2
@@ -141,7 +141,7 @@ def restarted(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
         angular_velocity=state.angular_velocity,
     )  # fmt: skip
     left = (scenario.samples - half) * scenario.sample_interval
-    rest = played(player, replace(scenario, scene=fresh, duration=left))
+    rest = played(variant, replace(scenario, scene=fresh, duration=left))
     if rest.status != "ok" or rest.trajectory is None:
         return scenario, rest
     before, after = whole.trajectory, rest.trajectory

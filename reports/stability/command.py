@@ -47,11 +47,11 @@ def find_limits(
     """Find the limits of `names`, all cases and maps if there are none, into `out`; exits 0, 1, 2 or 130."""
     cases, maps, touching = checked(names, vary)
     form = "full" if full else "quick"
-    players = checked_engines(engines)
-    if files := [name.removesuffix(OWN) for name in players if name not in ENGINES]:
+    chosen = checked_engines(engines)
+    if files := [name.removesuffix(OWN) for name in chosen if name not in ENGINES]:
         how = "a file is not driven to its limits: crosscheck check judges it, crosscheck run plays it"
         refuse([f"--engine {file}: {how}" for file in files])
-    plan = Plan(cases, maps, touching, players, form, affordable(workers or os.cpu_count() or 1), command)
+    plan = Plan(cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command)
     with opening(out):
         out = place_of(out)
         journal = open_part(out, STABILITY)
@@ -79,13 +79,13 @@ def gone_on_with(journal: Journal, plan: Plan, resume: bool) -> set[Task]:
 def write_files(folder: Path) -> Atlas:
     """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
     atlas = read(folder)
-    laws = [(one.name, one.player, *at[:-1]) for one in atlas.laws for at in one.gaps]
-    cells = [(one.name, one.player, *cell) for one in atlas.maps for cell in one.cells]
+    laws = [(one.name, one.engine, *at[:-1]) for one in atlas.laws for at in one.gaps]
+    cells = [(one.name, one.engine, *cell) for one in atlas.maps for cell in one.cells]
     with writing(folder, FILES):
         put_text(folder / LIMITS, table(atlas.limits).to_csv(index=False))
-        columns = ["scene", "player", *AtGap._fields[:-1]]
+        columns = ["scene", "engine", *AtGap._fields[:-1]]
         put_text(folder / LAWS, pd.DataFrame(laws, columns=columns).to_csv(index=False))
-        columns = ["map", "player", "x", "y", "reading", "failed", "event"]
+        columns = ["map", "engine", "x", "y", "reading", "failed", "event"]
         put_text(folder / MAP, pd.DataFrame(cells, columns=columns).to_csv(index=False))
         write_page(folder / PAGE, folder, atlas)
     return atlas
@@ -128,13 +128,13 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
     limits = atlas.limits
     rows = Table(title="Where they fail", title_justify="left", box=None, padding=(0, 1, 0, 0))
     shown = list(dict.fromkeys(limit.case for limit in limits))
-    players = [name for name in ENGINES if any(limit.player == name for limit in limits)]
+    engines = [name for name in ENGINES if any(limit.engine == name for limit in limits)]
     rows.add_column("case, parameter", overflow="fold")  # this one, so that no number is cut
-    for player in players:
-        rows.add_column(player.replace(":", "\n"), justify="right", no_wrap=True)
-    found = {(limit.case, limit.player): limit for limit in limits}
+    for engine in engines:
+        rows.add_column(engine.replace(":", "\n"), justify="right", no_wrap=True)
+    found = {(limit.case, limit.engine): limit for limit in limits}
     for name in shown:
-        cells = [in_words(found[name, player]) if (name, player) in found else "" for player in players]
+        cells = [in_words(found[name, engine]) if (name, engine) in found else "" for engine in engines]
         case, parameter = Path(name).name, case_named(name).parameter
         rows.add_row(case + (", " if len(case + parameter) < 24 else ",\n") + parameter, *cells)
     console.print(rows)
@@ -146,9 +146,9 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
     )
     console.print("values were scanned, are in limits.csv (works_at, fails_at, spacing) and on the page.")
     console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
-    lost = [f"{one.case} on {one.player}" for one in limits if one.status != "ok"]
-    lost += [f"{one.name} on {one.player}" for one in atlas.maps if one.status != "ok"]
-    lost += [f"{one.name} on {one.player}" for one in atlas.laws if one.status != "ok"]
+    lost = [f"{one.case} on {one.engine}" for one in limits if one.status != "ok"]
+    lost += [f"{one.name} on {one.engine}" for one in atlas.maps if one.status != "ok"]
+    lost += [f"{one.name} on {one.engine}" for one in atlas.laws if one.status != "ok"]
     if lost:
         say(f"no result: {', '.join(lost)}")
     sys.exit(FAILED if lost else DONE)

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from reports.stability.limits import NOT_KNOWN, Limit
-from reports.stability.players import play_as
 from reports.stability.predicates import judge
 from reports.stability.search import Search
 from reports.stability.twins import COLLISIONS_WAIT, told
+from reports.stability.variants import play_as
 from reports.stability.vary import at_offset, at_scale, at_tempo
 from scenarios.model import Scenario
 
@@ -60,23 +60,23 @@ class Cure(NamedTuple):
     """One change to a failing run.
 
     Attributes:
-        players, varied: patterns of players and of what is varied, for which it is tried.
+        engines, varied: patterns of engines and of what is varied, for which it is tried.
         tells: why it failed, if it works with the change.
         how: the change in words.
         change: what is done to the scene.
-        player: who plays it instead; "" is the same.
+        engine: who plays it instead; "" is the same.
     """
 
-    players: str
+    engines: str
     varied: str
     tells: str
     how: str
     change: Callable[[Scenario], Scenario] = unchanged
-    player: str = ""
+    engine: str = ""
 
-    def fits(self, player: str, varied: str) -> bool:
+    def fits(self, engine: str, varied: str) -> bool:
         """Whether it is tried."""
-        return fnmatch(player, self.players) and fnmatch(varied, self.varied)
+        return fnmatch(engine, self.engines) and fnmatch(varied, self.varied)
 
 
 SAYS_SO = "it says so"
@@ -98,16 +98,16 @@ CURES = {
         "[pb]*", "*", "too large for a length of the engine's own (cap on the way in a step, slop)",
         "32 times as small, at the same speeds", smaller,
     ),
-    "in_order": Cure("reference:[el]*", "*", COLLISIONS_WAIT, "as reference:ordered", player="reference:ordered"),
+    "in_order": Cure("reference:[el]*", "*", COLLISIONS_WAIT, "as reference:ordered", engine="reference:ordered"),
     "finer": Cure("*", "[!d]*", f"{COLLISIONS_WAIT}, and the step is too coarse for that", "in steps of an eighth", finer),
     **{
         f"{box}_swept": Cure(f"{box}:matched", "*", "disks are not swept against each other",
-                             f"as {box}:matched+bullets", player=f"{box}:matched+bullets")
+                             f"as {box}:matched+bullets", engine=f"{box}:matched+bullets")
         for box in ("box2d", "box2d_v3")
     },
     **{
         f"{engine}_matched": Cure(f"{engine}:shipped", "*", "a default of the engine that the matched profile changes",
-                                  f"as {engine}:matched", player=f"{engine}:matched")
+                                  f"as {engine}:matched", engine=f"{engine}:matched")
         for engine in ("pymunk", "box2d", "box2d_v3")
     },
 }  # fmt: skip
@@ -127,9 +127,9 @@ def cure_of(search: Search, limit: Limit) -> str:
         return ""
     scenario, _ = seen
     for name, cure in CURES.items():
-        if cure.fits(search.player, search.case.parameter):
+        if cure.fits(search.engine, search.case.parameter):
             changed = cure.change(scenario)
-            if not judge(search.case.predicate, changed, play_as(cure.player or search.player, changed)).failed:
+            if not judge(search.case.predicate, changed, play_as(cure.engine or search.engine, changed)).failed:
                 return name
     return ""
 
@@ -144,6 +144,6 @@ def why_played(limit: Limit, varied: str) -> tuple[str, str, str]:
     if cure := CURES.get(limit.cured):
         return cure.tells, "", f"works {cure.how}"
     if failing.broken == "refused":
-        return "the player refuses it", "", SAYS_SO
-    tried = [cure.how for cure in CURES.values() if cure.fits(limit.player, varied)]
+        return "the engine refuses it", "", SAYS_SO
+    tried = [cure.how for cure in CURES.values() if cure.fits(limit.engine, varied)]
     return f"{NOT_KNOWN}; it also fails {', '.join(tried)}" if tried else NOT_KNOWN, "", ""

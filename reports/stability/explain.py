@@ -34,7 +34,7 @@ def tried_out(search: Search, limit: Limit) -> Limit:
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
     """The limits with their reasons, each tested if it can be: by itself, or by the limit of its switch among them."""
-    by_name = {(limit.case, limit.player): limit for limit in limits}
+    by_name = {(limit.case, limit.engine): limit for limit in limits}
     return [with_reason(limit, by_name) for limit in limits]
 
 
@@ -68,7 +68,7 @@ def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Lim
     tests = []
     if reason.predicts is not None and brackets(limit, reason.predicts):
         tests.append(f"predicts {reason.predicts:.4g}")
-    if reason.switch != limit.player and (other := by_name.get((limit.case, reason.switch))) and farther(other, limit):
+    if reason.switch != limit.engine and (other := by_name.get((limit.case, reason.switch))) and farther(other, limit):
         tests.append(f"{reason.switch} gets farther")
     if limit.failing is not None and limit.failing.broken == "refused":
         tests.append(SAYS_SO)

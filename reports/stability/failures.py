@@ -68,9 +68,9 @@ def of_scenario(one: Trajectory, scenario: Scenario, most: int) -> bool:
 
 def file_of(limit: Limit, folder: Path) -> Path:
     """The file of the failing run."""
-    name = f"{limit.case}.{limit.player}"
+    name = f"{limit.case}.{limit.engine}"
     if "/" in name or len(name) > 200:  # two folders may have a file of one name
-        name = f"{Path(limit.case).name}.{limit.player}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"[-200:]
+        name = f"{Path(limit.case).name}.{limit.engine}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"[-200:]
     name = name.replace(":", "-")
     return folder / "trajectories" / f"{name}.npz"
 

@@ -8,8 +8,8 @@ from itertools import pairwise
 from math import nan, sqrt
 
 from adapters.play import Run
-from reports.stability.players import PLAYERS, Player, played
 from reports.stability.predicates import Predicate
+from reports.stability.variants import VARIANTS, Variant, played
 from scenarios.model import Scenario
 
 EXACT, NOT_KNOWN = "the exact answer", "not known"
@@ -42,9 +42,9 @@ FULL = Form("full", few=ALL, ratio=1.01, whole=True)
 FORMS = {form.name: form for form in (QUICK, FULL)}
 
 
-def once(player: Player, scenario: Scenario) -> tuple[Scenario, Run]:
+def once(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
     """One run, judged by the scenario's own truth or by the laws of physics."""
-    return scenario, played(player, scenario)
+    return scenario, played(variant, scenario)
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Case:
         predicate: what failing means.
         runs: at a value: 1 where nothing differs, else phases of the collision within a step, or seeds.
         whole: whether the parameter counts something.
-        also: players of `PLAYERS` besides those of `ENGINES`: an engine with one thing switched.
-        play: player and scenario -> the run and what it is judged by, where that takes more than one call of `play`.
+        also: engines of `VARIANTS` besides those of `ENGINES`: an engine with one thing switched.
+        play: engine and scenario -> the run and what it is judged by, where that takes more than one call of `play`.
         quick_values: to scan in the quick form, where a run is long: some of `values`.
         refines: whether the first edge is bisected, and the full form scans between the values (not with `by_chance`).
         ratio: how close the bracket is made at best, where a run is long or what is drawn differs much.
@@ -83,7 +83,7 @@ class Case:
     runs: int = 1
     whole: bool = False
     also: tuple[str, ...] = ()
-    play: Callable[[Player, Scenario], tuple[Scenario, Run]] = once
+    play: Callable[[Variant, Scenario], tuple[Scenario, Run]] = once
     quick_values: tuple[float, ...] = ()
     refines: bool = True
     ratio: float = 1.0
@@ -148,7 +148,7 @@ class Limit:
     """What a search found; plain numbers and text, so that it goes into a journal as it is.
 
     Attributes:
-        case, player: names; the player is a key of `PLAYERS`.
+        case, engine: names; the engine is a key of `VARIANTS`.
         form: of `FORMS`.
         verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on), or "works only beyond"
             (at works_at, and not at the gentler fails_at).
@@ -165,7 +165,7 @@ class Limit:
     """
 
     case: str
-    player: str
+    engine: str
     form: str
     verdict: str
     works_at: float
@@ -214,6 +214,6 @@ class Limit:
         return sum(trial.runs for trial in self.trials)
 
 
-def players_of(case: Case) -> list[str]:
-    """Who plays a case: every row of `ENGINES`, and the case's own switches, in the order of `PLAYERS`."""
-    return [name for name, player in PLAYERS.items() if not player.switch or name in case.also]
+def engines_of(case: Case) -> list[str]:
+    """Who plays a case: every row of `ENGINES`, and the case's own switches, in the order of `VARIANTS`."""
+    return [name for name, engine in VARIANTS.items() if not engine.switch or name in case.also]

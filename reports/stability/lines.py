@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from adapters.engines import ENGINES
-from reports.run.journal_lines import Count, File, Kinds, Line, Machine, Number, Player, Seconds, Seed, Words
+from reports.run.journal_lines import Count, EngineProfile, File, Kinds, Line, Machine, Number, Seconds, Seed, Words
 from reports.stability.cases import CASES
 from reports.stability.cures import CURES
 from reports.stability.limits import (
@@ -22,7 +22,7 @@ from reports.stability.limits import (
     Case,
     Limit,
     Trial,
-    players_of,
+    engines_of,
 )  # fmt: skip
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import GAPS, TOUCHING, LawOf
@@ -71,7 +71,7 @@ class TaskOf(Line):
 
     kind: Literal["limit", "map", "law"]
     name: File
-    player: Player
+    engine: EngineProfile
     form: Literal[tuple(FORMS)]  # type: ignore[valid-type]
 
 
@@ -95,7 +95,7 @@ class LimitRow(Line):
     """As `Limit`."""
 
     case: File
-    player: Player
+    engine: EngineProfile
     form: Literal[tuple(FORMS)]  # type: ignore[valid-type]
     verdict: Literal[LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND]  # type: ignore[valid-type]
     works_at: Number
@@ -116,7 +116,7 @@ class MapRow(Line):
     """As `MapOf`; a cell is x, y, reading, whether it failed, what broke."""
 
     name: Literal[tuple(MAPS)]  # type: ignore[valid-type]
-    player: Player
+    engine: EngineProfile
     cells: list[Annotated[list[Any], Field(min_length=5, max_length=5)]]
     status: Ended
     seconds: Number
@@ -136,7 +136,7 @@ class LawRow(Line):
     """As `LawOf`; a gap is as `AtGap`."""
 
     name: Literal[tuple(TOUCHING)]  # type: ignore[valid-type]
-    player: Player
+    engine: EngineProfile
     gaps: list[Annotated[list[Any], Field(min_length=6, max_length=6)]]
     status: Ended
 
@@ -176,14 +176,14 @@ class TaskLine(Line):
 
     @model_validator(mode="after")
     def of_its_task(self) -> TaskLine:
-        """What it gave is of its kind, of its name, and of its player."""
+        """What it gave is of its kind, of its name, and of its engine."""
         given = {"limit": self.limit, "map": self.map, "law": self.law}
         one = given.pop(self.task.kind)
         if one is None or any(given.values()):
             raise ValueError(f"{self.task.kind}: missing, or not alone")
         name = one.case if isinstance(one, LimitRow) else one.name
-        if (name, one.player) != (self.task.name, self.task.player):
-            raise ValueError(f"{self.task.kind}: must be of the task's name and player")
+        if (name, one.engine) != (self.task.name, self.task.engine):
+            raise ValueError(f"{self.task.kind}: must be of the task's name and engine")
         if isinstance(one, LimitRow) and one.form != self.task.form:
             raise ValueError(f"limit.form = {one.form!r}: must be that of the task")
         return self
@@ -196,16 +196,16 @@ KINDS = Kinds(
 )
 
 
-def unknown_player(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
-    """Why there is no such case or player, as the end of a sentence; "" if there is. files: those of the header."""
+def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
+    """Why there is no such case or engine, as the end of a sentence; "" if there is. files: those of the header."""
     if isinstance(one, Limit):
         path, _, what = one.case.rpartition(":")
         if one.case not in CASES and (path not in files or what not in VARIES):
             return f"limit.case = {one.case!r}: must be a case, or one of a file of the header"
-        players = players_of(CASES[one.case]) if one.case in CASES else [*ENGINES]
+        engines = engines_of(CASES[one.case]) if one.case in CASES else [*ENGINES]
     else:
-        players = MAPS[one.name].players([*ENGINES]) if isinstance(one, MapOf) else [*ENGINES]
-    return "" if one.player in players else f"player = {one.player!r}: must be one that plays this"
+        engines = MAPS[one.name].engines([*ENGINES]) if isinstance(one, MapOf) else [*ENGINES]
+    return "" if one.engine in engines else f"engine = {one.engine!r}: must be one that plays this"
 
 
 def impossible(limit: Limit, case: Case) -> str:
@@ -231,7 +231,7 @@ def impossible(limit: Limit, case: Case) -> str:
         if limit.twin:
             told(limit)
     except StopIteration:
-        return f"limit.twin = {limit.twin[:60]!r}: must name what the player does otherwise"
+        return f"limit.twin = {limit.twin[:60]!r}: must name what the engine does otherwise"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""Two parameters at once: how a player's reading depends on both, as a grid for every player."""
+"""Two parameters at once: how an engine's reading depends on both, as a grid for every engine."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from adapters.play import Run, play
 from reports.stability.cases_collisions import flyby
 from reports.stability.cases_gas import gas
 from reports.stability.cases_stacks import column
-from reports.stability.players import Switched, play_as
 from reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
 from reports.stability.predicates_crowds import STANDS
 from reports.stability.predicates_gas import ENERGY_DRIFTS
+from reports.stability.variants import Switched, play_as
 from scenarios.model import Scenario
 
 
@@ -31,8 +31,8 @@ class Map:
         x_name, y_name, x, y: the parameters with their units, and their values.
         scene: (x, y, number of the run) -> the scenario.
         predicate: what is read; the worst of `runs` is shown.
-        only: players that have the parameter; empty: all.
-        play: (player, scenario, x, y) -> the run.
+        only: engines that have the parameter; empty: all.
+        play: (engine, scenario, x, y) -> the run.
     """
 
     name: str
@@ -45,19 +45,19 @@ class Map:
     predicate: Predicate
     runs: int = 2
     only: tuple[str, ...] = ()
-    play: Callable[[str, Scenario, float, float], Run] = lambda player, scenario, _x, _y: play_as(player, scenario)
+    play: Callable[[str, Scenario, float, float], Run] = lambda engine, scenario, _x, _y: play_as(engine, scenario)
 
-    def players(self, asked: Sequence[str]) -> list[str]:
+    def engines(self, asked: Sequence[str]) -> list[str]:
         """Those asked for that have both parameters."""
         return [name for name in asked if name in (self.only or ENGINES)]
 
 
 @dataclass(frozen=True)
 class MapOf:
-    """A map on a player: rows (x, y, worst reading, whether a run failed, what broke); s of processor time it took."""
+    """A map on an engine: rows (x, y, worst reading, whether a run failed, what broke); s of processor time it took."""
 
     name: str
-    player: str
+    engine: str
     cells: tuple[tuple[float, float, float, bool, str], ...]
     status: str = "ok"
     seconds: float = nan
@@ -66,21 +66,21 @@ class MapOf:
     def from_record(record: dict[str, Any]) -> MapOf:
         """From a line of the journal."""
         cells = tuple((x, y, float(value), failed, broken) for x, y, value, failed, broken in record["cells"])
-        return MapOf(record["name"], record["player"], cells, record["status"])
+        return MapOf(record["name"], record["engine"], cells, record["status"])
 
 
-def map_of(name: str, player: str) -> MapOf:
-    """Play a map's grid on a player."""
+def map_of(name: str, engine: str) -> MapOf:
+    """Play a map's grid on an engine."""
     one = MAPS[name]
     cells = []
     for x in one.x:
         for y in one.y:
             scenarios = [one.scene(x, y, run) for run in range(one.runs)]
-            readings = [judge(one.predicate, scenario, one.play(player, scenario, x, y)) for scenario in scenarios]
+            readings = [judge(one.predicate, scenario, one.play(engine, scenario, x, y)) for scenario in scenarios]
             worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
             broken = next((f"{r.broken}: {r.event}" for r in readings if r.failed), "")
             cells.append((x, y, worst, any(r.failed for r in readings), broken))
-    return MapOf(name, player, tuple(cells))
+    return MapOf(name, engine, tuple(cells))
 
 
 def set_iterations(count: int, engine: Any) -> None:
@@ -93,13 +93,13 @@ def set_iterations(count: int, engine: Any) -> None:
         engine.substeps = count
 
 
-def with_iterations(player: str, scenario: Scenario, _ratio: float, count: float) -> Run:
+def with_iterations(engine: str, scenario: Scenario, _ratio: float, count: float) -> Run:
     """Play with so many iterations."""
-    engine = Switched(ENGINES[player].make(), partial(set_iterations, int(count)))
+    switched = Switched(ENGINES[engine].make(), partial(set_iterations, int(count)))
     try:
-        return play(engine, player, scenario, scenario.dt(1))
+        return play(switched, engine, scenario, scenario.dt(1))
     finally:
-        engine.close()
+        switched.close()
 
 
 def collision_at(x: float, y: float, run: int) -> Scenario:

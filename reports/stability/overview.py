@@ -23,18 +23,18 @@ class Cell(NamedTuple):
 
 
 class Why(NamedTuple):
-    """A reason in words, where it stands, how it was tested, and the players it is given for."""
+    """A reason in words, where it stands, how it was tested, and the engines it is given for."""
 
     text: str
     source: str
     tested: str
-    players: list[str]
+    engines: list[str]
 
 
 class MapTable(NamedTuple):
-    """A player's map: a row a y, from large to small, a cell an x."""
+    """An engine's map: a row a y, from large to small, a cell an x."""
 
-    player: str
+    engine: str
     rows: list[tuple[float, list[Cell]]]
 
 
@@ -62,12 +62,12 @@ def why(limit: Limit) -> str:
 
 
 def reasons(limits: Sequence[Limit]) -> list[Why]:
-    """Every reason once, with the players it is given for, in the order of appearance."""
+    """Every reason once, with the engines it is given for, in the order of appearance."""
     found: dict[tuple[str, str, str], list[str]] = {}
     for limit in limits:
         if limit.verdict != NEVER_FAILS:
-            found.setdefault((why(limit), limit.source, limit.tested), []).append(limit.player)
-    return [Why(*key, players) for key, players in found.items()]
+            found.setdefault((why(limit), limit.source, limit.tested), []).append(limit.engine)
+    return [Why(*key, engines) for key, engines in found.items()]
 
 
 def bracket(limit: Limit) -> tuple[str, str]:
@@ -84,7 +84,7 @@ def pattern(limit: Limit) -> str:
 
 def findings(limits: Sequence[Limit]) -> list[str]:
     """A few sentences, counted from the limits."""
-    mine = [limit for limit in limits if limit.player in ENGINES]
+    mine = [limit for limit in limits if limit.engine in ENGINES]
     cases = list(dict.fromkeys(limit.case for limit in mine))
     failing = [limit for limit in mine if limit.verdict != NEVER_FAILS]
     found = [f"{len(mine)} searches in {len(cases)} cases: {len(mine) - len(failing)} found no failure as far as they "
@@ -92,36 +92,36 @@ def findings(limits: Sequence[Limit]) -> list[str]:
              f"{sum(limit.verdict == NEVER_WORKS for limit in mine)} failed everywhere."]  # fmt: skip
     fails: dict[str, list[str]] = {}
     for limit in failing:
-        fails.setdefault(limit.player, []).append(limit.case)
+        fails.setdefault(limit.engine, []).append(limit.case)
     if fails:
-        order = sorted({limit.player for limit in mine}, key=lambda player: len(fails.get(player, [])))
+        order = sorted({limit.engine for limit in mine}, key=lambda engine: len(fails.get(engine, [])))
         found.append(f"Of these {len(cases)} cases {order[0]} fails in the fewest, {len(fails.get(order[0], []))}, and "
                      f"{order[-1]} in the most, {len(fails[order[-1]])}. Each fails somewhere else.")  # fmt: skip
     tested = [limit for limit in failing if limit.tested]
     found.append(
         f"The reasons of {len(tested)} of the {len(failing)} limits were tested: the limit follows from the reason, "
-        "or a player that differs in that one thing gets farther, or the failing run works without it, or the "
-        "reference with late collisions and the fewest habits of the player that suffice works and fails at the same values. "
+        "or an engine that differs in that one thing gets farther, or the failing run works without it, or the "
+        "reference with late collisions and the fewest habits of the engine that suffice works and fails at the same values. "
         "The others are called likely, or not known."
     )
     odd = [limit for limit in mine if not limit.monotone]
     if odd:
-        names = ", ".join(dict.fromkeys(f"{limit.player} in {limit.case}" for limit in odd[:3]))
+        names = ", ".join(dict.fromkeys(f"{limit.engine} in {limit.case}" for limit in odd[:3]))
         found.append(
-            f"{len(odd)} of the searches found more than one edge (marked *): a player that works again beyond its "
+            f"{len(odd)} of the searches found more than one edge (marked *): an engine that works again beyond its "
             f"first failure, as {names}. What stands in the table is the first failure."
         )
     return found
 
 
 def map_tables(maps: Sequence[MapOf]) -> dict[str, list[MapTable]]:
-    """Map -> a table a player."""
+    """Map -> a table an engine."""
     tables: dict[str, list[MapTable]] = {}
     for one in maps:
         bound = MAPS[one.name].predicate.bound
         at = {(x, y): map_cell(value, failed, broken, bound) for x, y, value, failed, broken in one.cells}
         rows = [(y, [at[x, y] for x in MAPS[one.name].x if (x, y) in at]) for y in reversed(MAPS[one.name].y)]
-        tables.setdefault(one.name, []).append(MapTable(one.player, rows))
+        tables.setdefault(one.name, []).append(MapTable(one.engine, rows))
     return tables
 
 
@@ -137,7 +137,7 @@ def map_cell(value: float, failed: bool, broken: str, bound: float) -> Cell:
 
 
 def law_cell(at: AtGap) -> Cell:
-    """The law that a player follows at a gap; coloured where it follows none."""
+    """The law that an engine follows at a gap; coloured where it follows none."""
     if not at.velocity:
         return Cell(at.law, "", -1, True)
     motion = "; ".join(f"({number(x, 2)}, {number(y, 2)})" for x, y in at.velocity)

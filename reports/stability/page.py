@@ -32,9 +32,9 @@ SECONDS = 5.0  # a replay lasts
 
 @dataclass(frozen=True)
 class Replay:
-    """The first failing run of a player: what the page's player takes, its height over its width, and a sentence."""
+    """The first failing run of an engine: what the page's player takes, its height over its width, and a sentence."""
 
-    player: str
+    engine: str
     pack: str
     ratio: float
     says: str
@@ -56,13 +56,13 @@ class Section:
         """Its name as a fragment of a URL."""
         return "".join(c if c.isalnum() or c in "_-" else "-" for c in self.case.name)
 
-    def cell(self, player: str) -> overview.Cell:
+    def cell(self, engine: str) -> overview.Cell:
         """Its limit in the overview; empty where it was not asked."""
-        return overview.cell_of(self.case, next((limit for limit in self.limits if limit.player == player), None))
+        return overview.cell_of(self.case, next((limit for limit in self.limits if limit.engine == engine), None))
 
-    def replay(self, player: str) -> Replay | None:
-        """The replay of a player's failure, if there is one."""
-        return next((replay for replay in self.replays if replay.player == player), None)
+    def replay(self, engine: str) -> Replay | None:
+        """The replay of an engine's failure, if there is one."""
+        return next((replay for replay in self.replays if replay.engine == engine), None)
 
 
 def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
@@ -72,7 +72,7 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
     for limit in limits:
         by_case.setdefault(limit.case, []).append(limit)
     sections = [section_of(case_named(name), found, folder) for name, found in by_case.items()]
-    names = [limit.player for limit in limits] + [one.player for one in maps] + [one.player for one in laws]
+    names = [limit.engine for limit in limits] + [one.engine for one in maps] + [one.engine for one in laws]
     names = list(dict.fromkeys(names))
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
     plotly, scripts = get_plotlyjs(), [(REPORTS / script).read_text(encoding="utf-8") for script in SCRIPTS]
@@ -85,7 +85,7 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
     environment.filters["number"] = style.number
     html = environment.get_template("stability.html.j2").render(
         sections=sections, families=families_of(sections), findings=overview.findings(limits), about=atlas.header,
-        players=[name for name in names if "+" not in name], looks=looks,
+        engines=[name for name in names if "+" not in name], looks=looks,
         maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, gaps=GAPS,
         words=overview, exact=EXACT,
         form=FORMS[atlas.header["form"]], css=Markup(css() + sheet),
@@ -126,17 +126,17 @@ def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
         layers.append((None, beside))
     pack = pack_layers(scenario, layers, shown, opening(failing, scenario, shown))
     says = f"{case.parameter} = {style.number(failing.value)}: {failing.event}"
-    return Replay(limit.player, pack, ratio_of(scenario, layers), says)
+    return Replay(limit.engine, pack, ratio_of(scenario, layers), says)
 
 
 def named(limit: Limit) -> Run:
-    """A run that carries a player's name, which decides how it is drawn."""
-    engine, profile = limit.player.split(":")
+    """A run that carries an engine's name, which decides how it is drawn."""
+    engine, profile = limit.engine.split(":")
     return Run(engine, profile, limit.case, 0.0)
 
 
 def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, Any]:
-    """Where the player starts: a tenth of what is shown before the failure; and what it marks."""
+    """Where the engine starts: a tenth of what is shown before the failure; and what it marks."""
     first, last = float(scenario.times[shown[0]]), float(scenario.times[shown[-1]])
     at = min(max(failing.at, first), last) if np.isfinite(failing.at) else first
     return {
@@ -147,7 +147,7 @@ def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, 
 
 
 def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
-    """The worst reading of every player against the parameter, and the bound above which it fails."""
+    """The worst reading of every engine against the parameter, and the bound above which it fails."""
     predicate = case.predicate
     if predicate.bound == 0:
         return shares(case, limits)
@@ -163,7 +163,7 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
             x, y = (np.array([getattr(trial, name) for trial in trials], float) for name in ("value", "worst"))
             lines.append(Line(named(limit), x, np.abs(y)))
     if not lines or not any((line.y > 0).any() for line in lines):
-        return Drawing(title, "No player reads more than 0 anywhere.", None)
+        return Drawing(title, "No engine reads more than 0 anywhere.", None)
     ends = [min(case.values), max(case.values)]
     guide = {
         "type": "scatter", "x": shortened(ends), "y": [predicate.bound or None] * 2, "mode": "lines", "name": "bound",

@@ -1,4 +1,4 @@
-"""The table of reasons: why a player fails where it does, a sentence and its source, and what must bear it out."""
+"""The table of reasons: why an engine fails where it does, a sentence and its source, and what must bear it out."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ class Reason(NamedTuple):
     """One row: the first that fits a limit is its reason.
 
     Attributes:
-        cases, players: patterns of names, as of files.
+        cases, engines: patterns of names, as of files.
         text: the sentence.
         source: where it is written down.
         predicts: the limit that follows from it.
-        switch: a player that differs in this thing only, or in little else, and must get farther.
+        switch: an engine that differs in this thing only, or in little else, and must get farther.
         habit: of `adapters.mechanisms.habits`, or `LATE`: what it speaks of, and a twin that has the limit must do.
     """
 
     cases: str
-    players: str
+    engines: str
     text: str
     source: str
     predicts: float | None = None
@@ -53,14 +53,14 @@ REASONS = (
     # One collision.
     *(
         Reason(
-            case, player, DISCRETE, GEOMETRY, limit, f"{player}+bullets" if player.startswith("box2d") else "", LATE
+            case, engine, DISCRETE, GEOMETRY, limit, f"{engine}+bullets" if engine.startswith("box2d") else "", LATE
         )
         for case, limit in (
             ("tunnelling_head_on", 2.0), ("tunnelling_offset", 2 * sqrt(1 - 0.49)), ("tunnelling_thin_wall", 1.0),
             ("tunnelling_thick_wall", 11.0), ("grazing", 1 - sqrt(1 - 0.01)),
         )
-        for player in ("reference:*", "pymunk:*", "box2d:matched", "box2d_v3:matched")
-        if (case, player) != ("grazing", "box2d_v3:matched")
+        for engine in ("reference:*", "pymunk:*", "box2d:matched", "box2d_v3:matched")
+        if (case, engine) != ("grazing", "box2d_v3:matched")
     ),
     Reason("tunnelling_*", "*", DISCRETE + "; disks are not swept unless one is a bullet", "Box2D manual, bullets",
            habit=LATE),
@@ -82,18 +82,18 @@ REASONS = (
     # One disk, or two.
     *(
         Reason(
-            "bounce_drift", player, "the push out of the floor adds height", "Munk2D src/cpSpaceStep.c, collision_bias",
+            "bounce_drift", engine, "the push out of the floor adds height", "Munk2D src/cpSpaceStep.c, collision_bias",
             None, "pymunk:matched", PUSH_OUT,
         )
-        for player in ("pymunk:shipped", "pymunk:matched+push_out")
+        for engine in ("pymunk:shipped", "pymunk:matched+push_out")
     ),
     Reason("bounce_drift", "pymunk:matched", "v dt exceeds the radius, and the floor is missed", GEOMETRY, habit=LATE),
     *(
         Reason(
-            "bounce_drift", player, "the velocity after gravity is reflected: every bounce gains |v| dt of height",
+            "bounce_drift", engine, "the velocity after gravity is reflected: every bounce gains |v| dt of height",
             "order of operations in a step: gravity, then restitution", 0.005, "", IMPULSE,
         )
-        for player in ("box2d:*", "reference:lesson")
+        for engine in ("box2d:*", "reference:lesson")
     ),
     Reason(
         "bounce_drift", "reference:exercise",
@@ -137,17 +137,17 @@ REASONS = (
         "stiff_push", "box2d:matched", "the swing reaches 2 units of length a step, where the engine cuts it; refused",
         B2_SETTINGS + "b2_maxTranslation",
     ),
-    *(Reason("stiff_push", player, EULER_OUT, MAP, growth_limit(1.0)) for player in ("reference:lesson", "pymunk:*")),
+    *(Reason("stiff_push", engine, EULER_OUT, MAP, growth_limit(1.0)) for engine in ("reference:lesson", "pymunk:*")),
     Reason(
         "stiff_push", "box2d_v3:*", "the push is constant over four substeps: the map grows by 1 + 3/8 (w dt)²", MAP,
         growth_limit(0.375),
     ),
     *(
         Reason(
-            "stiff_push", player, "the push is constant during a step: the map grows by 1 + (w dt)² / 2", MAP,
+            "stiff_push", engine, "the push is constant during a step: the map grows by 1 + (w dt)² / 2", MAP,
             growth_limit(0.5),
         )
-        for player in ("event_driven:*", "reference:ordered")
+        for engine in ("event_driven:*", "reference:ordered")
     ),
     # What every exact method refuses.
     Reason("*", "event_driven:*", "it refuses what has no single continuation: overlaps, and collisions that accumulate",
@@ -225,4 +225,4 @@ def reason_of(limit: Limit) -> Reason | None:
     if limit.verdict == NEVER_FAILS:
         return None
     rows = [row for row in REASONS if limit.case in CASES or row.cases == "*"]
-    return next((r for r in rows if fnmatch(limit.case, r.cases) and fnmatch(limit.player, r.players)), None)
+    return next((r for r in rows if fnmatch(limit.case, r.cases) and fnmatch(limit.engine, r.engines)), None)

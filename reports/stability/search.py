@@ -8,17 +8,17 @@ from math import isfinite, isnan, nan
 
 from adapters.play import Run
 from reports.stability.limits import ALL, LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Form, Limit, Trial
-from reports.stability.players import PLAYERS
 from reports.stability.predicates import Reading, judge
+from reports.stability.variants import VARIANTS
 from scenarios.model import Scenario
 
 
 @dataclass
 class Search:
-    """One case on one player; remembers what was read at each value and the first failing run there."""
+    """One case on one engine; remembers what was read at each value and the first failing run there."""
 
     case: Case
-    player: str
+    engine: str
     form: Form
     readings: dict[float, list[Reading]] = field(default_factory=dict)
     seen: dict[float, tuple[Scenario, Run]] = field(default_factory=dict)
@@ -57,7 +57,7 @@ class Search:
         while len(readings) < (most if failed or to_the_end else min(runs, most)):
             if failed > self.allowed and not (self.form.whole or to_the_end):
                 break
-            scenario, run = self.case.play(PLAYERS[self.player], self.case.scene(value, len(readings)))
+            scenario, run = self.case.play(VARIANTS[self.engine], self.case.scene(value, len(readings)))
             readings.append(judge(self.case.predicate, scenario, run))
             failed += readings[-1].failed
             if readings[-1].failed:
@@ -95,7 +95,7 @@ class Search:
         if verdict == LIMIT:
             until = until[: until.index(fails_at) + 1]
         spacing = max((max(one / other, other / one) for one, other in pairwise(until)), default=nan)
-        names = self.case.name, self.player, self.form.name
+        names = self.case.name, self.engine, self.form.name
         return Limit(*names, verdict, works_at, fails_at, trials, changes <= 1, spacing)
 
     def failure(self, limit: Limit) -> tuple[Scenario, Run] | None:

@@ -1,4 +1,4 @@
-"""Which law a player follows where touching disks are struck, and how far they must be apart until the question is
+"""Which law an engine follows where touching disks are struck, and how far they must be apart until the question is
 gone.
 
 Named, never scored: where disks touch, no limit of small gaps decides; where they do not, the exact answer does.
@@ -14,17 +14,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from reports.stability.cases_collisions import LEAD, RADIUS
-from reports.stability.players import play_as
+from reports.stability.variants import play_as
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario
 from scenarios.truth.exact import with_oracle
 
-NEAR = 0.02  # of the incoming speed: a player whose velocities are farther from every law follows none of them
+NEAR = 0.02  # of the incoming speed: an engine whose velocities are farther from every law follows none of them
 SPEED, DT = (
     8.0,
     1 / 1024,
 )  # a radius in 32 steps: where a collision is found late, its normal is off; above any threshold
-AFTER = 24  # steps after the collision: a player may take a step a contact
+AFTER = 24  # steps after the collision: an engine may take a step a contact
 PAIRS, AT_ONCE = "pair after pair", "all contacts at once"
 
 
@@ -51,7 +51,7 @@ class Touching:
 
 
 class AtGap(NamedTuple):
-    """What a player did at a gap in radii: the law it is nearest to, how far it is, and what it made of the start's.
+    """What an engine did at a gap in radii: the law it is nearest to, how far it is, and what it made of the start's.
 
     `law` is "none" if it is farther than `NEAR` from every one; momentum: by how much it changed, of all there is;
     energy: what is left of it; velocity: of the disks, over the incoming speed.
@@ -67,10 +67,10 @@ class AtGap(NamedTuple):
 
 @dataclass(frozen=True)
 class LawOf:
-    """What a player did at every gap."""
+    """What an engine did at every gap."""
 
     name: str
-    player: str
+    engine: str
     gaps: tuple[AtGap, ...]
     status: str = "ok"
 
@@ -146,17 +146,17 @@ def answers(name: str, gap: float) -> dict[str, list[Array]]:
     return one.laws | {PAIRS: [scenario.truth(scenario.times).velocity[-1] / SPEED]}
 
 
-def law_of(name: str, player: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
+def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
     """Play a scene at every gap, and compare with every law."""
     found = []
     for gap in gaps:
-        run = play_as(player, scene_of(TOUCHING[name], gap))
+        run = play_as(engine, scene_of(TOUCHING[name], gap))
         if run.status != "ok" or run.trajectory is None:
             found.append(AtGap(gap, "refused" if run.status == "unsupported" else run.status, nan, nan, nan, ()))
             continue
         velocity = run.trajectory.velocity[-1] / SPEED
         found.append(named(velocity, gap, answers(name, gap)))
-    return LawOf(name, player, tuple(found))
+    return LawOf(name, engine, tuple(found))
 
 
 def named(velocity: Array, gap: float, laws: dict[str, list[Array]]) -> AtGap:

@@ -1,8 +1,9 @@
-"""Which habits of a player suffice for its limit: the reference with these alone works and fails where the player does.
+"""Which habits of an engine suffice for its limit: the reference with these alone works and fails where the engine
+does.
 
 What an engine does otherwise than exact flight with late collisions is a table of habits
 (`adapters.mechanisms.habits`), each of them a switch of `adapters.mechanisms.ablated_reference`.
-A twin is the reference with some; one that has the player's limit shows the cause.
+A twin is the reference with some; one that has the engine's limit shows the cause.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ from adapters.mechanisms.habits import (
     with_habits,
 )
 from reports.stability.limits import Case, Limit
-from reports.stability.players import Player
 from reports.stability.predicates import Reading, judge
 from reports.stability.search import Search
+from reports.stability.variants import Variant
 from scenarios.model import Scenario
 
 LATE = "late collisions"  # a twin without any habit
 COLLISIONS_WAIT = "a collision waits for the end of its step"
 MOST = 300  # disks: the switched solver asks all pairs
-NEAR = 2.0  # where a player works nowhere, its twin must read as much as it does, to this factor
+NEAR = 2.0  # where an engine works nowhere, its twin must read as much as it does, to this factor
 
 B2_SETTINGS, B2_TYPES = "Box2D 2.3 Common/b2Settings.h: ", "Box2D 3.1 src/types.c: "
 THRESHOLD = "collisions that close at less than 1 m/s are played as inelastic"
@@ -59,7 +60,7 @@ SENTENCES = (
     (SKIN, "*", "walls are thicker than they are drawn", B2_SETTINGS + "b2_polygonRadius"),
     (DIGITS, "*", "numbers are float32", "IEEE 754"),
 )
-"""Habit, players, what it does, and where that stands."""
+"""Habit, engines, what it does, and where that stands."""
 
 
 def twin_of(search: Search, limit: Limit) -> str:
@@ -80,11 +81,11 @@ def twin_of(search: Search, limit: Limit) -> str:
 
 @dataclass(frozen=True)
 class Twins:
-    """A case with the scenarios that fail and work next to a limit, the player's habits, and what is read off its run.
+    """A case with the scenarios that fail and work next to a limit, the engine's habits, and what is read off its run.
 
     Attributes:
         bad: the first run that failed.
-        good: all runs next to it, none of which failed; none where the player works nowhere.
+        good: all runs next to it, none of which failed; none where the engine works nowhere.
     """
 
     case: Case
@@ -95,8 +96,8 @@ class Twins:
 
     @staticmethod
     def of(search: Search, limit: Limit) -> Twins | None:
-        """None where nothing failed or was played at all, or nothing is known of the player."""
-        seen, failing, (name, *switched) = search.failure(limit), limit.failing, search.player.split("+")
+        """None where nothing failed or was played at all, or nothing is known of the engine."""
+        seen, failing, (name, *switched) = search.failure(limit), limit.failing, search.engine.split("+")
         if seen is None or failing is None or seen[1].trajectory is None or name not in HABITS:
             return None
         judged, run = seen
@@ -125,7 +126,7 @@ class Twins:
         return left
 
     def alike(self, habits: Sequence[Habit]) -> bool:
-        """Whether the twin breaks what the player breaks where that fails, and works where it works."""
+        """Whether the twin breaks what the engine breaks where that fails, and works where it works."""
         reading = self.read(self.bad, habits)
         if not reading.failed or reading.broken != self.reading.broken:
             return False
@@ -136,18 +137,18 @@ class Twins:
 
     def read(self, scenario: Scenario, habits: Sequence[Habit]) -> Reading:
         """What the predicate reads off the twin's run, or runs."""
-        twin = Player("reference:twin", partial(with_habits, habits))
+        twin = Variant("reference:twin", partial(with_habits, habits))
         return judge(self.case.predicate, *self.case.play(twin, scenario))
 
 
 def told(limit: Limit) -> tuple[str, str, str]:
     """The reason that the twin gives, where it stands, and how it was tested."""
     names = limit.twin.split(", ")
-    rows = [next(row for row in SENTENCES if row[0] == name and fnmatch(limit.player, row[1])) for name in names]
+    rows = [next(row for row in SENTENCES if row[0] == name and fnmatch(limit.engine, row[1])) for name in names]
     text, source = ("; ".join(dict.fromkeys(row[k] for row in rows)) for k in (2, 3))
     if limit.twin == LATE:
         return text, source, "the reference with late collisions and nothing else has this limit"
-    tested = f"the reference with late collisions and the player's {listed(names)} has this limit"
+    tested = f"the reference with late collisions and the engine's {listed(names)} has this limit"
     return text, source, tested
 
 

@@ -147,7 +147,7 @@ def disk_between_static_disks() -> Scenario:
         position[:, 0], velocity[:, 0] = np.outer(x - reach, along), np.outer(v, along)
         kick = 2 * mass * speed * 5
         collisions = [(float(at), 0, 2 - k % 2, kick) for k, at in enumerate(legs.start[1:])]
-        # A rounding of one part in 2^52 grows to 1e-9 m in that many bounces, in any float64 player.
+        # A rounding of one part in 2^52 grows to 1e-9 m in that many bounces, in any float64 engine.
         growth = offset_growth(10 * reach, radius + static)
         bounces = int(np.log(1e-9 / (EPS * centre * 5)) / np.log(growth))
         horizon = float(legs.start[min(bounces, len(collisions))])

@@ -73,7 +73,7 @@ def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:
 
 
 def answered_by(scenario: Scenario) -> str:
-    """The cheapest model that answers it and is no player, which the harness takes for its truth: one of the three."""
+    """The cheapest model that answers it and is no engine, which the harness takes for its truth: one of the three."""
     if scenario.truth is None:
         return NOTHING
     return COLLISION_BY_COLLISION if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM

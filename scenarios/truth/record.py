@@ -69,7 +69,7 @@ class TruthRecord:
         angles = turning.angle, turning.angular_velocity
         until, reason = self.valid_until, self.reason
         if self.followed_until < until:
-            until, reason = self.followed_until, "from there on the rounding of float64 leads any player elsewhere"
+            until, reason = self.followed_until, "from there on the rounding of float64 leads any engine elsewhere"
         return answer(scene, t, (position, velocity), collisions, angles, until, self.error_bound, reason)
 
 

@@ -163,7 +163,7 @@ def test_what_is_switched_off_in_the_engine_is_what_is_left_out_in_the_reference
     assert np.abs(without - everything).max() > 0.001
 
 
-def test_every_player_with_habits_is_known_and_flies_as_its_row_says():
+def test_every_engine_with_habits_is_known_and_flies_as_its_row_says():
     """The table of habits names rows of `ENGINES`; the impulse is what an engine's own order of stages is."""
     assert set(HABITS) < set(ENGINES)
     scene = scenario("head_on_equal_e09")

@@ -105,7 +105,7 @@ def test_a_file_that_ends_its_process_is_a_crash(tmp_path: Path):
 
 @pytest.mark.slow
 def test_a_file_that_fails_does_not_spoil_the_run_of_the_others(tmp_path: Path):
-    """Exit 1, as one player could not be compared at all; a row each, and the right one is played."""
+    """Exit 1, as one engine could not be compared at all; a row each, and the right one is played."""
     (tmp_path / "throws.js").write_text(RIGHT.read_text().replace(*next(iter(THROWS.items()))))
     (tmp_path / "right.js").write_text(RIGHT.read_text())
     words = ["run", "head_on_equal_e09", "--dt", str(1 / 60), "--engine", "throws.js", "--engine", "right.js"]

@@ -26,7 +26,7 @@ def box_of(label: dict) -> Box:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_no_name_covers_another_or_is_cut_off(seed: int):
-    """Ten lines of four points that fall side by side in a corner, as those of the players do."""
+    """Ten lines of four points that fall side by side in a corner, as those of the engines do."""
     rng = np.random.default_rng(seed)
     start = rng.uniform([300, 40], [600, 120], (10, 2))
     lines = [

@@ -23,15 +23,15 @@ SCENES = (
     "box_billiard", "disk_between_static_disks", "slide_on_incline", "column_of_ten", "galperin_31", "cradle_touching",
     "spin_under_torque", "body_frame_thrust", "ship_thrust", "asteroids", "falling_box",
 )  # fmt: skip
-PLAYERS = [f"{engine}:{profile}" for engine in PLAIN for profile in ("shipped", "matched")]
+PLAYED = [f"{engine}:{profile}" for engine in PLAIN for profile in ("shipped", "matched")]
 NAMES = ("position", "velocity", "angle", "angular_velocity")
 
 
-def by_the_adapter(player: str, scenario: Scenario) -> tuple[Run, dict[str, Any]]:
+def by_the_adapter(engine: str, scenario: Scenario) -> tuple[Run, dict[str, Any]]:
     """Its run at the second step size, and the settings that it asked the engine for."""
-    engine = ENGINES[player].make()
-    run = play(engine, player, scenario, scenario.dt(scenario.substeps[1]))
-    engine.close()
+    made = ENGINES[engine].make()
+    run = play(made, engine, scenario, scenario.dt(scenario.substeps[1]))
+    made.close()
     return run, {name: asked for name, (asked, _) in run.settings.items() if asked is not None}
 
 
@@ -42,27 +42,27 @@ def unequal(run: Run, samples: Samples) -> list[str]:
     return [f"{name} by {np.abs(a - b).max():.2g}" for name, a, b in pairs if not np.array_equal(a, b)]
 
 
-@pytest.mark.parametrize("player", PLAYERS)
-def test_an_adapter_plays_what_its_engine_plays_when_called_directly(player: str, record_property: Record):
+@pytest.mark.parametrize("engine", PLAYED)
+def test_an_adapter_plays_what_its_engine_plays_when_called_directly(engine: str, record_property: Record):
     """Bit for bit, with the settings that it says it asked for, and no others."""
     wrong, played = [], 0
     for name in SCENES:
         scenario = catalogue.scenario(name)
-        run, asked = by_the_adapter(player, scenario)
+        run, asked = by_the_adapter(engine, scenario)
         assert run.status == "ok" or run.status == "unsupported", run.reason
         assert set(asked) <= KNOWN, f"plain_engines.py does not know the setting {set(asked) - KNOWN}"
         if run.status == "ok":
             played += 1
             samples = PLAIN[run.engine](scenario, run.dt, asked)
             wrong += [f"{name}: {fault}" for fault in unequal(run, samples)]
-    record_property("found", f"engines: {player}, {played} of {len(SCENES)} scenes, {len(wrong)} arrays differ")
+    record_property("found", f"engines: {engine}, {played} of {len(SCENES)} scenes, {len(wrong)} arrays differ")
 
     assert not wrong
     assert played > len(SCENES) / 2
 
 
 @pytest.mark.parametrize(
-    ("player", "scene", "setting", "value"),
+    ("engine", "scene", "setting", "value"),
     [
         ("pymunk:matched", "falling_box", "iterations", 7),
         ("pymunk:matched", "head_on_equal_e09", "elasticity", 0.9),
@@ -72,10 +72,10 @@ def test_an_adapter_plays_what_its_engine_plays_when_called_directly(player: str
         ("box2d_v3:matched", "near_miss", "length unit in m", 1.0),
     ],
 )
-def test_a_setting_that_is_not_the_one_recorded_is_noticed(player: str, scene: str, setting: str, value: Any):
+def test_a_setting_that_is_not_the_one_recorded_is_noticed(engine: str, scene: str, setting: str, value: Any):
     """So the record of settings is what was played with."""
     scenario = catalogue.scenario(scene)
-    run, asked = by_the_adapter(player, scenario)
+    run, asked = by_the_adapter(engine, scenario)
     plain = PLAIN[run.engine]
 
     assert not unequal(run, plain(scenario, run.dt, asked))

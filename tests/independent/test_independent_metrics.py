@@ -29,7 +29,7 @@ SCENES = (
     "wall_to_wall", "bouncing_ball_e09", "disk_between_static_disks", "column_of_ten", "galperin_31",
     "cradle_touching", "spin_under_torque", "ship_thrust", "asteroids", "falling_box",
 )  # fmt: skip
-PLAYERS = ("reference:exercise", "pymunk:matched", "box2d:shipped", "box2d_v3:matched", "event_driven:float64")
+PLAYED = ("reference:exercise", "pymunk:matched", "box2d:shipped", "box2d_v3:matched", "event_driven:float64")
 ROUNDING = 1e-12  # relative: sums of thousands of terms in another order
 FLOAT64 = 1e-13  # of energies and momenta over their whole: what is left of them is a difference, rounded at the whole
 WITH = {"time_to_1pct_s": "bouncing_ball_e09", "restitution": "head_on_unequal_e05"}
@@ -207,7 +207,7 @@ def first(trajectory: Trajectory, k: int) -> Trajectory:
 def compared(name: str) -> tuple[pd.DataFrame, dict[str, Trajectory], Scenario]:
     """The table of a scene at its second step size, and what it was made from."""
     scenario = catalogue.scenario(name)
-    runs = [play(ENGINES[player].make(), player, scenario, scenario.dt(scenario.substeps[1])) for player in PLAYERS]
+    runs = [play(ENGINES[engine].make(), engine, scenario, scenario.dt(scenario.substeps[1])) for engine in PLAYED]
     known = {run.name: run.trajectory for run in runs if run.trajectory is not None}
     known["truth"] = scenario.truth(scenario.times)
     return compare(scenario, runs).table, known, scenario

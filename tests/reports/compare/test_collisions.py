@@ -26,7 +26,7 @@ def test_a_missing_collision_is_missed_and_an_extra_collision_is_invented():
     np.testing.assert_allclose(invented.delay, 0.01)
 
 
-def test_a_player_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_late():
+def test_an_engine_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_late():
     """Collisions that come later and later are delays; beyond half the time between true collisions nobody knows which
     is which."""
     true = np.arange(1.0, 9.0)
@@ -39,13 +39,13 @@ def test_a_player_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_l
 
 
 def test_a_collision_that_the_end_cuts_off_is_not_blamed():
-    """A true collision less than `WINDOW` dt before the end may fall behind it for a late player."""
+    """A true collision less than `WINDOW` dt before the end may fall behind it for a late engine."""
     assert match(collisions(1.0), collisions(1.0, 9.98), 10.0, 0.01).missed == []
     assert match(collisions(1.0), collisions(1.0, 9.96), 10.0, 0.01).missed == [(9.96, 0, 1)]
 
 
 def test_collisions_that_no_step_can_tell_apart_are_not_blamed():
-    """Of ever faster bounces those closer together than 2 dt are left out, with what the player makes of them."""
+    """Of ever faster bounces those closer together than 2 dt are left out, with what the engine makes of them."""
     true = 2.0 - 0.5 ** np.arange(12.0)
     played = [t for t in true if t < 1.97]
     found = match(collisions(*played, 1.99, 2.01), collisions(*true), 10.0, 0.01)

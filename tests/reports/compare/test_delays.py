@@ -72,7 +72,7 @@ def test_a_disk_that_is_late_may_keep_falling(steps: float):
     velocity = truth.velocity.copy()
     for collision, impulse in zip(truth.collisions.t, truth.collisions.impulse):
         since = truth.t - collision
-        # `steps` dt after the bounce the player has not met the floor.
+        # `steps` dt after the bounce the engine has not met the floor.
         velocity[(since >= 0) & (since <= steps * dt), 0, 1] -= impulse / one.scene.mass[0]
 
     # Rounding of 10 m/s, ten bounces.

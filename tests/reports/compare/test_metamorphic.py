@@ -27,7 +27,7 @@ from scenarios.model import Scenario, Scene, Thrust
 from scenarios.truth.exact import with_oracle
 from tests.reports.compare.metamorphic import CHANGES, Change
 
-PLAYERS = ("reference:exercise", "reference:ordered", "pymunk:matched", "box2d:matched", "event_driven:float64")
+PLAYED = ("reference:exercise", "reference:ordered", "pymunk:matched", "box2d:matched", "event_driven:float64")
 ROOM = box([-2.5, -2.5], [2.5, 2.5])
 
 
@@ -89,7 +89,7 @@ where lengths are of 1 m, spread a hundredfold by restitutions read off small ch
 def played(name: str) -> tuple[Scenario, tuple[Run, ...], pd.DataFrame]:
     """A scene, every run of it that came to its end, and their table."""
     one = SCENES[name]()
-    every = [play(ENGINES[who].make(), who, one, one.dt(k)) for who in PLAYERS for k in one.substeps]
+    every = [play(ENGINES[who].make(), who, one, one.dt(k)) for who in PLAYED for k in one.substeps]
     runs = tuple(run for run in every if run.status == "ok")
     return one, runs, compare(one, runs).table
 

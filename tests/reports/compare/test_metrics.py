@@ -155,7 +155,7 @@ def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
 
 
 def test_a_run_that_diverged_earns_a_status_and_no_score():
-    """A player that gives NaN at step 7 was right before it, for a scene that nobody else played so short."""
+    """An engine that gives NaN at step 7 was right before it, for a scene that nobody else played so short."""
     one = scenario("slow_collision")
     run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
     good = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", one, one.dt(1))

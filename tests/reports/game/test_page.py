@@ -247,7 +247,7 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
 
 
 def test_with_reduced_motion_nothing_moves_by_itself(page: Page):
-    """The flight waits for the player."""
+    """The flight waits for the engine."""
     page.wait_for_timeout(200)
 
     assert page.evaluate("[game.now.frame, game.paused]") == [0, True]

@@ -12,31 +12,31 @@ from adapters.mechanisms.features import changed_box2d
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.limits import HARSHNESS, SEEN, limits_of
 from reports.page.style import TRUTH
-from reports.stability import players
+from reports.stability import variants
 from reports.stability.cases import CASES
-from reports.stability.players import Player
+from reports.stability.variants import Variant
 from tests.reports.stability.kept_limits import agrees, kept
 
 LESSON = LESSONS["limits"]
-PLAYERS = list(ENGINES)
+PLAYED = list(ENGINES)
 NAMES = [seen.case for seen in SEEN.values()]
 
 
-def at(case: str, player: str, place: int) -> tuple[int, int, int]:
+def at(case: str, engine: str, place: int) -> tuple[int, int, int]:
     """Where the sliders are for this."""
-    return NAMES.index(case), PLAYERS.index(player), place
+    return NAMES.index(case), PLAYED.index(engine), place
 
 
 @pytest.mark.parametrize("name", ["slow_collision", "spin", "far_from_origin"])
 def test_the_brackets_are_those_of_the_atlas(name: str):
     """Searched here and now they hold the limits of the full form."""
-    rows = {row.player: row for row in kept() if row.case == name}
-    found = {limit.player: limit for limit in limits_of(name)}
+    rows = {row.engine: row for row in kept() if row.case == name}
+    found = {limit.engine: limit for limit in limits_of(name)}
 
     assert set(found) == set(rows)
-    for player, row in rows.items():
-        assert found[player].verdict == row.verdict
-        assert agrees(found[player], row)
+    for engine, row in rows.items():
+        assert found[engine].verdict == row.verdict
+        assert agrees(found[engine], row)
 
 
 def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
@@ -44,7 +44,7 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
     place = at("slow_collision", "box2d:shipped", 5)
     limits_of.cache_clear()
     with monkeypatch.context() as patch:
-        patch.setitem(players.PLAYERS, "box2d:shipped", Player("box2d:shipped", changed_box2d))
+        patch.setitem(variants.VARIANTS, "box2d:shipped", Variant("box2d:shipped", changed_box2d))
         without = dict(LESSON.at(place).facts)["box2d:shipped"]
     limits_of.cache_clear()
 
@@ -55,7 +55,7 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
 
 
 @pytest.mark.parametrize(
-    ("case", "player", "place", "fails"),
+    ("case", "engine", "place", "fails"),
     [
         ("slow_collision", "box2d:shipped", 1, False), ("slow_collision", "box2d:shipped", 3, True),
         ("slow_collision", "box2d:matched", 3, False), ("tunnelling_thin_wall", "pymunk:matched", 3, False),
@@ -63,19 +63,19 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
         ("spin", "box2d:matched", 8, True), ("near_miss", "box2d_v3:shipped", 7, True),
     ],
 )  # fmt: skip
-def test_the_run_fails_beyond_the_limit_and_only_there(case: str, player: str, place: int, fails: bool):
+def test_the_run_fails_beyond_the_limit_and_only_there(case: str, engine: str, place: int, fails: bool):
     """What is drawn leaves the exact answer, and the replay marks where; else it stays, and marks nothing."""
-    shown = LESSON.at(at(case, player, place))
+    shown = LESSON.at(at(case, engine, place))
     curves = {curve.name: np.asarray(curve.y) for curve in shown.charts[0].curves}
     here = dict(shown.steps)["Here"]
 
     assert ("event" in shown.opening) == fails
     assert ("0 of" in here or "none of" in here or "it works" in here) != fails
-    if fails and player in curves:
-        k = len(curves[player])
+    if fails and engine in curves:
+        k = len(curves[engine])
         way = np.ptp(curves[TRUTH])
         # A near miss leaves it by the thousandth part of a way that is none at all.
-        assert np.abs(curves[player] - curves[TRUTH][:k]).max() > (0.2 * way if case != "near_miss" else 1e-4)
+        assert np.abs(curves[engine] - curves[TRUTH][:k]).max() > (0.2 * way if case != "near_miss" else 1e-4)
 
 
 def test_refusals_are_shown_beside_the_exact_answer():

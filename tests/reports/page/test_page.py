@@ -23,16 +23,16 @@ from tests.reports.page.browsing import opened, overhang
 
 HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>{{ 7 * 7 }}"
 LONG = "a_name_without_a_place_to_break_it_" * 6
-PLAYERS = ("reference:exercise", "pymunk:matched", "box2d:shipped")
+PLAYED = ("reference:exercise", "pymunk:matched", "box2d:shipped")
 HEAD_ON, ORBIT, ASTEROIDS = "head_on_equal_e09", "disk_between_static_disks", "asteroids"
 
 
 def played(name: str, **changes: Any) -> Comparison:
-    """A real scenario on three real players, with one that crashed and one that refused, both saying hostile things."""
+    """A real scenario on three real engines, with one that crashed and one that refused, both saying hostile things."""
     scene = replace(scenario(name), **changes)
     steps = scene.substeps[1:3]
     scene = replace(scene, substeps=steps)
-    runs = [play(ENGINES[key].make(), key, scene, scene.dt(k)) for key in PLAYERS for k in steps]
+    runs = [play(ENGINES[key].make(), key, scene, scene.dt(k)) for key in PLAYED for k in steps]
     failed = [("box2d_v3", "shipped", "crashed", HOSTILE), ("box2d_v3", "matched", "unsupported", f"no {LONG}")]
     runs += [Run(e, p, name, scene.dt(k), status, why) for e, p, status, why in failed for k in steps]
     return compare(scene, runs)
@@ -82,14 +82,14 @@ def page(desktop: tuple[Page, list[str]]) -> Iterator[Page]:
     assert heard == []
 
 
-def with_player(page: Page, name: str) -> None:
-    """Scroll to a scenario and wait until its player is there."""
+def with_engine(page: Page, name: str) -> None:
+    """Scroll to a scenario and wait until its engine is there."""
     page.evaluate("name => document.getElementById('s-' + name).scrollIntoView()", name)
-    page.wait_for_function("name => players[name]", arg=name)
+    page.wait_for_function("name => engines[name]", arg=name)
 
 
 def test_every_chart_is_drawn_once_it_is_in_view(page: Page) -> None:
-    """Each chart holds a drawing with a line a player; all that have a figure are drawn."""
+    """Each chart holds a drawing with a line an engine; all that have a figure are drawn."""
     plots = page.locator(".plot")
 
     assert plots.count() == 3 * len(CHARTS) - 1  # without a truth there is no error against dt
@@ -97,25 +97,25 @@ def test_every_chart_is_drawn_once_it_is_in_view(page: Page) -> None:
         plots.nth(k).scroll_into_view_if_needed()
         plots.nth(k).locator(".main-svg .scatterlayer .trace").first.wait_for()
         names = plots.nth(k).evaluate("plot => plot.data.map(trace => trace.name)")
-        assert set(names) <= {*PLAYERS, "∝ dt"}
-        assert len(names) >= len(PLAYERS) - 1
+        assert set(names) <= {*PLAYED, "∝ dt"}
+        assert len(names) >= len(PLAYED) - 1
 
 
 def test_nothing_is_drawn_before_it_is_in_view(browser: Browser, path: Path) -> None:
     """A page just opened has drawn no chart and unpacked no replay of its last scenario."""
     page, _ = opened(browser, path.as_uri())
-    drawn = page.locator(f"#s-{ASTEROIDS} .main-svg").count(), page.evaluate("name => name in players", ASTEROIDS)
+    drawn = page.locator(f"#s-{ASTEROIDS} .main-svg").count(), page.evaluate("name => name in engines", ASTEROIDS)
     page.context.close()
 
     assert drawn == (0, False)
 
 
-def test_the_player_moves_disks(page: Page) -> None:
+def test_the_engine_moves_disks(page: Page) -> None:
     """Another time is another picture and other positions."""
-    with_player(page, HEAD_ON)
+    with_engine(page, HEAD_ON)
     picture = "name => document.querySelector('#s-' + name + ' canvas').toDataURL()"
     before = page.evaluate(picture, HEAD_ON)
-    seek = "name => [0, 1].map(t => { players[name].seek(t); return players[name].positions('pymunk:matched'); })"
+    seek = "name => [0, 1].map(t => { engines[name].seek(t); return engines[name].positions('pymunk:matched'); })"
     start, later = page.evaluate(seek, HEAD_ON)
 
     assert abs(later[0][0] - start[0][0]) > 0.1
@@ -123,16 +123,16 @@ def test_the_player_moves_disks(page: Page) -> None:
 
 
 @pytest.mark.parametrize("name", [HEAD_ON, ORBIT, ASTEROIDS])
-def test_the_player_shows_the_trajectory(page: Page, comparisons: list[Comparison], name: str) -> None:
+def test_the_engine_shows_the_trajectory(page: Page, comparisons: list[Comparison], name: str) -> None:
     """At the packed instants positions are those of the run, to half a step of the position grid."""
-    with_player(page, name)
+    with_engine(page, name)
     comparison = next(each for each in comparisons if each.scenario.name == name)
-    instants = np.array(page.evaluate("name => players[name].pack.t", name))
-    at_all = "([p, layer]) => players[p].pack.t.map(t => { players[p].seek(t); return players[p].positions(layer); })"
-    shown = [page.evaluate(at_all, [name, player]) for player in PLAYERS]
+    instants = np.array(page.evaluate("name => engines[name].pack.t", name))
+    at_all = "([p, layer]) => engines[p].pack.t.map(t => { engines[p].seek(t); return engines[p].positions(layer); })"
+    shown = [page.evaluate(at_all, [name, engine]) for engine in PLAYED]
     rows = np.rint(instants / comparison.scenario.sample_interval).astype(int)
-    for player, positions in zip(PLAYERS, shown):
-        run = next(r for r in comparison.runs if r.name == player and r.dt == comparison.middle_dt)
+    for engine, positions in zip(PLAYED, shown):
+        run = next(r for r in comparison.runs if r.name == engine and r.dt == comparison.middle_dt)
         assert run.trajectory is not None
         expected = run.trajectory.position[rows]
         half_step = np.ptp(expected, axis=(0, 1)) / 65535 / 2
@@ -141,11 +141,11 @@ def test_the_player_shows_the_trajectory(page: Page, comparisons: list[Compariso
 
 
 def test_the_truth_is_not_drawn_beyond_its_horizon(page: Page, comparisons: list[Comparison]) -> None:
-    """After the horizon there are no positions of the truth, and the player says when it ended."""
-    with_player(page, ORBIT)
+    """After the horizon there are no positions of the truth, and the engine says when it ended."""
+    with_engine(page, ORBIT)
     truth = comparisons[1].truth
     assert truth is not None
-    at = "([name, t]) => { players[name].seek(t); return players[name].positions('truth'); }"
+    at = "([name, t]) => { engines[name].seek(t); return engines[name].positions('truth'); }"
     before, after = (page.evaluate(at, [ORBIT, float(truth.valid_until) + s]) for s in (-0.1, 0.1))
 
     assert before is not None
@@ -153,34 +153,34 @@ def test_the_truth_is_not_drawn_beyond_its_horizon(page: Page, comparisons: list
     assert "truth ends at" in page.locator(f"#s-{ORBIT} .ended").inner_text()
 
 
-def test_the_player_is_played_with_the_keyboard(page: Page) -> None:
+def test_the_engine_is_played_with_the_keyboard(page: Page) -> None:
     """Arrows step by a frame, space plays and stops; nothing plays by itself."""
-    with_player(page, HEAD_ON)
-    player = page.locator(f"#s-{HEAD_ON} .player")
-    player.focus()
-    page.evaluate("name => players[name].seek(0)", HEAD_ON)
+    with_engine(page, HEAD_ON)
+    engine = page.locator(f"#s-{HEAD_ON} .player")
+    engine.focus()
+    page.evaluate("name => engines[name].seek(0)", HEAD_ON)
 
-    assert page.evaluate("name => players[name].playing", HEAD_ON) is False
-    player.press("ArrowRight")
-    assert page.evaluate("name => players[name].time === players[name].pack.t[1]", HEAD_ON)
-    player.press("ArrowLeft")
-    assert page.evaluate("name => players[name].time", HEAD_ON) == 0
-    player.press(" ")
-    page.wait_for_function("name => players[name].time > 0.05", arg=HEAD_ON)
-    player.press(" ")
-    assert page.evaluate("name => players[name].playing", HEAD_ON) is False
+    assert page.evaluate("name => engines[name].playing", HEAD_ON) is False
+    engine.press("ArrowRight")
+    assert page.evaluate("name => engines[name].time === engines[name].pack.t[1]", HEAD_ON)
+    engine.press("ArrowLeft")
+    assert page.evaluate("name => engines[name].time", HEAD_ON) == 0
+    engine.press(" ")
+    page.wait_for_function("name => engines[name].time > 0.05", arg=HEAD_ON)
+    engine.press(" ")
+    assert page.evaluate("name => engines[name].playing", HEAD_ON) is False
 
 
-def test_the_legend_hides_a_player_everywhere(page: Page) -> None:
+def test_the_legend_hides_an_engine_everywhere(page: Page) -> None:
     """A box that is not ticked hides disks and lines; "all" brings them back."""
-    with_player(page, HEAD_ON)
+    with_engine(page, HEAD_ON)
     plot = page.locator(f"#s-{HEAD_ON} .plot").first
     plot.scroll_into_view_if_needed()
     plot.locator(".main-svg .trace").first.wait_for()
     visible = "plot => plot.data.find(trace => trace.name === 'pymunk:matched').visible"
     page.locator(f"#s-{HEAD_ON} .legend input[value='pymunk:matched']").uncheck()
 
-    assert page.evaluate("name => players[name].hidden.has('pymunk:matched')", HEAD_ON)
+    assert page.evaluate("name => engines[name].hidden.has('pymunk:matched')", HEAD_ON)
     assert plot.evaluate(visible) is False
     page.locator(f"#s-{HEAD_ON} .picks button").first.click()
     assert plot.evaluate(visible) is True
@@ -188,7 +188,7 @@ def test_the_legend_hides_a_player_everywhere(page: Page) -> None:
 
 def test_charts_follow_the_dark(page: Page) -> None:
     """Where the reader turns to dark, the lines that are drawn take the colours of the dark."""
-    with_player(page, HEAD_ON)
+    with_engine(page, HEAD_ON)
     plot = page.locator(f"#s-{HEAD_ON} .plot").first
     plot.scroll_into_view_if_needed()
     plot.locator(".main-svg .trace").first.wait_for()
@@ -233,7 +233,7 @@ def test_the_page_never_scrolls_sideways(browser: Browser, path: Path, width: in
     """All fits the width, however long a word is; wide tables scroll by themselves."""
     page, heard = opened(browser, path.as_uri(), viewport={"width": width, "height": 800}, reduced_motion="reduce")
     for name in (HEAD_ON, ORBIT, ASTEROIDS):
-        with_player(page, name)
+        with_engine(page, name)
     page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
     wide = overhang(page)
     page.context.close()

@@ -10,14 +10,14 @@ from reports.run.known_answers import KNOWN_ANSWERS
 from reports.run.playing import play_here
 from reports.run.suite import Means, Plan, begin, keep_answer, keep_cell, tasks_of
 
-PLAYERS = ("pymunk:shipped", "pymunk:matched")
+PLAYED = ("pymunk:shipped", "pymunk:matched")
 
 
 def make(folder: Path, scene_file: Path) -> Path:
     """Its folder, complete but for its tables: every kind of line is in its journal."""
     plan = Plan(
         ["slow_collision", str(scene_file)],
-        {name: ENGINES[name] for name in PLAYERS},
+        {name: ENGINES[name] for name in PLAYED},
         0,
         [],
         False,
@@ -28,7 +28,7 @@ def make(folder: Path, scene_file: Path) -> Path:
     cells = [task for task in tasks_of(plan, scenarios) if isinstance(task, Cell)]
     with open_new(folder) as journal:
         begin(plan, journal, scenarios, len(cells))
-        for name in PLAYERS:
+        for name in PLAYED:
             finding = Finding(
                 *name.split(":"), "read_copies", "Does read give copies?", "copies", "copies", 0.0, "keeps"
             )

@@ -19,7 +19,7 @@ from reports.run.made import digest_of, read_made
 from reports.speed import budget, ladder, lines, models
 from reports.speed.kept import Kept
 from reports.speed.measure import in_turns, scene_rows
-from reports.speed.plan import PLAIN, SCENE, Player
+from reports.speed.plan import PLAIN, SCENE, Measurement
 from reports.stability import lines as atlas_lines
 from reports.stability.atlas import Task, found_limit, journalled
 from reports.stability.command import write_files
@@ -41,13 +41,13 @@ SAMPLE = 60  # edits whose pages are made in the long test
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The journal of a measurement: a ladder, what its error is made of, times and a closed form."""
     place = tmp_path_factory.mktemp("measured")
-    player = Player(SCENE, "slow_collision", 0, NAME, PLAIN, row_of(NAME).make, (1, 2, 4))
+    engine = Measurement(SCENE, "slow_collision", 0, NAME, PLAIN, row_of(NAME).make, (1, 2, 4))
     with Journal(place) as journal:
         kept = Kept(journal, HEADER, False, SCENES)
-        kept.add(player.task, player.errors())
+        kept.add(engine.task, engine.errors())
         kept.add(("budget", "slow_collision", NAME), budget.budget_of("slow_collision", 0, NAME, 2))
         often = {"rounds": 1, "budget": 0.0}
-        kept.add(("time", SCENE, "slow_collision"), scene_rows(SCENE, "slow_collision", 0, in_turns([player]), often))
+        kept.add(("time", SCENE, "slow_collision"), scene_rows(SCENE, "slow_collision", 0, in_turns([engine]), often))
         kept.add(("time", "truth", "slow_collision"), models.closed_form("slow_collision", 0))
     assert ladder.held("slow_collision", 0).scenario.name == "slow_collision"
     return place
@@ -62,8 +62,8 @@ def atlas(tmp_path_factory: pytest.TempPathFactory) -> Path:
     tasks = [Task(kind, name, "pymunk:matched", "quick") for kind, name in
              (("limit", "spin"), ("law", "touching_break"), ("map", one.name))]  # fmt: skip
     cells = tuple((x, y, 0.1, False, "") for x, y in product(one.x, one.y))
-    found = [found_limit(tasks[0], place), law_of(tasks[1].name, tasks[1].player),
-             MapOf(one.name, tasks[2].player, cells)]  # fmt: skip
+    found = [found_limit(tasks[0], place), law_of(tasks[1].name, tasks[1].engine),
+             MapOf(one.name, tasks[2].engine, cells)]  # fmt: skip
     with Journal(place) as journal:
         journal.append({"header": about("", 0) | {"form": "quick", "files": {}}})
         for task, result in zip(tasks, found):
@@ -184,10 +184,10 @@ def test_a_line_that_is_there_twice_counts_once(journal: tuple, tmp_path: Path):
         ("atlas", 0, ("header", "files"), {"../x": "y"}, "header.files.../x = 'y': must match pattern"),
         ("atlas", 1, ("limit", "trials", 0, "value"), 1e9, "limit.trials[0].value = 1000000000.0: must be from"),
         ("atlas", 1, ("limit", "cured"), "x", "limit.cured = 'x': must be"),
-        ("atlas", 1, ("limit", "case"), "../x.toml:dt", "limit: must be of the task's name and player"),
+        ("atlas", 1, ("limit", "case"), "../x.toml:dt", "limit: must be of the task's name and engine"),
         ("atlas", 2, ("law", "gaps", 0, 5), [[1]], "gaps[0][5]: must hold numbers"),
         ("atlas", 3, ("map", "cells", 0, 0), 17, "cells: must be those of the map's grid"),
-        ("atlas", 3, ("task", "player"), "pymunk:x", "map: must be of the task's name and player"),
+        ("atlas", 3, ("task", "engine"), "pymunk:x", "map: must be of the task's name and engine"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_named(

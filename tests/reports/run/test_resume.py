@@ -41,7 +41,7 @@ def test_an_interrupted_run_can_be_reported_and_says_it_is_not_finished(small: P
 
 
 def test_an_engine_that_was_asked_but_has_not_played_yet_does_not_spoil_the_page(small: Path, tmp_path: Path):
-    """Broken off after the first cell: the probes of all have ended, one player has a row."""
+    """Broken off after the first cell: the probes of all have ended, one engine has a row."""
     broken_off(small, tmp_path / "out", after=5)
     done = crosscheck("report", "out", cwd=tmp_path)
 

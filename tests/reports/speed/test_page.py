@@ -33,7 +33,7 @@ from tests.reports.page.browsing import opened, overhang
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
 SCENES = ("head_on_equal_e09", "asteroids")
-PLAYERS = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
+PLAYED = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
 LITTLE = replace(QUICK, seeds=3, most_steps=1000, rounds=2, budget=0.0, sizes=(3, 10, 100, 1000), patience=1.0,
     feature_scenes=("bouncing_ball_e1",), dial_scenes=("slide_on_incline", "falling_box"),
     budget_scenes=("head_on_equal_e09",))  # fmt: skip
@@ -44,12 +44,12 @@ SAID = {"load": 0.0, "seconds": 1.0}
 def measured() -> Measured:
     """A little of everything, played and timed for real, in worker processes."""
     with Progress() as progress:
-        return measure(Plan(SCENES, PLAYERS, LITTLE, 0, 2), progress)
+        return measure(Plan(SCENES, PLAYED, LITTLE, 0, 2), progress)
 
 
 @pytest.fixture(scope="module")
 def results(measured: Measured) -> Results:
-    """The same with one player that failed one rung of one scene, and one that refused all of it."""
+    """The same with one engine that failed one rung of one scene, and one that refused all of it."""
     errors = measured.errors.copy()
     here = (errors.scenario == SCENES[0]) & (errors.engine == "pymunk") & (errors.kind == "scene")
     refused = here & (errors.profile == "shipped")
@@ -60,11 +60,11 @@ def results(measured: Measured) -> Results:
     samples = measured.samples
     timed = (samples.scenario == SCENES[0]) & (samples.engine == "pymunk") & (samples.profile == "shipped")
     changed = replace(measured, errors=errors, samples=samples[~(timed & (samples.kind == "scene"))])
-    return Results(Plan(SCENES, PLAYERS, LITTLE, 0, 2), changed)
+    return Results(Plan(SCENES, PLAYED, LITTLE, 0, 2), changed)
 
 
 def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
-    """A row a round for every player, dt and copy; a row a seed for every player and dt."""
+    """A row a round for every engine, dt and copy; a row a seed for every engine and dt."""
     results.write(tmp_path)
     samples, errors = (pd.read_csv(tmp_path / f"speed_{name}.csv") for name in ("samples", "errors"))
     one = samples[(samples.kind == "scene") & (samples.engine == "event_driven") & (samples.scenario == SCENES[0])]
@@ -101,7 +101,7 @@ def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Result
     assert max(edges["pymunk:matched"].x) < max(edges["pymunk:shipped"].x)
 
 
-def test_the_front_of_a_chart_is_the_event_driven_player(results: Results):
+def test_the_front_of_a_chart_is_the_event_driven_engine(results: Results):
     """In a head-on collision it is both cheapest and exact, so that nobody else is on the front."""
     points = results.points[results.points.scenario == SCENES[0]]
     drawn = {trace.name: trace for trace in charts.speed(points).data}
@@ -141,9 +141,9 @@ def test_a_pooled_failure_counts_as_infinitely_wrong(results: Results):
     assert (row.failed, np.isinf(row.error_high)) == (1, True)
 
 
-def test_every_feature_of_a_player_is_set_against_it_in_every_scene(results: Results):
+def test_every_feature_of_an_engine_is_set_against_it_in_every_scene(results: Results):
     """Time and error together; an engine changed in nothing reads 1 in both, so it is not listed."""
-    expected = {feature.change for feature in FEATURES if feature.engine in PLAYERS}
+    expected = {feature.change for feature in FEATURES if feature.engine in PLAYED}
     table = results.features
 
     assert set(table.change) == expected
@@ -190,7 +190,7 @@ def test_the_cheapest_model_is_named_for_every_scene(results: Results):
 
     assert models.loc[SCENES[0]].truth == CLOSED_FORM
     assert models.loc["asteroids"].truth == COLLISION_BY_COLLISION
-    assert models.loc["asteroids"].player == "event_driven:float64"
+    assert models.loc["asteroids"].engine == "event_driven:float64"
     assert set(models.model) <= {"closed form", "collision to collision, float64"}
 
 
@@ -216,7 +216,7 @@ def test_a_ratio_that_drifts_beyond_the_gate_is_named():
 
 
 def test_the_kept_figures_have_every_ratio_that_is_gated():
-    """All players but the yardstick, at all sizes."""
+    """All engines but the yardstick, at all sizes."""
     from adapters.engines import ENGINES
 
     assert set(figures.ratios(figures.read())) == {
@@ -228,7 +228,7 @@ def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
     """How much one scene moves the curve, what failed, who costs less than our own solver; and of a budget that is cut,
     which scene, when, of how long, and over how many seconds the share is. Without the cut scene none of the latter.
     """
-    rows = [row for name in HABITS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYERS]
+    rows = [row for name in HABITS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYED]
     both = pd.concat([results.measured.budget, pd.DataFrame(rows, columns=results.measured.budget.columns)])
     cut = Results(results.plan, replace(results.measured, budget=both))
     whole, shorter = (page_of(each, tmp_path) for each in (results, cut))
@@ -266,6 +266,6 @@ def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
         plot.locator(".main-svg").first.wait_for()
     assert tab.locator(".plot").count() == 2 + 2 + 3 + 1 + 2 * len(SCENES)
     assert overhang(tab) <= 0
-    assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with habits: three players; two switched off
+    assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with habits: three engines; two switched off
     assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
     assert heard == []

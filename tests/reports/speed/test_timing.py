@@ -43,8 +43,8 @@ def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
 
 def test_what_wrapping_in_python_took_is_told_apart():
     """A quarter of each step goes into wrapping: it is left out of the cost, and told beside it."""
-    players = {("sleeper:own", 1, 0): partial(Sleeper, EACH, EACH / 4)}
-    row = summed_up(table(ladder.times_of("near_miss", 0, players, 3, 1.0)), ["key"]).iloc[0]
+    engines = {("sleeper:own", 1, 0): partial(Sleeper, EACH, EACH / 4)}
+    row = summed_up(table(ladder.times_of("near_miss", 0, engines, 3, 1.0)), ["key"]).iloc[0]
 
     rate = scenario("near_miss").samples / scenario("near_miss").duration
     assert row.wrapping == pytest.approx(rate * EACH / 4)
@@ -53,8 +53,8 @@ def test_what_wrapping_in_python_took_is_told_apart():
 
 def test_an_engine_against_itself_reads_one():
     """The noise floor of two sleepers is the clock's own: sleeping is never early, and the fastest is on time."""
-    players = {("sleeper:own", 1, copy): partial(Sleeper, EACH) for copy in (0, 1)}
-    best = summed_up(table(ladder.times_of("near_miss", 0, players, 5, 1.0)), ["key"]).best
+    engines = {("sleeper:own", 1, copy): partial(Sleeper, EACH) for copy in (0, 1)}
+    best = summed_up(table(ladder.times_of("near_miss", 0, engines, 5, 1.0)), ["key"]).best
 
     assert best[1] / best[0] == pytest.approx(1.0, abs=0.05)
 
@@ -135,8 +135,8 @@ def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
 
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_told_of():
     """A sleeper of 2 ms a step, the same for every size, is stopped only by a patience below that."""
-    players = {"sleeper:own": partial(Sleeper, 2e-3)}
-    samples, stopped = sizes.costs(players, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)
+    engines = {"sleeper:own": partial(Sleeper, 2e-3)}
+    samples, stopped = sizes.costs(engines, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)
 
     assert {sample.key[1] for sample in samples} == {3, 4}
     assert list(stopped) == [("sleeper:own", 5)]

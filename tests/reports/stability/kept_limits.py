@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from reports.page import style
 from reports.stability.cases import CASES
-from reports.stability.limits import ONLY_BEYOND, Limit, players_of
+from reports.stability.limits import ONLY_BEYOND, Limit, engines_of
 
 FILE = Path(__file__).parents[3] / "tests" / "data" / "stability_limits.csv"
 COLUMNS = ("engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "verdict", "monotone",
@@ -22,10 +22,10 @@ COLUMNS = ("engine", "profile", "case", "parameter", "works_at", "fails_at", "un
 
 
 class Kept(NamedTuple):
-    """A row of the file: case, player, form, verdict, where it works and fails, its reason and how that was tested."""
+    """A row of the file: case, engine, form, verdict, where it works and fails, its reason and how that was tested."""
 
     case: str
-    player: str
+    engine: str
     form: str
     verdict: str
     works_at: float
@@ -39,7 +39,7 @@ def kept() -> list[Kept]:
     """The file's rows."""
     return [
         Kept(
-            row["case"], player_of(row), row["form"], row["verdict"], number(row["works_at"]),
+            row["case"], engine_of(row), row["form"], row["verdict"], number(row["works_at"]),
             number(row["fails_at"]), row["monotone"] == "True", row["reason"], row["tested"],
         )
         for row in rows_of(FILE)
@@ -52,7 +52,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def player_of(row: dict[str, str]) -> str:
+def engine_of(row: dict[str, str]) -> str:
     """engine:profile."""
     return f"{row['engine']}:{row['profile']}"
 
@@ -94,17 +94,17 @@ IN_README = {
     "column": "disks on each other",
     "fast_gas": "step displacement / radius, gas at e = 1",
 }
-PLAYERS = ("reference:exercise", "pymunk:matched", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
+VARIANTS = ("reference:exercise", "pymunk:matched", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
            "box2d_v3:matched", "event_driven:float64")  # fmt: skip
 
 
 def readme_table() -> str:
-    """The table of reports/stability/README.md: where players fail; a dash: not as far as was tried."""
-    found = {(row.case, row.player): row for row in kept()}
-    heads = [player.replace(":", "<br>") for player in PLAYERS]
-    lines = [f"| fails at | {' | '.join(heads)} |", "|---|" + "---|" * len(PLAYERS)]
+    """The table of reports/stability/README.md: where engines fail; a dash: not as far as was tried."""
+    found = {(row.case, row.engine): row for row in kept()}
+    heads = [engine.replace(":", "<br>") for engine in VARIANTS]
+    lines = [f"| fails at | {' | '.join(heads)} |", "|---|" + "---|" * len(VARIANTS)]
     for case, what in IN_README.items():
-        cells = [in_words(found[case, player]) for player in PLAYERS]
+        cells = [in_words(found[case, engine]) for engine in VARIANTS]
         lines.append(f"| {what} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -116,16 +116,16 @@ def in_words(row: Kept) -> str:
 
 
 def keep(folder: Path) -> None:
-    """Put the limits of a folder's atlas in its full form into the file, in the order of cases and players."""
+    """Put the limits of a folder's atlas in its full form into the file, in the order of cases and engines."""
     found = rows_of(folder / "limits.csv")
     if not found or {row["form"] for row in found} != {"full"}:
         raise SystemExit(f"{folder}: holds no full atlas; make one: crosscheck stability --full --out {folder}")
-    rows = {(row["case"], player_of(row)): row for row in [*rows_of(FILE), *found]}
+    rows = {(row["case"], engine_of(row)): row for row in [*rows_of(FILE), *found]}
     with FILE.open("w", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
-        writer.writerows(rows[key] for name, case in CASES.items() for player in players_of(case)
-                         if (key := (name, player)) in rows)  # fmt: skip
+        writer.writerows(rows[key] for name, case in CASES.items() for engine in engines_of(case)
+                         if (key := (name, engine)) in rows)  # fmt: skip
 
 
 if __name__ == "__main__":

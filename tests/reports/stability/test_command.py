@@ -29,17 +29,17 @@ ASKED = ("slow_collision", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_sp
 
 @pytest.fixture(scope="module")
 def atlas(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An atlas of two cases, a scene file and a map, on two players."""
+    """An atlas of two cases, a scene file and a map, on two engines."""
     out = tmp_path_factory.mktemp("atlas") / "out"
-    players = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
-    done = crosscheck("stability", *ASKED, "--vary", "speed", *players, "--out", out, cwd=ROOT / "tests" / "data")
+    engines = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
+    done = crosscheck("stability", *ASKED, "--vary", "speed", *engines, "--out", out, cwd=ROOT / "tests" / "data")
     assert done.returncode == 0, done.stderr
     assert "stability.html" in done.stdout
     return out
 
 
 def test_the_table_of_limits_is_a_file(atlas: Path):
-    """A row a case and player, columns as documented, and the threshold of Box2D in it."""
+    """A row a case and engine, columns as documented, and the threshold of Box2D in it."""
     table = pd.read_csv(atlas / "limits.csv")
 
     assert list(table.columns) == list(COLUMNS)
@@ -76,7 +76,7 @@ def test_what_has_ended_is_not_played_again(atlas: Path, monkeypatch: pytest.Mon
     )
     had, done = done_before(atlas, plan)
 
-    kept = {(task.name, task.player) for task in done}
+    kept = {(task.name, task.engine) for task in done}
     assert ("slow_collision", "box2d:shipped") in kept
     assert ("dt_and_speed", "pymunk:matched") in kept
     assert all(task.name != "grazing" for task in done)
@@ -96,9 +96,9 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
     part = tmp_path / "out.part"
     shutil.copytree(atlas, part)
     before = (part / JOURNAL).read_bytes()
-    players = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
-    again = crosscheck("stability", "slow_collision", *players, "--out", "out", cwd=tmp_path)
-    other = crosscheck("stability", "spin", *players, "--out", "out", "--resume", cwd=tmp_path)
+    engines = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
+    again = crosscheck("stability", "slow_collision", *engines, "--out", "out", cwd=tmp_path)
+    other = crosscheck("stability", "spin", *engines, "--out", "out", "--resume", cwd=tmp_path)
 
     assert (again.returncode, other.returncode) == (2, 2)
     assert "out.part holds 10 results of an interrupted run: to go on with it, ask again with --resume" in again.stderr
@@ -142,21 +142,21 @@ def page(request: pytest.FixtureRequest, browser: Browser, atlas: Path):
 
 
 def test_a_failure_is_one_click_away_and_opens_just_before_it(page: Page):
-    """The button shows the player's run; time stands before the event, and the event is in sight."""
+    """The button shows the engine's run; time stands before the event, and the event is in sight."""
     section = page.locator("#c-tunnelling_thin_wall")
     section.scroll_into_view_if_needed()
-    page.wait_for_function("() => window.players && window.players['tunnelling_thin_wall']")
+    page.wait_for_function("() => window.engines && window.engines['tunnelling_thin_wall']")
     section.locator("button.watch").first.click()
-    page.wait_for_function("() => players['tunnelling_thin_wall'].pack.layers[0].name === 'pymunk:matched'")
+    page.wait_for_function("() => engines['tunnelling_thin_wall'].pack.layers[0].name === 'pymunk:matched'")
     opens, event, end = page.evaluate(
-        "() => { const p = players['tunnelling_thin_wall']; return [p.time, p.pack.event.t, p.until]; }"
+        "() => { const p = engines['tunnelling_thin_wall']; return [p.time, p.pack.event.t, p.until]; }"
     )
 
     assert opens < event <= end
     assert "the collision is missed" in section.locator(".says").inner_text()
-    page.evaluate("() => players['tunnelling_thin_wall'].seek(players['tunnelling_thin_wall'].until)")
+    page.evaluate("() => engines['tunnelling_thin_wall'].seek(engines['tunnelling_thin_wall'].until)")
     truth, played = page.evaluate(
-        "() => ['truth', 'pymunk:matched'].map((name) => players['tunnelling_thin_wall'].positions(name)[0][0])"
+        "() => ['truth', 'pymunk:matched'].map((name) => engines['tunnelling_thin_wall'].positions(name)[0][0])"
     )
     assert truth < 0 < played  # it is on the wrong side of the wall
 

@@ -16,7 +16,6 @@ from reports.stability.cases import CASES
 from reports.stability.cases_gas import RADIUS, gas, wrapped_run
 from reports.stability.hard_disks import compressibility, gas_in_box
 from reports.stability.limits import QUICK
-from reports.stability.players import play_as
 from reports.stability.predicates import judge
 from reports.stability.predicates_gas import (
     BLOCKS,
@@ -31,6 +30,7 @@ from reports.stability.predicates_gas import (
     shares_of_speeds,
 )
 from reports.stability.search import Search
+from reports.stability.variants import play_as
 from scenarios.catalogue import SCENARIOS
 from scenarios.model import Scenario, Trajectory, frozen
 
@@ -38,9 +38,9 @@ EXACT = "event_driven:float64"
 LATE_AND_NOT = ("pymunk:matched", "reference:ordered")
 
 
-def played(player: str, scenario: Scenario) -> Trajectory:
+def played(engine: str, scenario: Scenario) -> Trajectory:
     """The whole run."""
-    run = play_as(player, scenario)
+    run = play_as(engine, scenario)
     assert run.status == "ok"
     assert run.trajectory is not None
     return run.trajectory
@@ -143,9 +143,9 @@ def test_equipartition_holds_in_an_exact_gas_up_to_a_mass_ratio_of_1e4_and_a_hot
 def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_noticed():
     """float64 to 1e-14, float32 to 1e-6, in 1000 steps; one disk stopped at the end is one part in some twenty."""
     scenario = wrapped_run(1000.0, 0)
-    for player, bound in (("reference:exercise", 1e-14), ("pymunk:matched", 1e-14), ("box2d:matched", 1e-6),
+    for engine, bound in (("reference:exercise", 1e-14), ("pymunk:matched", 1e-14), ("box2d:matched", 1e-6),
                           ("box2d_v3:matched", 1e-6)):  # fmt: skip
-        one = played(player, scenario)
+        one = played(engine, scenario)
         reading = verdict(MOMENTUM_DRIFTS, scenario, one)
         assert not reading.failed
         assert reading.value < bound

@@ -13,10 +13,10 @@ from adapters.mechanisms.features import changed_box2d, changed_box2d_v3
 from reports.stability.cases import CASES
 from reports.stability.cases_alone import ball, far, on_spring, oscillator
 from reports.stability.limits import QUICK, Limit
-from reports.stability.players import PLAYERS, Player, play_as, played
 from reports.stability.predicates import apex_drift
 from reports.stability.search import Search
 from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, answers, law_of, named
+from reports.stability.variants import VARIANTS, Variant, play_as, played
 from scenarios.model import Trajectory
 
 PARTNERS = [f"{engine}:{profile}" for engine in ("box2d", "box2d_v3") for profile in ("shipped", "matched")]
@@ -25,33 +25,33 @@ DISCRETE = ["reference:exercise", "reference:lesson", "pymunk:shipped", "pymunk:
 
 
 @cache
-def limit(case: str, player: str) -> Limit:
+def limit(case: str, engine: str) -> Limit:
     """The limit in the quick form."""
-    return Search(CASES[case], player, QUICK).limit()
+    return Search(CASES[case], engine, QUICK).limit()
 
 
-def assert_fails_at(case: str, player: str, value: float, slack: float = 1.0) -> None:
+def assert_fails_at(case: str, engine: str, value: float, slack: float = 1.0) -> None:
     """The bracket holds the value; `slack` times further out is still called holding."""
-    found = limit(case, player)
+    found = limit(case, engine)
     low, high = sorted((found.works_at, found.fails_at))
-    assert low / slack <= value <= high * slack, f"{player} in {case}: {value} is not in {low} .. {high}"
+    assert low / slack <= value <= high * slack, f"{engine} in {case}: {value} is not in {low} .. {high}"
 
 
-@pytest.mark.parametrize("player", DISCRETE)
+@pytest.mark.parametrize("engine", DISCRETE)
 @pytest.mark.parametrize(
     ("case", "value"),
     [("tunnelling_head_on", 2.0), ("tunnelling_offset", 2 * sqrt(1 - 0.7**2)), ("tunnelling_thin_wall", 1.0)],
 )
-def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(case: str, value: float, player: str):
+def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(case: str, value: float, engine: str):
     """v dt > 2R between disks head-on, 2R sqrt(1 - (b/2R)2) off centre, R at a thin wall."""
-    assert_fails_at(case, player, value)
+    assert_fails_at(case, engine, value)
 
 
-@pytest.mark.parametrize("player", ["box2d:matched+bullets", "box2d_v3:matched+bullets", "event_driven:float64"])
+@pytest.mark.parametrize("engine", ["box2d:matched+bullets", "box2d_v3:matched+bullets", "event_driven:float64"])
 @pytest.mark.parametrize("case", ["tunnelling_head_on", "tunnelling_thin_wall"])
-def test_nothing_is_missed_by_what_sweeps(case: str, player: str):
+def test_nothing_is_missed_by_what_sweeps(case: str, engine: str):
     """The switch that shows it: the same engines with continuous collision and bullets, and no steps at all."""
-    assert limit(case, player).verdict == "does not fail"
+    assert limit(case, engine).verdict == "does not fail"
 
 
 def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
@@ -63,9 +63,9 @@ def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
 
 def test_only_the_speculative_margin_invents_collisions():
     """Box2D 3.1, within four slops: as shipped 0.02 m, 0.04 of the sum of the radii; nobody else."""
-    found = {player: limit("near_miss", player).verdict for player in (*DISCRETE, *PARTNERS)}
+    found = {engine: limit("near_miss", engine).verdict for engine in (*DISCRETE, *PARTNERS)}
 
-    invent = {player for player, verdict in found.items() if verdict != "does not fail"}
+    invent = {engine for engine, verdict in found.items() if verdict != "does not fail"}
     assert "box2d_v3:shipped" in invent
     assert invent <= {"box2d_v3:shipped", "box2d_v3:matched"}
     assert limit("near_miss", "box2d_v3:shipped").fails_at < 0.04
@@ -95,11 +95,11 @@ def test_the_caps_on_spin_are_a_quarter_and_an_eighth_of_a_turn_a_step():
     assert_fails_at("spin", "box2d_v3:shipped", 4 * atan(pi / 16) / 0.98)
 
 
-def drift(player: str | Player, x: float, runs: int = 1) -> float:
+def drift(engine: str | Variant, x: float, runs: int = 1) -> float:
     """Gain of height per bounce over |v| dt, of balls dropped from 1.25 m and a little more; x = dt / fall time."""
     found = []
     for scenario in (ball(x, run) for run in range(runs)):
-        trajectory = played(player if isinstance(player, Player) else PLAYERS[player], scenario).trajectory
+        trajectory = played(engine if isinstance(engine, Variant) else VARIANTS[engine], scenario).trajectory
         assert trajectory is not None
         height = scenario.scene.position[0, 1] - scenario.scene.radius[0]
         found.append(
@@ -112,12 +112,12 @@ def test_a_bounce_gains_what_the_order_of_operations_says():
     """Closed forms: pymunk 0, Box2D 2.3 +|v| dt; Box2D 3.1 with soft contacts about -|v| dt / substeps."""
     assert abs(drift("pymunk:matched", 0.02)) < 1e-9  # rounding of 1000 steps
     # Higher orders in dt: a tenth at this step. Continuous collision takes the ball at the wall, and the gain with it.
-    no_ccd = Player("box2d:matched+no_ccd", partial(changed_box2d, continuous=False, bullet=False))
+    no_ccd = Variant("box2d:matched+no_ccd", partial(changed_box2d, continuous=False, bullet=False))
     assert drift(no_ccd, 0.01) == pytest.approx(1.0, rel=0.1)
     assert abs(drift("box2d:matched", 0.01)) < 0.01
     assert drift("reference:lesson", 0.01) == pytest.approx(1.0, rel=0.1)
     # A soft contact gives back more or less with the phase of the collision in its step.
-    soft = Player("box2d_v3:matched+soft", partial(changed_box2d_v3, length_unit=0.02, hertz=30.0))
+    soft = Variant("box2d_v3:matched+soft", partial(changed_box2d_v3, length_unit=0.02, hertz=30.0))
     assert drift(soft, 0.005, runs=6) == pytest.approx(-1 / 4, rel=0.25)
     # The stiffest contacts, and a wider margin, take back a part of it; four times the substeps, all of it.
     assert -1 / 4 < drift("box2d_v3:matched", 0.01, runs=6) < -1 / 16
@@ -125,26 +125,26 @@ def test_a_bounce_gains_what_the_order_of_operations_says():
     assert drift("box2d_v3:shipped", 0.01, runs=6) < -0.5  # its margin of 2 cm stops the ball before the floor
 
 
-@pytest.mark.parametrize("player", PARTNERS)
-def test_float32_is_off_by_6_percent_at_10_km(player: str):
+@pytest.mark.parametrize("engine", PARTNERS)
+def test_float32_is_off_by_6_percent_at_10_km(engine: str):
     """At 1 m/s and 1/240 s, exactly as adding up in float32 is; from 4096 m on it is more than 1 %."""
     scenario = far(1e4, 0)
-    trajectory = play_as(player, scenario).trajectory
+    trajectory = play_as(engine, scenario).trajectory
     x = np.float32(1e4)
     for _ in range(240):
         x = np.float32(x + np.float32(1 / 240))
     assert trajectory is not None
     assert trajectory.position[-1, 0, 0] - 1e4 == float(x) - 1e4
     assert float(x) - 1e4 == pytest.approx(1 - 0.06, abs=0.005)
-    assert_fails_at("far_from_origin", player, 4096.0)
+    assert_fails_at("far_from_origin", engine, 4096.0)
 
 
 @pytest.mark.parametrize(
-    ("player", "factor"), [("pymunk:matched", 2.71), ("box2d:matched", 0.98), ("box2d_v3:matched", 1.44)]
+    ("engine", "factor"), [("pymunk:matched", 2.71), ("box2d:matched", 0.98), ("box2d_v3:matched", 1.44)]
 )
-def test_a_push_read_off_the_positions_makes_an_oscillator_grow_as_published(player: str, factor: float):
+def test_a_push_read_off_the_positions_makes_an_oscillator_grow_as_published(engine: str, factor: float):
     """E / E0 after 400 steps at w dt = 0.05, engine_facts section 5."""
-    trajectory: Trajectory | None = on_spring(PLAYERS[player], oscillator(0.05, 0))[1].trajectory
+    trajectory: Trajectory | None = on_spring(VARIANTS[engine], oscillator(0.05, 0))[1].trajectory
     assert trajectory is not None
     energy = (trajectory.velocity**2 + trajectory.position**2).sum(axis=(1, 2)) / 2
 
@@ -152,12 +152,12 @@ def test_a_push_read_off_the_positions_makes_an_oscillator_grow_as_published(pla
 
 
 @pytest.mark.parametrize(
-    ("player", "gain"), [("reference:lesson", 1.0), ("pymunk:matched", 1.0), ("box2d_v3:matched", 0.375),
+    ("engine", "gain"), [("reference:lesson", 1.0), ("pymunk:matched", 1.0), ("box2d_v3:matched", 0.375),
                          ("event_driven:float64", 0.5)]
 )  # fmt: skip
-def test_it_doubles_where_the_determinant_of_the_map_says(player: str, gain: float):
+def test_it_doubles_where_the_determinant_of_the_map_says(engine: str, gain: float):
     """1 + (1 - alpha) (w dt)2 a step, over 300 steps; symplectic Euler holds until w dt = 2."""
-    assert_fails_at("stiff_push", player, sqrt((2 ** (1 / 300) - 1) / gain))
+    assert_fails_at("stiff_push", engine, sqrt((2 ** (1 / 300) - 1) / gain))
     assert_fails_at("stiff_push", "reference:exercise", 2.0)
 
 
@@ -170,7 +170,7 @@ def test_a_restitution_of_a_pair_is_e_squared_only_in_pymunk_as_shipped():
 
 def test_a_pair_keeps_its_velocities_up_to_a_mass_ratio_of_1e8():
     """Alone, no engine has trouble with unequal masses."""
-    assert all(limit("mass_ratio", player).verdict == "does not fail" for player in (*DISCRETE, *PARTNERS))
+    assert all(limit("mass_ratio", engine).verdict == "does not fail" for engine in (*DISCRETE, *PARTNERS))
 
 
 def test_a_wrong_threshold_would_be_noticed():
@@ -186,7 +186,7 @@ GAPS_TRIED = (0.0, 0.01, 0.1)
 
 
 @pytest.mark.parametrize(
-    ("scene", "player", "words"),
+    ("scene", "engine", "words"),
     [
         ("touching_cradle_of_3", "reference:exercise", (PAIRS, PAIRS, PAIRS)),
         ("touching_cradle_of_3", "pymunk:matched", (PAIRS, PAIRS, PAIRS)),
@@ -199,13 +199,13 @@ GAPS_TRIED = (0.0, 0.01, 0.1)
         ("touching_break", "box2d_v3:matched", ("none", "none", PAIRS)),
     ],
 )
-def test_touching_disks_are_struck_after_the_law_that_the_engine_is_known_for(scene: str, player: str, words: tuple):
+def test_touching_disks_are_struck_after_the_law_that_the_engine_is_known_for(scene: str, engine: str, words: tuple):
     """engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to neither.
 
     From a gap on that is wider than the way in a step, a thirty-second of a radius, everybody plays pair after pair.
     Box2D 3.1 holds for touching what is within its margin: four slops, with a unit of half a radius a hundredth of it.
     """
-    found = law_of(scene, player, GAPS_TRIED)
+    found = law_of(scene, engine, GAPS_TRIED)
 
     assert tuple(at.law for at in found.gaps) == words
     for at in found.gaps:
@@ -224,7 +224,7 @@ def test_the_named_laws_keep_momentum_and_energy_at_every_gap():
         assert min(np.abs(small - v).max() for v in one.laws[PAIRS]) < 2e-3
 
 
-def test_a_player_that_keeps_to_no_law_is_not_given_one():
+def test_an_engine_that_keeps_to_no_law_is_not_given_one():
     """The negative control: an answer in the middle between the two laws, and one that loses a twentieth."""
     laws = answers("touching_break", 0.0)
     pairs, at_once = laws[PAIRS][0], laws[AT_ONCE][0]

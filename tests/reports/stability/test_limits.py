@@ -8,9 +8,9 @@ from functools import cache
 import pytest
 
 from reports.stability.cases import CASES
-from reports.stability.limits import NEVER_FAILS, QUICK, Limit, players_of
-from reports.stability.players import PLAYERS
+from reports.stability.limits import NEVER_FAILS, QUICK, Limit, engines_of
 from reports.stability.search import Search
+from reports.stability.variants import VARIANTS
 from tests.reports.stability.kept_limits import Kept, agrees, in_words, kept
 
 KEPT = kept()
@@ -23,20 +23,20 @@ CHANGED = (
 
 
 @cache
-def quick(case: str, player: str) -> Limit:
+def quick(case: str, engine: str) -> Limit:
     """Found here and now in the quick form."""
-    return Search(CASES[case], player, QUICK).limit()
+    return Search(CASES[case], engine, QUICK).limit()
 
 
 def assert_agrees(row: Kept) -> None:
     """The quick form's bracket holds the full form's limit: strict both ways."""
-    found = quick(row.case, row.player)
+    found = quick(row.case, row.engine)
     assert agrees(found, row), f"{found.verdict}, {found.works_at} to {found.fails_at}, for {row}: {CHANGED}"
 
 
 def name_of(row: Kept) -> str:
     """As a test is called."""
-    return f"{row.case}-{row.player}"
+    return f"{row.case}-{row.engine}"
 
 
 @pytest.mark.parametrize("row", [row for row in KEPT if row.case in FAST], ids=name_of)
@@ -52,12 +52,12 @@ def test_the_quick_form_finds_every_other_limit_of_the_full_one(row: Kept):
     assert_agrees(row)
 
 
-def test_every_case_and_player_is_kept():
+def test_every_case_and_engine_is_kept():
     """None is left out."""
-    asked = {(name, player) for name, case in CASES.items() for player in players_of(case)}
+    asked = {(name, engine) for name, case in CASES.items() for engine in engines_of(case)}
 
-    assert {(row.case, row.player) for row in KEPT} == asked
-    assert {row.player for row in KEPT} == set(PLAYERS)
+    assert {(row.case, row.engine) for row in KEPT} == asked
+    assert {row.engine for row in KEPT} == set(VARIANTS)
 
 
 def test_every_limit_has_a_reason_and_an_untested_one_is_called_likely():
@@ -74,8 +74,8 @@ def test_every_limit_has_a_reason_and_an_untested_one_is_called_likely():
 @pytest.mark.parametrize("factor", [0.8, 1.25])
 def test_an_engine_that_fails_earlier_or_later_is_noticed(factor: float):
     """The negative control: a limit moved by a quarter either way, and one that is gone."""
-    row = next(row for row in KEPT if (row.case, row.player) == ("slow_collision", "box2d:shipped"))
-    now = quick(row.case, row.player)
+    row = next(row for row in KEPT if (row.case, row.engine) == ("slow_collision", "box2d:shipped"))
+    now = quick(row.case, row.engine)
 
     assert agrees(now, row)
     assert not agrees(replace(now, works_at=now.works_at * factor, fails_at=now.fails_at * factor), row)
@@ -84,23 +84,23 @@ def test_an_engine_that_fails_earlier_or_later_is_noticed(factor: float):
 
 def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
     """The negative control: the scan as it was once, few heights of the ball and few values, called 0.057 a limit."""
-    row = next(row for row in KEPT if (row.case, row.player) == ("bounce_drift", "reference:exercise"))
-    flattering = Limit(row.case, row.player, "quick", "limit", 0.0545, 0.0572, ())
+    row = next(row for row in KEPT if (row.case, row.engine) == ("bounce_drift", "reference:exercise"))
+    flattering = Limit(row.case, row.engine, "quick", "limit", 0.0545, 0.0572, ())
 
     assert not agrees(flattering, row)
     assert row.fails_at < 0.006
 
 
-@pytest.mark.parametrize("player", ["reference:exercise", "reference:lesson", "box2d:shipped"])
-def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(player: str):
+@pytest.mark.parametrize("engine", ["reference:exercise", "reference:lesson", "box2d:shipped"])
+def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(engine: str):
     """At values, heights and phases that no form has played, the ball comes back wherever it is said to.
 
     Each of these loses or gains up to |v| dt of height a bounce, 2 dt over the fall time: 1 % from 0.005 on.
     """
-    found = quick("bounce_drift", player)
+    found = quick("bounce_drift", engine)
     case = CASES["bounce_drift"]
     others = [0.0021, 0.0026, 0.0034, 0.0039, 0.0043, 0.0046]
-    search = Search(replace(case, scene=lambda x, run: case.scene(x, run + 100), runs=8), player, QUICK)
+    search = Search(replace(case, scene=lambda x, run: case.scene(x, run + 100), runs=8), engine, QUICK)
 
     assert found.works_at <= 0.0053
     assert all(search.trial(x, 8).works for x in others if x < found.works_at)
@@ -109,7 +109,7 @@ def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(player:
 
 def test_a_limit_that_is_not_the_only_edge_is_marked():
     """In a table the first failure, and a star."""
-    row = next(row for row in KEPT if row.case == "slow_collision" and row.player == "box2d:shipped")
+    row = next(row for row in KEPT if row.case == "slow_collision" and row.engine == "box2d:shipped")
 
     assert row.monotone
     assert in_words(row._replace(monotone=False)) == in_words(row) + "*"

@@ -15,9 +15,9 @@ from reports.stability.cases import CASES
 from reports.stability.cures import CURES, cure_of, faster, larger, slower, smaller, why_played
 from reports.stability.explain import explained, tried_out
 from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
-from reports.stability.players import PLAYERS, play_as
 from reports.stability.reasons import reason_of
 from reports.stability.search import Search
+from reports.stability.variants import VARIANTS, play_as
 from reports.stability.vary import VARIES, case_of_file, varied
 from scenarios.files.scene_file import read_scene_file
 from scenarios.truth.exact import with_oracle
@@ -26,17 +26,17 @@ SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 
 
 @cache
-def found(what: str, player: str, scene: str = "two.toml") -> Limit:
+def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
     """The limit on a scene of tests/data/scenes, with what cures its failure, asked without a twin."""
     path = str(SCENES / scene)
-    search = Search(case_of_file(path, what), player, QUICK)
+    search = Search(case_of_file(path, what), engine, QUICK)
     limit = search.limit()
     [known] = explained([replace(limit, case=f"{path}:{what}", cured=cure_of(search, limit))])
     return known
 
 
 @pytest.mark.parametrize(
-    ("what", "player", "tells"),
+    ("what", "engine", "tells"),
     [
         ("offset", "box2d:matched", "positions are float32"),
         ("offset", "box2d_v3:matched", "positions are float32"),
@@ -45,9 +45,9 @@ def found(what: str, player: str, scene: str = "two.toml") -> Limit:
         ("speed", "reference:exercise", "a collision waits for the end of its step"),
     ],
 )
-def test_a_reason_is_what_the_failing_run_works_without(what: str, player: str, tells: str):
+def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, tells: str):
     """Two disks head-on at 1 m/s and 1/200 s: the mechanisms known from the atlas come out by themselves."""
-    limit = found(what, player)
+    limit = found(what, engine)
 
     assert tells in limit.reason
     assert limit.tested.startswith("works ")
@@ -81,12 +81,12 @@ def test_where_nothing_cures_it_a_twin_may_tell_and_else_it_is_called_not_known(
 
 
 @pytest.mark.parametrize("change", [faster, slower, larger, smaller])
-@pytest.mark.parametrize("player", ["reference:exercise", "reference:ordered"])
-def test_a_solver_without_units_plays_a_similar_scene_to_the_same_bits(change, player: str):
+@pytest.mark.parametrize("engine", ["reference:exercise", "reference:ordered"])
+def test_a_solver_without_units_plays_a_similar_scene_to_the_same_bits(change, engine: str):
     """So that none of these changes can help by chance: in it only what has a unit of its own plays otherwise."""
     one = replace(read_scene_file(SCENES / "bumper.toml"), substeps=(1,))
     other = change(one)
-    run, same = play_as(player, one).trajectory, play_as(player, other).trajectory
+    run, same = play_as(engine, one).trajectory, play_as(engine, other).trajectory
     assert run is not None
     assert same is not None
     size = float(other.scene.radius[0] / one.scene.radius[0])
@@ -122,10 +122,10 @@ def test_a_scene_in_which_nothing_can_go_wrong_has_limits_all_the_same():
 
 def test_every_change_is_tried_on_somebody():
     """None is left over."""
-    players = ("reference:exercise", "pymunk:shipped", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
+    engines = ("reference:exercise", "pymunk:shipped", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
                "box2d_v3:matched")  # fmt: skip
     for name, cure in CURES.items():
-        assert any(cure.fits(player, what) for player in players for what in ("dt", "speed", "offset")), name
+        assert any(cure.fits(engine, what) for engine in engines for what in ("dt", "speed", "offset")), name
 
 
 def test_a_collision_that_nobody_makes_fails_however_near_to_the_start_it_is():
@@ -143,7 +143,7 @@ def test_a_collision_that_nobody_makes_fails_however_near_to_the_start_it_is():
 def test_a_disk_that_float32_keeps_where_it_is_fails():
     """A million metres out the last place is 6 cm, and a step of 2 cm is none, whatever the velocity says."""
     path = str(SCENES / "two.toml")
-    far = {name: Search(case_of_file(path, "offset"), name, QUICK).trial(1e6) for name in PLAYERS if "+" not in name}
+    far = {name: Search(case_of_file(path, "offset"), name, QUICK).trial(1e6) for name in VARIANTS if "+" not in name}
 
     assert far["box2d:matched"].broken == "strays"
     assert not far["box2d:matched"].works
@@ -165,7 +165,7 @@ def test_the_name_of_a_scene_file_does_not_pick_its_reason(name: str):
     limit = Limit(f"{name}:speed", "box2d:matched", "quick", "limit", 1.0, 2.0, (failing,))
 
     assert reason_of(limit) is None
-    assert reason_of(replace(limit, player="event_driven:float64")) is not None
+    assert reason_of(replace(limit, engine="event_driven:float64")) is not None
 
 
 def test_the_help_names_what_can_be_varied():

@@ -9,45 +9,45 @@ import pytest
 
 from reports.stability.cases import CASES
 from reports.stability.limits import FULL, QUICK
-from tests.reports.stability.kept_limits import IN_README, PLAYERS, in_words, kept
+from tests.reports.stability.kept_limits import IN_README, VARIANTS, in_words, kept
 
 TEXT = (Path(__file__).parents[3] / "reports/stability/README.md").read_text("utf-8")
-FOUND = {(row.case, row.player): row for row in kept()}
+FOUND = {(row.case, row.engine): row for row in kept()}
 
 
 def cells_of(text: str) -> dict[tuple[str, str], str]:
     """(row, engine:profile) -> what stands there, of the table whose first heading is "fails at"."""
     lines = text[text.index("| fails at |") :].split("\n\n")[0].splitlines()
     head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    players = [name.replace("<br>", ":") for name in head[1:]]
-    return {(row[0], player): cell for row in rows for player, cell in zip(players, row[1:], strict=True)}
+    engines = [name.replace("<br>", ":") for name in head[1:]]
+    return {(row[0], engine): cell for row in rows for engine, cell in zip(engines, row[1:], strict=True)}
 
 
 CELLS = cells_of(TEXT)
 
 
-@pytest.mark.parametrize("player", PLAYERS)
+@pytest.mark.parametrize("engine", VARIANTS)
 @pytest.mark.parametrize("case", IN_README)
-def test_a_number_of_the_table_is_the_first_failure_of_the_full_form(case: str, player: str):
+def test_a_number_of_the_table_is_the_first_failure_of_the_full_form(case: str, engine: str):
     """Row and column by their headings, to the digits that are shown."""
-    assert CELLS[IN_README[case], player] == in_words(FOUND[case, player])
+    assert CELLS[IN_README[case], engine] == in_words(FOUND[case, engine])
 
 
 def test_the_table_has_no_other_rows_and_no_other_columns():
     """Nothing in it that no limit holds."""
     assert {row for row, _ in CELLS} == set(IN_README.values())
-    assert {player for _, player in CELLS} == set(PLAYERS)
+    assert {engine for _, engine in CELLS} == set(VARIANTS)
 
 
 def test_a_number_that_is_no_longer_true_is_noticed():
     """The negative control: one digit of one engine."""
     line = f"| {IN_README['bounce_drift']} |"
-    old = CELLS[IN_README["bounce_drift"], PLAYERS[0]]
+    old = CELLS[IN_README["bounce_drift"], VARIANTS[0]]
     wrong = cells_of(TEXT.replace(f"{line} {old} |", f"{line} 0.057 |"))
 
     differ = [key for key, cell in wrong.items() if cell != CELLS[key]]
-    assert differ == [(IN_README["bounce_drift"], PLAYERS[0])]
-    assert wrong[differ[0]] != in_words(FOUND["bounce_drift", PLAYERS[0]])
+    assert differ == [(IN_README["bounce_drift"], VARIANTS[0])]
+    assert wrong[differ[0]] != in_words(FOUND["bounce_drift", VARIANTS[0]])
 
 
 def test_what_is_said_of_the_two_forms_is_what_they_do():
@@ -63,4 +63,4 @@ def test_what_is_said_of_the_two_forms_is_what_they_do():
 
 def test_what_the_readme_says_is_of_the_full_form():
     """Its numbers are read off nothing coarser."""
-    assert {FOUND[case, player].form for case in IN_README for player in PLAYERS} == {"full"}
+    assert {FOUND[case, engine].form for case in IN_README for engine in VARIANTS} == {"full"}

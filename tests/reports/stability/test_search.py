@@ -27,9 +27,9 @@ from reports.stability.cases_gas import gas
 from reports.stability.explain import explained
 from reports.stability.failures import AFTER, BEFORE, keep_failure, kept_failure, near, part_of
 from reports.stability.limits import FULL, QUICK, Case, Limit, Trial
-from reports.stability.players import Player, play_as
 from reports.stability.predicates import Predicate, Reading, judge
 from reports.stability.search import Search
+from reports.stability.variants import Variant, play_as
 from scenarios.families.placing import lay_out
 from scenarios.model import Scenario, Trajectory
 
@@ -56,7 +56,7 @@ def case(reading: Callable[[float, int], float], values: tuple[float, ...], **mo
     def scene(x: float, run: int) -> Scenario:
         return Scenario("made-up", "?", "", replace(SCENE, velocity=[[reading(x, run), 0]]), 1.0, 1.0, (1,))
 
-    def play(_: Player, scenario: Scenario) -> tuple[Scenario, Run]:
+    def play(_: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
         start = scenario.scene.state
         arrays = [np.array([a, a]) for a in (start.position, start.velocity, start.angle, start.angular_velocity)]
         return scenario, Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
@@ -65,7 +65,7 @@ def case(reading: Callable[[float, int], float], values: tuple[float, ...], **mo
 
 
 def limit_of(one: Case, form: Any = FULL) -> Limit:
-    """The limit of a player that does not matter."""
+    """The limit of an engine that does not matter."""
     return Search(one, "reference:exercise", form).limit()
 
 

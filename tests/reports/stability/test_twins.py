@@ -1,4 +1,4 @@
-"""A twin is the reference with some of a player's habits: it has the player's limit if it has the cause, else not."""
+"""A twin is the reference with some of an engine's habits: it has the engine's limit if it has the cause, else not."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from adapters.mechanisms.habits import FLIGHT, FRICTION, HABITS, PUSH_OUT, RESTI
 from reports.stability.cases import CASES
 from reports.stability.explain import explained
 from reports.stability.limits import QUICK, Limit, Trial
-from reports.stability.players import PLAYERS, Player, play_as
 from reports.stability.search import Search
 from reports.stability.twins import COLLISIONS_WAIT, LATE, Twins, told, twin_of
+from reports.stability.variants import VARIANTS, Variant, play_as
 from scenarios.catalogue import scenario
 
 
 @cache
-def found(case: str, player: str) -> tuple[Search, Limit]:
-    """The limit of a player, and the search that remembers its failing run."""
-    search = Search(CASES[case], player, QUICK)
+def found(case: str, engine: str) -> tuple[Search, Limit]:
+    """The limit of an engine, and the search that remembers its failing run."""
+    search = Search(CASES[case], engine, QUICK)
     return search, search.limit()
 
 
 @pytest.mark.parametrize(
-    ("case", "player", "habits"),
+    ("case", "engine", "habits"),
     [
         ("dt_head_on_equal_e09", "pymunk:matched", LATE),  # one collision, nothing pulls
         ("dt_head_on_equal_e09", "box2d_v3:matched", LATE),
@@ -43,9 +43,9 @@ def found(case: str, player: str) -> tuple[Search, Limit]:
         ("bounce_drift", "reference:lesson", FLIGHT),  # explicit Euler
     ],
 )
-def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, player: str, habits: str):
+def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, engine: str, habits: str):
     """Mechanisms with a closed form or a setting of their own."""
-    assert twin_of(*found(case, player)) == habits
+    assert twin_of(*found(case, engine)) == habits
 
 
 def test_a_twin_without_the_cause_does_not_have_the_limit():
@@ -70,7 +70,7 @@ def test_a_cause_that_no_habit_names_gives_no_twin(monkeypatch: pytest.MonkeyPat
         engine.load = lambda scene, dt: load(replace(scene, restitution=scene.restitution / 2), dt)
         return engine
 
-    monkeypatch.setitem(PLAYERS, "pymunk:matched", Player("pymunk:matched", halved))
+    monkeypatch.setitem(VARIANTS, "pymunk:matched", Variant("pymunk:matched", halved))
     search = Search(CASES["slow_collision"], "pymunk:matched", QUICK)
     limit = search.limit()
 
@@ -78,7 +78,7 @@ def test_a_cause_that_no_habit_names_gives_no_twin(monkeypatch: pytest.MonkeyPat
     assert twin_of(search, limit) == ""
 
 
-def test_where_a_player_works_nowhere_a_twin_must_read_as_much_as_it_does():
+def test_where_an_engine_works_nowhere_a_twin_must_read_as_much_as_it_does():
     """Failing anywhere proves nothing of one that fails everywhere: its number has to come out."""
     search, limit = found("dt_wall_to_wall", "pymunk:shipped")
     twins = Twins.of(search, limit)
@@ -90,10 +90,10 @@ def test_where_a_player_works_nowhere_a_twin_must_read_as_much_as_it_does():
     assert not far.alike(twins.habits)
 
 
-@pytest.mark.parametrize("player", ["reference:ordered", "event_driven:float64"])
-def test_of_a_player_whose_habits_nobody_knows_there_is_no_twin(player: str):
+@pytest.mark.parametrize("engine", ["reference:ordered", "event_driven:float64"])
+def test_of_an_engine_whose_habits_nobody_knows_there_is_no_twin(engine: str):
     """Late collisions would be no news of one whose collisions are not late."""
-    search = Search(CASES["overlap_recovery"], player, QUICK)
+    search = Search(CASES["overlap_recovery"], engine, QUICK)
     assert twin_of(search, search.limit()) == ""
 
 
@@ -106,19 +106,19 @@ def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_twin():
     )
 
     assert "pushed out by a share a step" in kept.reason
-    assert kept.tested == "the reference with late collisions and the player's flight and push-out has this limit"
+    assert kept.tested == "the reference with late collisions and the engine's flight and push-out has this limit"
     assert other.reason == "friction takes speed along the contact"
     assert other.source == "the engine's default"
     assert untested.why.startswith("likely: overlaps are pushed out")
 
 
-@pytest.mark.parametrize("player", HABITS)
-def test_every_habit_has_words(player: str):
-    """All of a player's for which the reference has a switch."""
+@pytest.mark.parametrize("engine", HABITS)
+def test_every_habit_has_words(engine: str):
+    """All of an engine's for which the reference has a switch."""
     one = scenario("head_on_equal_e09")
-    settings = play_as(player, replace(one, substeps=(4,))).settings
-    names = [habit.name for habit in habits_of(player, settings, one.scene, one.dt(4)) if habit.switches]
-    limit = Limit("slow_collision", player, "quick", "never works", nan, 1.0, ())
+    settings = play_as(engine, replace(one, substeps=(4,))).settings
+    names = [habit.name for habit in habits_of(engine, settings, one.scene, one.dt(4)) if habit.switches]
+    limit = Limit("slow_collision", engine, "quick", "never works", nan, 1.0, ())
 
     assert told(replace(limit, twin=LATE))[0] == COLLISIONS_WAIT
     assert len(names) >= 2

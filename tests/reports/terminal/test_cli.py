@@ -33,7 +33,7 @@ SMALL = [
 
 @pytest.fixture(scope="module")
 def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a finished run of two scenarios and three players."""
+    """The folder of a finished run of two scenarios and three engines."""
     cwd = tmp_path_factory.mktemp("small")
     done = process(*SMALL, "--out", "here", cwd=cwd)
 
@@ -73,7 +73,7 @@ def test_a_run_writes_its_files(small_run: Path):
     assert set(runs.status) == {"ok"}
     assert {path.stem for path in (small_run / "trajectories").iterdir()} == set(runs.cell)
     assert "header" in lines[0]
-    assert lines[-1]["footer"]["tasks"] == 8 + 4  # and the conformance of four players
+    assert lines[-1]["footer"]["tasks"] == 8 + 4  # and the conformance of four engines
     assert json.loads((small_run / "machine.json").read_text())["seed"] == 0
     assert (small_run / "report.html").stat().st_size < 8e6
 

@@ -13,7 +13,7 @@ from adapters.play import Run, play
 from scenarios.model import Scenario, Scene
 
 
-class Player(NamedTuple):
+class Variant(NamedTuple):
     """A name, engine:profile; how to make its engine; and what is switched in it: "" for a row of `ENGINES`."""
 
     name: str
@@ -49,34 +49,34 @@ def with_bullets(make: Callable[..., Engine]) -> Callable[[], Any]:
 
 BULLETS = "continuous collision, what moves is a bullet"
 SWITCHED = (
-    Player("pymunk:matched+fifty_iterations", partial(changed_pymunk, iterations=50), "50 iterations for 10"),
-    Player(
+    Variant("pymunk:matched+fifty_iterations", partial(changed_pymunk, iterations=50), "50 iterations for 10"),
+    Variant(
         "pymunk:matched+push_out", partial(changed_pymunk, collision_bias=(1 - 0.1) ** 60),
         "overlaps pushed out as shipped",
     ),
-    Player("box2d:matched+bullets", with_bullets(partial(changed_box2d, elastic_continuous=True)), BULLETS),
-    Player("box2d_v3:matched+bullets", with_bullets(changed_box2d_v3), BULLETS),
-    Player("box2d_v3:matched+16_substeps", partial(changed_box2d_v3, substeps=16), "16 substeps for 4"),
+    Variant("box2d:matched+bullets", with_bullets(partial(changed_box2d, elastic_continuous=True)), BULLETS),
+    Variant("box2d_v3:matched+bullets", with_bullets(changed_box2d_v3), BULLETS),
+    Variant("box2d_v3:matched+16_substeps", partial(changed_box2d_v3, substeps=16), "16 substeps for 4"),
 )  # fmt: skip
-PLAYERS: dict[str, Player] = {
-    player.name: player for player in (*(Player(name, row.make) for name, row in ENGINES.items()), *SWITCHED)
+VARIANTS: dict[str, Variant] = {
+    variant.name: variant for variant in (*(Variant(name, row.make) for name, row in ENGINES.items()), *SWITCHED)
 }
 
 
-def played(player: Player, scenario: Scenario) -> Run:
+def played(variant: Variant, scenario: Scenario) -> Run:
     """Play a scenario at its only step size; the engine is closed again. A library that is missing is a refusal."""
     dt = scenario.dt(scenario.substeps[0])
     try:
-        engine = player.make()
+        engine = variant.make()
     except ImportError as missing:
-        name, profile = player.name.split(":")
+        name, profile = variant.name.split(":")
         return Run(name, profile, scenario.name, dt, "unsupported", f"{missing.name or missing} cannot be imported")
     try:
-        return play(engine, player.name, scenario, dt)
+        return play(engine, variant.name, scenario, dt)
     finally:
         engine.close()
 
 
-def play_as(player: str, scenario: Scenario) -> Run:
-    """`played` by a key of `PLAYERS`."""
-    return played(PLAYERS[player], scenario)
+def play_as(engine: str, scenario: Scenario) -> Run:
+    """`played` by a key of `VARIANTS`."""
+    return played(VARIANTS[engine], scenario)
