@@ -1,4 +1,5 @@
-"""box2d-py 2.3.8 (Box2D 2.3), float32: collide at the old position, then one velocity solve, then push-out."""
+"""box2d-py 2.3.8 (Box2D 2.3), float32: collide at the old position, then one velocity solve, then position
+correction."""
 
 from __future__ import annotations
 
@@ -150,7 +151,7 @@ class Box2DEngine:
         body.CreateFixture(Box2D.b2FixtureDef(shape=shape, **self._surface()))
         return body
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Apply force and torque; `Step` clears both."""
         per_time2 = self.time**2
         self.bodies[disk].ApplyForceToCenter(vector(force * self.length * per_time2), True)
@@ -241,7 +242,7 @@ def fastest(scene: Scene) -> float:
 
 
 class Listener(Box2D.b2ContactListener):
-    """Logs (step, i, j, impulse in the engine's units) of every contact that pushed."""
+    """Logs (step, i, j, impulse in the engine's units) of every contact with an impulse."""
 
     def __init__(self, engine: Box2DEngine) -> None:
         super().__init__()
@@ -249,7 +250,7 @@ class Listener(Box2D.b2ContactListener):
         self.log: list[tuple[int, int, int, float]] = []
 
     def PostSolve(self, contact: Any, impulse: Any) -> None:
-        """Called once a step for every touching pair, whether it pushed or not."""
+        """Called once a step for every touching pair, with an impulse or not."""
         J = impulse.normalImpulses[0]
         if J > 0.0:
             i, j = contact.fixtureA.body.userData, contact.fixtureB.body.userData

@@ -155,7 +155,7 @@ class Box2DV3:
         start, end = self.scene.walls[w]
         body.create_segment_shape(self._shape(), pyb2d3.segment(vector(start), vector(end)))
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Apply force and torque; `step` clears both."""
         self.bodies[disk].apply_force_to_center(vector(force))
         self.bodies[disk].apply_torque(float(torque))

@@ -29,7 +29,7 @@ class NotStarted(Exception):
 
 
 class Collision(NamedTuple):
-    """One contact that pushed during step `step` (from 0): i and j in either order, wall w as -1 - w; N s.
+    """One contact with an impulse during step `step` (from 0): i and j in either order, wall w as -1 - w; N s.
 
     A contact that lasts gives a collision in every step; `play` keeps where each one begins.
     """
@@ -56,8 +56,8 @@ class Engine(Protocol):
     def load(self, scene: Scene, dt: float) -> None:
         """Forget everything and build the scene for steps of `dt` s; raise `Unsupported` rather than approximate."""
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
-        """Act on one disk during the next step only; N (world frame), N m; pushes add up."""
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
+        """Act on one disk during the next step only; N (world frame), N m; forces add up."""
 
     def step(self, count: int = 1) -> None:
         """Advance `count` steps; the only call that is timed."""
@@ -66,7 +66,7 @@ class Engine(Protocol):
         """The present state, as float64 copies."""
 
     def collisions(self) -> list[Collision]:
-        """Every push of a contact since `load`, in order of steps."""
+        """Every impulse of a contact since `load`, in order of steps."""
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """Setting -> (asked for, resolved by the engine), after `load`; asked None: the engine's own default."""

@@ -109,23 +109,23 @@ def collisions_of(engine: Engine) -> list[Collision]:
 
 
 def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: float) -> float:
-    """Advance `count` steps from step number `first`, pushing where a thrust is on; the seconds inside `step`."""
+    """Advance `count` steps from step number `first`, applying the thrusts that are on; the seconds inside `step`."""
     seconds = 0.0
-    for step, pushes in pushed_steps(scenario.thrusts, first, count, dt):
-        for thrust, share in pushes:
-            engine.push(thrust.disk, world_force(thrust, engine) * share, thrust.torque * share)
+    for step, acting in thrust_steps(scenario.thrusts, first, count, dt):
+        for thrust, share in acting:
+            engine.apply_force(thrust.disk, world_force(thrust, engine) * share, thrust.torque * share)
         started = perf_counter()
         engine.step(step)
         seconds += perf_counter() - started
     return seconds
 
 
-def pushed_steps(
+def thrust_steps(
     thrusts: Sequence[Thrust], first: int, count: int, dt: float
 ) -> Iterator[tuple[int, list[tuple[Thrust, float]]]]:
-    """Cut steps first .. first + count into (how many, pushes): one by one where a thrust is on, else in one go.
+    """Cut steps first .. first + count into (how many, acting): one by one where a thrust is on, else in one go.
 
-    A push carries the share of the step during which its thrust is on, so that its impulse is exact.
+    A thrust carries the share of the step during which its thrust is on, so that its impulse is exact.
     """
     if not thrusts:
         yield count, []
@@ -133,10 +133,10 @@ def pushed_steps(
     free = 0
     for step in range(first, first + count):
         shares = [(t, min(t.stop / dt, step + 1) - max(t.start / dt, step)) for t in thrusts]
-        if pushes := [(t, share) for t, share in shares if share > 1e-9]:  # less is rounding of start / dt
+        if acting := [(t, share) for t, share in shares if share > 1e-9]:  # less is rounding of start / dt
             if free:
                 yield free, []
-            yield 1, pushes
+            yield 1, acting
             free = 0
         else:
             free += 1
@@ -160,9 +160,9 @@ def turned(force: Array, angle: float) -> Array:
 def reach(scenario: Scenario) -> float:
     """m from the origin, no less than any disk can get in free flight under gravity and thrust."""
     scene, t = scenario.scene, scenario.duration
-    push = sum(float(np.linalg.norm(thrust.force)) for thrust in scenario.thrusts) / scene.mass.min()
+    thrust = sum(float(np.linalg.norm(one.force)) for one in scenario.thrusts) / scene.mass.min()
     start = max(np.abs(scene.position).max(), np.abs(scene.walls).max(initial=0.0), scene.radius.max())
-    return float(start + np.abs(scene.velocity).max() * t + (np.linalg.norm(scene.gravity) + push) * t * t / 2)
+    return float(start + np.abs(scene.velocity).max() * t + (np.linalg.norm(scene.gravity) + thrust) * t * t / 2)
 
 
 def fault_of(state: State, farthest: float) -> str:
@@ -181,17 +181,17 @@ def fault_of(state: State, farthest: float) -> str:
 
 
 def weight_impulse(scene: Scene, dt: float) -> float:
-    """N s, the most that the weight of everything can push on a contact during one step."""
+    """N s, the largest impulse that the weight of everything can give a contact during one step."""
     moving = scene.mass[~scene.static].sum()
     return float(2 * moving * np.linalg.norm(scene.gravity) * dt)
 
 
 def first_collisions(collisions: Sequence[Collision], dt: float, weight: float = 0.0) -> Collisions:
-    """One collision where a pair begins to push; its time is the end of the step.
+    """One collision where the impulses of a pair begin; its time is the end of the step.
 
-    A push in the step after another of the same pair goes on with it if it is no stronger than `weight` N s, or if
-    the engine does not tell how strong it is: else it is a collision of its own. Pushes of less than a millionth of the
-    pair's strongest are rounding, and left out.
+    An impulse in the step after another of the same pair continues it if it is no larger than `weight` N s, or if
+    the engine does not report how large it is: else it is a collision of its own. Impulses of less than a millionth of
+    the pair's strongest are rounding, and left out.
     """
     if not collisions:
         return Collisions.of([])

@@ -114,7 +114,7 @@ class Pymunk:
             a, b = arbiter.shapes
             self.log.append(Collision(self.steps, self.index[a], self.index[b], impulse))
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to the body's force and torque; pymunk clears both after a step."""
         if (body := self.bodies[disk]) is not None:
             body.force += tuple(force)

@@ -52,22 +52,22 @@ class Reference:
             restitution=float(scene.restitution), gravity=np.array(scene.gravity),
             walls=np.array(scene.walls), low=np.array(low), high=np.array(high), **self.options,
         )  # fmt: skip
-        self.pushed = False
+        self.forced = False
         self._advance(0)  # compiles, if nobody has yet
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to the disk's force and torque; `step` clears both."""
         self.disks.force[disk] += force
         self.disks.torque[disk] += torque
-        self.pushed = True
+        self.forced = True
 
     def step(self, count: int = 1) -> None:
-        """One call into the compiled solver; a push lasts for the first step only."""
-        if self.pushed:
+        """One call into the compiled solver; a force lasts for the first step only."""
+        if self.forced:
             self._advance(1)
             self.disks.force.fill(0.0)
             self.disks.torque.fill(0.0)
-            self.pushed = False
+            self.forced = False
             count -= 1
         self._advance(count)
 

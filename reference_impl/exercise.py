@@ -51,7 +51,7 @@ def integrate(disks: Disks, world: World, dt: float) -> None:
 
 @kernel
 def collide(disks: Disks, a: int, b: int, world: World) -> float:
-    """Task 2, one pair; returns the impulse J in N s (positive: pushes apart), 0 where there is none."""
+    """Task 2, one pair; returns the impulse J in N s (positive: repulsive), 0 where there is none."""
     x, v, mass = disks.position, disks.velocity, disks.mass
 
     # (a) Detect: closer than the sum of the radii? Two static disks never move.

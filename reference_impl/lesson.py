@@ -82,7 +82,7 @@ def collide(disks: Disks, a: int, b: int, world: World) -> float:
         return 0.0
     nx, ny = nx / distance, ny / distance
 
-    # Each is pushed out along n by its part w / (w1 + w2) of the overlap.
+    # Each is moved out along n by its part w / (w1 + w2) of the overlap.
     delta = (disks.radius[a] + disks.radius[b]) - distance
     move(x, a, nx, ny, -w1 / (w1 + w2) * delta)
     move(x, b, nx, ny, w2 / (w1 + w2) * delta)

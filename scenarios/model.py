@@ -133,11 +133,11 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Thrust:
-    """A constant push on one disk from `start` to `stop`.
+    """A constant thrust on one disk from `start` to `stop`.
 
     Attributes:
         disk: index into the scene.
-        start, stop: s; the push acts for start <= t < stop.
+        start, stop: s; the thrust acts for start <= t < stop.
         force: (2,) N.
         torque: N m.
         frame: "world", or "body": the force turns with the disk's angle.
@@ -173,7 +173,7 @@ class Scenario:
         duration: s, a whole number of sample intervals.
         sample_interval: s; every engine is sampled at i * sample_interval.
         substeps: the dt ladder, dt = sample_interval / k, coarse to fine; the middle one is the page's.
-        thrusts: piecewise-constant pushes.
+        thrusts: piecewise-constant thrusts.
         truth: times (k,) s -> the exact `Trajectory` there, up to its horizon, or `NoTruth` (see `truth_at`); or None.
         without_truth: why there is no exact answer, in one sentence, where `truth` is None.
         seed: what the scene was drawn from, or None.
@@ -237,7 +237,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Collisions:
-    """Collisions in order of time; one entry where a contact begins to push, however long it lasts.
+    """Collisions in order of time; one entry where the impulses of a contact begin, however long they last.
 
     Attributes:
         t: (h,) s; for a stepping engine the end of the step that resolved the collision.

@@ -22,7 +22,7 @@ from adapters.engine import Row
 from adapters.play import fault_of
 
 NONE = np.zeros(2)
-ROUNDINGS = 8  # a scale, an inverse mass, a product, a sum: no path from a push to a velocity rounds more often
+ROUNDINGS = 8  # a scale, an inverse mass, a product, a sum: no path from a force to a velocity rounds more often
 
 
 def order_and_shapes(row: Row) -> Reading:
@@ -63,12 +63,12 @@ def read_copies(row: Row) -> Reading:
 
 
 def load_forgets(row: Row) -> Reading:
-    """An engine that has played, been struck, and still holds a push does after `load` what a fresh one does."""
+    """An engine that has played, been struck, and still holds a force does after `load` what a fresh one does."""
     with loaded(row, head_on(2.0)) as used:
         for _ in range(12):
-            used.push(2, np.array([1.0, 2.0]), 3.0)
+            used.apply_force(2, np.array([1.0, 2.0]), 3.0)
             used.step()
-        used.push(1, np.array([5.0, 5.0]), 5.0)
+        used.apply_force(1, np.array([5.0, 5.0]), 5.0)
         used.load(plain(), DT / 2)
         left = len(used.collisions())
         seen = history(used)
@@ -122,20 +122,20 @@ def stays_finite(row: Row) -> Reading:
     return Reading("finite", "finite")
 
 
-def push_lasts_one_step(row: Row) -> Reading:
-    """One push, then one step, then three: the speed after the first is the speed after all."""
+def force_lasts_one_step(row: Row) -> Reading:
+    """One force, then one step, then three: the speed after the first is the speed after all."""
     force = np.array([20.0, 10.0])
     with loaded(row, one_disk()) as engine:
-        engine.push(0, force, 3.0)
+        engine.apply_force(0, force, 3.0)
         engine.step()
         first = engine.read()
         engine.step(3)
         last = engine.read()
     with loaded(row, one_disk()) as engine:
-        engine.push(0, force, 3.0)
+        engine.apply_force(0, force, 3.0)
         engine.step(4)
         at_once = engine.read()
-    pushes = [
+    ratios = [
         largest(later) / largest(once)
         for later, once in (
             (last.velocity, first.velocity),
@@ -145,22 +145,22 @@ def push_lasts_one_step(row: Row) -> Reading:
         )
     ]
     # Nothing acts on the disk afterwards, so its velocity is not even rounded again.
-    return Reading(max(pushes, key=lambda ratio: abs(ratio - 1)), 1.0, 4 * row.rounding)
+    return Reading(max(ratios, key=lambda ratio: abs(ratio - 1)), 1.0, 4 * row.rounding)
 
 
-def mass_by_push(row: Row) -> Reading:
+def mass_by_force(row: Row) -> Reading:
     """F dt / dv of a disk of 7.3 kg; by a density of 1 it would have 0.785 kg."""
     with loaded(row, one_disk()) as engine:
-        engine.push(0, np.array([30.0, 0.0]), 0.0)
+        engine.apply_force(0, np.array([30.0, 0.0]), 0.0)
         engine.step()
         dv = float(engine.read().velocity[0, 0])
     return Reading(30.0 * DT / dv if dv else np.inf, 7.3, ROUNDINGS * row.rounding * 7.3)
 
 
-def inertia_by_push(row: Row) -> Reading:
+def inertia_by_torque(row: Row) -> Reading:
     """torque dt / dw of a disk of 0.9 kg m2; a solid disk of its mass would have 0.9125."""
     with loaded(row, one_disk()) as engine:
-        engine.push(0, NONE, 2.0)
+        engine.apply_force(0, NONE, 2.0)
         engine.step()
         dw = float(engine.read().angular_velocity[0])
     return Reading(2.0 * DT / dw if dw else np.inf, 0.9, ROUNDINGS * row.rounding * 0.9)
@@ -218,7 +218,7 @@ def impulse_is_told(row: Row) -> Reading:
 
 
 def static_stays(row: Row) -> Reading:
-    """A static disk that is struck and pushed keeps its state to the bit."""
+    """A static disk that is struck and under a force keeps its state to the bit."""
     scene = scene_of(
         position=[[-1.02, 0.1], [0.0, 0.0]], velocity=[[2.0, 0.0], [0.0, 0.0]], radius=[0.5, 0.5], mass=[1.0, np.inf],
         gravity=[0.0, -9.8],
@@ -226,7 +226,7 @@ def static_stays(row: Row) -> Reading:
     with loaded(row, scene) as engine:
         before = engine.read()
         for _ in range(12):
-            engine.push(1, np.array([5.0, 5.0]), 5.0)
+            engine.apply_force(1, np.array([5.0, 5.0]), 5.0)
             engine.step()
         after, collisions = engine.read(), told(engine)
     moved = [name for name, array in vars(after).items() if (array[1] != getattr(before, name)[1]).any()]
@@ -243,11 +243,11 @@ CONTRACT: dict[str, Probe] = {
     "counts_are_steps": Probe("Where does step(3) differ from three steps?", counts_are_steps, "breaks"),
     "steps_obey_dt": Probe("How fast is a disk of 1.5 m/s by its path, at two dt? (m/s)", steps_obey_dt, "breaks"),
     "stays_finite": Probe("Is every number finite for 20 steps of a plain scene?", stays_finite, "breaks"),
-    "push_lasts_one_step": Probe(
-        "How much faster is a disk 3 steps after a push than after its first step?", push_lasts_one_step, "breaks"
+    "force_lasts_one_step": Probe(
+        "How much faster is a disk 3 steps after a force than after its first step?", force_lasts_one_step, "breaks"
     ),
-    "mass_by_push": Probe("What mass does a push feel? (kg)", mass_by_push, "breaks"),
-    "inertia_by_push": Probe("What inertia does a torque feel? (kg m2)", inertia_by_push, "breaks"),
+    "mass_by_force": Probe("What mass does a force see? (kg)", mass_by_force, "breaks"),
+    "inertia_by_torque": Probe("What inertia does a torque see? (kg m2)", inertia_by_torque, "breaks"),
     "same_instant": Probe("How fast is a disk after 1 s under 9.81 m/s2? (m/s)", same_instant, "breaks"),
     "collisions_are_told": Probe(
         "Which collisions are told when disks 1 and 2 meet once?", collisions_are_told, "breaks"
@@ -255,5 +255,5 @@ CONTRACT: dict[str, Probe] = {
     "walls_are_told": Probe("Which collisions are told when disk 1 meets wall 1 once?", walls_are_told, "breaks"),
     "collisions_name_their_step": Probe("In which step is a collision told?", collisions_name_their_step, "breaks"),
     "impulse_is_told": Probe("Which impulse is told of a collision? (N s)", impulse_is_told, "breaks"),
-    "static_stays": Probe("Does a static disk that is struck and pushed stay?", static_stays, "breaks"),
+    "static_stays": Probe("Does a static disk that is struck and under a force stay?", static_stays, "breaks"),
 }

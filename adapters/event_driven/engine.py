@@ -15,7 +15,7 @@ from scenarios.no_truth import NoTruth
 
 
 class EventDriven:
-    """Plays exactly but for rounding; dt says when it is looked at, and for how long a push lasts."""
+    """Plays exactly but for rounding; dt says when it is looked at, and for how long a force acts."""
 
     listening, wrapping = (
         True,
@@ -32,18 +32,18 @@ class EventDriven:
         self.scene, self.dt, self.steps = scene, dt, 0
         self.angle, self.spin, self.turned_at = scene.angle.copy(), scene.angular_velocity.copy(), 0
         self.force, self.torque = np.zeros((scene.n, 2)), np.zeros(scene.n)
-        self.pushed: set[int] = set()
+        self.forced: set[int] = set()
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to what accelerates the disk during the next step; a static one stays."""
         if not self.scene.static[disk]:
             self.force[disk] += force
             self.torque[disk] += torque
-            self.pushed.add(disk)
+            self.forced.add(disk)
 
     def step(self, count: int = 1) -> None:
-        """Let the events of `count` steps happen; a push is an acceleration from the first one's start to its end."""
-        if self.pushed and count:
+        """Let the events of `count` steps happen; a force is an acceleration from the first one's start to its end."""
+        if self.forced and count:
             turning = self.torque / self.scene.inertia
             self.settle()  # it turned freely up to here
             self.accelerate(self.scene.gravity + self.force / self.scene.mass[:, None])
@@ -51,13 +51,13 @@ class EventDriven:
             self.accelerate(np.broadcast_to(self.scene.gravity, (self.scene.n, 2)))
             self.settle(turning)
             self.force[:], self.torque[:] = 0.0, 0.0
-            self.pushed.clear()
+            self.forced.clear()
             count -= 1
         self.advance(count)
 
     def accelerate(self, acceleration: Array) -> None:
-        """Give each pushed disk its row of acceleration (n, 2) m/s2 from now on."""
-        for disk in sorted(self.pushed):
+        """Give each disk with a force its row of acceleration (n, 2) m/s2 from now on."""
+        for disk in sorted(self.forced):
             self.engine.pull(disk, self.steps * self.dt, acceleration[disk])
 
     def advance(self, count: int) -> None:
@@ -92,7 +92,7 @@ class EventDriven:
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """There is nothing to set: the scene is all."""
-        return {"contact times": (None, "roots of the gap"), "a push within a step": (None, "constant acceleration")}
+        return {"contact times": (None, "roots of the gap"), "a force within a step": (None, "constant acceleration")}
 
     def versions(self) -> dict[str, str]:
         """The compiler decides the last bit."""

@@ -137,7 +137,7 @@ def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
         corner = second_wall(walls, arena.grid, a, w)
     may_rest = part == 0 and mixed and (walls_only or not trapped)
     if may_rest and rests(walls, a, w, corner, crowded, trapped):
-        if impulse == 0.0:  # a contact that begins to push without a collision
+        if impulse == 0.0:  # a contact whose impulses begin without a collision
             tell(arena, a.t, i, -1 - w, 0.0, 1.0)
         return GOES_ON
     if trapped:

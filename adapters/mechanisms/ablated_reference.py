@@ -11,15 +11,15 @@ import numpy as np
 
 from adapters.mechanisms.contacts import (
     Contacts,
+    apply_pair,
     by_colour,
     by_island,
     closing,
     detect,
+    drive_to_target,
     gap_along,
     gap_of,
     inverse_mass,
-    push_apart,
-    push_to_target,
     rub,
     turn,
 )
@@ -29,11 +29,11 @@ from reference_impl.state import Disks, World
 
 STAGES = (
     "accelerate", "move", "pairs", "walls", "detect", "by_island", "by_colour", "aim", "warm_start", "bounce", "cap",
-    "push_out", "nudge", "soften", "relax", "restitute",
+    "position_correction", "nudge", "soften", "relax", "restitute",
 )  # fmt: skip
 (
     ACCELERATE, MOVE, PAIRS, WALLS, DETECT, BY_ISLAND, BY_COLOUR, AIM, WARM_START, BOUNCE, CAP,
-    PUSH_OUT, NUDGE, SOFTEN, RELAX, RESTITUTE,
+    POSITION_CORRECTION, NUDGE, SOFTEN, RELAX, RESTITUTE,
 ) = range(len(STAGES))  # fmt: skip
 
 
@@ -47,9 +47,9 @@ class Switches(NamedTuple):
     project_walls: bool = True  # of `walls`
     iterations: int = 8  # of `bounce`
     friction: float = 0.0  # of `bounce`, `soften` and `relax`
-    push_share: float = 0.0  # of the overlap beyond the slop: undone by each of push_iterations, or by `nudge`
-    push_iterations: int = 3
-    push_most: float = inf  # m, that one of them moves at most
+    correction_share: float = 0.0  # of the overlap beyond the slop, each iteration or `nudge`
+    correction_iterations: int = 3
+    correction_most: float = inf  # m, that one of them moves at most
     slop: float = 0.0  # m, of overlap that is left
     cap: float = inf  # m, by which a disk moves at most; its velocity is cut
     margin: float = 0.0  # m, from which on two are a contact
@@ -58,7 +58,7 @@ class Switches(NamedTuple):
     skin: float = 0.0  # m, by which walls are thicker than they are
     hertz: float = 30.0  # of `soften`: the stiffness of a contact
     damping: float = 10.0  # its damping ratio
-    push_speed: float = 0.0  # m/s, at which it pushes out at most
+    push_speed: float = 0.0  # m/s, of position correction, at most
 
 
 @compiled
@@ -103,8 +103,8 @@ def act(
         bounce(disks, on, kept)
     elif stage == CAP:
         cap(disks.velocity, on.cap, h)
-    elif stage == PUSH_OUT:
-        push_out(disks, world, on, kept)
+    elif stage == POSITION_CORRECTION:
+        position_correction(disks, world, on, kept)
     elif stage == NUDGE:
         nudge(disks.mass, on, kept, h)
     elif stage == SOFTEN:
@@ -200,17 +200,17 @@ def warm_start(disks: Disks, kept: Contacts) -> None:
         if contact.late:
             continue
         i, j, nx, ny = contact.i, contact.j, contact.nx, contact.ny
-        push_apart(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse)
+        apply_pair(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse)
         turn(disks, contact, contact.slide)
 
 
 @compiled
 def bounce(disks: Disks, on: Switches, kept: Contacts) -> None:
-    """Sequential impulses: go through all contacts again and again; what was pushed may be taken back."""
+    """Sequential impulses: go through all contacts again and again; an impulse may be taken back."""
     for _ in range(on.iterations):
         for c in range(kept.found[0]):
             rub(disks, kept.rows[c], on.friction)
-            push_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)
+            drive_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)
 
 
 @compiled
@@ -224,22 +224,22 @@ def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
 
 
 @compiled
-def push_out(disks: Disks, world: World, on: Switches, kept: Contacts) -> None:
+def position_correction(disks: Disks, world: World, on: Switches, kept: Contacts) -> None:
     """Undo a share of every overlap beyond the slop, some times in every island."""
     first = 0
-    while on.push_share > 0.0 and first < kept.found[0]:
+    while on.correction_share > 0.0 and first < kept.found[0]:
         end = first
         while end < kept.found[0] and kept.rows[end].island == kept.rows[first].island:
             end += 1
         worst = -inf
-        for _ in range(on.push_iterations):
+        for _ in range(on.correction_iterations):
             if worst < -3.0 * on.slop:  # else all are within three slops
-                worst = push_out_island(disks, world, on, kept, first, end)
+                worst = correct_island(disks, world, on, kept, first, end)
         first = end
 
 
 @compiled
-def push_out_island(disks: Disks, world: World, on: Switches, kept: Contacts, first: int, end: int) -> float:
+def correct_island(disks: Disks, world: World, on: Switches, kept: Contacts, first: int, end: int) -> float:
     """Once through the contacts from `first` to before `end`; returns the smallest gap in m there was, at most 0."""
     worst = 0.0
     for c in range(first, end):
@@ -247,8 +247,8 @@ def push_out_island(disks: Disks, world: World, on: Switches, kept: Contacts, fi
         gap, nx, ny = gap_of(disks, world, i, j)
         gap -= on.skin if j < 0 else 0.0
         worst = min(worst, gap)
-        by = min(max(-on.push_share * (gap + on.slop), 0.0), on.push_most)
-        push_apart(disks.position, disks.mass, i, j, nx, ny, by / inverse_mass(disks.mass, i, j))
+        by = min(max(-on.correction_share * (gap + on.slop), 0.0), on.correction_most)
+        apply_pair(disks.position, disks.mass, i, j, nx, ny, by / inverse_mass(disks.mass, i, j))
     return worst
 
 
@@ -261,17 +261,17 @@ def nudge(mass, on: Switches, kept: Contacts, h: float) -> None:  # type: ignore
         for c in range(kept.found[0]):
             contact = kept.rows[c]
             i, j, nx, ny, before = contact.i, contact.j, contact.nx, contact.ny, contact.nudged
-            wanted = on.push_share * max(-(contact.gap + on.slop), 0.0) / h
+            wanted = on.correction_share * max(-(contact.gap + on.slop), 0.0) / h
             more = (wanted - closing(kept.nudge, i, j, nx, ny)) / inverse_mass(mass, i, j)
             contact.nudged = max(before + more, 0.0)
-            push_apart(kept.nudge, mass, i, j, nx, ny, contact.nudged - before)
+            apply_pair(kept.nudge, mass, i, j, nx, ny, contact.nudged - before)
 
 
 @compiled
-def soften(disks: Disks, on: Switches, kept: Contacts, h: float, pushing: bool) -> None:
+def soften(disks: Disks, on: Switches, kept: Contacts, h: float, biased: bool) -> None:
     """A damped spring a contact, solved for the end of the substep (E. Catto, Solver2D, 2024: soft step).
 
-    Not `pushing` is its second pass, which takes the push out of the velocities again. What is not yet touching may
+    Not `biased` is its second pass, which takes the bias out of the velocities again. What is not yet touching may
     come together, but no farther.
     """
     for c in range(kept.found[0]):
@@ -280,14 +280,14 @@ def soften(disks: Disks, on: Switches, kept: Contacts, h: float, pushing: bool) 
         target, share, memory = 0.0, 1.0, 0.0
         if gap > 0.0:
             target = -gap / h
-        elif pushing and on.push_speed > 0.0:
+        elif biased and on.push_speed > 0.0:
             rigid = contact.j < 0 or disks.mass[contact.i] == inf or disks.mass[contact.j] == inf
             omega = 2.0 * pi * min(on.hertz, 0.125 / h) * (2.0 if rigid else 1.0)
             stiff = 2.0 * on.damping + h * omega
             memory = 1.0 / (1.0 + h * omega * stiff)
             share = 1.0 - memory
             target = min(-omega / stiff * gap, on.push_speed)
-        push_to_target(disks, contact, target, share, memory)
+        drive_to_target(disks, contact, target, share, memory)
         rub(disks, contact, on.friction)
 
 
@@ -296,4 +296,4 @@ def restitute(disks: Disks, kept: Contacts) -> None:
     """One sweep that gives every contact which was pressed the velocity it was aimed at."""
     for c in range(kept.found[0]):
         if kept.rows[c].target != 0.0 and kept.rows[c].strongest > 0.0:
-            push_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)
+            drive_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)

@@ -1,4 +1,4 @@
-"""Who touches whom, and what has pushed them: what `switched` keeps of a step, and from step to step.
+"""Who touches whom, and their impulses: what `switched` keeps of a step, and from step to step.
 
 A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i and is that of the moment
 it was found. Compiled by numba, as `exercise` is.
@@ -214,20 +214,20 @@ def inverse_mass(mass, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
 
 
 @compiled
-def push_to_target(disks: Disks, contact, target: float, share: float, memory: float) -> None:  # type: ignore[no-untyped-def]
-    """The impulse that gives a contact its target velocity, if it is a push in all.
+def drive_to_target(disks: Disks, contact, target: float, share: float, memory: float) -> None:  # type: ignore[no-untyped-def]
+    """The impulse that gives a contact its target velocity, if the sum is not negative.
 
-    `share` of it where the contact is soft, less `memory` times what it has been pushed by.
+    `share` of it where the contact is soft, less `memory` times its impulse so far.
     """
     i, j, nx, ny, before = contact.i, contact.j, contact.nx, contact.ny, contact.impulse
     wanted = (target - closing(disks.velocity, i, j, nx, ny)) / inverse_mass(disks.mass, i, j)
     contact.impulse = max(before + share * wanted - memory * before, 0.0)
     contact.strongest = max(contact.strongest, contact.impulse - before)
-    push_apart(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse - before)
+    apply_pair(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse - before)
 
 
 @compiled
-def push_apart(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
+def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
     """Add `by` along n to row i and against n to row j, each by its inverse mass."""
     move(rows, i, nx, ny, by / mass[i])
     if j >= 0:
@@ -254,7 +254,7 @@ def rub(disks: Disks, contact, friction: float) -> None:  # type: ignore[no-unty
 def turn(disks: Disks, contact, by: float) -> None:  # type: ignore[no-untyped-def]
     """N s more along the tangent, which turns both the same way round."""
     i, j, inertia = contact.i, contact.j, disks.inertia
-    push_apart(disks.velocity, disks.mass, i, j, -contact.ny, contact.nx, by)
+    apply_pair(disks.velocity, disks.mass, i, j, -contact.ny, contact.nx, by)
     disks.angular_velocity[i] -= (disks.radius[i] + contact.gap / 2) * by / inertia[i]
     if j >= 0:
         disks.angular_velocity[j] -= (disks.radius[j] + contact.gap / 2) * by / inertia[j]

@@ -96,7 +96,7 @@ FEATURES: tuple[Feature, ...] = (
     *_rows("box2d:matched", changed_box2d, {
         "1 iteration, not 8": {"velocity_iterations": 1},
         "30 iterations, not 8": {"velocity_iterations": 30},
-        "no push-out": {"position_iterations": 0},
+        "no position correction": {"position_iterations": 0},
         "no CCD": {"continuous": False, "bullet": False},
         "CCD at e = 1, too": {"elastic_continuous": True, "elastic_bullet": True},
         "sleeping": {"sleeping": True},

@@ -20,9 +20,9 @@ from adapters.mechanisms.switched import BOX2D, BOX2D_V3, PYMUNK, Switched
 from scenarios.model import Scene
 
 NAMES = (
-    "flight", "restitution", "impulse", "friction", "wall skin", "push-out", "float32", "CCD, sleep",
+    "flight", "restitution", "impulse", "friction", "wall skin", "position correction", "float32", "CCD, sleep",
 )  # fmt: skip
-FLIGHT, RESTITUTION, IMPULSE, FRICTION, SKIN, PUSH_OUT, DIGITS, SWEPT = NAMES
+FLIGHT, RESTITUTION, IMPULSE, FRICTION, SKIN, POSITION_CORRECTION, DIGITS, SWEPT = NAMES
 # Exact flight; what overlaps at the end of a step gets its impulse there and then; nothing is moved out of it.
 LATE: dict[str, Any] = {
     "order": ("move", "accelerate", "pairs", "walls"), "alpha": 0.5, "project": False, "project_walls": False,
@@ -64,12 +64,15 @@ def with_habits(habits: Sequence[Habit]) -> Switched:
 
 
 def _exercise(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Habit]:
-    return [Habit(PUSH_OUT, {"project": True, "project_walls": True})]
+    return [Habit(POSITION_CORRECTION, {"project": True, "project_walls": True})]
 
 
 def _lesson(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Habit]:
     # Walls come first, and flip a velocity without moving the disk.
-    return [Habit(IMPULSE, {"order": ("move", "accelerate", "walls", "pairs")}), Habit(PUSH_OUT, {"project": True})]
+    return [
+        Habit(IMPULSE, {"order": ("move", "accelerate", "walls", "pairs")}),
+        Habit(POSITION_CORRECTION, {"project": True}),
+    ]
 
 
 def _pymunk(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Habit]:
@@ -80,10 +83,10 @@ def _pymunk(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> 
         "order": PYMUNK, "iterations": told["iterations"], "threshold": -np.inf,
         "memory": told["collision_persistence"],
     }  # fmt: skip
-    push = {"push_share": 1.0 - told["collision_bias"] ** dt, "slop": told["collision_slop"]}
+    correction = {"correction_share": 1.0 - told["collision_bias"] ** dt, "slop": told["collision_slop"]}
     return [
         Habit(IMPULSE, impulse),
-        Habit(PUSH_OUT, push, (IMPULSE,), partial(Pymunk, profile, collision_bias=1.0)),
+        Habit(POSITION_CORRECTION, correction, (IMPULSE,), partial(Pymunk, profile, collision_bias=1.0)),
     ]
 
 
@@ -101,15 +104,15 @@ def _box2d(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> l
     cap = told["speed cap in m/s"] * dt
     impulse = {"order": BOX2D, "iterations": velocity, "touching": True, "cap": cap}
     # b2_baumgarte 0.2; b2_maxLinearCorrection 0.2 is a tenth of b2_maxTranslation, the cap.
-    push = {
-        "push_share": 0.2 if position else 0.0, "push_iterations": position, "slop": told["linear slop in m"],
-        "push_most": 0.1 * cap,
+    correction = {
+        "correction_share": 0.2 if position else 0.0, "correction_iterations": position, "slop": told["linear slop in m"],
+        "correction_most": 0.1 * cap,
     }  # fmt: skip
     without = partial(Box2DEngine, profile, position_iterations=0, elastic_position_iterations=0)
     return [
         Habit(RESTITUTION, {"threshold": told["restitution threshold in m/s"]}),
         Habit(IMPULSE, impulse),
-        Habit(PUSH_OUT, push, (IMPULSE,), without),
+        Habit(POSITION_CORRECTION, correction, (IMPULSE,), without),
     ]
 
 
@@ -131,7 +134,7 @@ def _box2d_shipped(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Hab
         *_box2d(told, scene, dt, "shipped"),
         Habit(FRICTION, {"friction": told["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
         # b2_polygonRadius, which an edge has, too: twice the slop.
-        Habit(SKIN, {"skin": 2 * told["linear slop in m"]}, (IMPULSE, PUSH_OUT)),
+        Habit(SKIN, {"skin": 2 * told["linear slop in m"]}, (IMPULSE, POSITION_CORRECTION)),
         Habit(SWEPT, without=partial(shipped, continuous=False, elastic_continuous=False, sleeping=False)),
     ]
 
@@ -142,7 +145,7 @@ def _box2d_v3(told: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Habit]
         "order": BOX2D_V3, "touching": True, "margin": 0.02 * told["length unit in m"], "hertz": chosen["hertz"],
         "damping": chosen["damping_ratio"],
     }  # fmt: skip
-    return [Habit(IMPULSE, impulse), Habit(PUSH_OUT, {"push_speed": chosen["push_speed"]}, (IMPULSE,))]
+    return [Habit(IMPULSE, impulse), Habit(POSITION_CORRECTION, {"push_speed": chosen["push_speed"]}, (IMPULSE,))]
 
 
 def _box2d_v3_matched(told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Habit]:

@@ -17,8 +17,9 @@ from scenarios.model import Scene
 EXERCISE = ("accelerate", "move", "pairs", "walls")
 POSITION_FIRST = ("move", "pairs", "walls", "accelerate")
 # Collide where they are, then aim at a velocity after gravity, then move (Box2D 2.3, b2Island::Solve).
-BOX2D = ("detect", "by_island", "accelerate", "aim", "warm_start", "bounce", "cap", "move", "push_out")
-# Move, collide there, aim at a velocity before gravity; the push-out moves in the next step (Munk2D, cpSpaceStep).
+BOX2D = ("detect", "by_island", "accelerate", "aim", "warm_start", "bounce", "cap", "move", "position_correction")
+# Move, collide there, aim at a velocity before gravity; the position correction moves in the next step (Munk2D,
+# cpSpaceStep).
 PYMUNK = ("move", "detect", "aim", "accelerate", "warm_start", "bounce", "nudge")
 # Collide and aim once, then soft substeps, then one sweep for restitution (Box2D 3.1, b2SolverStage).
 BOX2D_V3 = ("detect", "by_colour", "aim", *("accelerate", "warm_start", "soften", "move", "relax") * 4, "restitute")

@@ -53,10 +53,10 @@ class Whole:
         self.engine.load(Scene(**argument["scene"] | {"walls": walls}), argument["dt"])
 
     def whole_step(self, argument: dict[str, Any]) -> None:
-        """`count` steps; pushes act in the first."""
-        for disk, (x, y, torque) in enumerate(argument["pushes"] or ()):
+        """`count` steps; forces act in the first."""
+        for disk, (x, y, torque) in enumerate(argument["forces"] or ()):
             if x or y or torque:
-                self.engine.push(disk, np.array([x, y]), torque)
+                self.engine.apply_force(disk, np.array([x, y]), torque)
         self.engine.step(argument["count"])
 
     def whole_read(self, _argument: Any) -> list[list[float]]:

@@ -174,15 +174,15 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     return "null";
   }
 
-  function step({ count, pushes, held }) {
+  function step({ count, forces, held }) {
     const { spheres, gravity } = world;
     const n = spheres.length;
     for (let k = 0; k < count; k++) {
       for (let i = 0; i < n; i++) {
-        const s = spheres[i], push = pushes && (held || k === 0) ? pushes[i] : null;
-        s.force.x = s.mass * gravity[0] + (push ? push[0] : 0);
-        s.force.y = s.mass * gravity[1] + (push ? push[1] : 0);
-        s.torque = push ? push[2] : 0;
+        const s = spheres[i], force = forces && (held || k === 0) ? forces[i] : null;
+        s.force.x = s.mass * gravity[0] + (force ? force[0] : 0);
+        s.force.y = s.mass * gravity[1] + (force ? force[1] : 0);
+        s.torque = force ? force[2] : 0;
         file.integrate(s, world.dt);
       }
       for (let i = 0; i < n; i++) for (let j = i + 1; j < n; j++) pair(i, j);

@@ -48,7 +48,7 @@ class Student:
     def load(self, scene: Scene, dt: float) -> None:
         """Make the scene's spheres; raises `Unsupported` for what the exercise has not."""
         self.whole = self.process.surface == "advance"
-        self.pushes = np.zeros((scene.n, 3))
+        self.forces = np.zeros((scene.n, 3))
         if self.whole:
             fields = {
                 name: None if value is None else np.asarray(value).tolist() for name, value in vars(scene).items()
@@ -75,16 +75,16 @@ class Student:
         if scene.n > 1 and not abs(self.restitution - scene.restitution) <= REST:
             raise Unsupported(f"the file has e = {self.restitution:.3g}, the scene needs {scene.restitution:g}")
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to what acts during the next step."""
-        self.pushes[disk] += [*force, torque]
+        self.forces[disk] += [*force, torque]
 
     def step(self, count: int = 1) -> None:
         """One request for all the steps."""
-        pushes = self.pushes.tolist() if self.pushes.any() else None
-        self.process.do("whole_step" if self.whole else "step", {"count": count, "pushes": pushes}, self.limit)
+        forces = self.forces.tolist() if self.forces.any() else None
+        self.process.do("whole_step" if self.whole else "step", {"count": count, "forces": forces}, self.limit)
         self.limit = self.patience
-        self.pushes[:] = 0.0
+        self.forces[:] = 0.0
 
     def read(self) -> State:
         """From the arrays, or from the spheres' fields."""

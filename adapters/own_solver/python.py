@@ -174,12 +174,12 @@ class PythonSolver:
         self.spheres: list[Any] = [sphere_of(r) for r in scene["spheres"]]
 
     def step(self, argument: dict[str, Any]) -> None:
-        """Integrate all, collide every pair i < j, wrap; `count` times; pushes act in the first, or in all if held."""
+        """Integrate all, collide every pair i < j, wrap; `count` times; forces act in the first, or in all if held."""
         gx, gy = self.scene["gravity"]
-        pushes, held = argument["pushes"], argument.get("held", False)
+        forces, held = argument["forces"], argument.get("held", False)
         for k in range(argument["count"]):
             for i, s in enumerate(self.spheres):
-                px, py, turn = pushes[i] if pushes and (held or k == 0) else (0.0, 0.0, 0.0)
+                px, py, turn = forces[i] if forces and (held or k == 0) else (0.0, 0.0, 0.0)
                 s.force.x, s.force.y, s.torque = s.mass * gx + px, s.mass * gy + py, turn
                 self.file["integrate"](s, self.scene["dt"])
             for i in range(len(self.spheres)):

@@ -56,10 +56,10 @@ def worlds(n: int, wraps: bool) -> dict[str, Question]:
     """Questions on `n` of the file's own spheres, the ufo first."""
     step = (("step", DT),)
     plain = parked(n)
-    pushed = tuple(b._replace(v=(0.4, -0.3), F=(2.0, 1.0), w=0.5, torque=0.3, m=1.5, MoI=0.7) for b in plain)
+    forced = tuple(b._replace(v=(0.4, -0.3), F=(2.0, 1.0), w=0.5, torque=0.3, m=1.5, MoI=0.7) for b in plain)
     found = {
-        "free": Question(pushed, step, world=True),
-        "alone": Question((pushed[0],), (("integrate", 0, DT),)),
+        "free": Question(forced, step, world=True),
+        "alone": Question((forced[0],), (("integrate", 0, DT),)),
     }
     middle = n // 2
     for i, j in sorted({(0, 1), (0, middle), (0, n - 1), (1, 2), (1, n - 1), (n - 2, n - 1), (middle - 1, middle)}):

@@ -12,7 +12,7 @@ from reports.check.questions import QUESTIONS, Answer, Ball
 from reports.check.rows import Law, Row, follows, judged, near, shown
 from scenarios.model import Array
 
-PUSHES = ("push", "push, other numbers", "coast")
+FORCED = ("force", "force, other numbers", "coast")
 X: Array = np.array([1.0, 0.0])
 Y: Array = np.array([0.0, 1.0])
 G: Array = np.array([0.0, -9.81])  # m/s2
@@ -24,7 +24,7 @@ def taken(vector: Array, part: int) -> Array:
 
 
 # (v or w, force or torque, mass or inertia, the other of the two, dt) -> v' or w'
-PUSHED: dict[str, Law] = {
+UNDER_FORCE: dict[str, Law] = {
     "": lambda v, f, m, _o, dt: v + f / m * dt,
     "it is never changed": lambda v, *_: v,
     "the force is not divided by the {mass}": lambda v, f, _m, _o, dt: v + f * dt,
@@ -86,16 +86,16 @@ MOVED: dict[str, Law] = {
 
 def motion_rows(answers: dict[str, Answer]) -> list[Row]:
     """The rows of task 1; the function has been called without failing."""
-    seen = [(QUESTIONS[name].balls[0], QUESTIONS[name].calls[0][2], answers[name].last[0]) for name in PUSHES]
+    seen = [(QUESTIONS[name].balls[0], QUESTIONS[name].calls[0][2], answers[name].last[0]) for name in FORCED]
     linear = [(np.array(b.v), np.array(b.F), b.m, b.MoI, dt) for b, dt, _ in seen]
     angular = [(np.array(b.w), np.array(b.torque), b.MoI, b.m, dt) for b, dt, _ in seen]
     # The positions are judged by the velocities that came, so that one mistake is found once.
     places = [(np.array(b.x), np.array(b.v), np.array(a.v), np.array(b.F) / b.m, dt) for b, dt, a in seen]
     angles = [(np.array(b.alpha), np.array(b.w), np.array(a.w), b.torque / b.MoI, dt) for b, dt, a in seen]
     after = [a for _, _, a in seen]
-    velocity = law_row("velocity", "What velocity has a sphere after one step under a force?", "m/s", PUSHED, linear,
+    velocity = law_row("velocity", "What velocity has a sphere after one step under a force?", "m/s", UNDER_FORCE, linear,
                        [a.v for a in after], {"mass": "mass", "other": "MoI"})  # fmt: skip
-    spin = law_row("spin", "What angular velocity has it after one step under a torque?", "rad/s", PUSHED, angular,
+    spin = law_row("spin", "What angular velocity has it after one step under a torque?", "rad/s", UNDER_FORCE, angular,
                    [a.w for a in after], {"mass": "MoI", "other": "mass"})  # fmt: skip
     return [
         velocity,
@@ -105,7 +105,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[Row]:
         law_row("angle", "What is its angle then, its angular velocity being what came?", "rad", MOVED, angles,
                 [a.alpha for a in after], {"velocity": "angular velocity"}),
         coasting(seen[2][0], seen[2][2], velocity.cause or spin.cause),
-        lasting(answers["push twice"]),
+        lasting(answers["force twice"]),
         untouched(seen),
     ]  # fmt: skip
 
@@ -164,14 +164,14 @@ def coasting(before: Ball, after: Ball, mistake: str) -> Row:
 
 def lasting(answer: Answer) -> Row:
     """Force and torque stay until the keys change them."""
-    before, after = QUESTIONS["push twice"].balls[0], answer.last[0]
+    before, after = QUESTIONS["force twice"].balls[0], answer.last[0]
     right = near(after.F, before.F) and near(after.torque, before.torque)
     cleared = near(after.F, (0, 0)) or near(after.torque, 0)
     return judged(
         "force kept", "1", "Are force and torque the same after a step?",
         f"F = {shown(after.F)} N, torque = {shown(after.torque)} N m",
         f"F = {shown(before.F)} N, torque = {shown(before.torque)} N m", right,
-        "they are cleared: a key that is held would push for one step only" if cleared else "integrate changes them",
+        "they are cleared: a key that is held would act for one step only" if cleared else "integrate changes them",
     )  # fmt: skip
 
 

@@ -54,7 +54,7 @@ def scene_lines(scenario: Scenario) -> list[str]:
             f"at {shown(scene.position[k])} m, {shown(scene.velocity[k])} m/s, size {shown(scene.radius[k])} m, "
             f"mass {shown(scene.mass[k])} kg"
         )
-        for push in (push for push in scenario.thrusts if push.disk == k):
-            lines[-1] += f", force {shown(push.force)} N, torque {shown(push.torque)} N m"
+        for thrust in (thrust for thrust in scenario.thrusts if thrust.disk == k):
+            lines[-1] += f", force {shown(thrust.force)} N, torque {shown(thrust.torque)} N m"
             lines[-1] += f", MoI {shown(scene.inertia[k])} kg m²"
     return lines

@@ -72,8 +72,8 @@ class Answer:
         return self.balls[-1]
 
 
-def pushed(dt: float, **changes: object) -> Question:
-    """A sphere that is pushed and turned, integrated once; its mass and inertia are those of no solid disk."""
+def forced(dt: float, **changes: object) -> Question:
+    """A sphere with a force and a torque, integrated once; its mass and inertia are those of no solid disk."""
     plain = Ball((0.3, -0.7), (1.1, -0.4), (2.0, 3.0), 0.2, 0.9, 0.7, 1.7, 0.6, 0.25)
     return Question((plain._replace(**changes),), (("integrate", 0, dt),))  # type: ignore[arg-type]
 
@@ -113,10 +113,10 @@ def head_on(speed: float) -> Question:
 def questions() -> dict[str, Question]:
     """All but those about the file's own scene, by name."""
     found = {
-        "push": pushed(0.1),
-        "push, other numbers": pushed(0.03, x=(-1.2, 0.4), v=(-0.5, 0.8), F=(-1.5, 4.0), m=0.6, MoI=1.9, w=-0.7),
-        "coast": pushed(0.1, F=(0.0, 0.0), torque=0.0),
-        "push twice": Question(pushed(0.1).balls, (("integrate", 0, 0.1), ("integrate", 0, 0.1))),
+        "force": forced(0.1),
+        "force, other numbers": forced(0.03, x=(-1.2, 0.4), v=(-0.5, 0.8), F=(-1.5, 4.0), m=0.6, MoI=1.9, w=-0.7),
+        "coast": forced(0.1, F=(0.0, 0.0), torque=0.0),
+        "force twice": Question(forced(0.1).balls, (("integrate", 0, 0.1), ("integrate", 0, 0.1))),
         "touch": pair(Ball((0.0, 0.0), (1.0, 0.0), r=0.25), Ball((0.75, 0.0), (-1.0, 0.0), r=0.5)),
         "same centre": pair(Ball((0.1, 0.2), (1.0, 0.5)), Ball((0.1, 0.2), (-0.5, 0.3), m=2.0)),
         "at rest to each other": meeting((1.3, 5.1), (0.3, 0.2), (0.3, 0.2), 0.5),

@@ -14,7 +14,7 @@ from adapters.own_solver.process import SolverProcess
 from reports.check.rows import FOLLOWS, TOLERANCE, Row, judged, near, not_asked, shown
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
-from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.closed_forms import world_thrusts
 from scenarios.truth.exact import TruthRecord, computed
 
 DT = 1e-3  # s, the exercise's
@@ -43,12 +43,12 @@ def step_of(process: SolverProcess) -> float:
 
 
 def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> Played:
-    """Play it by the file's own functions; its pushes last as long as it does. Raises `SolverFailed`."""
+    """Play it by the file's own functions; its forces last as long as it does. Raises `SolverFailed`."""
     scene, count = scenario.scene, round(scenario.sample_interval / dt)
-    pushes = np.zeros((scene.n, 3))
-    for push in scenario.thrusts:
-        pushes[push.disk] += [*push.force, push.torque]
-    step = {"count": count, "pushes": pushes.tolist() if pushes.any() else None, "held": True}
+    forces = np.zeros((scene.n, 3))
+    for thrust in scenario.thrusts:
+        forces[thrust.disk] += [*thrust.force, thrust.torque]
+    step = {"count": count, "forces": forces.tolist() if forces.any() else None, "held": True}
     start: dict[str, Any] = {"spheres": spheres_of(scene), "dt": dt, "gravity": [0.0, 0.0], "wrap": None}
     requests = [("load", start, LIMIT), ("read", None, LIMIT)]
     for _ in range(scenario.samples):
@@ -105,7 +105,7 @@ def scene_row(scenario: Scenario, record: TruthRecord | None, played: Played, dt
 def truth_of(scenario: Scenario, record: TruthRecord | None) -> Trajectory:
     """The exact motion, up to where it is known."""
     if record is None:
-        return world_pushes(scenario.scene, scenario.thrusts, scenario.times)
+        return world_thrusts(scenario.scene, scenario.thrusts, scenario.times)
     return record.sampled(scenario.scene, scenario.thrusts, scenario.times)
 
 
@@ -123,15 +123,15 @@ def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
 def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) -> Array:
     """(k,) m, how far a right solver in steps of `dt` s may be off at the times t (k,) s.
 
-    Free flight under a push: symplectic Euler is a dt t / 2 ahead. A collision is found up to dt late, so that each
+    Free flight under a thrust: symplectic Euler is a dt t / 2 ahead. A collision is found up to dt late, so that each
     disk goes on for u dt; its normal is turned by that and by what the disks were off before, over (rA + rB) cos, which
     sends them off by as much of their change of velocity. Errors add up and grow with time, so that
     after several strikes it is generous: there the row on the first wrong collision is the one that sees.
     """
     scene = scenario.scene
-    push = max((float(np.hypot(*p.force)) / scene.mass[p.disk] for p in scenario.thrusts), default=0.0)
+    fastest = max((float(np.hypot(*p.force)) / scene.mass[p.disk] for p in scenario.thrusts), default=0.0)
     if record is None:
-        return 1.001 * push * dt * t / 2
+        return 1.001 * fastest * dt * t / 2
     place, speed, before = 0.0, 0.0, 0.0
     steps = [(0.0, 0.0, 0.0)]
     for at, i, j, kick, cosine in record.events:
@@ -216,12 +216,12 @@ MET: dict[str, tuple] = {
 @lru_cache(maxsize=8)
 def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
     """The scenes of a check with restitution `e`, each with its exact motion: a closed form, or many digits."""
-    pushed = Scenario(
-        name="pushed", asks="Where is a sphere that a force pushes and a torque turns for a second?", source="F = m a",
+    forced = Scenario(
+        name="forced", asks="Where is a sphere that a force forces and a torque turns for a second?", source="F = m a",
         scene=scene_of([[-1.0, 0.5, 0.6, -0.2]], [0.3], [1.4], e),
         duration=1.0, sample_interval=INTERVAL, thrusts=[Thrust(0, 0.0, 1.0, np.array([0.5, 0.9]), 0.02)],
     )  # fmt: skip
-    found: list[tuple[Scenario, TruthRecord | None]] = [(pushed, None)]
+    found: list[tuple[Scenario, TruthRecord | None]] = [(forced, None)]
     for name, (asks, duration, rows, radius, mass) in MET.items():
         scenario = Scenario(name=name, asks=asks, source="drawn for this check", scene=scene_of(rows, radius, mass, e),
                             duration=duration, sample_interval=INTERVAL)  # fmt: skip

@@ -32,7 +32,7 @@ GAP = 0.05  # m, least distance of two surfaces at the start
 Sphere = tuple[int, int, int, int, int, int]
 """x, y in half metres, vx, vy in m/s, radius in quarters of a metre, mass in kg."""
 Drawn = tuple[list[Sphere], tuple[int, int, int]]
-"""The spheres, and the push of one that is alone: force x, y in N, torque in tenths of a N m."""
+"""The spheres, and the thrust of one that is alone: force x, y in N, torque in tenths of a N m."""
 # Tried before any is drawn: on a busy machine the time may be up before a pair that collisions is.
 FIRST: list[Drawn] = [
     ([(0, 0, 1, 1, 1, 2)], (1, 2, 1)),
@@ -76,8 +76,8 @@ def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
 
 def size(drawn: Drawn) -> tuple[int, int]:
     """How many spheres a scene has, and how large its numbers are."""
-    spheres, push = drawn
-    return len(spheres), sum(map(abs, push)) + sum(abs(number) for sphere in spheres for number in sphere)
+    spheres, thrust = drawn
+    return len(spheres), sum(map(abs, thrust)) + sum(abs(number) for sphere in spheres for number in sphere)
 
 
 @contextmanager
@@ -92,14 +92,14 @@ def homeless() -> Iterator[None]:
 
 
 def without_idlers(
-    process: SolverProcess, spheres: list[Sphere], push: tuple[int, int, int], e: float
+    process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float
 ) -> tuple[list[Sphere], tuple[int, int, int]]:
     """The scene without the spheres that the fault does not need: the time may be up before hypothesis sees to it."""
     for k in range(len(spheres)):
         fewer = spheres[:k] + spheres[k + 1 :]
-        if fewer and fault_of(process, fewer, push, e):
-            return without_idlers(process, fewer, push, e)
-    return spheres, push
+        if fewer and fault_of(process, fewer, thrust, e):
+            return without_idlers(process, fewer, thrust, e)
+    return spheres, thrust
 
 
 def ints(most: int) -> st.SearchStrategy[int]:
@@ -107,16 +107,16 @@ def ints(most: int) -> st.SearchStrategy[int]:
     return st.integers(-most, most)
 
 
-def scenario_of(spheres: list[Sphere], push: tuple[int, int, int], e: float, interval: float) -> Scenario | None:
-    """The scene of these numbers; None if spheres are too near each other at the start. One alone is also pushed."""
+def scenario_of(spheres: list[Sphere], thrust: tuple[int, int, int], e: float, interval: float) -> Scenario | None:
+    """The scene of these numbers; None if spheres are too near each other at the start. One alone also has a thrust."""
     rows = [(x / 2, y / 2, float(u), float(v)) for x, y, u, v, _, _ in spheres]
     radius, mass = [r / 4 for *_, r, _ in spheres], [float(m) for *_, m in spheres]
     for i in range(len(rows)):
         for j in range(i):
             if np.hypot(rows[i][0] - rows[j][0], rows[i][1] - rows[j][1]) < radius[i] + radius[j] + GAP:
                 return None
-    alone = len(rows) == 1 and any(push)
-    thrusts = [Thrust(0, 0.0, DURATION, np.array(push[:2], float), push[2] * 0.1)] if alone else []
+    alone = len(rows) == 1 and any(thrust)
+    thrusts = [Thrust(0, 0.0, DURATION, np.array(thrust[:2], float), thrust[2] * 0.1)] if alone else []
     return Scenario(
         name="smallest", asks="Which scene is the smallest that shows the fault?", source="drawn and shrunk",
         scene=scene_of(rows, radius, mass, e), duration=DURATION, sample_interval=interval,
@@ -124,9 +124,9 @@ def scenario_of(spheres: list[Sphere], push: tuple[int, int, int], e: float, int
     )  # fmt: skip
 
 
-def fault_of(process: SolverProcess, spheres: list[Sphere], push: tuple[int, int, int], e: float) -> str:
+def fault_of(process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float) -> str:
     """What is wrong with the file's motion in a scene; "" if nothing is, or it is no scene."""
-    scenario = scenario_of(spheres, push, e, DURATION)
+    scenario = scenario_of(spheres, thrust, e, DURATION)
     if scenario is None:
         return ""
     try:
@@ -141,8 +141,8 @@ def flight_fault(scenario: Scenario, played: Played) -> str:
     scene, t = scenario.scene, scenario.duration
     met = {int(i) for row in played.contacts for i in row[1:3]}
     for k in set(range(scene.n)) - met:
-        force = sum((push.force for push in scenario.thrusts if push.disk == k), np.zeros(2))
-        torque = sum(push.torque for push in scenario.thrusts if push.disk == k)
+        force = sum((thrust.force for thrust in scenario.thrusts if thrust.disk == k), np.zeros(2))
+        torque = sum(thrust.torque for thrust in scenario.thrusts if thrust.disk == k)
         x = scene.position[k] + scene.velocity[k] * t + force / scene.mass[k] * t * (t + DT) / 2
         angle = torque / scene.inertia[k] * t * (t + DT) / 2
         if not near(played.position[-1, k], x, SINGLE):
@@ -153,11 +153,11 @@ def flight_fault(scenario: Scenario, played: Played) -> str:
     return ""
 
 
-def shown_by(process: SolverProcess, spheres: list[Sphere], push: tuple[int, int, int], e: float) -> Smallest:
+def shown_by(process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float) -> Smallest:
     """The scene with the file's motion and the exact one."""
-    scenario = scenario_of(spheres, push, e, INTERVAL)
+    scenario = scenario_of(spheres, thrust, e, INTERVAL)
     assert scenario is not None
-    fault = fault_of(process, spheres, push, e)
+    fault = fault_of(process, spheres, thrust, e)
     played = play_scene(process, scenario, DT)
     kicked = [row for row in played.contacts if not near(row[[5, 6, 9, 10]], row[[13, 14, 17, 18]])]
     collisions = Collisions.of([((row[0] + 1) * DT, int(row[1]), int(row[2]), float("nan")) for row in kicked])

@@ -86,7 +86,7 @@ def hinted(rows: list[Row], text: str) -> list[Row]:
 SET_IN_CONDITION = re.compile(r"\b(if|while)\s*\(\s*[\w.]+\s*=(?![=>])")
 
 
-MOTION = ("push", "push, other numbers", "coast", "push twice")
+MOTION = ("force", "force, other numbers", "coast", "force twice")
 
 
 def stuck(answers: dict[str, Answer]) -> bool:

@@ -61,10 +61,10 @@ def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
         other = x[j] if j >= 0 else laws.nearest_on_segment(x[i : i + 1], *scene.walls[-1 - j])[0]
         impulse = size * (x[i] - other) / np.linalg.norm(x[i] - other)
         bodies = ((i, impulse), (j, -impulse)) if j >= 0 else ((i, impulse),)
-        moved = [(k, push) for k, push in bodies if not scene.static[k]]
+        moved = [(k, change) for k, change in bodies if not scene.static[k]]
         lost = size**2 * (1 - e) / (1 + e) / 2 * sum(inverse[k] for k, _ in moved)
         rows.append((t, *(moved[0][1] if len(moved) == 1 else (0.0, 0.0)), lost))
-        disks += [(k, t, *(push * inverse[k])) for k, push in moved]
+        disks += [(k, t, *(change * inverse[k])) for k, change in moved]
     table, by_disk = np.array(rows).reshape(-1, 4), np.array(disks).reshape(-1, 4)
     by_disk = by_disk[np.argsort(by_disk[:, 0], kind="stable")]
     limits = np.searchsorted(by_disk[:, 0], np.arange(scene.n + 1))

@@ -120,15 +120,15 @@ class Field {
   }
 
   // `flyers`: [{name, at: [[x, y, angle], ...], gone}], the solid one first named by `solid`; `mark`: where one parted.
-  draw(flyers, solid, push, marks) {
-    this.last = [flyers, solid, push, marks];
+  draw(flyers, solid, force, marks) {
+    this.last = [flyers, solid, force, marks];
     const pen = this.canvas.getContext("2d");
     pen.setTransform(1, 0, 0, 1, 0, 0);
     pen.drawImage(this.sky, 0, 0);
     pen.setTransform(this.size[2], 0, 0, this.size[2], 0, 0);
     const leader = flyers[solid];
     leader.at.forEach(([x, y, angle], disk) => disk !== SHIP && this.drawRock(pen, disk, x, y, angle));
-    this.drawShip(pen, ...leader.at[SHIP], push);
+    this.drawShip(pen, ...leader.at[SHIP], force);
     flyers.forEach((flyer, k) => k !== solid && !flyer.gone && this.drawGhost(pen, flyer, leader));
     marks.forEach((mark) => this.drawMark(pen, mark));
   }

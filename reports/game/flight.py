@@ -1,4 +1,4 @@
-"""One flight of the exercise's game: the same pushes through several engines, frame by frame; no server in here."""
+"""One flight of the exercise's game: the same thrusts through several engines, frame by frame; no server in here."""
 
 from __future__ import annotations
 
@@ -116,20 +116,20 @@ class Flight:
         for _ in range(count):
             if self.over:
                 return
-            pushed = self.scenario if self.replayed else replace(self.scenario, thrusts=self.pilot.now)
+            steered = self.scenario if self.replayed else replace(self.scenario, thrusts=self.pilot.now)
             for flyer in self.flyers:
                 if not flyer.left:
-                    self.fly(flyer, pushed)
+                    self.fly(flyer, steered)
             self.frame += 1
             self.compare()
 
-    def fly(self, flyer: Flyer, pushed: Scenario) -> None:
+    def fly(self, flyer: Flyer, steered: Scenario) -> None:
         """One frame of one engine, by the same steps as `play` makes them, looked at once or, near an edge, at each."""
         stride = 1 if self.may_leave(flyer.state) else self.substeps
         first = self.frame * self.substeps
         for step in range(first, first + self.substeps, stride):
             if not flyer.left:
-                self.fly_on(flyer, pushed, step, stride)
+                self.fly_on(flyer, steered, step, stride)
 
     def may_leave(self, state: State) -> bool:
         """Whether the ship is so near an edge that a frame may carry it beyond."""
@@ -139,11 +139,11 @@ class Flight:
         room = self.scenario.scene.radius[SHIP] + 2 * np.abs(state.velocity[SHIP]) * self.scenario.sample_interval
         return bool(((state.position[SHIP] < low + room) | (state.position[SHIP] > high - room)).any())
 
-    def fly_on(self, flyer: Flyer, pushed: Scenario, step: int, count: int) -> None:
+    def fly_on(self, flyer: Flyer, steered: Scenario, step: int, count: int) -> None:
         """`count` steps of one engine from step number `step` on; what it raises or does wrong makes it leave."""
         before = flyer.state
         try:
-            advance(flyer.engine, pushed, step, count, self.dt)
+            advance(flyer.engine, steered, step, count, self.dt)
             flyer.state = flyer.engine.read()
             collisions = flyer.engine.collisions()
         except Exception as error:  # a refusal, or whatever an engine raises

@@ -104,7 +104,7 @@ class Game {
       at: this.field.radius.map((_, disk) => this.between(before.flyers[k], flyer, disk, this.paused ? 1 : share)),
     }));
     const marks = after.flyers.flatMap((flyer, k) => flyer.parted ? [this.mark(flyer.parted, this.field.engines[k])] : []);
-    this.sky.draw(flyers, after.solid, after.push, marks);
+    this.sky.draw(flyers, after.solid, after.force, marks);
     recent(this.drawn, [now, performance.now() - began]);
   }
 
@@ -255,7 +255,7 @@ class Game {
     const key = keyOf(event);
     if (key && !(writes && event.key.length > 1) && by("wishes") && !event.target.matches?.("input[type=radio]")) {
       event.preventDefault();
-      if (!event.repeat || key === "w" || key === "s") this.key(key, true);  // a repeated push aims anew, as in the exercise
+      if (!event.repeat || key === "w" || key === "s") this.key(key, true);  // a repeated key aims anew, as in the exercise
     } else if (!writes) {
       const act = { p: () => this.pause(!this.paused), ".": () => this.step(), n: () => this.begin() }[event.key.toLowerCase()];
       if (act && !event.repeat) { event.preventDefault(); act(); }

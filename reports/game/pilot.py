@@ -10,7 +10,7 @@ import numpy as np
 from scenarios.model import Array, Scene, Thrust
 
 SHIP = 0  # the disk that is steered
-PUSH, TURN = 0.25, 1.0  # m/s2 and rad/s2, of the exercise: force mass 0.25, torque MoI 1.0
+THRUST, TURN = 0.25, 1.0  # m/s2 and rad/s2, of the exercise: force mass 0.25, torque MoI 1.0
 FORWARD = {"w": 1.0, "s": -1.0}
 LEFT = {"a": 1.0, "d": -1.0}
 KEYS = (*FORWARD, *LEFT)
@@ -18,7 +18,7 @@ KEYS = (*FORWARD, *LEFT)
 
 @dataclass(frozen=True)
 class Held:
-    """A push that is on since the start of frame `since`: (2,) N in the world frame, N m."""
+    """A thrust that is on since the start of frame `since`: (2,) N in the world frame, N m."""
 
     since: int
     force: Array
@@ -33,8 +33,8 @@ class Held:
 class Pilot:
     """Keys in, thrusts out. `interval`: s, of a frame; keys act at the start of one.
 
-    W and S push along the ship's heading as it is when the key event comes (a repeated event aims anew), A and D
-    turn; releasing either key of a pair ends its push, as in the exercise.
+    W and S accelerate along the ship's heading as it is when the key event comes (a repeated event aims anew), A and D
+    turn; releasing either key of a pair ends its thrust, as in the exercise.
     """
 
     scene: Scene
@@ -45,8 +45,8 @@ class Pilot:
     def key(self, key: str, down: bool, frame: int, angle: float) -> None:
         """Key `key` of `KEYS` goes down (again) or up at the start of frame `frame`, the ship's heading `angle` rad."""
         if key in FORWARD:
-            push = FORWARD[key] * PUSH * float(self.scene.mass[SHIP])
-            self.change("force", frame, push * np.array([cos(angle), sin(angle)]) if down else np.zeros(2), 0.0)
+            force = FORWARD[key] * THRUST * float(self.scene.mass[SHIP])
+            self.change("force", frame, force * np.array([cos(angle), sin(angle)]) if down else np.zeros(2), 0.0)
         else:
             self.change("torque", frame, np.zeros(2), down * LEFT[key] * TURN * float(self.scene.inertia[SHIP]))
 
@@ -63,10 +63,10 @@ class Pilot:
 
     @property
     def now(self) -> list[Thrust]:
-        """The pushes that are on, without an end."""
+        """The thrusts that are on, without an end."""
         return [held.thrust(self.interval) for held in self.held.values()]
 
     def thrusts(self, frames: int) -> list[Thrust]:
-        """All pushes of the first `frames` frames, those still on cut there, in order of time."""
+        """All thrusts of the first `frames` frames, those still on cut there, in order of time."""
         ends = [held.thrust(self.interval, frames) for held in self.held.values() if held.since < frames]
         return sorted(self.past + ends, key=lambda thrust: thrust.start)

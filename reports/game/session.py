@@ -77,10 +77,10 @@ class Session:
             "solid": flight.flyers.index(flight.solid), "flyers": [self.told(flyer) for flyer in flight.flyers],
             "ship": [*ship.position[SHIP].tolist(), *ship.velocity[SHIP].tolist(),
                      float(ship.angle[SHIP]), float(ship.angular_velocity[SHIP])],
-            "push": self.push(), "won": flight.won, "over": flight.over, "left_at": flight.left_at,
+            "force": self.force(), "won": flight.won, "over": flight.over, "left_at": flight.left_at,
         }  # fmt: skip
 
-    def push(self) -> list[float]:
+    def force(self) -> list[float]:
         """What drives the ship: force N in the world frame, torque N m."""
         flight = self.flight
         time = flight.frame * flight.scenario.sample_interval

@@ -47,7 +47,7 @@ def way(each: Trajectory) -> Array:
 
 
 def aside(each: Trajectory) -> Array:
-    """(k,) m that it has been pushed aside."""
+    """(k,) m that it has been deflected."""
     return each.position[:, 0, 1] - each.position[0, 0, 1]
 
 
@@ -55,7 +55,7 @@ SEEN = {
     "a fast disk meets another": Seen("tunnelling_head_on", "Way of the disk", "m", way),
     "a fast disk meets a thin wall": Seen("tunnelling_thin_wall", "Way of the disk", "m", way),
     "a slow collision": Seen("slow_collision", "Way of the first disk", "m", way),
-    "a near miss": Seen("near_miss", "The first disk, pushed aside", "m", aside),
+    "a near miss": Seen("near_miss", "Deflection of the first disk", "m", aside),
     "a scene made smaller": Seen("scale_down", "Way of the first disk", "m", way),
     # A replay keeps seven digits of a place: farther out they are too few for a disk.
     "far from the origin": Seen("far_from_origin", "Way of the disk", "m", way, harshest=1e5),

@@ -153,11 +153,11 @@ def show_gravity(settings: Settings) -> Shown:
     return Shown([Chart("Height of the centre", "time in s", "m", curves)], filmed(scenario, runs), facts)
 
 
-def show_push_out(settings: Settings) -> Shown:
+def show_position_correction(settings: Settings) -> Shown:
     """How an overlap that is there at the start is undone."""
     x, still = [[0.0, 0.0], [0.8, 0.0]], np.zeros((2, 2))
     scenario = asked(lay_out(position=x, velocity=still, radius=[0.5] * 2, mass=[np.inf, 2.0], restitution=0.0), 0.4)
-    on = Switched(BOX2D, push_most=0.2, push_share=settings["share"], slop=settings["slop"] / 1e3)
+    on = Switched(BOX2D, correction_most=0.2, correction_share=settings["share"], slop=settings["slop"] / 1e3)
     engine = changed_box2d(continuous=False, bullet=False, length_unit=1.0)
     runs = [play(engine, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
     engine.close()
@@ -219,7 +219,7 @@ def page(
     *sliders: Slider,
 ) -> Lesson:  # fmt: skip
     """A page of this lesson."""
-    exact = () if name == "push-out" else (TRUTH,)  # disks that overlap have no exact answer
+    exact = () if name == "position correction" else (TRUTH,)  # disks that overlap have no exact answer
     return Lesson(name, f"6.{part}", title, asks, (text,), sliders, (*names, PLAIN, SWITCHED, *exact), show)
 
 
@@ -257,11 +257,11 @@ MECHANISMS = (
         Slider("order", "Velocity that is turned round", tuple(ORDERS), 0), Slider("k", "Steps in 1/60 s", (1, 4), 1),
     ),
     page(
-        5, "push-out", "Slop and push-out", "What becomes of an overlap?",
+        5, "position correction", "Slop and position correction", "What becomes of an overlap?",
         "The exercise projects an overlap away at once. Box2D undoes a share of it, three times a step, and leaves the "
         "last bit, the slop, so that a contact stays a contact. Here a disk begins 20 cm deep in a fixed one, which no "
         "exact answer allows. Box2D's continuous collision is off, because it undoes the overlap sooner.",
-        [NO_CCD], show_push_out,
+        [NO_CCD], show_position_correction,
         Slider("share", "Share undone each time", (0.0, 0.1, 0.2, 0.4), 0),
         Slider("slop", "Slop", (0.0, 1.25, 2.5, 5.0), 0, "mm"),
     ),

@@ -48,7 +48,7 @@ def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
     """Detection, projection, impulse and momentum, each with the numbers of this collision."""
     before, after, told = collision_of_the_reference(scene, dt)
     (m1, m2), e = scene.mass, scene.restitution
-    x = before.position + before.velocity * dt  # nothing pushes, so symplectic Euler moves by v dt
+    x = before.position + before.velocity * dt  # no force acts, so symplectic Euler moves by v dt
     gap = x[0] - x[1]
     distance, reach = float(np.hypot(*gap)), float(scene.radius.sum())
     n, overlap = gap / distance, reach - distance

@@ -12,7 +12,7 @@ from reports.page.style import TRUTH, number
 from scenarios.families.exercise import ship_thrust
 from scenarios.families.lesson import falling_box, ping_pong
 from scenarios.model import Scenario, Thrust, Trajectory
-from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.closed_forms import world_thrusts
 from scenarios.truth.exact import with_oracle
 
 LADDER = (1, 2, 4, 8, 16, 32)
@@ -69,13 +69,13 @@ PARTICLE = Lesson(
 )  # fmt: skip
 
 
-def pushed_ship(acceleration: float) -> Scenario:
-    """The exercise's ship, pushed along x for 2 s and coasting for 2 s."""
+def thrust_ship(acceleration: float) -> Scenario:
+    """The exercise's ship, accelerated along x for 2 s and coasting for 2 s."""
     base = ship_thrust()
     scene = base.scene
     thrusts = [Thrust(0, 0.5, 2.5, np.array([acceleration * float(scene.mass[0]), 0.0]))]
     return replace(
-        base, duration=4.0, sample_interval=1 / 16, thrusts=thrusts, truth=lambda t: world_pushes(scene, thrusts, t)
+        base, duration=4.0, sample_interval=1 / 16, thrusts=thrusts, truth=lambda t: world_thrusts(scene, thrusts, t)
     )
 
 
@@ -88,7 +88,7 @@ THRUST_NAMES = (
 def show_thrust(settings: Settings) -> Shown:
     """Who is ahead of the parabola and who is behind, and the formula for it."""
     acceleration = settings["a"]
-    scenario = pushed_ship(acceleration)
+    scenario = thrust_ship(acceleration)
     shown = Played.by(scenario, THRUST_NAMES, settings["k"])
     assert shown.truth is not None
     exact, dt = shown.truth, shown.scenario.dt(settings["k"])
@@ -96,11 +96,11 @@ def show_thrust(settings: Settings) -> Shown:
     def ahead(each: Trajectory) -> np.ndarray:
         return 1e3 * (each.position[:, 0, 0] - exact.position[: len(each), 0, 0])
 
-    pushed = np.clip(exact.t - 0.5, 0, 2.0)
+    acted = np.clip(exact.t - 0.5, 0, 2.0)
     facts = []
     for run in shown.runs:
         row = ENGINES[run.name]
-        law = 1e3 * (row.alpha - 0.5) * acceleration * dt * pushed[-1]
+        law = 1e3 * (row.alpha - 0.5) * acceleration * dt * acted[-1]
         got = ahead(run.trajectory)[-1] if run.trajectory else np.nan
         facts.append((f"{run.name}, α = {number(row.alpha)}", f"{number(got)} mm, (α − ½) a dt T = {number(law)} mm"))
     return Shown(
@@ -115,13 +115,13 @@ def show_thrust(settings: Settings) -> Shown:
 
 THRUST = Lesson(
     name="thrust", number="2", title="Force and thrust",
-    asks="Does a push carry every engine equally far?",
+    asks="Does a force carry every engine equally far?",
     text=(
         "A force changes the velocity by <code>F/m dt</code> a step, and everybody agrees on the velocity. Where the "
-        "ship is depends on the order: with <code>x' = x + v dt + α a dt²</code> a push of T seconds ends "
+        "ship is depends on the order: with <code>x' = x + v dt + α a dt²</code> a thrust of T seconds ends "
         "<code>(α − ½) a T dt</code> away from the parabola. Velocity first is <code>α = 1</code>, position first "
         "<code>α = 0</code>, four substeps <code>α = 0.625</code>.",
-        "The ship is pushed from 0.5 s to 2.5 s and then coasts: the offset grows while the force is on, and stays.",
+        "The ship is accelerated from 0.5 s to 2.5 s and then coasts: the offset grows while the force is on, and stays.",
     ),
     sliders=(
         Slider("k", "Steps in 1/16 s", (1, 2, 4, 8, 16), 1),

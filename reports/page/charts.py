@@ -69,13 +69,13 @@ def momentum(comparison: Comparison) -> Drawing:
     """Momentum that should not be there; where walls take some up, momentum apart from the truth's."""
     if violations.knows_impulses(comparison.scenario):
         caption = (
-            "Distance of the momentum from P(0) and what weight and pushes have added since, over the Σ m|v| at hand. "
+            "Distance of the momentum from P(0) and what weight and thrusts have added since, over the Σ m|v| at hand. "
             "Lower is better."
         )
         lines = over(views(comparison, None), violations.momentum)
         return Drawing("Momentum error", caption, over_time(comparison, lines, "error / Σ m|v| at hand"))
     if comparison.truth is None:
-        why = "Walls, static disks or turning pushes take up momentum, and no exact answer says how much."
+        why = "Walls, static disks or turning thrusts take up momentum, and no exact answer says how much."
         return Drawing("Momentum", why, None)
     scale, lines = scales.momentum(comparison.scenario) or 1.0, []
     for run, view in views(comparison, comparison.truth):
@@ -112,7 +112,7 @@ def energy_course(comparison: Comparison) -> Drawing:
         lines.append(Line(run, view.played.t, laws.energy(view.played, scene) / scale))
     caption = (
         "No exact answer says how much energy the collisions should take, so this is no error: the energy over that "
-        "at hand. Without pushes it must never rise."
+        "at hand. Without thrusts it must never rise."
     )
     return Drawing("Energy", caption, over_time(comparison, lines, "energy / energy at hand", log=False))
 

@@ -36,7 +36,7 @@ FAMILIES = {
     "scenarios.families.pairs": "Two disks meet",
     "scenarios.families.walls": "Walls, floors and fixed disks",
     "scenarios.families.rows": "Disks in a row",
-    "scenarios.families.thrusts": "Pushes and spin",
+    "scenarios.families.thrusts": "Thrusts and spin",
     "scenarios.families.exercise": "The exercise",
     "scenarios.families.crowds": "Crowds",
 }

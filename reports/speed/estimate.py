@@ -13,10 +13,10 @@ from reports.speed.plan import SCENE, Measurement, Plan, Reach
 from reports.speed.timing import FEWEST_ROUNDS, LEAST, WARM_UP
 from scenarios.model import Scenario
 
-# s, means over the measurements: of a step, of each disk in it, of pushing in Python, of wrapping each disk there; of
-# reading all and each disk once; of making ready for a sample. On the machine of `figures.csv`; elsewhere half or twice
-# as much.
-STEP, STEP_DISK, PUSH, WRAP_DISK = 1.0e-6, 0.17e-6, 16e-6, 0.75e-6
+# s, means over the measurements: of a step, of each disk in it, of applying forces in Python, of wrapping each disk
+# there; of reading all and each disk once; of making ready for a sample. On the machine of `figures.csv`; elsewhere
+# half or twice as much.
+STEP, STEP_DISK, FORCE, WRAP_DISK = 1.0e-6, 0.17e-6, 16e-6, 0.75e-6
 READ, READ_DISK, READY = 20e-6, 1.5e-6, 1.5e-3
 LISTENING = 1.5  # times a step where collisions are heard of, too
 STARTING = 12.0  # s until the workers have imported and compiled
@@ -42,7 +42,7 @@ def step_of(scenario: Scenario) -> float:
     """s, of one step of a scene, in Python included."""
     n = scenario.scene.n
     wrapping = n * WRAP_DISK if scenario.scene.wrap is not None else 0.0
-    return STEP + n * STEP_DISK + (PUSH if scenario.thrusts else 0.0) + wrapping
+    return STEP + n * STEP_DISK + (FORCE if scenario.thrusts else 0.0) + wrapping
 
 
 def seconds_to_play(measurement: Measurement, reach: Reach) -> float:

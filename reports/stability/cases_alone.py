@@ -105,7 +105,7 @@ def oscillator(x: float, _run: int) -> Scenario:
 
 
 def on_spring(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
-    """Play a disk whose push -x N is read off its position before every step, as a user of an engine writes it."""
+    """Play a disk whose force -x N is read off its position before every step, as a user of an engine writes it."""
     engine = variant.make()
     states: list[State] = []
     status, reason, settings = "ok", "", {}
@@ -114,7 +114,7 @@ def on_spring(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
         settings = engine.settings()
         states.append(engine.read())
         for _ in range(scenario.samples):
-            engine.push(0, -states[-1].position[0], 0.0)
+            engine.apply_force(0, -states[-1].position[0], 0.0)
             engine.step()
             states.append(engine.read())
             if reason := fault_of(states[-1], 1e6):
@@ -138,7 +138,7 @@ ALONE = (
         "bounce_drift", FAMILY, "Up to which dt does a ball at e = 1 come back to its height?",
         "dt / fall time", "1", (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2),
         ball, BOUNCES_OFF, runs=16,
-        also=("box2d_v3:matched+16_substeps", "pymunk:matched+push_out"),
+        also=("box2d_v3:matched+16_substeps", "pymunk:matched+position_correction"),
     ),
     Case(
         "scale_up", FAMILY, "How much larger may a scene be made and stay the same?",
@@ -158,7 +158,7 @@ ALONE = (
         also=("box2d_v3:matched+16_substeps",),
     ),
     Case(
-        "stiff_push", FAMILY, "How stiff may a spring be whose push is read off the positions before each step?",
+        "stiff_force", FAMILY, "How stiff may a spring be whose force is read off the positions before each step?",
         "w dt", "1", (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0), oscillator, SPRING_GROWS,
         play=on_spring,
     ),

@@ -83,11 +83,11 @@ SAYS_SO = "it says so"
 CURES = {
     "at_home": Cure("box2d*", "offset", "positions are float32, too coarse so far out", "at the origin", at_home),
     "faster": Cure(
-        "[pb]*", "*", "too slow for a time of the engine's own (threshold of restitution, rate of push-out)",
+        "[pb]*", "*", "too slow for a time of the engine's own (threshold of restitution, rate of position correction)",
         "32 times as fast", faster,
     ),
     "slower": Cure(
-        "[pb]*", "*", "too fast for a time of the engine's own (cap on speed, rate of push-out)",
+        "[pb]*", "*", "too fast for a time of the engine's own (cap on speed, rate of position correction)",
         "32 times as slow", slower,
     ),
     "larger": Cure(

@@ -78,8 +78,8 @@ def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
         )
     )
     if not np.isnan(collisions.impulse).any():  # Box2D 3.1 does not tell with what impulse it collisions
-        pushed = counted(played, collisions.j < 0, collisions.impulse)
-        parts.append(_beside("pressure", pushed, ought.force, "the pressure of the virial series"))
+        exchanged = counted(played, collisions.j < 0, collisions.impulse)
+        parts.append(_beside("pressure", exchanged, ought.force, "the pressure of the virial series"))
     return max(parts, key=lambda part: part.value)._replace(at=float(played.t[len(played) // 10]))
 
 

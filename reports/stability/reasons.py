@@ -6,7 +6,7 @@ from fnmatch import fnmatch
 from math import atan, pi, sqrt
 from typing import NamedTuple
 
-from adapters.mechanisms.habits import DIGITS, FLIGHT, IMPULSE, PUSH_OUT, RESTITUTION
+from adapters.mechanisms.habits import DIGITS, FLIGHT, IMPULSE, POSITION_CORRECTION, RESTITUTION
 from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, Limit
 from reports.stability.twins import B2_SETTINGS, B2_TYPES, LATE, OF_PYMUNK, PRODUCT, THRESHOLD, THRESHOLDS
@@ -36,7 +36,7 @@ class Reason(NamedTuple):
 DISCRETE = "contacts are looked for at the ends of steps only, and lost once the centres have passed each other"
 GEOMETRY = "geometry: (v dt)² = (2R)² - b² between disks, v dt = R at a thin wall"
 EULER_OUT = (
-    "the push belongs to a place where the disk is not: with x' = x + v dt the oscillator's map grows by 1 + (w dt)²"
+    "the force belongs to a place where the disk is not: with x' = x + v dt the oscillator's map grows by 1 + (w dt)²"
 )
 QUARTER = "nothing turns by more than pi/2 a step"
 MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES"
@@ -82,10 +82,10 @@ REASONS = (
     # One disk, or two.
     *(
         Reason(
-            "bounce_drift", engine, "the push out of the floor adds height", "Munk2D src/cpSpaceStep.c, collision_bias",
-            None, "pymunk:matched", PUSH_OUT,
+            "bounce_drift", engine, "the position correction out of the floor adds height", "Munk2D src/cpSpaceStep.c, collision_bias",
+            None, "pymunk:matched", POSITION_CORRECTION,
         )
-        for engine in ("pymunk:shipped", "pymunk:matched+push_out")
+        for engine in ("pymunk:shipped", "pymunk:matched+position_correction")
     ),
     Reason("bounce_drift", "pymunk:matched", "v dt exceeds the radius, and the floor is missed", GEOMETRY, habit=LATE),
     *(
@@ -131,20 +131,20 @@ REASONS = (
         "Box2D 3.1 src/constants.h: B2_MAX_ROTATION", pi / 4,
     ),
     Reason(
-        "stiff_push", "reference:exercise", "symplectic Euler is unstable from w dt = 2 on", "linear stability", 2.0
+        "stiff_force", "reference:exercise", "symplectic Euler is unstable from w dt = 2 on", "linear stability", 2.0
     ),
     Reason(
-        "stiff_push", "box2d:matched", "the swing reaches 2 units of length a step, where the engine cuts it; refused",
+        "stiff_force", "box2d:matched", "the swing reaches 2 units of length a step, where the engine cuts it; refused",
         B2_SETTINGS + "b2_maxTranslation",
     ),
-    *(Reason("stiff_push", engine, EULER_OUT, MAP, growth_limit(1.0)) for engine in ("reference:lesson", "pymunk:*")),
+    *(Reason("stiff_force", engine, EULER_OUT, MAP, growth_limit(1.0)) for engine in ("reference:lesson", "pymunk:*")),
     Reason(
-        "stiff_push", "box2d_v3:*", "the push is constant over four substeps: the map grows by 1 + 3/8 (w dt)²", MAP,
+        "stiff_force", "box2d_v3:*", "the force is constant over four substeps: the map grows by 1 + 3/8 (w dt)²", MAP,
         growth_limit(0.375),
     ),
     *(
         Reason(
-            "stiff_push", engine, "the push is constant during a step: the map grows by 1 + (w dt)² / 2", MAP,
+            "stiff_force", engine, "the force is constant during a step: the map grows by 1 + (w dt)² / 2", MAP,
             growth_limit(0.5),
         )
         for engine in ("event_driven:*", "reference:ordered")
@@ -160,28 +160,28 @@ REASONS = (
     ),
     Reason("dt_*", "reference:ordered", "the collisions of a step are bounded, and what is left shows as overlap",
            "reference_impl/ordered.py"),
-    Reason("overlap_recovery", "reference:ordered", "overlaps that no collision made are not pushed out",
+    Reason("overlap_recovery", "reference:ordered", "overlaps that no collision made are not corrected",
            "reference_impl/ordered.py"),
     Reason("column", "reference:*", "each pair is projected once a step, without regard to the others",
-           "exercise 11, task 2", habit=PUSH_OUT),
+           "exercise 11, task 2", habit=POSITION_CORRECTION),
     Reason("heavy_on_light", "reference:*", "each pair is projected once a step, without regard to the others",
-           "exercise 11, task 2", habit=PUSH_OUT),
-    Reason("column", "pymunk:*", "overlaps are pushed out by a share a step, down to a slop a contact",
-           "Munk2D src/cpArbiter.c, cpArbiterPreStep", habit=PUSH_OUT),
+           "exercise 11, task 2", habit=POSITION_CORRECTION),
+    Reason("column", "pymunk:*", "overlaps are corrected by a share per step, down to a slop a contact",
+           "Munk2D src/cpArbiter.c, cpArbiterPreStep", habit=POSITION_CORRECTION),
     Reason("heavy_on_light", "pymunk:shipped", "10 sequential impulses do not carry a heavy disk on a light one",
            "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched", IMPULSE),
     Reason("heavy_on_light", "*", "sequential impulses converge as slowly as the masses are unequal",
            "Catto, Iterative dynamics with temporal coherence, 2005", habit=IMPULSE),
     Reason("column", "*", "every contact may keep its slop, and soft ones give way as the load grows",
-           "Box2D, b2_linearSlop; contact softness in 3.1", habit=PUSH_OUT),
+           "Box2D, b2_linearSlop; contact softness in 3.1", habit=POSITION_CORRECTION),
     Reason("overlap_recovery", "pymunk:shipped", "overlaps up to a slop of 0.1 m, here 0.4 radii, are left",
-           "Munk2D src/cpSpace.c, collisionSlop", 0.02, "pymunk:matched", PUSH_OUT),
+           "Munk2D src/cpSpace.c, collisionSlop", 0.02, "pymunk:matched", POSITION_CORRECTION),
     Reason("overlap_recovery", "box2d:shipped", "overlaps up to a slop of 5 mm, here 0.02 radii, are left",
-           B2_SETTINGS + "b2_linearSlop", 0.02, "box2d:matched", PUSH_OUT),
-    Reason("overlap_*", "*", "an overlap is pushed out by a share a step", "the engine's position correction",
-           habit=PUSH_OUT),
-    Reason("overfull_box", "*", "disks are pushed beyond a wall, and from there on outwards", "walls have two sides",
-           habit=PUSH_OUT),
+           B2_SETTINGS + "b2_linearSlop", 0.02, "box2d:matched", POSITION_CORRECTION),
+    Reason("overlap_*", "*", "an overlap is corrected by a share per step", "the engine's position correction",
+           habit=POSITION_CORRECTION),
+    Reason("overfull_box", "*", "disks are moved beyond a wall, and from there on outwards", "walls have two sides",
+           habit=POSITION_CORRECTION),
     Reason("*_comes_to_rest", "box2d:matched", "without a threshold a lying disk chatters at e g dt / (1 - e)",
            "fixed point of v' = e (v + g dt)", None, "box2d:shipped"),
     Reason("*_comes_to_rest", "box2d:shipped", "chatter above the threshold of 1 m/s goes on for ever",

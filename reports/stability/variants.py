@@ -51,8 +51,8 @@ BULLETS = "continuous collision, what moves is a bullet"
 SWITCHED = (
     Variant("pymunk:matched+fifty_iterations", partial(changed_pymunk, iterations=50), "50 iterations for 10"),
     Variant(
-        "pymunk:matched+push_out", partial(changed_pymunk, collision_bias=(1 - 0.1) ** 60),
-        "overlaps pushed out as shipped",
+        "pymunk:matched+position_correction", partial(changed_pymunk, collision_bias=(1 - 0.1) ** 60),
+        "position correction as shipped",
     ),
     Variant("box2d:matched+bullets", with_bullets(partial(changed_box2d, elastic_continuous=True)), BULLETS),
     Variant("box2d_v3:matched+bullets", with_bullets(changed_box2d_v3), BULLETS),

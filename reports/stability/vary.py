@@ -27,7 +27,7 @@ def at_speed(one: Scenario, x: float) -> Scenario:
 
 
 def at_mass_ratio(one: Scenario, x: float) -> Scenario:
-    """The mass of the first disk that moves times x, and its inertia, and what pushes it."""
+    """The mass of the first disk that moves times x, and its inertia, and the thrusts on it."""
     scene = one.scene
     disk = int(np.flatnonzero(~scene.static)[0])
     factor = np.where(np.arange(scene.n) == disk, x, 1.0)
@@ -42,7 +42,7 @@ def at_restitution(one: Scenario, x: float) -> Scenario:
 
 
 def at_scale(one: Scenario, x: float) -> Scenario:
-    """All lengths times x, times as they are: velocities, gravity and pushes grow along."""
+    """All lengths times x, times as they are: velocities, gravity and thrusts grow along."""
     scene = one.scene
     larger: Scene = replace(
         scene, position=scene.position * x, velocity=scene.velocity * x, radius=scene.radius * x,
@@ -103,7 +103,7 @@ def similar(
 
 
 def scaled_thrust(thrust: Thrust, force: float, torque: float) -> Thrust:
-    """The push times so much."""
+    """The thrust times so much."""
     return replace(thrust, force=thrust.force * force, torque=thrust.torque * torque)
 
 

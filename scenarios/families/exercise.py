@@ -6,7 +6,7 @@ import numpy as np
 
 from scenarios.families.placing import lay_out, scatter
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
-from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.closed_forms import world_thrusts
 from scenarios.truth.exact import with_oracle
 
 SOURCE = 'Visual Computing, exercise 11, "Physics based simulation"'
@@ -17,8 +17,9 @@ SHIP_INERTIA = np.pi / 2 * SHIP_RADIUS**4
 INTERVAL = 0.04
 LADDER = (4, 10, 20, 40)  # down to the exercise's own step of 0.001 s
 
-# Key down s, key up s, sign: whole numbers of sample intervals, so that no step is pushed by halves.
-PUSHES = ((0.20, 1.40, 1), (2.60, 4.00, 1), (4.40, 5.40, -1))  # W, W, S
+# Key down s, key up s, sign: whole numbers of sample intervals, so that every step is under a thrust from its start to
+# its end or not at all.
+KEYS_DOWN = ((0.20, 1.40, 1), (2.60, 4.00, 1), (4.40, 5.40, -1))  # W, W, S
 TURNS = ((0.60, 1.80, 1), (2.20, 3.40, -1), (4.80, 5.20, -1))  # A, D, D
 
 
@@ -68,18 +69,18 @@ def ship_thrust() -> Scenario:
     )
     turns = [Thrust(0, down, up, np.zeros(2), SHIP_INERTIA * sign) for down, up, sign in TURNS]
     thrusts = list(turns)
-    for down, up, sign in PUSHES:
-        # The exercise aims the push once, when the key goes down; it does not turn with the ship.
-        angle = world_pushes(scene, turns, np.array([down])).angle[0, 0]
+    for down, up, sign in KEYS_DOWN:
+        # The exercise aims the thrust once, when the key goes down; it does not turn with the ship.
+        angle = world_thrusts(scene, turns, np.array([down])).angle[0, 0]
         aim = np.array([np.cos(angle), np.sin(angle)])
         thrusts.append(Thrust(0, down, up, sign * SHIP_MASS * 0.25 * aim))
 
     def truth(t: Array) -> Trajectory:
-        return world_pushes(scene, thrusts, t)
+        return world_thrusts(scene, thrusts, t)
 
     return Scenario(
         name="ship_thrust",
-        asks="Does a steered ship end where its pushes and turns carry it?",
+        asks="Does a steered ship end where its thrusts and turns carry it?",
         source=f"{SOURCE}: keys W, S, A, D; x0 + v0 t + F t2 / 2m piece by piece",
         scene=scene,
         duration=6.0,

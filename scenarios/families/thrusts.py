@@ -1,4 +1,4 @@
-"""Disks under pushes, fixed in the world or in the disk."""
+"""Disks under thrusts, fixed in the world or in the disk."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Thrust, Trajectory
-from scenarios.truth.closed_forms import answer, body_push, flight, world_pushes
+from scenarios.truth.closed_forms import answer, body_thrust, flight, world_thrusts
 
 INTERVAL = 1 / 60
 
 
 def spin_under_torque() -> Scenario:
-    """Two disks, pushed and turned by overlapping pushes."""
+    """Two disks, under overlapping thrusts with a torque each."""
     scene = lay_out(
         position=[[-3.0, 0.0], [3.0, 1.0]],
         velocity=[[0.5, -0.25], [0.0, 0.0]],
@@ -22,7 +22,8 @@ def spin_under_torque() -> Scenario:
         mass=[2.0, 0.7],
         restitution=1.0,
     )
-    # Disk, first and last sample, force N, torque N m: whole intervals, so that no step is pushed by halves.
+    # Disk, first and last sample, force N, torque N m: whole intervals, so that every step is under a thrust from its
+    # start to its end or not at all.
     table = (
         (0, 0, 240, [0.0, 0.0], 0.125),
         (0, 30, 90, [0.6, 0.2], 0.0),
@@ -36,7 +37,7 @@ def spin_under_torque() -> Scenario:
     ]
 
     def truth(t: Array) -> Trajectory:
-        return world_pushes(scene, thrusts, t)
+        return world_thrusts(scene, thrusts, t)
 
     return Scenario(
         name="spin_under_torque",
@@ -65,7 +66,7 @@ def body_frame_thrust() -> Scenario:
 
     def truth(t: Array) -> Trajectory:
         burnt, spin = np.minimum(t, burn), scene.angular_velocity[0]
-        moved, gained = body_push(burnt, force / scene.mass[0], scene.angle[0], spin)
+        moved, gained = body_thrust(burnt, force / scene.mass[0], scene.angle[0], spin)
         position, velocity = flight(t[:, None], scene.position[0], scene.velocity[0])
         coast = np.maximum(t - burn, 0)[:, None] * gained
         return answer(scene, t, ((position + moved + coast)[:, None], (velocity + gained)[:, None]))

@@ -240,7 +240,7 @@ def column_of_ten() -> Scenario:
 
 
 def _touching(scene: Scene) -> list[Collision]:
-    """The contacts of disks stacked on wall 0: they push from t = 0, by a force, so with no impulse."""
+    """The contacts of disks stacked on wall 0: they act from t = 0 with a force, so with no impulse."""
     return [(0.0, 0, -1, 0.0), *((0.0, i, i + 1, 0.0) for i in range(scene.n - 1))]
 
 

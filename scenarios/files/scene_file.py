@@ -240,8 +240,8 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
             one, two = number[row], number[w + first[row] + k]
             if overlap[k] > rounding:
                 # Where the side cannot be told, the way out may lead across the middle: it is longer by that.
-                push = thick[row] + radius[near][k] - away[k] @ normal
-                yield min(one, two), max(one, two), overlap[k], normal * push * np.sign(two - one) + 0.0
+                reach = thick[row] + radius[near][k] - away[k] @ normal
+                yield min(one, two), max(one, two), overlap[k], normal * reach * np.sign(two - one) + 0.0
 
 
 def write_scene_file(scenario: Scenario, path: str | Path) -> None:

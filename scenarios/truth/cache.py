@@ -37,7 +37,7 @@ def folder() -> Path | None:
 
 
 def key_of(scenario: Scenario, certifying: bool) -> str:
-    """A hash over all that decides a record: scene, pushes, duration, the oracle's source and what it can prove."""
+    """A hash over all that decides a record: scene, thrusts, duration, the oracle's source and what it can prove."""
     scene, hashed = scenario.scene, hashlib.sha256()
     parts = [
         scene.position, scene.velocity, scene.radius, scene.mass, scene.walls, scene.gravity, scene.restitution,

@@ -1,4 +1,4 @@
-"""Closed forms of flights, bounces, single collisions and pushes: exact answers without any stepping.
+"""Closed forms of flights, bounces, single collisions and thrusts: exact answers without any stepping.
 
 SI units, float64; right to 1e-13 of the lengths and speeds of a scene (tests/scenarios/test_closed_forms.py).
 """
@@ -172,27 +172,27 @@ def offset_growth(free_path: float, reach: float) -> float:
     return float(q + np.sqrt(q * q - 1))
 
 
-def world_pushes(scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
-    """Free disks under constant pushes fixed in the world, at the times t (k,) s.
+def world_thrusts(scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
+    """Free disks under constant thrusts fixed in the world, at the times t (k,) s.
 
-    The sum of x + v t and, for each push, a (acted^2 / 2 + acted (t - stop)+), acted = how long it has
+    The sum of x + v t and, for each thrust, a (acted^2 / 2 + acted (t - stop)+), acted = how long it has
     acted; torque and angle alike (Newton's second law, twice integrated).
     """
     position, velocity = flight(t[:, None, None], scene.position, scene.velocity)
     angle, angular_velocity = flight(t[:, None], scene.angle, scene.angular_velocity)
-    for push in thrusts:
-        acted = np.clip(t - push.start, 0, push.stop - push.start)
-        moved = acted * (acted / 2 + np.maximum(t - push.stop, 0))
-        acceleration, spin_up = push.force / scene.mass[push.disk], push.torque / scene.inertia[push.disk]
-        velocity[:, push.disk] += acted[:, None] * acceleration
-        position[:, push.disk] += moved[:, None] * acceleration
-        angular_velocity[:, push.disk] += acted * spin_up
-        angle[:, push.disk] += moved * spin_up
+    for thrust in thrusts:
+        acted = np.clip(t - thrust.start, 0, thrust.stop - thrust.start)
+        moved = acted * (acted / 2 + np.maximum(t - thrust.stop, 0))
+        acceleration, spin_up = thrust.force / scene.mass[thrust.disk], thrust.torque / scene.inertia[thrust.disk]
+        velocity[:, thrust.disk] += acted[:, None] * acceleration
+        position[:, thrust.disk] += moved[:, None] * acceleration
+        angular_velocity[:, thrust.disk] += acted * spin_up
+        angle[:, thrust.disk] += moved * spin_up
     return answer(scene, t, (position, velocity), turning=(angle, angular_velocity))
 
 
-def body_push(t: Array, acceleration: Array, angle: float, spin: float) -> Motion:
-    """Displacement m and gain of velocity m/s, (k, 2) each, after t (k,) s of a push fixed to its disk.
+def body_thrust(t: Array, acceleration: Array, angle: float, spin: float) -> Motion:
+    """Displacement m and gain of velocity m/s, (k, 2) each, after t (k,) s of a thrust fixed to its disk.
 
     acceleration (2,) m/s2 in the disk's own axes, turned by angle + spin t; spin != 0. In the complex
     plane the integrals of exp(i w t): gain = f (exp(i w t) - 1) / (i w), displacement = (gain - f t) / (i w).

@@ -100,15 +100,15 @@ def computed(
         raise NoTruth(f"{scene.n} disks are more than the {MOST_DISKS} that are followed in many digits")
     if fault := _out_of_scale(scenario):
         raise NoTruth(fault)
-    if any(push.frame == "body" and push.force.any() for push in thrusts):
-        raise NoTruth("a push that turns with its disk makes paths whose contacts no polynomial gives")
-    pushes = [push for push in thrusts if push.force.any()]
+    if any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts):
+        raise NoTruth("a thrust that turns with its disk makes paths whose contacts no polynomial gives")
+    forced = [thrust for thrust in thrusts if thrust.force.any()]
     clock = clock or Clock()
-    record = certified(scenario, pushes, clock) if kind is None and has_balls() else None
-    return record or two_precisions(scenario, pushes, kind or digits, clock)
+    record = certified(scenario, forced, clock) if kind is None and has_balls() else None
+    return record or two_precisions(scenario, forced, kind or digits, clock)
 
 
-def certified(scenario: Scenario, pushes: Sequence[Thrust], clock: Clock) -> TruthRecord | None:
+def certified(scenario: Scenario, forced: Sequence[Thrust], clock: Clock) -> TruthRecord | None:
     """The record by interval arithmetic, which proves every comparison; None where no precision decides one.
 
     How far the first bits reach tells how many are needed for all: a motion loses them at a steady rate. When the
@@ -118,7 +118,7 @@ def certified(scenario: Scenario, pushes: Sequence[Thrust], clock: Clock) -> Tru
     attempts: list[tuple[Path, int]] = []
     while bits <= MOST_BITS:
         try:
-            path = trace(scenario.scene, pushes, until, balls(bits), Work(steps(bits), clock))
+            path = trace(scenario.scene, forced, until, balls(bits), Work(steps(bits), clock))
             error, reached = spread(path, until), until
             if error < accuracy and not clock.struck:
                 return record_of(scenario, path, error, bits, "certified")
@@ -183,14 +183,14 @@ def widest(table: Array, until: float) -> float:
 
 
 def two_precisions(
-    scenario: Scenario, pushes: Sequence[Thrust], kind: Callable[[int], Numbers], clock: Clock
+    scenario: Scenario, forced: Sequence[Thrust], kind: Callable[[int], Numbers], clock: Clock
 ) -> TruthRecord:
     """The record in numbers of one kind, up to where twice as many bits say the same, or the `clock` is over."""
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     attempts: list[tuple[Path, float, int]] = []
     while True:
-        coarse = trace(scene, pushes, until, kind(bits), Work(steps(bits), clock, COARSE))
-        fine = trace(scene, pushes, until, kind(2 * bits), Work(steps(2 * bits), clock))
+        coarse = trace(scene, forced, until, kind(bits), Work(steps(bits), clock, COARSE))
+        fine = trace(scene, forced, until, kind(2 * bits), Work(steps(2 * bits), clock))
         parted, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
         if clock.struck and coarse.end < fine.end:

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
-from scenarios.truth.closed_forms import Collision, answer, world_pushes
+from scenarios.truth.closed_forms import Collision, answer, world_thrusts
 from scenarios.truth.horizon import ASTRAY, horizon
 from scenarios.truth.oracle.path import Event, Path
 
 EPS = float(np.finfo(float).eps)
 ROUNDINGS = 4 * EPS  # of the largest coordinate and of the longest way: a few for a leg's start, a time, a sample
 LEAST = 1e-4  # s; of the bounces that die out those that last less are not listed, as in `walls.bouncing_ball_e09`
-TOUCH = 1e-6  # m, what is closer to a wall at the end may be pushed by it
+TOUCH = 1e-6  # m, what is closer to a wall at the end may be in contact with it
 NONE: Array = frozen(np.zeros((0, 1)))
 
 
@@ -61,7 +61,7 @@ class TruthRecord:
             legs = self.legs[self.legs[:, 0] == i]
             leg = legs[np.maximum(np.searchsorted(legs[:, 1], t, side="right") - 1, 0)]
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
-        turning = world_pushes(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
+        turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
         # What lies there from the start counts as a contact that begins with no impulse; later ones began before.
         collisions: list[Collision] = [
             (float(at), int(i), int(j), float(kick)) for at, i, j, kick, _ in self.events if kick or not at
@@ -209,7 +209,7 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     near = span[touched.any(axis=0)]
     names = f"disk {ours[0]}" if len(ours) == 1 else "disks " + ", ".join(map(str, ours))
     momentum = (mass[:, None] * v).sum(axis=0)
-    # Round a fixed disk, or round the end of a wall, the push turns: no direction keeps its momentum.
+    # Round a fixed disk, or round the end of a wall, the normal turns: no direction keeps its momentum.
     if any(scene.static[i] for i in disks if i < scene.n) or (touched & ((share <= 0) | (share >= 1))).any():
         near = np.eye(2)
     pull = " but for gravity" if scene.gravity.any() else ""

@@ -81,11 +81,11 @@ class NanAtStep7(Sound):
                 self.disks.velocity[0] = np.nan
 
 
-class PushLasts(Sound):
+class ForceLasts(Sound):
     """Nobody clears the forces."""
 
     def step(self, count=1):
-        self.pushed = False
+        self.forced = False
         super().step(count)
 
 
@@ -98,14 +98,14 @@ class LoadKeepsCollisions(Sound):
         self.log = kept
 
 
-class LoadKeepsPush(Sound):
-    """A push that waited for a step waits on."""
+class LoadKeepsForce(Sound):
+    """A force that waited for a step waits on."""
 
     def load(self, scene, dt):
-        waiting = self.disks.force.sum(axis=0) if getattr(self, "pushed", False) else None
+        waiting = self.disks.force.sum(axis=0) if getattr(self, "forced", False) else None
         super().load(scene, dt)
         if waiting is not None:
-            self.push(0, waiting, 0.0)
+            self.apply_force(0, waiting, 0.0)
 
 
 class SharesOneWorld(Sound):
@@ -309,14 +309,14 @@ CAUGHT_BY: dict[type[Engine], str] = {
     WrapsAngles: "order_and_shapes",
     GivesLiveView: "read_copies",
     LoadKeepsCollisions: "load_forgets",
-    LoadKeepsPush: "load_forgets",
+    LoadKeepsForce: "load_forgets",
     SharesOneWorld: "worlds_are_apart",
     IgnoresCount: "counts_are_steps",
     IgnoresDt: "steps_obey_dt",
     NanAtStep7: "stays_finite",
-    PushLasts: "push_lasts_one_step",
-    MassFromDensity: "mass_by_push",
-    SolidDiskInertia: "inertia_by_push",
+    ForceLasts: "force_lasts_one_step",
+    MassFromDensity: "mass_by_force",
+    SolidDiskInertia: "inertia_by_torque",
     VelocityHalfAStepOff: "same_instant",
     TellsNoCollisions: "collisions_are_told",
     NumbersWallsFromTheEnd: "walls_are_told",

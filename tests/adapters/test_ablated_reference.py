@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.habits import FLIGHT, HABITS, IMPULSE, LATE, PUSH_OUT, RESTITUTION, habits_of, with_habits
+from adapters.mechanisms.habits import (
+    FLIGHT,
+    HABITS,
+    IMPULSE,
+    LATE,
+    POSITION_CORRECTION,
+    RESTITUTION,
+    habits_of,
+    with_habits,
+)
 from adapters.mechanisms.switched import BOX2D, BOX2D_V3, PYMUNK, Switched
 from adapters.play import Run, play
 from adapters.reference import Reference
@@ -37,7 +46,7 @@ def positions(engine: Any, scene: Scenario, dt: float) -> Array:
     "name", ["oblique_e09", "falling_box", "asteroids", "ship_thrust", "disk_between_static_disks"]
 )
 def test_with_nothing_switched_on_it_is_the_exercise_to_the_bit(name: str):
-    """Pairs, walls, the wrap, pushes, and disks that stand still; positions and collisions."""
+    """Pairs, walls, the wrap, forces, and disks that stand still; positions and collisions."""
     scene = scenario(name)
     plain, switched = (
         play(engine, "one:run", scene, scene.dt(scene.substeps[1])).trajectory
@@ -142,7 +151,7 @@ def test_with_all_its_habits_the_reference_is_the_engine(name: str, scene: str, 
     ("name", "scene", "habit"),
     [
         ("pymunk:shipped", "oblique_e09", RESTITUTION),
-        ("pymunk:matched", "bouncing_ball_e09", PUSH_OUT),
+        ("pymunk:matched", "bouncing_ball_e09", POSITION_CORRECTION),
         ("box2d_v3:shipped", "slow_collision", RESTITUTION),
         ("box2d:shipped", "box_billiard", "friction"),
     ],
@@ -187,7 +196,7 @@ scene = lay_out(
     walls=box([-0.6, -0.6], [2.6, 2.6]), restitution=0.8, gravity=[0.1, -0.7],
     angular_velocity=np.where(n == 4, 0, 1.0),
 )
-on = {"friction": 0.3, "push_share": 0.1, "slop": 0.01, "push_speed": 3.0, "margin": 0.01}
+on = {"friction": 0.3, "correction_share": 0.1, "slop": 0.01, "push_speed": 3.0, "margin": 0.01}
 for order in (EXERCISE, BOX2D, PYMUNK, BOX2D_V3):
     engine = Switched(order, **on)
     engine.load(scene, 0.01)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from adapters.conformance.probe import first_difference, history, loaded, one_disk, plain
 from adapters.engine import NOT_TOLD
 from adapters.engines import ENGINES
-from adapters.play import STATUSES, play, pushed_steps
+from adapters.play import STATUSES, play, thrust_steps
 from adapters.reference import Reference
 from reference_impl import exercise
 from reports.run.cells import Cell
@@ -54,18 +54,18 @@ def arrays(trajectory):
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_thrust_that_starts_and_stops_inside_steps_gives_its_exact_impulse(name):
-    """0.013 s to 0.687 s in steps of 0.02 s: the first and last push carry a share of a step."""
+    """0.013 s to 0.687 s in steps of 0.02 s: the first and last thrust carry a share of a step."""
     thrust = Thrust(0, 0.013, 0.687, [3.0, -2.0], torque=0.4)
     end = played(name, asked(one_disk(), [thrust]), 0.02).trajectory.at(-1)
     seconds, digits = 0.687 - 0.013, ENGINES[name].rounding
-    # A push and a velocity round in each of 35 steps.
+    # A force and a velocity round in each of 35 steps.
     assert end.velocity[0] == pytest.approx(seconds * thrust.force / 7.3, rel=2 * 35 * digits)
     assert end.angular_velocity[0] == pytest.approx(seconds * 0.4 / 0.9, rel=2 * 35 * digits)
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_body_frame_thrust_turns_with_the_disk(name):
-    """A disk that stands at a right angle is pushed along y by a force along its own x."""
+    """A disk that stands at a right angle is accelerated along y by a force along its own x."""
     scene = replace(one_disk(), angle=np.array([np.pi / 2]))
     thrust = Thrust(0, 0.0, 1.0, [7.3, 0.0], frame="body")
     end = played(name, asked(scene, [thrust]), 0.05).trajectory.at(-1)
@@ -84,9 +84,9 @@ def test_the_shares_of_a_thrust_add_up_to_its_length(start, lasts, dt, at_once):
     """However the steps are cut into samples, and no step is lost or done twice."""
     thrust = Thrust(0, start, start + lasts, [1.0, 0.0])
     steps = at_once * (int((start + lasts) / dt / at_once) + 1)
-    cuts = [cut for first in range(0, steps, at_once) for cut in pushed_steps([thrust], first, at_once, dt)]
+    cuts = [cut for first in range(0, steps, at_once) for cut in thrust_steps([thrust], first, at_once, dt)]
     assert sum(count for count, _ in cuts) == steps
-    shares = sum(share for _, pushes in cuts for _, share in pushes)
+    shares = sum(share for _, thrusts in cuts for _, share in thrusts)
     # The first and the last share may be dropped below 1e-9; start / dt rounds at 300 steps of 2^-53.
     assert abs(shares * dt - lasts) <= 2e-9 * dt + 300 * 2.0**-53
 

@@ -1,4 +1,4 @@
-"""Where a collision begins in the pushes that an engine tells of, step by step."""
+"""Where a collision begins in the impulses that an engine reports, step by step."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from adapters.play import first_collisions
 
 
 def test_weight_in_consecutive_steps_is_one_collision_and_collisions_are_each_their_own():
-    """Pushes no stronger than weight go on with the one before; a stronger one is a collision again, a step later or
+    """Impulses no larger than weight continue the one before; a larger one is a collision again, a step later or
     not."""
     collisions = [
         Collision(3, 1, 0, 2.0),
@@ -31,10 +31,10 @@ def test_weight_in_consecutive_steps_is_one_collision_and_collisions_are_each_th
 
 @settings(derandomize=True)
 @given(st.sets(st.tuples(st.integers(0, 12), st.sampled_from([(0, 1), (0, 2), (1, 2), (1, -1), (1, -2)]))))
-def test_collisions_are_the_beginnings_of_runs_of_pushes(pushes):
-    """Counted the slow way: a push whose pair did not push in the step before."""
-    rows = sorted((step, pair) for step, pair in pushes)
+def test_collisions_are_the_beginnings_of_runs_of_impulses(impulses):
+    """Counted the slow way: an impulse whose pair had none in the step before."""
+    rows = sorted((step, pair) for step, pair in impulses)
     found = first_collisions([Collision(step, *pair, 1.0) for step, pair in rows], 1.0, weight=1.0)
-    begins = {(step + 1.0, *pair) for step, pair in pushes if (step - 1, pair) not in pushes}
+    begins = {(step + 1.0, *pair) for step, pair in impulses if (step - 1, pair) not in impulses}
     assert set(zip(found.t.tolist(), found.i.tolist(), found.j.tolist())) == begins
     assert (np.diff(found.t) >= 0).all()

@@ -28,7 +28,7 @@ def scene(disks: str, walls: str = "", top: str = "", duration: float = 2.0, int
 
 SQUARE = "-0.5 -0.5 0.5 -0.5; 0.5 -0.5 0.5 0.5; 0.5 0.5 -0.5 0.5; -0.5 0.5 -0.5 -0.5"
 FALL = "gravity = [0.0, -9.81]\n"
-PUSH = "[[thrust]]\ndisk = 0\nstart = 0.0\nstop = 1.0\nforce = [{}, 0.0]\n"
+THRUST = "[[thrust]]\ndisk = 0\nstart = 0.0\nstop = 1.0\nforce = [{}, 0.0]\n"
 ROW = ";".join(f"{k * 0.5} 0.0 0.0 0.0" for k in range(1, 11))
 
 # What `truth` is asked: the scene, the exit code, what it must say.
@@ -59,11 +59,11 @@ HARD: dict[str, tuple[str, tuple[int, ...], str]] = {
               "0.8660254037844386"), (0,), "",
     ),
     "a corner that is met at once": (scene("0 0 1 1", "1 -1 1 1; -1 1 1 1"), (0,), "horizon"),
-    "a thrust without end": (scene("0 0 0 0", "", PUSH.format(1.0).replace("stop = 1.0", "stop = inf")), (0,),
+    "a thrust without end": (scene("0 0 0 0", "", THRUST.format(1.0).replace("stop = 1.0", "stop = inf")), (0,),
                              "horizon"),
-    "a thrust of a thousand million newtons": (scene("0 0 0 0; 3 0 0 0", "", PUSH.format(1e9)), (1,),
+    "a thrust of a thousand million newtons": (scene("0 0 0 0; 3 0 0 0", "", THRUST.format(1e9)), (1,),
                                                "too large to follow"),
-    "a thrust of the smallest float": (scene("0 0 0 0", "", PUSH.format(5e-324)), (0,), "horizon"),
+    "a thrust of the smallest float": (scene("0 0 0 0", "", THRUST.format(5e-324)), (0,), "horizon"),
     "a disk of a thousandth of a millimetre beside one of a kilometre": (
         scene("0 0 0 0 1000; -1001 0 1 0 0.000001"), (1,), "no exact answer",
     ),

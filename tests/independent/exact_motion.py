@@ -217,8 +217,8 @@ class Motion:
         disks = [Disk(exact(x) + dx, exact(v) + dv, mpc(0), *size) for x, v, (dx, dv), size in starts]
         breaks = {mpfr(t) for thrust in scenario.thrusts for t in (thrust.start, thrust.stop) if 0 < t < stop}
         for until in (*sorted(breaks), stop):
-            pushed = [acceleration(scene, scenario.thrusts, i, self.now) for i in range(scene.n)]
-            disks = [disk._replace(a=a) for disk, a in zip(disks, pushed)]
+            accelerations = [acceleration(scene, scenario.thrusts, i, self.now) for i in range(scene.n)]
+            disks = [disk._replace(a=a) for disk, a in zip(disks, accelerations)]
             while self.now < until:
                 self.times.append(self.now)
                 self.states.append(disks)

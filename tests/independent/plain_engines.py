@@ -22,10 +22,10 @@ Samples = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 Row = tuple[float, ...]  # x, y, vx, vy, angle, angular velocity of one disk
 
 
-Push = tuple[int, np.ndarray, float]
+Force = tuple[int, np.ndarray, float]
 
 
-def forces(scenario: Scenario, step: int, dt: float, angle: Callable[[int], float]) -> Iterator[Push]:
+def forces(scenario: Scenario, step: int, dt: float, angle: Callable[[int], float]) -> Iterator[Force]:
     """Disk, force (2,) N and torque N m of every thrust in a step: its mean over that, so that the impulse is exact.
 
     A force in the axes of the disk is turned by the angle which that has at the start of the step.

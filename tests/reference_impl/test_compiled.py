@@ -30,7 +30,7 @@ for solver, side, steps in ((exercise, 4, 600), (lesson, 4, 600), (ordered, 4, 6
 
 
 def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
-    """A crowd with collisions, two walls, gravity, wrap, spin, pushes and a static disk, through every variant."""
+    """A crowd with collisions, two walls, gravity, wrap, spin, forces and a static disk, through every variant."""
     outputs = [
         subprocess.run(
             [sys.executable, "-c", SCENE], capture_output=True, check=True, cwd=Path(__file__).parents[2],

@@ -187,7 +187,7 @@ def test_the_equations_of_the_lesson_equal_the_impulse_of_the_exercise(pair):
 @steady
 @given(pair=overlapping_pairs(), static=st.integers(0, 1))
 def test_a_static_disk_never_moves(solver, pair, static):
-    """Collision, pushed, pulled by gravity, or overlapped by another static disk: to the bit."""
+    """Struck, under a force, under gravity, or overlapped by another static disk: to the bit."""
     disks, world = pair
     disks.mass[static], disks.velocity[static] = np.inf, 0.0
     disks.force[...], disks.torque[...] = 3.0, 2.0

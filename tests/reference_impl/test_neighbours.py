@@ -30,8 +30,8 @@ def scenes(draw):
     velocity = speed * rng.normal(size=(n, 2))  # of static disks, too, which nevertheless do not move
     spin = rng.normal(size=n) * rng.choice([-0.0, 1.0], n)
     disks = make_disks(rng.uniform(0, side, (n, 2)), velocity, radius, mass, angular_velocity=spin)
-    pushed = rng.random(n) < draw(st.sampled_from([0.0, 0.1, 1.0]))
-    disks.force[pushed], disks.torque[pushed] = [3.0, -2.0], 0.7
+    forced = rng.random(n) < draw(st.sampled_from([0.0, 0.1, 1.0]))
+    disks.force[forced], disks.torque[forced] = [3.0, -2.0], 0.7
     corners = np.array([[0, 0], [side, 0], [side, side], [0, side]])
     walls = np.stack([corners, np.roll(corners, -1, 0)], 1)[: draw(st.sampled_from([0, 2, 4]))]
     box = draw(st.sampled_from([np.inf, side]))

@@ -14,7 +14,7 @@ from scenarios.model import Array, Scenario, Scene, Thrust
 
 Draw = np.random.Generator
 
-INTERVAL = 1 / 16  # s; thrusts switch at samples, so that every step is pushed as a whole
+INTERVAL = 1 / 16  # s; thrusts switch at samples, so that every step is under a thrust as a whole
 RESTITUTIONS = (0.0, 0.02, 0.5, 0.9, 1.0, None)  # None: anything from 0 to 1
 NEAREST = 1e-3  # m between things that do not touch
 GRID = 1 / 8  # m; multiples of it are exact in float64, and so is whether disks on it touch

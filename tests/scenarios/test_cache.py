@@ -76,7 +76,7 @@ def test_a_corrupted_file_is_made_anew(content: bytes, folder: Path, made: list[
 
 
 def test_what_decides_the_answer_decides_the_key():
-    """Duration, scene and pushes; not the name, the question or the ladder."""
+    """Duration, scene and thrusts; not the name, the question or the ladder."""
     keys = {
         truth_cache.key_of(one, False)
         for one in (

@@ -44,7 +44,7 @@ def test_scenario_asks_one_question_and_has_a_truth_or_a_reason_for_none(name):
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_nothing_overlaps_at_the_start_and_all_is_on_the_page(name):
-    """No engine begins by pushing disks apart."""
+    """No engine begins by correcting overlaps."""
     scene = scenario(name).scene
     # A unit in the last place of the coordinates: touching disks touch to rounding.
     assert smallest_gap(scene, scene.position[None])[0] >= -1e-15
@@ -106,11 +106,11 @@ def test_no_collision_falls_on_a_step(name):
 
 
 @pytest.mark.parametrize("name", ANSWERED)
-def test_pushes_begin_and_end_at_samples(name):
-    """No step of any dt of the ladder is pushed for a part of it only."""
+def test_thrusts_begin_and_end_at_samples(name):
+    """No step of any dt of the ladder is under a thrust for a part of it only."""
     run = scenario(name)
-    for push in run.thrusts:
-        samples = np.array([push.start, push.stop]) / run.sample_interval
+    for thrust in run.thrusts:
+        samples = np.array([thrust.start, thrust.stop]) / run.sample_interval
         # One rounding of the quotient.
         np.testing.assert_allclose(samples, np.round(samples), rtol=1e-15)
 

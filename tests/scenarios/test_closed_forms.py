@@ -12,9 +12,9 @@ from scenarios.model import Scene
 from scenarios.truth.exact import OracleTruth
 
 ANSWERED = [name for name in SCENARIOS if (truth := scenario(name).truth) and not isinstance(truth, OracleTruth)]
-PUSHED = [name for name in ANSWERED if scenario(name).thrusts]
+THRUST = [name for name in ANSWERED if scenario(name).thrusts]
 RESTING = ["rest_on_floor", "slide_on_incline", "column_of_ten"]
-FLYING = [name for name in ANSWERED if name not in (*PUSHED, *RESTING)]
+FLYING = [name for name in ANSWERED if name not in (*THRUST, *RESTING)]
 
 
 def exact(name):
@@ -143,7 +143,7 @@ def test_velocity_is_the_derivative_of_position(name):
     run, truth, until = exact(name)
     h = 1e-4
     times = np.linspace(0.01, until - 0.01, 301)
-    edges = np.concatenate([truth.collisions.t, *([push.start, push.stop] for push in run.thrusts), [-1]])
+    edges = np.concatenate([truth.collisions.t, *([thrust.start, thrust.stop] for thrust in run.thrusts), [-1]])
     times = times[np.abs(times[:, None] - edges).min(axis=1) > 2 * h]
     before, now, after = (run.truth(times + shift) for shift in (-h, 0, h))
     # Central differences: jerk h2 / 6 < 5 m/s3 1e-8 / 6 = 1e-8 (0 in a parabola), rounding 15 m 1e-16 / h = 3e-11.
@@ -152,8 +152,8 @@ def test_velocity_is_the_derivative_of_position(name):
         np.testing.assert_allclose(slope, getattr(now, rate), rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", PUSHED)
-def test_velocity_and_spin_change_by_the_pushes_as_quadrature_has_it(name):
+@pytest.mark.parametrize("name", THRUST)
+def test_velocity_and_spin_change_by_the_thrusts_as_quadrature_has_it(name):
     """The integral of force and torque over every sample interval, world and body frame."""
     run, truth, _ = exact(name)
     nodes, weights = np.polynomial.legendre.leggauss(8)
@@ -163,13 +163,13 @@ def test_velocity_and_spin_change_by_the_pushes_as_quadrature_has_it(name):
         t = start + width * (nodes + 1) / 2
         angle = run.truth(t).angle
         gained[k + 1], turned[k + 1] = gained[k], turned[k]
-        for push in run.thrusts:
-            if not push.start - 1e-9 < start < push.stop - 1e-9:
+        for thrust in run.thrusts:
+            if not thrust.start - 1e-9 < start < thrust.stop - 1e-9:
                 continue
-            turn = np.exp(1j * angle[:, push.disk]) if push.frame == "body" else np.ones(8)
-            force = (complex(*push.force) * turn * weights).sum() * width / 2
-            gained[k + 1, push.disk] += np.array([force.real, force.imag]) / run.scene.mass[push.disk]
-            turned[k + 1, push.disk] += push.torque * width / run.scene.inertia[push.disk]
+            turn = np.exp(1j * angle[:, thrust.disk]) if thrust.frame == "body" else np.ones(8)
+            force = (complex(*thrust.force) * turn * weights).sum() * width / 2
+            gained[k + 1, thrust.disk] += np.array([force.real, force.imag]) / run.scene.mass[thrust.disk]
+            turned[k + 1, thrust.disk] += thrust.torque * width / run.scene.inertia[thrust.disk]
     # Eight nodes per 1/60 s are exact to rounding: some hundreds of sums of 1e-16.
     np.testing.assert_allclose(truth.velocity, run.scene.velocity + gained, rtol=0, atol=1e-13)
     np.testing.assert_allclose(truth.angular_velocity, run.scene.angular_velocity + turned, rtol=0, atol=1e-13)

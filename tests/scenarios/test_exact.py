@@ -20,10 +20,10 @@ from tests.reports.compare.metamorphic import Change
 from tests.scenarios.exercise_box import boxed, lasting
 
 
-def pushed(force: float, away: float = 0.0, duration: float = 2.0) -> Scenario:
+def under_thrust(force: float, away: float = 0.0, duration: float = 2.0) -> Scenario:
     """A disk of 1 kg under a thrust, `away` m from the origin."""
     scene = lay_out(position=[[away, 0.0]], velocity=[[2.0, 0.0]], radius=[0.25], mass=[1.0], restitution=0.9)
-    return with_oracle(Scenario("pushed", "?", "", scene, duration, 0.02, thrusts=[Thrust(0, 0.0, 1.0, [force, 0.0])]))
+    return with_oracle(Scenario("thrust", "?", "", scene, duration, 0.02, thrusts=[Thrust(0, 0.0, 1.0, [force, 0.0])]))
 
 
 def keeps_its_promise(one: Scenario, record: TruthRecord) -> bool:
@@ -34,7 +34,7 @@ def keeps_its_promise(one: Scenario, record: TruthRecord) -> bool:
 @pytest.mark.parametrize(("force", "away"), [(1e6, 0.0), (9e5, 1e3), (1.0, 1e5), (0.0, 1e5), (1e3, 2e5)])
 def test_an_answer_ends_where_float64_cannot_tell_it_any_more(force: float, away: float):
     """After a long way, or far from the origin; before that it is what was promised."""
-    one = pushed(force, away, 20.0)
+    one = under_thrust(force, away, 20.0)
     record = record_of(one)
     assert keeps_its_promise(one, record)
     if record.valid_until < one.duration:
@@ -44,13 +44,13 @@ def test_an_answer_ends_where_float64_cannot_tell_it_any_more(force: float, away
 def test_where_nothing_can_be_told_there_is_no_answer():
     """At 10^6 m a rounding is 10^-10 m, and a few of them too much."""
     with pytest.raises(NoTruth, match="the rounding of float64 is more than"):
-        record_of(pushed(0.0, away=1e6))
+        record_of(under_thrust(0.0, away=1e6))
 
 
 def test_without_the_rule_the_promise_is_broken(monkeypatch: pytest.MonkeyPatch):
     """The control: the same record, taken to its end."""
     monkeypatch.setattr(oracle_record, "within_float64", lambda _scenario, path, _error: path)
-    one = pushed(1e6, 0.0, 20.0)
+    one = under_thrust(1e6, 0.0, 20.0)
     assert not keeps_its_promise(one, computed(one))
 
 
@@ -58,7 +58,7 @@ def test_without_the_rule_the_promise_is_broken(monkeypatch: pytest.MonkeyPatch)
 def test_a_thrust_out_of_scale_is_refused_at_once(force: float):
     """It went on for ever from 1e154 N on, and gave an answer to 10^85 m below."""
     with pytest.raises(NoTruth, match="the largest acceleration by a thrust is"):
-        record_of(pushed(force))
+        record_of(under_thrust(force))
 
 
 @settings(max_examples=60, deadline=None)
@@ -72,8 +72,8 @@ def test_no_record_breaks_its_promise(force: float, away: float, radius: float, 
         position=[[away, 0.0], [away, 40.0]], velocity=[[1.0, 0.0], [0.0, -1.0]], radius=[radius] * 2,
         mass=[1.0, 2.0], restitution=1.0, gravity=gravity,
     )  # fmt: skip
-    push = Thrust(0, 0.0, duration / 2, [force, 0.0])
-    one = with_oracle(Scenario("any", "?", "", scene, duration, duration / 10, thrusts=[push]))
+    thrust = Thrust(0, 0.0, duration / 2, [force, 0.0])
+    one = with_oracle(Scenario("any", "?", "", scene, duration, duration / 10, thrusts=[thrust]))
     try:
         record = record_of(one)
     except NoTruth:

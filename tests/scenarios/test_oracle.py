@@ -188,8 +188,8 @@ def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
     assert collision[4] == pytest.approx(np.sqrt(1 - 0.16), rel=1e-14)
 
 
-def test_pushes_carry_a_disk_into_a_wall():
-    """From rest, s = F t2 / 2m; the push ends, the disk flies on."""
+def test_thrusts_carry_a_disk_into_a_wall():
+    """From rest, s = F t2 / 2m; the thrust ends, the disk flies on."""
     scene = lay_out(
         position=[[0, 0]], velocity=[[0, 0]], radius=[0.5], mass=[2], walls=[[[2, -1], [2, 1]]], restitution=1
     )

@@ -86,14 +86,14 @@ CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201,
     [
         (asked(replace(ROW, position=ROW.position * [0.9, 1])), "disk 1 and disk 2 overlap by 0.05 m at the start"),
         (asked(replace(BALL, position=[[0, 0.1], [0, 2]])), "disk 0 and wall 0 overlap by 0.15 m at the start"),
-        (asked(ROW, thrusts=BODY), "a push that turns with its disk"),
+        (asked(ROW, thrusts=BODY), "a thrust that turns with its disk"),
         (asked(CROWD), "201 disks are more than the 200"),
         (asked(replace(SEAM, radius=[1e-9, 1])), "a radius of 1e-09 m is below 1e-06 m"),
         (asked(replace(BALL, velocity=[[1e9, 0], [0, 0]])), r"the largest velocity is 1e\+09 \(SI\), above 1e\+06"),
     ],
 )
 def test_what_it_cannot_do_is_refused(one: Scenario, reason: str):
-    """With one sentence; nothing is pushed apart."""
+    """With one sentence; no overlap is corrected."""
     with pytest.raises(NoTruth, match=reason):
         computed(one)
 

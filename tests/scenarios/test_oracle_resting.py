@@ -230,7 +230,7 @@ def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
     assert "the collisions of disk 1 on disk 0 accumulate" in computed(asked(aside, 0.1)).reason
 
 
-def test_a_push_lifts_a_resting_disk_and_lets_it_fall():
+def test_a_thrust_lifts_a_resting_disk_and_lets_it_fall():
     """Twice its weight for half a second from 1 s on."""
     scene = lay_out(
         position=[[0, 0.25]], velocity=[[0, 0]], radius=[0.25], mass=[2], gravity=[0, -9.81], restitution=0.5,
@@ -275,7 +275,7 @@ def test_a_settling_box_is_answered_far_beyond_its_first_rest():
 
 
 def test_round_the_end_of_a_wall_no_momentum_is_said_to_stay():
-    """There the push of the wall turns with the disk: only its energy is known on."""
+    """There the normal of the wall turns with the disk: only its energy is known on."""
     scene = Scene(
         position=np.array([[0.0, 0.5]]), velocity=np.array([[2.0, 0.0]]), radius=np.array([0.5]), mass=np.ones(1),
         restitution=0.0, gravity=np.array([0.0, -9.81]), walls=np.array([[[-10.0, 0.0], [1.0, 0.0]]]),

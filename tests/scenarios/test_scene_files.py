@@ -169,10 +169,10 @@ def scenarios(draw: st.DrawFn) -> Scenario:
     start, last = draw(st.floats(0, 10)), draw(st.just(np.inf) | st.floats(11, 20))
     frame: Literal["world", "body"] = draw(st.sampled_from(["world", "body"]))
     force = np.array([draw(coordinate), 0.1])
-    push = Thrust(n - 1, start, last, force, draw(coordinate), frame)
+    reach = Thrust(n - 1, start, last, force, draw(coordinate), frame)
     interval, samples = draw(st.floats(1e-3, 1)), draw(st.integers(1, 1000))
     asks, source = draw(st.text(st.characters(codec="utf-8"), min_size=1)), draw(st.text())
-    return Scenario("any", asks, source, scene, interval * samples, interval, thrusts=[push])
+    return Scenario("any", asks, source, scene, interval * samples, interval, thrusts=[reach])
 
 
 @given(scenarios())

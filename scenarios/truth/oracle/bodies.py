@@ -13,7 +13,8 @@ from scenarios.truth.oracle.numbers import Number, Numbers
 from scenarios.truth.oracle.ties import Contact, Matter, Touch, Velocity
 
 STATIC, FALLING = 0, 1
-"""Kinds of acceleration: none, gravity; each pushed disk is a kind of its own, from 2 on; below 0: slides on a wall."""
+"""Kinds of acceleration: none, gravity; each disk under a thrust is a kind of its own, from 2 on; below 0: slides on a
+wall."""
 
 
 STILL, STRAIGHT, CURVED = range(3)
@@ -152,8 +153,8 @@ class Bodies:
         x, y, vx, vy = place
         self.begin(i, Leg(now, x, y, vx, vy, *self.acceleration(i)))
 
-    def push(self, i: int, now: Number, thrusts: Sequence[Thrust]) -> None:
-        """Body i is pushed by all of `thrusts` from now on."""
+    def set_thrusts(self, i: int, now: Number, thrusts: Sequence[Thrust]) -> None:
+        """Body i is accelerated by all of `thrusts` from now on."""
         exact, inverse = self.k.exact, self.matter.inverse_mass[i]
         a = [exact(g) for g in (self.scene.gravity * (not self.scene.static[i])).tolist()]
         for thrust in thrusts:

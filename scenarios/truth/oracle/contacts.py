@@ -13,7 +13,7 @@ HALVINGS = 12  # of a bracket, before Newton is tried: enough to leave the neigh
 
 
 class Pressed(ArithmeticError):
-    """Two bodies touch, do not approach, and are pushed together: a contact that lasts, no collision."""
+    """Two bodies touch, do not approach, and are pressed together: a contact that lasts, no collision."""
 
 
 def meeting(k: Numbers, c: Number, b: Number, a2: Number) -> Number | None:

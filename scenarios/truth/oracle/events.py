@@ -56,9 +56,9 @@ class Motion:
         return self.path
 
     def begin(self) -> None:
-        """Push what is pushed from the start, rest what lies still, predict all."""
+        """Set the thrusts on from the start, rest what lies still, predict all."""
         while self.switches and self.switches[-1][0] == 0:
-            self.push(self.switches.pop()[1])
+            self.set_thrusts(self.switches.pop()[1])
         for contact in lie_down(self.ahead):
             self.rest(contact)
         self.follow_up(set(np.flatnonzero(~self.scene.static).tolist()))
@@ -69,7 +69,7 @@ class Motion:
         if self.switches and self.switches[-1][0] <= soonest:
             t, disk = self.switches.pop()
             self.now = self.k.exact(t)
-            self.push(disk)
+            self.set_thrusts(disk)
             self.follow_up({disk})
             return True
         if soonest == np.inf:
@@ -276,10 +276,10 @@ class Motion:
                 raise Ends(float(self.now), reason, sorted(other.disks))
         self.follow_up({i})
 
-    def push(self, disk: int) -> None:
-        """Begin or end a push."""
+    def set_thrusts(self, disk: int) -> None:
+        """Begin or end a thrust."""
         on = [p for p in self.thrusts if p.disk == disk and p.start <= float(self.now) < p.stop]
-        self.bodies.push(disk, self.now, on)
+        self.bodies.set_thrusts(disk, self.now, on)
 
     def follow_up(self, disks: set[int]) -> None:
         """Write down the new legs and predict the disks anew."""

@@ -39,8 +39,8 @@ def settle(ahead: Ahead, contact: Contact, now: Number, thrusts: Sequence[Thrust
     ax, ay = along(bodies, contact, leg.ax, leg.ay)
     hop = Hop(-contact.side * wall.ty, contact.side * wall.tx, speed, fall)
     bounces = Leg(now, leg.x, leg.y, vx, vy, ax, ay, hop)
-    pushed = [edge for push in thrusts if push.disk == i for edge in (push.start, push.stop)]
-    if any(float(now) < edge <= float(stop) * SAFE for edge in pushed):
+    edges = [edge for thrust in thrusts if thrust.disk == i for edge in (thrust.start, thrust.stop)]
+    if any(float(now) < edge <= float(stop) * SAFE for edge in edges):
         return None
     if not untouched(ahead, contact, bounces, float(stop), thrusts):
         return None
@@ -59,7 +59,7 @@ def along(bodies: Bodies, contact: Contact, x: Number, y: Number) -> tuple[Numbe
 def untouched(ahead: Ahead, contact: Contact, leg: Leg, stop: float, thrusts: Sequence[Thrust]) -> bool:
     """Rule Z1: whether the disk on `leg` meets nothing but its wall until `stop` s, whatever the others do.
 
-    None can be faster than all energy there is, with what gravity and pushes may add, makes it:
+    None can be faster than all energy there is, with what gravity and thrusts may add, makes it:
     d sqrt(K) / dt <= a sqrt(M / 2), K <= sum m v^2 / 2, |v_j| <= sqrt(2 K / m_j).
     """
     bodies, scene, i, w = ahead.bodies, ahead.scene, contact.i, contact.j
@@ -123,8 +123,8 @@ def travel(bodies: Bodies, states: Array, left: float, thrusts: Sequence[Thrust]
     """(b,) m, how far each body gets within `left` s at most, from states (b, 6) as of `moved`; see `untouched`."""
     mass = np.append(bodies.scene.mass, np.full(len(states) - bodies.scene.n, np.inf))
     moves = np.isfinite(mass)
-    pushes = [float(np.hypot(*push.force)) / mass[push.disk] for push in thrusts]
-    pull = float(np.hypot(*bodies.scene.gravity)) + sum(pushes)
+    accelerations = [float(np.hypot(*thrust.force)) / mass[thrust.disk] for thrust in thrusts]
+    pull = float(np.hypot(*bodies.scene.gravity)) + sum(accelerations)
     hops = np.array([0.0 if leg.hop is None else float(leg.hop.speed) ** 2 for leg in bodies.legs])
     energy = (mass[moves] * ((states[moves, 2:4] ** 2).sum(axis=1) + hops[moves])).sum() / 2
     speed = np.sqrt(energy) + np.sqrt(mass[moves].sum() / 2) * pull * left

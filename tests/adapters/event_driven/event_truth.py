@@ -10,7 +10,7 @@ import numpy as np
 from adapters.event_driven.events import EventEngine
 from scenarios.model import Array, Scenario, Scene, Trajectory, frozen
 from scenarios.no_truth import NoTruth
-from scenarios.truth.closed_forms import Motion, answer, world_pushes
+from scenarios.truth.closed_forms import Motion, answer, world_thrusts
 
 ERROR_BOUND = 1e-9  # m
 SAFETY = 10.0  # a perturbed run may stray so many times less than the bound, since the run itself is as far off
@@ -25,12 +25,12 @@ class EventTruth:
     to where the motion has no single continuation; `reason` says which, or is "" if it holds for the duration.
 
     Raises:
-        NoTruth: the scene has no answer at all, or pushes that turn with their disk.
+        NoTruth: the scene has no answer at all, or thrusts that turn with their disk.
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        if any(push.frame == "body" and push.force.any() for push in scenario.thrusts):
-            raise NoTruth("a push that turns with its disk makes no parabolas")
+        if any(thrust.frame == "body" and thrust.force.any() for thrust in scenario.thrusts):
+            raise NoTruth("a thrust that turns with its disk makes no parabolas")
         self.scenario = scenario
         EventEngine(scenario.scene).advance(0.0)  # refuses a start that is none
 
@@ -39,7 +39,7 @@ class EventTruth:
         scene, thrusts = self.scenario.scene, self.scenario.thrusts
         motion, collisions, _, _ = self.play(scene, np.asarray(t)[np.asarray(t) <= self.valid_until])
         reached = np.asarray(t)[: len(motion[0])]
-        turned = world_pushes(scene, thrusts, reached)
+        turned = world_thrusts(scene, thrusts, reached)
         rows = [(float(at), int(i), int(j), float(impulse)) for at, i, j, impulse in collisions]
         turning = (turned.angle, turned.angular_velocity)
         return answer(scene, reached, motion, rows, turning, self.valid_until, ERROR_BOUND)
@@ -78,14 +78,14 @@ class EventTruth:
         """Position and velocity (k, n, 2) at as many of the times as are reached, collisions (h, 4); when and why it
         ends."""
         engine = EventEngine(scene)
-        edges = {edge for push in self.scenario.thrusts for edge in (push.start, push.stop)}
+        edges = {edge for thrust in self.scenario.thrusts for edge in (thrust.start, thrust.stop)}
         seen: list[tuple[Array, Array]] = []
         end, reason = np.inf, ""
         try:
             for at in sorted({*t.tolist(), *(edge for edge in edges if edge <= t[-1])} if len(t) else ()):
                 engine.advance(at)
                 if at in edges:
-                    self.push(engine, scene, at)
+                    self.set_accelerations(engine, scene, at)
                 seen += [engine.look(at)] * int((t == at).sum())
         except NoTruth as refusal:
             end, reason = refusal.at, str(refusal)
@@ -93,16 +93,16 @@ class EventTruth:
         position, velocity = (np.array([look[part] for look in seen]).reshape(shape) for part in range(2))
         return (position, velocity), engine.collisions, end, reason
 
-    def push(self, engine: EventEngine, scene: Scene, at: float) -> None:
-        """Give every pushed disk the acceleration it has from `at` s on."""
-        for disk in sorted({push.disk for push in self.scenario.thrusts}):
+    def set_accelerations(self, engine: EventEngine, scene: Scene, at: float) -> None:
+        """Give every disk under a thrust the acceleration it has from `at` s on."""
+        for disk in sorted({thrust.disk for thrust in self.scenario.thrusts}):
             on = [p.force for p in self.scenario.thrusts if p.disk == disk and p.start <= at < p.stop]
             if not scene.static[disk]:
                 engine.pull(disk, at, scene.gravity + sum(on, np.zeros(2)) / scene.mass[disk])
 
 
 def float64_truth(scenario: Scenario) -> EventTruth:
-    """The scenario's answer by float64 events; raises `NoTruth` if its start or its pushes allow none."""
+    """The scenario's answer by float64 events; raises `NoTruth` if its start or its thrusts allow none."""
     return EventTruth(scenario)
 
 

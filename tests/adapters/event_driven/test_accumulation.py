@@ -153,7 +153,7 @@ def test_collisions_that_accumulate_are_refused_where_the_exact_answer_ends_too(
     assert engine.spent < 10_000
 
 
-def test_a_disk_pushed_into_a_wall_by_another_is_refused():
+def test_a_disk_driven_into_a_wall_by_another_is_refused():
     """One that is pulled by nothing, between the wall and one that is."""
     scene = Scene(
         position=[[0.25, 0.0], [1.2, 0.0]], velocity=np.zeros((2, 2)), radius=[0.25, 0.25], mass=[1.0, 1.0],

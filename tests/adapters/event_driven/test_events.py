@@ -56,7 +56,7 @@ def test_where_nothing_is_chaotic_the_horizon_is_the_duration(name):
 
 @pytest.mark.parametrize(("name", "words"), REFUSED.items())
 def test_a_scene_without_an_answer_is_refused_with_its_reason(name, words):
-    """Resting contacts, disks that touch and close in, pushes in the body frame."""
+    """Resting contacts, disks that touch and close in, thrusts in the body frame."""
     with pytest.raises(NoTruth, match=words):
         float64_truth(scenario(name))
 
@@ -138,10 +138,10 @@ def test_the_wrap_is_an_event_and_a_reentry_on_top_of_a_disk_ends_the_answer():
                 state_after(scene, 1.0)
 
 
-def test_a_pushed_disk_strikes_a_resting_one_at_the_root_of_the_gap():
+def test_a_disk_under_a_thrust_strikes_a_resting_one_at_the_root_of_the_gap():
     """From rest under 2 m/s2: a gap of 1 m is closed after 1 s at 2 m/s; equal masses swap."""
     scene = two(gap=1.0, closing=0.0, restitution=1.0)
-    run = Scenario("pushed", "", "", scene, 4.0, 0.125, thrusts=[Thrust(0, 0.5, 1.5, [2.0, 0.0])])
+    run = Scenario("thrust", "", "", scene, 4.0, 0.125, thrusts=[Thrust(0, 0.5, 1.5, [2.0, 0.0])])
     truth = float64_truth(run)(run.times)
     assert truth.collisions.t.tolist() == pytest.approx([1.5], abs=1e-15)
     assert truth.velocity[-1, 1, 0] == pytest.approx(2.0, abs=1e-14)

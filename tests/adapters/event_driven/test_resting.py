@@ -124,7 +124,7 @@ def test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(sp
     assert v[0] == pytest.approx([speed, -G * fall], abs=1e-14)
 
 
-def test_a_push_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
+def test_a_thrust_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
     """2 m/s2 upward and to the right from 1 s to 2 s; the same twice as strong downward leaves it where it is."""
     scene = disks([[0.0, 0.5]], [[0.0, 0.0]], 0.5)
     for upward, height in ((2.0, 1.0), (-4.0, 0.0)):

@@ -187,7 +187,7 @@ def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path)
     for name, text in {"with.js": code + "// vec2\n", "without.js": code}.items():
         (tmp_path / name).write_text(text)
         with SolverProcess(read_solver(tmp_path / name)) as process:
-            seen[name] = ask(process, {"push": QUESTIONS["push"]})["push"].last[0].alpha
+            seen[name] = ask(process, {"force": QUESTIONS["force"]})["force"].last[0].alpha
 
     assert seen == {"with.js": 1.0, "without.js": 2.0}
 

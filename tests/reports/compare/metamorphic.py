@@ -80,7 +80,7 @@ class Change:
             wrap=None if scene.wrap is None else np.sort(self.place(scene.wrap), axis=0),
         )  # fmt: skip
 
-    def push(self, thrust: Thrust, n: int) -> Thrust:
+    def thrust(self, thrust: Thrust, n: int) -> Thrust:
         """The thrust, told otherwise; one that turns with its disk only flips."""
         flipped = thrust.force * [1, self.flip] if thrust.frame == "body" else self.way(thrust.force)
         force = self.mass * self.length / self.time**2 * flipped
@@ -90,10 +90,10 @@ class Change:
 
     def scenario(self, one: Scenario) -> Scenario:
         """The scenario, with its exact answer told otherwise."""
-        pushes = [self.push(thrust, one.scene.n) for thrust in self.thrusts(one.thrusts)]
+        thrusts = [self.thrust(thrust, one.scene.n) for thrust in self.thrusts(one.thrusts)]
         new = replace(
             one, scene=self.scene(one.scene), duration=self.time * one.duration,
-            sample_interval=self.time * one.sample_interval, thrusts=pushes, truth=None,
+            sample_interval=self.time * one.sample_interval, thrusts=thrusts, truth=None,
         )  # fmt: skip
         if one.truth is None:
             return new

@@ -115,16 +115,17 @@ def test_collisions_take_the_energy_and_the_walls_the_momentum_that_the_truth_lo
 
 
 def test_of_two_collisions_at_one_instant_either_may_come_first():
-    """A ball in the middle of a row is pushed and pushes on; mirrored, the list has the two the other way round."""
+    """A ball in the middle of a row receives an impulse and gives one; mirrored, the list has the two the other way
+    round."""
     t, when = np.array([1.0]), np.array([1.0, 1.0])
-    push, give = np.array([1.0, 0.0]), np.array([-1.0, 0.0])
+    receive, give = np.array([1.0, 0.0]), np.array([-1.0, 0.0])
     still = np.zeros((1, 1, 2))
     limits = np.array([0, 2])
-    for change in (np.array([push, give]), np.array([give, push])):
-        for met in (push, give, np.zeros(2)):
+    for change in (np.array([receive, give]), np.array([give, receive])):
+        for met in (receive, give, np.zeros(2)):
             assert np.array_equal(nearest(t, met[None, None], still, limits, when, change, 0.1)[0, 0], met)
-    apart = np.array([1.0, 1.01])  # the control: one after the other, to push on before it is pushed is wrong
-    found = nearest(t + 0.02, give[None, None], still, limits, apart, np.array([push, give]), 0.1)[0, 0]
+    apart = np.array([1.0, 1.01])  # the control: one after the other, to give before it receives is wrong
+    found = nearest(t + 0.02, give[None, None], still, limits, apart, np.array([receive, give]), 0.1)[0, 0]
     assert not np.array_equal(found, give)
 
 

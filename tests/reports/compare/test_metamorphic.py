@@ -59,11 +59,11 @@ SCENES: dict[str, Callable[[], Scenario]] = {
             restitution=1.0, walls=box([-1.1, -1.7], [1.1, 1.7]),
         ), 3.0, 0.1,
     ),
-    "pushed": lambda: asked(
-        "pushed", crowd(restitution=0.8), 1.0, 0.02,
+    "thrust": lambda: asked(
+        "thrust", crowd(restitution=0.8), 1.0, 0.02,
         (Thrust(0, 0.1, 0.5, [1.5, -2.0], 0.3), Thrust(3, 0.2, 0.77, [0.0, 4.0])),
     ),
-    "pushed to the walls": lambda: asked(
+    "thrust to the walls": lambda: asked(
         "steered", crowd(restitution=0.7, walls=ROOM), 0.8, 0.02, (Thrust(1, 0.0, 0.6, [3.0, 0.5], 0.3, "body"),),
     ),
     "wrapped": lambda: asked("wrapped", crowd(restitution=0.9, wrap=[[-3.0, -2.0], [3.0, 2.0]]), 1.0, 0.02),
@@ -71,7 +71,7 @@ SCENES: dict[str, Callable[[], Scenario]] = {
 
 # What a change cannot be asked of: a moving frame moves walls, what stands still and gravity's energy; the wrap stands
 # along the axes and is as long as it is.
-WALLED = ("elastic", "room", "falling", "grid", "pushed to the walls", "wrapped")
+WALLED = ("elastic", "room", "falling", "grid", "thrust to the walls", "wrapped")
 LEFT_OUT = {("boosted", name) for name in WALLED} | {
     (name, "wrapped") for name in ("turned", "turned by a quarter and mirrored")
 }
@@ -135,7 +135,7 @@ def test_every_metric_is_under_test():
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     length=st.floats(1e-4, 1e4), time=st.floats(1e-4, 1e4), mass=st.floats(1e-4, 1e4), turn=st.floats(0, 7),
-    flip=st.sampled_from([1, -1]), name=st.sampled_from(["free", "falling", "grid", "pushed"]),
+    flip=st.sampled_from([1, -1]), name=st.sampled_from(["free", "falling", "grid", "thrust"]),
 )  # fmt: skip
 def test_any_units_and_any_axes_will_do(length: float, time: float, mass: float, turn: float, flip: int, name: str):
     """All at once."""
@@ -221,8 +221,8 @@ WRONG = [
     (per_second, "1", "room", "walls doubled"),
     (heavy, "1", "room", "in g"),
     (largest, "1", "room", "in mm"),
-    (of_thrusts, "1", "pushed", "thrusts cut in two"),
-    (of_thrusts, "1", "pushed", "thrusts shared by two"),
+    (of_thrusts, "1", "thrust", "thrusts cut in two"),
+    (of_thrusts, "1", "thrust", "thrusts shared by two"),
     (fastest, "m/s", "free", "boosted"),
 ]
 

@@ -92,10 +92,10 @@ def test_energy_that_is_created_is_seen():
 
 
 def test_weight_and_thrust_are_accounted_for():
-    """Free flight under gravity and a world-frame push has no momentum error."""
+    """Free flight under gravity and a world-frame thrust has no momentum error."""
     scene = Scene(position=[[0, 0]], velocity=[[1, 2]], radius=[0.1], mass=[2], restitution=1, gravity=[0, -9.81])
     one = Scenario(
-        name="pushed", asks="?", source="", scene=scene, duration=1.0, sample_interval=0.1,
+        name="thrust", asks="?", source="", scene=scene, duration=1.0, sample_interval=0.1,
         thrusts=[Thrust(0, 0.25, 0.6, [3.0, 1.0])],
     )  # fmt: skip
     run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))

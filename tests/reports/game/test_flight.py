@@ -1,4 +1,5 @@
-"""A flight without a server: keys push as the exercise says, the same keys give the same bits, a saved flight too."""
+"""A flight without a server: keys accelerate as the exercise says, the same keys give the same bits, a saved flight
+too."""
 
 from __future__ import annotations
 
@@ -16,9 +17,9 @@ from reports.game.flight import EARTH, FRAME, Flight, field_scenario
 from reports.game.pilot import SHIP
 from scenarios.families.exercise import SHIP as START
 from scenarios.files.scene_file import read_scene_file, scene_text
-from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.closed_forms import world_thrusts
 
-EVENTS = [  # frame, key, down: a turn, a push across it, a renewed push, both keys of a pair
+EVENTS = [  # frame, key, down: a turn, a thrust across it, a renewed thrust, both keys of a pair
     (8, "a", True), (24, "w", True), (40, "w", True), (56, "a", False), (72, "w", False), (80, "s", True),
     (88, "d", True), (96, "w", True), (110, "d", False), (120, "s", False), (130, "w", False),
 ]  # fmt: skip
@@ -43,13 +44,13 @@ def bits(flight: Flight) -> list[dict[str, bytes]]:
 
 @pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64"])
 def test_keys_move_the_ship_as_the_exercise_says(name: str):
-    """Against x + v t + F t2 / 2m, pushes of 0.25 m/s2 along the heading at the key event and turns of 1 rad/s2."""
+    """Against x + v t + F t2 / 2m, thrusts of 0.25 m/s2 along the heading at the key event and turns of 1 rad/s2."""
     flight = flown([name], 160, asteroids=0)
     scenario = flight.saved()
-    truth = world_pushes(scenario.scene, scenario.thrusts, scenario.times).at(-1)
-    # Each push of T s puts the ship (alpha - 1/2) a dt T off, which it keeps; alpha is the order of the updates.
-    pushed = sum(thrust.stop - thrust.start for thrust in scenario.thrusts if thrust.force.any())
-    offset = abs(ENGINES[name].alpha - 0.5) * 0.25 * flight.dt * pushed
+    truth = world_thrusts(scenario.scene, scenario.thrusts, scenario.times).at(-1)
+    # Each thrust of T s puts the ship (alpha - 1/2) a dt T off, which it keeps; alpha is the order of the updates.
+    thrusting = sum(thrust.stop - thrust.start for thrust in scenario.thrusts if thrust.force.any())
+    offset = abs(ENGINES[name].alpha - 0.5) * 0.25 * flight.dt * thrusting
     rounding = ENGINES[name].rounding * 160 * 16 * 4  # one a step, of coordinates up to 4 m
     apart = np.abs(flight.solid.state.position[SHIP] - truth.position[SHIP]).max()
 
@@ -58,22 +59,22 @@ def test_keys_move_the_ship_as_the_exercise_says(name: str):
     assert np.hypot(*(truth.position[SHIP] - START)) > 0.2
 
 
-def test_a_push_keeps_its_direction_while_the_ship_turns():
+def test_a_thrust_keeps_its_direction_while_the_ship_turns():
     """W aims once when it goes down, and anew when its event is repeated; the force's size is mass times 0.25."""
     flight = flown(["reference:exercise"], 60, EVENTS[:4], asteroids=0)
-    pushes = [thrust for thrust in flight.saved().thrusts if thrust.force.any()]
+    thrusts = [thrust for thrust in flight.saved().thrusts if thrust.force.any()]
     size = flight.scenario.scene.mass[SHIP] * 0.25
-    headings = [np.arctan2(*thrust.force[::-1]) for thrust in pushes]
+    headings = [np.arctan2(*thrust.force[::-1]) for thrust in thrusts]
 
-    assert [(thrust.start / FRAME, thrust.stop / FRAME) for thrust in pushes] == [(24, 40), (40, 60)]
-    assert np.allclose([np.hypot(*thrust.force) for thrust in pushes], size, rtol=1e-15)
+    assert [(thrust.start / FRAME, thrust.stop / FRAME) for thrust in thrusts] == [(24, 40), (40, 60)]
+    assert np.allclose([np.hypot(*thrust.force) for thrust in thrusts], size, rtol=1e-15)
     # alpha'' = 1 rad/s2 since frame 8; symplectic Euler turns dt t / 2 further, and rounds.
     expected = [((frame - 8) * FRAME) ** 2 / 2 for frame in (24, 40)]
     assert np.allclose(headings, expected, atol=flight.dt * 32 * FRAME / 2 + 1e-12)
 
 
-def test_releasing_either_key_of_a_pair_ends_the_push():
-    """As in the exercise: S takes over from W, and when S is released nothing pushes, though W is still held."""
+def test_releasing_either_key_of_a_pair_ends_the_thrust():
+    """As in the exercise: S takes over from W, and when S is released no force acts, though W is still held."""
     flight = flown(["reference:exercise"], 40, [(0, "w", True), (10, "s", True), (20, "s", False)], asteroids=0)
     first, second = flight.saved().thrusts
 
@@ -164,7 +165,8 @@ def test_a_ship_that_leaves_is_set_back_to_its_start():
 
 @pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched"])
 def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
-    """As in the exercise: the rest of the frame it is already under way again, pushed from its start and from rest."""
+    """As in the exercise: the rest of the frame it is already under way again, thrusting from its start and from
+    rest."""
     flight = flown([name], 222, [(0, "s", True)], asteroids=0)
     while flight.left_at < 0:
         flight.advance()

@@ -19,7 +19,7 @@ from reports.game.flight import FRAME
 from reports.game.pilot import SHIP
 from reports.game.server import Game
 from scenarios.files.scene_file import read_scene_file
-from scenarios.truth.closed_forms import world_pushes
+from scenarios.truth.closed_forms import world_thrusts
 from tests.reports.game.test_flight import steered_home
 from tests.reports.page.browsing import opened, overhang, served
 
@@ -90,7 +90,7 @@ def test_keys_held_and_released_move_the_ship(page: Page):
     x, y, vx, vy, angle, spin = page.evaluate("game.now.ship")
     dt, t = FRAME / 16, 64 * FRAME
 
-    # Symplectic Euler is a dt T / 2 further on after a push of T s, and rounds.
+    # Symplectic Euler is a dt T / 2 further on after a thrust of T s, and rounds.
     assert x == pytest.approx(-3.5 + 0.25 * t * (t / 2 + 64 * FRAME) + 0.25 * dt * t / 2, abs=1e-12)
     assert (y, vx, vy) == (0.0, pytest.approx(0.25 * t, abs=1e-14), 0.0)
     assert spin == pytest.approx(32 * FRAME, abs=1e-14)
@@ -149,7 +149,7 @@ def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Pa
     shown, solid = page.evaluate("game.now.ship"), FLOWN[0]
     scenario = read_scene_file(saved(page, tmp_path))
     end = play(ENGINES[solid].make(), solid, scenario, scenario.dt(scenario.substeps[1])).trajectory.at(-1)  # type: ignore[union-attr]
-    exact = world_pushes(scenario.scene, scenario.thrusts, scenario.times).at(-1)
+    exact = world_thrusts(scenario.scene, scenario.thrusts, scenario.times).at(-1)
 
     assert len(scenario.thrusts) >= 2
     assert shown == [*end.position[SHIP], *end.velocity[SHIP], end.angle[SHIP], end.angular_velocity[SHIP]]
@@ -193,7 +193,7 @@ def test_any_scene_file_can_be_flown(browser: Browser):
 
 
 def test_a_finger_steers_too(page: Page):
-    """The button pushes as long as it is held."""
+    """The button acts as long as it is held."""
     wish(page, asteroids=0)
     box = page.locator("[data-key=w]").bounding_box()
     assert box is not None

@@ -55,15 +55,15 @@ def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
     assert (told["left_at"], told["won"], session.field()["earth"]) == (-1, False, None)
 
 
-def test_the_flame_is_against_a_push_that_turns_with_the_ship():
-    """In a replayed scene whose push is in the ship's own frame; the page draws what it is told."""
+def test_the_flame_is_against_a_thrust_that_turns_with_the_ship():
+    """In a replayed scene whose thrust is in the ship's own frame; the page draws what it is told."""
     whole = SCENARIOS["body_frame_thrust"]()
     session = Session(["reference:exercise"], whole)
-    [push] = whole.thrusts
-    x, y = push.force
+    [thrust] = whole.thrusts
+    x, y = thrust.force
     session.flight.advance(20)
     angle = float(session.flight.solid.state.angle[SHIP])
 
-    assert push.frame == "body"
+    assert thrust.frame == "body"
     assert abs(angle) > 0.1
-    assert session.push()[:2] == pytest.approx([cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y])
+    assert session.force()[:2] == pytest.approx([cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y])

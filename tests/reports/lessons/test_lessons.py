@@ -53,8 +53,8 @@ def test_with_nothing_switched_on_the_switches_give_the_reference(name: str):
         # 600 steps that each round a height of up to 2 m, and bounces that hand the error on.
         ("gravity", "box2d:matched", (2, 1), (0, 1), 2400 * FLOAT32),
         ("gravity", "pymunk:matched", (1, 1), (2, 1), 1e-12),
-        # mm: 24 steps with three push-outs each, of coordinates up to 1 m.
-        ("push-out", "box2d:matched+no_ccd", (2, 2), (2, 1), 1e3 * 72 * FLOAT32),
+        # mm: 24 steps with three position corrections each, of coordinates up to 1 m.
+        ("position correction", "box2d:matched+no_ccd", (2, 2), (2, 1), 1e3 * 72 * FLOAT32),
         # mm: 360 substeps, of heights up to 4 m.
         ("substeps", "box2d_v3:matched", (2, 0), (1, 0), 1e3 * 360 * 4 * FLOAT32),
         ("digits", "box2d:shipped", (1, 2), (0, 2), 0.0),
@@ -87,8 +87,8 @@ def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name:
 
     assert shown.film is not None
     assert any(run.trajectory is not None for run in shown.film.runs)
-    assert (shown.film.truth is None) == (name == "push-out")  # its disks overlap from the start
-    assert (TRUTH in drawn) == (name not in ("push-out", "crowd"))  # nor has a cost in time
+    assert (shown.film.truth is None) == (name == "position correction")  # its disks overlap from the start
+    assert (TRUTH in drawn) == (name not in ("position correction", "crowd"))  # nor has a cost in time
     assert drawn | {run.name for run in shown.film.runs} <= set(lesson.names)
 
 

@@ -28,7 +28,7 @@ class Controlled:
         self.dt, self.steps, self.start = dt, 0, scene
         self.position, self.velocity = np.array(scene.position), np.array(scene.velocity)
 
-    def push(self, disk, force, torque):
+    def apply_force(self, disk, force, torque):
         pass
 
     def step(self, count=1):

@@ -24,7 +24,7 @@ class Sleeper:
         self.scene, self.dt = scene, dt
         sleep(0.005)
 
-    def push(self, disk: int, force: Array, torque: float) -> None:
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Nothing moves."""
 
     def step(self, count: int = 1) -> None:

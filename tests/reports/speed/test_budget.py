@@ -11,7 +11,7 @@ import pytest
 
 from adapters.engine import Row
 from adapters.engines import ENGINES
-from adapters.mechanisms.habits import DIGITS, FLIGHT, HABITS, LATE, PUSH_OUT, RESTITUTION, Habit
+from adapters.mechanisms.habits import DIGITS, FLIGHT, HABITS, LATE, POSITION_CORRECTION, RESTITUTION, Habit
 from adapters.mechanisms.switched import Switched
 from reports.compare import scales
 from reports.speed import budget, budget_tables
@@ -22,7 +22,7 @@ FLOAT64 = 2.0**-53
 KNOWN = [
     Habit(FLIGHT, {"alpha": 1.0}),
     Habit(RESTITUTION, {"mixing": "the product"}),
-    Habit(PUSH_OUT, {"project": True}),
+    Habit(POSITION_CORRECTION, {"project": True}),
 ]
 
 
@@ -60,7 +60,7 @@ def test_a_planted_engine_gets_its_parts_and_its_bug_is_unexplained():
     left = parts[UNEXPLAINED].position
     assert left[..., 1] == pytest.approx(np.broadcast_to(Drifting.bug / moving, left.shape[:2]), abs=1e-12)
     assert np.abs(left[..., 0]).max() <= 1e-12
-    for habit in (RESTITUTION, PUSH_OUT):
+    for habit in (RESTITUTION, POSITION_CORRECTION):
         assert parts[habit].radii > 100 * FLOAT64
     assert parts[FLIGHT].radii == 0.0  # nothing pulls here
 

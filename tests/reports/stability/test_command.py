@@ -189,7 +189,7 @@ def test_every_case_of_the_issue_is_there():
         "dt_gas_of_100", "bounce_drift", "slow_collision", "scale_up", "scale_down", "far_from_origin", "dense_gas",
         "long_gas", "long_wrapped_gas",
         "mass_ratio", "heavy_on_light", "heavy_in_gas", "column", "overlap_energy", "overlap_recovery", "overfull_box",
-        "pile_comes_to_rest", "ball_comes_to_rest", "grazing", "spin", "stiff_push", "insertion_order", "restart",
+        "pile_comes_to_rest", "ball_comes_to_rest", "grazing", "spin", "stiff_force", "insertion_order", "restart",
         "thermometer", "equipartition",
     }  # fmt: skip
 

@@ -142,7 +142,7 @@ def test_float32_is_off_by_6_percent_at_10_km(engine: str):
 @pytest.mark.parametrize(
     ("engine", "factor"), [("pymunk:matched", 2.71), ("box2d:matched", 0.98), ("box2d_v3:matched", 1.44)]
 )
-def test_a_push_read_off_the_positions_makes_an_oscillator_grow_as_published(engine: str, factor: float):
+def test_a_force_read_off_the_positions_makes_an_oscillator_grow_as_published(engine: str, factor: float):
     """E / E0 after 400 steps at w dt = 0.05, engine_facts section 5."""
     trajectory: Trajectory | None = on_spring(VARIANTS[engine], oscillator(0.05, 0))[1].trajectory
     assert trajectory is not None
@@ -157,8 +157,8 @@ def test_a_push_read_off_the_positions_makes_an_oscillator_grow_as_published(eng
 )  # fmt: skip
 def test_it_doubles_where_the_determinant_of_the_map_says(engine: str, gain: float):
     """1 + (1 - alpha) (w dt)2 a step, over 300 steps; symplectic Euler holds until w dt = 2."""
-    assert_fails_at("stiff_push", engine, sqrt((2 ** (1 / 300) - 1) / gain))
-    assert_fails_at("stiff_push", "reference:exercise", 2.0)
+    assert_fails_at("stiff_force", engine, sqrt((2 ** (1 / 300) - 1) / gain))
+    assert_fails_at("stiff_force", "reference:exercise", 2.0)
 
 
 def test_a_restitution_of_a_pair_is_e_squared_only_in_pymunk_as_shipped():

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from adapters.mechanisms.features import changed_pymunk
-from adapters.mechanisms.habits import FLIGHT, FRICTION, HABITS, PUSH_OUT, RESTITUTION, habits_of
+from adapters.mechanisms.habits import FLIGHT, FRICTION, HABITS, POSITION_CORRECTION, RESTITUTION, habits_of
 from reports.stability.cases import CASES
 from reports.stability.explain import explained
 from reports.stability.limits import QUICK, Limit, Trial
@@ -33,7 +33,7 @@ def found(case: str, engine: str) -> tuple[Search, Limit]:
         ("dt_head_on_equal_e09", "pymunk:matched", LATE),  # one collision, nothing pulls
         ("dt_head_on_equal_e09", "box2d_v3:matched", LATE),
         ("dt_wall_to_wall", "reference:lesson", LATE),
-        ("dt_wall_to_wall", "reference:exercise", PUSH_OUT),  # each time it is set onto the wall
+        ("dt_wall_to_wall", "reference:exercise", POSITION_CORRECTION),  # each time it is set onto the wall
         ("dt_wall_to_wall", "pymunk:shipped", RESTITUTION),
         ("slow_collision", "box2d:shipped", RESTITUTION),  # its threshold of 1 m/s
         ("slow_collision", "box2d_v3:shipped", RESTITUTION),
@@ -102,14 +102,17 @@ def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_twin():
     failing = Trial(10.0, 1, 1, 2.0, 0)
     limit = Limit("column", "pymunk:matched", "quick", "limit", 5.0, 10.0, (failing,))
     [kept, other, untested] = explained(
-        [replace(limit, twin=f"{FLIGHT}, {PUSH_OUT}"), replace(limit, twin=FRICTION), limit]
+        [replace(limit, twin=f"{FLIGHT}, {POSITION_CORRECTION}"), replace(limit, twin=FRICTION), limit]
     )
 
-    assert "pushed out by a share a step" in kept.reason
-    assert kept.tested == "the reference with late collisions and the engine's flight and push-out has this limit"
+    assert "corrected by a share per step" in kept.reason
+    assert (
+        kept.tested
+        == "the reference with late collisions and the engine's flight and position correction has this limit"
+    )
     assert other.reason == "friction takes speed along the contact"
     assert other.source == "the engine's default"
-    assert untested.why.startswith("likely: overlaps are pushed out")
+    assert untested.why.startswith("likely: overlaps are corrected")
 
 
 @pytest.mark.parametrize("engine", HABITS)

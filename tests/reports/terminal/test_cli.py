@@ -158,7 +158,7 @@ def test_truth_says_why_there_is_none(tmp_path: Path):
     done = crosscheck("truth", "turning.toml", cwd=tmp_path)
 
     assert done.returncode == 1
-    assert "no exact answer: a push that turns with its disk" in done.stderr
+    assert "no exact answer: a thrust that turns with its disk" in done.stderr
 
 
 @pytest.mark.parametrize("terminal", [True, False])
