@@ -35,15 +35,15 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 @compiled
 def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> int:
     """Advance by near pairs, however few the disks are; returns in how many steps all pairs had to be asked."""
-    pull, n, unlisted = pull_on(disks, world, dt), len(disks.radius), 0
+    acceleration, n, unlisted = accelerations_of(disks, world, dt), len(disks.radius), 0
     k, i, j, looks = 0, 0, 0, 0  # in step k nothing has been asked from the pair (i, j) on
     here = disks.position.reshape(-1)  # in place of homes while there is no list: nobody is far from where it is
     if count > 0:
-        fly(disks, dt, pull, here, inf)
+        fly(disks, dt, acceleration, here, inf)
     while k < count:
         near, began = look_around(disks, world, dt, count - k), k
         if near.listed:
-            k, i, j = play(disks, world, dt, count, collisions, pull, near, k, i, j)
+            k, i, j = play(disks, world, dt, count, collisions, acceleration, near, k, i, j)
         looks = looks + 1 if k == began else 0
         if k < count and (not near.listed or looks > n // LOOK):
             collide_rest(disks, world, k, collisions, i, j)
@@ -51,12 +51,12 @@ def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions
             wrap(disks.position, world)
             k, i, j, looks, unlisted = k + 1, 0, 0, 0, unlisted + 1
             if k < count:
-                fly(disks, dt, pull, here, inf)
-    turn(disks, dt, count, pull)
+                fly(disks, dt, acceleration, here, inf)
+    turn(disks, dt, count, acceleration)
     return unlisted
 
 
-class Pull(NamedTuple):
+class Accelerations(NamedTuple):
     """What force, torque and gravity do in a step, and to whom; the same in every step of a call."""
 
     kick: np.ndarray  # (2n,) m/s, x and y in turn
@@ -65,7 +65,7 @@ class Pull(NamedTuple):
 
 
 @compiled
-def pull_on(disks: Disks, world: World, dt: float) -> Pull:
+def accelerations_of(disks: Disks, world: World, dt: float) -> Accelerations:
     """Rounded as in `exercise.integrate`."""
     n, g = len(disks.mass), world.gravity
     kick, turn, moving, runs = np.zeros(2 * n), np.zeros(n), np.zeros((n, 2), np.uint32), 0
@@ -79,17 +79,26 @@ def pull_on(disks: Disks, world: World, dt: float) -> Pull:
             moving[runs, 0] = i
             runs += 1
         moving[runs - 1, 1] = i + 1
-    return Pull(kick, turn, moving[:runs].copy())
+    return Accelerations(kick, turn, moving[:runs].copy())
 
 
 @compiled
 def play(
-    disks: Disks, world: World, dt: float, count: int, collisions: list, pull: Pull, near: Near, k: int, i: int, j: int
+    disks: Disks,
+    world: World,
+    dt: float,
+    count: int,
+    collisions: list,
+    acceleration: Accelerations,
+    near: Near,
+    k: int,
+    i: int,
+    j: int,
 ) -> tuple[int, int, int]:
     """Go on from the pair (i, j) of step k up to `count` or until a disk goes astray; returns where that is."""
     pairs, p = len(near.first), first_from(near, i, j)
     while True:
-        k, p = next_touch(disks, world, dt, count, pull, near, k, p)
+        k, p = next_touch(disks, world, dt, count, acceleration, near, k, p)
         if p == NONE:
             return k, 0, 0
         if p < pairs:
@@ -111,7 +120,7 @@ def play(
 
 @kernel
 def next_touch(
-    disks: Disks, world: World, dt: float, count: int, pull: Pull, near: Near, k: int, p: int
+    disks: Disks, world: World, dt: float, count: int, acceleration: Accelerations, near: Near, k: int, p: int
 ) -> tuple[int, int]:
     """(step, number) of the next near pair that touches, from number p of step k on; walls are numbered after pairs.
 
@@ -126,22 +135,22 @@ def next_touch(
             return k, p
         wrap(disks.position, world)
         k, p = k + 1, 0
-        if k == count or fly(disks, dt, pull, near.home, EARLY * near.leash) > 0:
+        if k == count or fly(disks, dt, acceleration, near.home, EARLY * near.leash) > 0:
             return k, NONE
 
 
 @kernel
-def fly(disks: Disks, dt: float, pull: Pull, home, leash: float) -> int:  # type: ignore[no-untyped-def]
+def fly(disks: Disks, dt: float, acceleration: Accelerations, home, leash: float) -> int:  # type: ignore[no-untyped-def]
     """As `exercise.integrate`, but for the angles; returns how many disks are then farther from home than the leash.
 
     One thing at a time and no way out of a loop, so that it is done in vectors; and in blocks, so that the next loop
     finds in the nearest cache what the one before has left there.
     """
     x, v, strays = disks.position.reshape(-1), disks.velocity.reshape(-1), 0
-    for run in range(len(pull.moving)):
-        begin, end = np.int64(pull.moving[run, 0]), np.int64(pull.moving[run, 1])
+    for run in range(len(acceleration.moving)):
+        begin, end = np.int64(acceleration.moving[run, 0]), np.int64(acceleration.moving[run, 1])
         for c in range(2 * begin, 2 * end):
-            v[c] += pull.kick[c]
+            v[c] += acceleration.kick[c]
             x[c] += v[c] * dt
         for i in range(begin, end):
             strays += astray(x, home, i, leash)
@@ -149,15 +158,15 @@ def fly(disks: Disks, dt: float, pull: Pull, home, leash: float) -> int:  # type
 
 
 @kernel
-def turn(disks: Disks, dt: float, count: int, pull: Pull) -> None:
+def turn(disks: Disks, dt: float, count: int, acceleration: Accelerations) -> None:
     """The angles and spins of all steps, at last, as no collision asks for them: a block is fetched once for all of
     them."""
     angle, spin = disks.angle, disks.angular_velocity
-    for run in range(len(pull.moving)):
-        begin, end = np.int64(pull.moving[run, 0]), np.int64(pull.moving[run, 1])
+    for run in range(len(acceleration.moving)):
+        begin, end = np.int64(acceleration.moving[run, 0]), np.int64(acceleration.moving[run, 1])
         for _ in range(count):
             for i in range(begin, end):
-                spin[i] += pull.turn[i]
+                spin[i] += acceleration.turn[i]
                 angle[i] += spin[i] * dt
 
 

@@ -26,40 +26,41 @@ NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the worl
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
-    pull = np.zeros_like(disks.velocity)
+    acceleration = np.zeros_like(disks.velocity)
     for k in range(count):
-        step(disks, world, pull, dt, k, collisions)
+        step(disks, world, acceleration, dt, k, collisions)
     return collisions
 
 
 @compiled
-def step(disks: Disks, world: World, pull, dt: float, k: int, collisions: list) -> None:  # type: ignore[no-untyped-def]
-    """One step: fly, then resolve meeting after meeting. `pull` (n, 2) m/s2 is what accelerates each disk now."""
-    fly(disks, world, pull, dt)
+def step(disks: Disks, world: World, acceleration, dt: float, k: int, collisions: list) -> None:  # type: ignore[no-untyped-def]
+    """One step: fly, then resolve meeting after meeting. `acceleration` (n, 2) m/s2 is what accelerates each disk
+    now."""
+    fly(disks, world, acceleration, dt)
     now = -dt
     for _ in range(MOST * len(disks.radius)):
-        now, i, j = first_meeting(disks, world, pull, now, dt)
+        now, i, j = first_meeting(disks, world, acceleration, now, dt)
         if i == NOBODY:
             break
         if j == EDGE:
             carry_over(disks.position, world, i)
         else:
-            impulse = collide(disks, world, pull, i, j, now, dt)
+            impulse = collide(disks, world, acceleration, i, j, now, dt)
             if impulse > 0.0:
                 collisions.append((k, i, j, impulse))
 
 
 @compiled
-def fly(disks: Disks, world: World, pull, dt: float) -> None:  # type: ignore[no-untyped-def]
+def fly(disks: Disks, world: World, acceleration, dt: float) -> None:  # type: ignore[no-untyped-def]
     """x + v dt + a dt2 / 2 and v + a dt for all, as if nobody met; turning alike."""
     x, v, spin = disks.position, disks.velocity, disks.angular_velocity
     for i in range(len(disks.mass)):
         if disks.mass[i] == inf:
             continue
         for axis in range(2):
-            pull[i, axis] = world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
-            move(x, disks.remainder, i, axis, v[i, axis] * dt + pull[i, axis] * (dt * dt / 2))
-            v[i, axis] += pull[i, axis] * dt
+            acceleration[i, axis] = world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
+            move(x, disks.remainder, i, axis, v[i, axis] * dt + acceleration[i, axis] * (dt * dt / 2))
+            v[i, axis] += acceleration[i, axis] * dt
         turning = disks.torque[i] / disks.inertia[i]
         disks.angle[i] += spin[i] * dt + turning * (dt * dt / 2)
         spin[i] += turning * dt
@@ -78,17 +79,17 @@ def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[n
 
 
 @compiled
-def first_meeting(disks: Disks, world: World, pull, now: float, dt: float) -> tuple[float, int, int]:  # type: ignore[no-untyped-def]
+def first_meeting(disks: Disks, world: World, acceleration, now: float, dt: float) -> tuple[float, int, int]:  # type: ignore[no-untyped-def]
     """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or the edge."""
     x, radius, mass, walls = disks.position, disks.radius, disks.mass, world.walls
-    n, way = len(radius), longest_way(disks.velocity, pull, dt)
+    n, way = len(radius), longest_way(disks.velocity, acceleration, dt)
     first, who, whom = inf, NOBODY, NOBODY
     for i in range(n):
         for j in range(i + 1, n):
             # Who met within the step cannot be farther apart at its end than both ways: passing through is seen, too.
             dx, dy, reach = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], radius[i] + radius[j] + 2.0 * way
             if dx * dx + dy * dy < reach * reach and not (mass[i] == inf and mass[j] == inf):
-                s = meeting(path_to_disk(x, disks.velocity, pull, radius, i, j), now)
+                s = meeting(path_to_disk(x, disks.velocity, acceleration, radius, i, j), now)
                 if s < first:
                     first, who, whom = s, i, j
         if mass[i] == inf:
@@ -98,7 +99,7 @@ def first_meeting(disks: Disks, world: World, pull, now: float, dt: float) -> tu
             left, right = min(walls[w, 0, 0], walls[w, 1, 0]), max(walls[w, 0, 0], walls[w, 1, 0])
             low, high = min(walls[w, 0, 1], walls[w, 1, 1]), max(walls[w, 0, 1], walls[w, 1, 1])
             if left - reach < x[i, 0] < right + reach and low - reach < x[i, 1] < high + reach:
-                s = meeting(path_to_wall(x, disks.velocity, pull, radius, i, walls, w), now)
+                s = meeting(path_to_wall(x, disks.velocity, acceleration, radius, i, walls, w), now)
                 if s < first:
                     first, who, whom = s, i, -1 - w
         for axis in range(2):
@@ -111,29 +112,29 @@ def first_meeting(disks: Disks, world: World, pull, now: float, dt: float) -> tu
 
 
 @compiled
-def longest_way(velocity, pull, dt: float) -> float:  # type: ignore[no-untyped-def]
+def longest_way(velocity, acceleration, dt: float) -> float:  # type: ignore[no-untyped-def]
     """m: no disk gets farther in a step."""
     fastest2, strongest2 = 0.0, 0.0
     for i in range(len(velocity)):
         fastest2 = max(fastest2, velocity[i, 0] * velocity[i, 0] + velocity[i, 1] * velocity[i, 1])
-        strongest2 = max(strongest2, pull[i, 0] * pull[i, 0] + pull[i, 1] * pull[i, 1])
+        strongest2 = max(strongest2, acceleration[i, 0] * acceleration[i, 0] + acceleration[i, 1] * acceleration[i, 1])
     return (sqrt(fastest2) + sqrt(strongest2) * dt) * dt
 
 
 @compiled
-def path_to_disk(x, v, pull, radius, i: int, j: int):  # type: ignore[no-untyped-def]
+def path_to_disk(x, v, acceleration, radius, i: int, j: int):  # type: ignore[no-untyped-def]
     """How disk i moves as seen from disk j, which is a wall without length."""
     return (
         x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], v[i, 0] - v[j, 0], v[i, 1] - v[j, 1],
-        pull[i, 0] - pull[j, 0], pull[i, 1] - pull[j, 1], 0.0, 0.0, radius[i] + radius[j],
+        acceleration[i, 0] - acceleration[j, 0], acceleration[i, 1] - acceleration[j, 1], 0.0, 0.0, radius[i] + radius[j],
     )  # fmt: skip
 
 
 @compiled
-def path_to_wall(x, v, pull, radius, i: int, walls, w: int):  # type: ignore[no-untyped-def]
+def path_to_wall(x, v, acceleration, radius, i: int, walls, w: int):  # type: ignore[no-untyped-def]
     """How disk i moves as seen from the start of wall w: place, velocity, acceleration; the wall, and the reach."""
     return (
-        x[i, 0] - walls[w, 0, 0], x[i, 1] - walls[w, 0, 1], v[i, 0], v[i, 1], pull[i, 0], pull[i, 1],
+        x[i, 0] - walls[w, 0, 0], x[i, 1] - walls[w, 0, 1], v[i, 0], v[i, 1], acceleration[i, 0], acceleration[i, 1],
         walls[w, 1, 0] - walls[w, 0, 0], walls[w, 1, 1] - walls[w, 0, 1], radius[i],
     )  # fmt: skip
 
@@ -198,33 +199,33 @@ def root(path, low: float, high: float) -> float:  # type: ignore[no-untyped-def
 
 
 @compiled
-def collide(disks: Disks, world: World, pull, i: int, j: int, s: float, dt: float) -> float:  # type: ignore[no-untyped-def]
+def collide(disks: Disks, world: World, acceleration, i: int, j: int, s: float, dt: float) -> float:  # type: ignore[no-untyped-def]
     """The impulse J = -(1 + e) (vi - vj).n / (1/mi + 1/mj) at s, and both on their new ways to the end; returns J."""
     x, v, e = disks.position, disks.velocity, world.restitution
     if j >= 0:
-        path = path_to_disk(x, v, pull, disks.radius, i, j)
+        path = path_to_disk(x, v, acceleration, disks.radius, i, j)
         wi, wj = 1.0 / disks.mass[i], 1.0 / disks.mass[j]
     else:
-        path = path_to_wall(x, v, pull, disks.radius, i, world.walls, -1 - j)
+        path = path_to_wall(x, v, acceleration, disks.radius, i, world.walls, -1 - j)
         wi, wj = 1.0 / disks.mass[i], 0.0
     _, rate, nx, ny = contact(path, s)
     speed, inward, hold = max(-rate, 0.0), -(path[4] * nx + path[5] * ny), 0.0
     if 2.0 * e * speed < inward * dt * REST:  # it would be back at once, and ever sooner: it rests, and is held
         e, hold = 0.0, inward / (wi + wj)
     J = (1.0 + e) * speed / (wi + wj)
-    fly_anew(disks, pull, i, wi * nx, wi * ny, J, hold, s)
+    fly_anew(disks, acceleration, i, wi * nx, wi * ny, J, hold, s)
     if j >= 0:
-        fly_anew(disks, pull, j, -wj * nx, -wj * ny, J, hold, s)
+        fly_anew(disks, acceleration, j, -wj * nx, -wj * ny, J, hold, s)
     return J - hold * s
 
 
 @compiled
-def fly_anew(disks: Disks, pull, i: int, wx: float, wy: float, J: float, hold: float, s: float) -> None:  # type: ignore[no-untyped-def]
+def fly_anew(disks: Disks, acceleration, i: int, wx: float, wy: float, J: float, hold: float, s: float) -> None:  # type: ignore[no-untyped-def]
     """From s on, as if disk i had left with the impulse J and the force `hold` along n; (wx, wy) is n / mass."""
     for axis, w in enumerate((wx, wy)):
         move(disks.position, disks.remainder, i, axis, (hold * (s * s / 2) - J * s) * w)
         disks.velocity[i, axis] += (J - hold * s) * w
-        pull[i, axis] += hold * w
+        acceleration[i, axis] += hold * w
 
 
 @compiled

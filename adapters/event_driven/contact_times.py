@@ -14,19 +14,20 @@ Quartic = tuple[float, float, float, float, float]
 
 
 @kernel
-def line_time(gap: float, speed: float, pull: float) -> float:
-    """First t >= 0 at which gap + speed t + pull t2 / 2 goes down through 0, without a difference of near equals.
+def line_time(gap: float, speed: float, acceleration: float) -> float:
+    """First t >= 0 at which gap + speed t + acceleration t2 / 2 goes down through 0, without a difference of near
+    equals.
 
     Where the gap is below 0 and rises, it must come down again; where it never gets above 0, the answer is its top.
     """
-    if gap <= 0.0 and (speed < 0.0 or (speed == 0.0 and pull < 0.0)):
+    if gap <= 0.0 and (speed < 0.0 or (speed == 0.0 and acceleration < 0.0)):
         return 0.0
-    if pull == 0.0:
+    if acceleration == 0.0:
         return gap / -speed if speed < 0.0 else inf
-    disc = speed * speed - 2.0 * pull * gap
-    if pull < 0.0:
+    disc = speed * speed - 2.0 * acceleration * gap
+    if acceleration < 0.0:
         root = sqrt(max(disc, 0.0))
-        return 2.0 * gap / (root - speed) if speed < 0.0 else (speed + root) / -pull
+        return 2.0 * gap / (root - speed) if speed < 0.0 else (speed + root) / -acceleration
     return 2.0 * gap / (sqrt(disc) - speed) if speed < 0.0 and gap > 0.0 and disc > 0.0 else inf
 
 

@@ -35,7 +35,7 @@ DISK = np.dtype(
         ("radius", "f8"),
         ("next", "u4"),  # the next disk in the chain of its cell
         ("cx", "i4"), ("cy", "i4"),  # its cell
-        ("count", "i4"),  # collisions and changes of pull so far
+        ("count", "i4"),  # collisions and changes of acceleration so far
         ("weight", "f8"),  # 1 / mass
         ("noise", "f8"),  # m/s, what rounding may have left of the closing speed of its last collision
         ("pair_time", "f8"), ("own_time", "f8"),  # when it meets another disk, or something by itself
@@ -45,7 +45,7 @@ DISK = np.dtype(
         ("before", "u4"),  # the disk before it in its chain
         ("mark_collisions", "i4"), ("mark_time", "f8"),  # collisions since, to notice when they accumulate
         ("ax", "f8"), ("ay", "f8"),  # acceleration; lying on a wall, only that along it
-        ("pull_x", "f8"), ("pull_y", "f8"),  # acceleration of free flight
+        ("free_ax", "f8"), ("free_ay", "f8"),  # acceleration of free flight
         ("ox", "f8"), ("oy", "f8"),  # where cell (0, 0) of its lap lies: the grid of an open scene repeats for ever
         ("wall", "i4"),  # the wall it lies on; -1: none; -2 - wall: none since it slid off that one
         ("bounces", "i4"),  # collisions in a row on the face of one wall
@@ -60,7 +60,7 @@ RUN = np.dtype(
         ("collisions", "i4"),  # those that count
         ("walls", "i4"),  # collisions in a row with walls, whether it has flown between them or not
         ("start", "f8"),  # s, when the first of the run was
-        ("pull", "f8"),  # m/s2, the largest that acted on those who took part
+        ("acceleration", "f8"),  # m/s2, the largest that acted on those who took part
     ]
 )  # fmt: skip
 
@@ -76,7 +76,7 @@ class Grid(NamedTuple):
 
 
 # () where there are only disks and they fly straight, else (True,). Numba knows how long a tuple is when it compiles,
-# so that a gas has a loop of its own, without a trace of walls and pulls.
+# so that a gas has a loop of its own, without a trace of walls and accelerations.
 Scenery = tuple[()] | tuple[bool]
 
 
@@ -84,7 +84,7 @@ class Rules(NamedTuple):
     """What all disks obey."""
 
     restitution: float
-    falling: bool  # something is pulled
+    falling: bool  # something is accelerated
     mixed: bool  # not everything alike
     wrapped: bool
     lasting: bool  # bounces die out too slowly for `crowd`, or never

@@ -58,7 +58,7 @@ class EventDriven:
     def accelerate(self, acceleration: Array) -> None:
         """Give each disk with a force its row of acceleration (n, 2) m/s2 from now on."""
         for disk in sorted(self.forced):
-            self.engine.pull(disk, self.steps * self.dt, acceleration[disk])
+            self.engine.accelerate(disk, self.steps * self.dt, acceleration[disk])
 
     def advance(self, count: int) -> None:
         """Let the events of `count` steps happen."""

@@ -102,8 +102,11 @@ class EventEngine:
         disks, radius = self.arena.disks, float(self.scene.radius.min())
         now = min(until, float(self.arena.clock[BASE] + self.arena.tree[1].time))
         speed = np.hypot(disks["vx"], disks["vy"]).max()
-        pull = np.hypot(disks["pull_x"], disks["pull_y"]).max()
-        rate, took = (NARROW + CROWDED * self.scene.n) * (speed / radius + np.sqrt(pull / radius)), now - self.since
+        acceleration = np.hypot(disks["free_ax"], disks["free_ay"]).max()
+        rate, took = (
+            (NARROW + CROWDED * self.scene.n) * (speed / radius + np.sqrt(acceleration / radius)),
+            now - self.since,
+        )
         # What is no number is no progress either.
         if not (self.spent <= rate * took and self.spent * (until - now) <= MOST_AHEAD * took):
             span = f"{self.spent} events from {self.since:.9g} s to {now:.9g} s"
@@ -125,11 +128,11 @@ class EventEngine:
             self.kept.append(self.arena.log[: told[LOGGED]].copy())
             told[LOGGED] = 0
 
-    def pull(self, disk: int, at: float, acceleration: Array) -> None:
+    def accelerate(self, disk: int, at: float, acceleration: Array) -> None:
         """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so, (2,) m/s2."""
         self.arena = self.arena._replace(rules=self.arena.rules._replace(falling=True, mixed=True))
         self.scenery = (True,)
-        event_loop.pull(self.arena, self.scenery, disk, at, acceleration[0], acceleration[1])
+        event_loop.accelerate(self.arena, self.scenery, disk, at, acceleration[0], acceleration[1])
 
     def look(self, at: float) -> tuple[Array, Array]:
         """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; nothing changes by looking."""
@@ -278,8 +281,8 @@ def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:
     disks["x"], disks["y"] = position.T
     disks["vx"], disks["vy"] = scene.velocity.T
     disks["ox"], disks["oy"] = low
-    pull = np.where(scene.static[:, None], 0.0, scene.gravity)
-    disks["ax"], disks["ay"] = disks["pull_x"], disks["pull_y"] = pull.T
+    acceleration = np.where(scene.static[:, None], 0.0, scene.gravity)
+    disks["ax"], disks["ay"] = disks["free_ax"], disks["free_ay"] = acceleration.T
     disks["radius"], disks["weight"] = scene.radius, 1 / scene.mass
     disks["pair_time"] = disks["own_time"] = np.inf
     disks["last"], disks["wall"], disks["corner"] = NOBODY, -1, -1

@@ -110,8 +110,8 @@ def rattles_on_disk(run: Any, a: Any, b: Any, restitution: float, impulse: float
     if a.weight == 0.0:
         return False
     run.walls = 0
-    pull2 = max(a.pull_x * a.pull_x + a.pull_y * a.pull_y, b.pull_x * b.pull_x + b.pull_y * b.pull_y)
-    return rattles(run, a, impulse * (a.weight + b.weight) / (1.0 + restitution), sqrt(pull2), counts)
+    acceleration2 = max(a.free_ax * a.free_ax + a.free_ay * a.free_ay, b.free_ax * b.free_ax + b.free_ay * b.free_ay)
+    return rattles(run, a, impulse * (a.weight + b.weight) / (1.0 + restitution), sqrt(acceleration2), counts)
 
 
 @kernel
@@ -130,8 +130,8 @@ def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
     trapped = False
     if arena.rules.falling or arena.rules.restitution < 1.0:
         closing = impulse * a.weight / (1.0 + arena.rules.restitution)
-        pull = sqrt(a.pull_x * a.pull_x + a.pull_y * a.pull_y)
-        trapped = rattles(run, a, closing, pull, changed or arena.rules.lasting)
+        acceleration = sqrt(a.free_ax * a.free_ax + a.free_ay * a.free_ay)
+        trapped = rattles(run, a, closing, acceleration, changed or arena.rules.lasting)
     mixed, corner = arena.rules.mixed, -1
     if part == 0 and (crowded or trapped or (mixed and slow(a))):
         corner = second_wall(walls, arena.grid, a, w)
@@ -143,6 +143,6 @@ def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
     if trapped:
         stop(arena, run.start, i, -1 - w)
     to_and_fro = False
-    if corner >= 0 and walls_only and (a.pull_x != 0.0 or a.pull_y != 0.0):
+    if corner >= 0 and walls_only and (a.free_ax != 0.0 or a.free_ay != 0.0):
         to_and_fro = not slow(a) or hold(walls, a, w, corner) > 0.0
     return ACCUMULATION if trapped or (crowded and not to_and_fro) else GOES_ON

@@ -138,7 +138,7 @@ def alone(arena: Arena, i: int) -> int:
 def leave(arena: Arena, i: int) -> int:
     """Disk `i` reaches the end of the wall it lies on: it flies off, unless it is too slow and would turn about it."""
     a, w = arena.disks[i], int(arena.disks[i].wall)
-    speed2, press = a.vx * a.vx + a.vy * a.vy, -across(arena.walls, a, w, a.pull_x, a.pull_y)
+    speed2, press = a.vx * a.vx + a.vy * a.vy, -across(arena.walls, a, w, a.free_ax, a.free_ay)
     take_off(a)
     a.wall, a.count = -2 - w, a.count + 1
     a.last, a.noise = -1 - w, ROUNDING * (abs(a.vx) + abs(a.vy))
@@ -208,11 +208,11 @@ def ask_again(a: Any, tree: Tree, i: int, now: float) -> None:
 
 
 @kernel
-def pull(arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float) -> None:
+def accelerate(arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float) -> None:
     """From `at` s on, which must not lie before the last event, let disk `i` accelerate by (ax, ay)."""
     a, now = arena.disks[i], at - arena.clock[BASE]
     fly(a, now, scenery)
-    a.pull_x, a.pull_y = ax, ay
+    a.free_ax, a.free_ay = ax, ay
     bear(arena.walls, a)
     change(a)
     ask_again(a, arena.tree, i, now)

@@ -1,9 +1,9 @@
 """Rest in the event engine: what lies on a wall or in a corner, and collisions between which nothing flies any more.
 
-A disk whose bounces on a wall have come to their end lies on it: it has neither normal speed nor normal pull, and flies
-along the wall on a parabola of its own, until a collision, a change of pull or the wall's end takes it off. Between two
-walls that its pull presses it into it lies still. This is the limit of the bounces, not a model of friction or of
-sticking.
+A disk whose bounces on a wall have come to their end lies on it: it has neither normal speed nor normal acceleration,
+and flies along the wall on a parabola of its own, until a collision, a change of acceleration or the wall's end takes
+it off. Between two walls that its acceleration presses it into it lies still. This is the limit of the bounces, not a
+model of friction or of sticking.
 """
 
 from __future__ import annotations
@@ -37,17 +37,18 @@ def across(walls: Walls, a: Any, w: int, x: float, y: float) -> float:
 
 @kernel
 def lie_down(walls: Walls, a: Any, w: int) -> None:
-    """Let a disk that touches wall `w` lie on it: of its speed and its pull only what is along the wall is left."""
+    """Let a disk that touches wall `w` lie on it: of its speed and its acceleration only what is along the wall is
+    left."""
     ux, uy = walls.segment[w, 2], walls.segment[w, 3]
-    speed, pull = a.vx * ux + a.vy * uy, a.pull_x * ux + a.pull_y * uy
-    a.vx, a.vy, a.ax, a.ay = speed * ux, speed * uy, pull * ux, pull * uy
+    speed, acceleration = a.vx * ux + a.vy * uy, a.free_ax * ux + a.free_ay * uy
+    a.vx, a.vy, a.ax, a.ay = speed * ux, speed * uy, acceleration * ux, acceleration * uy
     a.wall, a.bounces = w, 0
 
 
 @kernel
 def take_off(a: Any) -> None:
     """Let a disk that lies on a wall fly again."""
-    a.ax, a.ay, a.wall = a.pull_x, a.pull_y, -1
+    a.ax, a.ay, a.wall = a.free_ax, a.free_ay, -1
 
 
 @kernel
@@ -56,7 +57,7 @@ def leave_corner(walls: Walls, a: Any) -> None:
     if abs(across(walls, a, a.corner, a.vx, a.vy)) < abs(across(walls, a, a.wall, a.vx, a.vy)):
         a.wall = a.corner
     a.corner = -1
-    if across(walls, a, a.wall, a.pull_x, a.pull_y) >= 0.0:
+    if across(walls, a, a.wall, a.free_ax, a.free_ay) >= 0.0:
         take_off(a)
 
 
@@ -78,9 +79,9 @@ def jolt(walls: Walls, a: Any) -> None:
 
 @kernel
 def fall_into(walls: Walls, a: Any, w: int, k: int) -> float:
-    """m/s2 at which its pull drives a disk into wall `k` while it slides along wall `w`."""
+    """m/s2 at which its acceleration drives a disk into wall `k` while it slides along wall `w`."""
     (nx, ny), (mx, my) = outward(walls, a, w), outward(walls, a, k)
-    return (nx * mx + ny * my) * (nx * a.pull_x + ny * a.pull_y) - (mx * a.pull_x + my * a.pull_y)
+    return (nx * mx + ny * my) * (nx * a.free_ax + ny * a.free_ay) - (mx * a.free_ax + my * a.free_ay)
 
 
 @kernel
@@ -91,9 +92,9 @@ def blur(a: Any) -> float:
 
 @kernel
 def slow(a: Any) -> bool:
-    """Whether a disk is too slow for a flight that rounding does not hide, even straight against its pull."""
-    speed2, pull2 = a.vx * a.vx + a.vy * a.vy, a.pull_x * a.pull_x + a.pull_y * a.pull_y
-    return speed2 * speed2 <= 4.0 * pull2 * blur(a) * blur(a)
+    """Whether a disk is too slow for a flight that rounding does not hide, even straight against its acceleration."""
+    speed2, acceleration2 = a.vx * a.vx + a.vy * a.vy, a.free_ax * a.free_ax + a.free_ay * a.free_ay
+    return speed2 * speed2 <= 4.0 * acceleration2 * blur(a) * blur(a)
 
 
 @kernel
@@ -113,9 +114,9 @@ def second_wall(walls: Walls, g: Grid, a: Any, w: int) -> int:
 
 @kernel
 def hold(walls: Walls, a: Any, w: int, k: int) -> float:
-    """m/s2, at least, at which its pull brings a disk that slides along either wall back into the corner; or 0.
+    """m/s2, at least, at which its acceleration brings a disk that slides along either wall back into the corner; or 0.
 
-    Where it is positive, the pull is minus a sum of the two normals.
+    Where it is positive, the acceleration is minus a sum of the two normals.
     """
     return max(min(fall_into(walls, a, w, k), fall_into(walls, a, k, w)), 0.0)
 
@@ -145,7 +146,7 @@ def rests(walls: Walls, a: Any, w: int, k: int, crowded: bool, trapped: bool) ->
     if k >= 0 and lie_still(walls, a, w, k, trapped):
         return True
     over = a.bounces >= COLLISIONS if crowded or trapped else abs(across(walls, a, w, a.vx, a.vy)) <= a.noise
-    if not over or (a.wall >= 0 and k < 0) or across(walls, a, w, a.pull_x, a.pull_y) >= 0.0:
+    if not over or (a.wall >= 0 and k < 0) or across(walls, a, w, a.free_ax, a.free_ay) >= 0.0:
         return False
     lie_down(walls, a, w)
     return True
@@ -153,34 +154,35 @@ def rests(walls: Walls, a: Any, w: int, k: int, crowded: bool, trapped: bool) ->
 
 @kernel
 def bear(walls: Walls, a: Any) -> None:
-    """After a change of its pull: let a disk lie still in its corner, or on the wall that still bears it, or fly."""
+    """After a change of its acceleration: let a disk lie still in its corner, or on the wall that still bears it, or
+    fly."""
     w, k = a.wall, a.corner
     a.corner = -1
     if k >= 0:
         if lie_still(walls, a, w, k, False):
             return
-        if across(walls, a, w, a.pull_x, a.pull_y) >= 0.0 or fall_into(walls, a, w, k) > 0.0:
+        if across(walls, a, w, a.free_ax, a.free_ay) >= 0.0 or fall_into(walls, a, w, k) > 0.0:
             w = k
-    if w >= 0 and across(walls, a, w, a.pull_x, a.pull_y) < 0.0:
+    if w >= 0 and across(walls, a, w, a.free_ax, a.free_ay) < 0.0:
         lie_down(walls, a, w)
     else:
         take_off(a)
 
 
 @kernel
-def rattles(run: Any, a: Any, closing: float, pull: float, counts: bool) -> bool:
+def rattles(run: Any, a: Any, closing: float, acceleration: float, counts: bool) -> bool:
     """Whether a disk that has just collided, closing at so many m/s, rattles between what it touches.
 
     A bounce that gets no higher than `blur` is none that float64 can play: v2 / 2 <= g blur, where g is the largest
-    pull on those who take part, and what bends the way round a disk. It takes sqrt(8 blur / g) at most. COLLISIONS
-    collisions in a row that count, with no more than LONGEST times as long for each, have no end. What counts is a
-    collision with another thing than the one before: those with one thing die out by themselves, but where e is too
-    near 1 for that.
+    acceleration on those who take part, and what bends the way round a disk. It takes sqrt(8 blur / g) at most.
+    COLLISIONS collisions in a row that count, with no more than LONGEST times as long for each, have no end. What
+    counts is a collision with another thing than the one before: those with one thing die out by themselves, but where
+    e is too near 1 for that.
     """
-    run.pull = max(run.pull, pull)
-    g = run.pull + (a.vx * a.vx + a.vy * a.vy) / a.radius
+    run.acceleration = max(run.acceleration, acceleration)
+    g = run.acceleration + (a.vx * a.vx + a.vy * a.vy) / a.radius
     if closing * closing > 2.0 * g * blur(a) + a.noise * a.noise:
-        run.collisions, run.pull = 0, 0.0
+        run.collisions, run.acceleration = 0, 0.0
         return False
     if run.collisions == 0:
         run.start = a.t

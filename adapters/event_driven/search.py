@@ -43,15 +43,15 @@ def next_own(g: Grid, walls: Walls, wrapped: bool, a: Any) -> tuple[float, int]:
     """As `next_edge` on a parabola: also the wrap box, the walls near its cell, the end of the one it lies on."""
     best, code = inf, EDGE
     for axis in range(2):
-        x, v, pull = (a.x, a.vx, a.ax) if axis == 0 else (a.y, a.vy, a.ay)
+        x, v, acceleration = (a.x, a.vx, a.ax) if axis == 0 else (a.y, a.vy, a.ay)
         low = a.ox + a.cx * g.side[0] if axis == 0 else a.oy + a.cy * g.side[1]
         for high in range(2):
             sign = 1.0 - 2.0 * high
-            t = line_time(sign * (x - low - high * g.side[axis]), sign * v, sign * pull)
+            t = line_time(sign * (x - low - high * g.side[axis]), sign * v, sign * acceleration)
             if t < best:
                 best, code = t, EDGE + 2 * axis + high
             if wrapped:
-                t = line_time(sign * (x - walls.wrap[high, axis]), sign * v, sign * pull)
+                t = line_time(sign * (x - walls.wrap[high, axis]), sign * v, sign * acceleration)
                 if t < best:
                     best, code = t, WRAP + 2 * axis + high
     c = a.cx * g.shape[1] + a.cy
@@ -80,9 +80,9 @@ def wall_time(walls: Walls, a: Any, w: int, part: int, until: float) -> float:
             dx, dy = dx - length * ux, dy - length * uy
         return meeting(dx, dy, a.vx, a.vy, a.ax, a.ay, a.radius, noise, until)
     first = inf
-    height, speed, pull = dy * ux - dx * uy, a.vy * ux - a.vx * uy, a.ay * ux - a.ax * uy
+    height, speed, acceleration = dy * ux - dx * uy, a.vy * ux - a.vx * uy, a.ay * ux - a.ax * uy
     for side in (1.0, -1.0):
-        gap, v, p = side * height - a.radius, side * speed, side * pull
+        gap, v, p = side * height - a.radius, side * speed, side * acceleration
         if noise > 0.0 and side * height > 0.0:
             if abs(gap) < ROUNDING * (abs(dx) + abs(dy) + a.radius):  # beside a wall's end it may be far below
                 gap = 0.0
@@ -101,8 +101,10 @@ def end_time(walls: Walls, a: Any) -> float:
     """When a disk that slides along a wall reaches its end."""
     ux, uy = walls.segment[a.wall, 2], walls.segment[a.wall, 3]
     along = (a.x - walls.segment[a.wall, 0]) * ux + (a.y - walls.segment[a.wall, 1]) * uy
-    speed, pull = a.vx * ux + a.vy * uy, a.ax * ux + a.ay * uy
-    return min(line_time(along, speed, pull), line_time(walls.segment[a.wall, 4] - along, -speed, -pull))
+    speed, acceleration = a.vx * ux + a.vy * uy, a.ax * ux + a.ay * uy
+    return min(
+        line_time(along, speed, acceleration), line_time(walls.segment[a.wall, 4] - along, -speed, -acceleration)
+    )
 
 
 @kernel

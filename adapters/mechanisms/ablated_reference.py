@@ -135,8 +135,8 @@ def move(disks: Disks, world: World, on: Switches, kept: Contacts, h: float) -> 
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
             for axis in range(2):
-                pull = world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
-                moved[i, axis] += (v[i, axis] + kept.nudge[i, axis]) * h + more * pull
+                acceleration = world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
+                moved[i, axis] += (v[i, axis] + kept.nudge[i, axis]) * h + more * acceleration
                 disks.position[i, axis] = kept.start[i, axis] + moved[i, axis]
                 kept.nudge[i, axis] = 0.0
             disks.angle[i] += disks.angular_velocity[i] * h + more * disks.torque[i] / disks.inertia[i]

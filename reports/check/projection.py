@@ -24,11 +24,11 @@ class Shift(NamedTuple):
     sizes: float
 
 
-PULLED = "the sign is wrong: they are pulled into each other"
+WRONG_SIGN = "the sign is wrong: they are moved into each other"
 # (shift) -> the displacement of both together that a mistake would give, m
 TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "the positions are never changed: not implemented": lambda s, a, b: 0.0,
-    PULLED: lambda s, a, b: -s.overlap,
+    WRONG_SIGN: lambda s, a, b: -s.overlap,
     "only half of the overlap is taken out: it is halved twice": lambda s, a, b: s.overlap / 2,
     "the overlap is counted twice: each is moved by all of it": lambda s, a, b: 2 * s.overlap,
     "the sign is wrong, and the overlap is counted twice": lambda s, a, b: -2 * s.overlap,
@@ -53,7 +53,7 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
 }
 
 
-def pulled(answers: dict[str, Answer]) -> bool:
+def moved_together(answers: dict[str, Answer]) -> bool:
     """Whether pairs that collision are displaced the wrong way."""
     shifts = [shift_of(question.balls, answers[name].last) for name, question in COLLISIONS.items()]
     return all(s.a + s.b < 0 and near(s.across, 0.0, 0.1) for s in shifts)

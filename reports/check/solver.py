@@ -16,7 +16,7 @@ from reports.check.impacts import APPROACH, BACKWARDS, explain
 from reports.check.impulse import impulse_not_asked, impulse_rows
 from reports.check.loop import loop_rows
 from reports.check.motion import motion_rows
-from reports.check.projection import projection_rows, pulled
+from reports.check.projection import moved_together, projection_rows
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, ask
 from reports.check.restitution import Restitution, code_of, restitution_of
 from reports.check.rows import Row, judged, not_asked
@@ -122,7 +122,7 @@ def task_2(process: SolverProcess, answers: dict[str, Answer], text: str) -> tup
         return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None
     restitution = restitution_of(text, mine)
     found = explain(mine, restitution)
-    if found is not None and found.impulse == APPROACH and pulled(mine):
+    if found is not None and found.impulse == APPROACH and moved_together(mine):
         found = replace(found, impulse=BACKWARDS)
     rows += projection_rows(mine, found)
     return rows + impulse_rows(mine, restitution, found), restitution

@@ -212,14 +212,14 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     # Round a fixed disk, or round the end of a wall, the normal turns: no direction keeps its momentum.
     if any(scene.static[i] for i in disks if i < scene.n) or (touched & ((share <= 0) | (share >= 1))).any():
         near = np.eye(2)
-    pull = " but for gravity" if scene.gravity.any() else ""
+    exception = " but for gravity" if scene.gravity.any() else ""
     if not len(near):
         total = f"({momentum[0]:.6g}, {momentum[1]:.6g}) N s"
-        yield f"{names}: nothing else touches them, so their momentum, {total}, stays{pull}"
+        yield f"{names}: nothing else touches them, so their momentum, {total}, stays{exception}"
     elif np.abs(near[:, 0] * near[0, 1] - near[:, 1] * near[0, 0]).max() <= EPS * np.abs(near).max() ** 2:
         way = near[0] / np.hypot(*near[0])
         yield (
             f"{names}: all walls they touch lie along ({way[0]:.4g}, {way[1]:.4g}), so their momentum that way, "
-            f"{momentum @ way:.6g} N s, stays{pull}"
+            f"{momentum @ way:.6g} N s, stays{exception}"
         )
-    yield f"{names}: their kinetic energy, {(mass * (v**2).sum(axis=1)).sum() / 2:.6g} J, can only fall{pull}"
+    yield f"{names}: their kinetic energy, {(mass * (v**2).sum(axis=1)).sum() / 2:.6g} J, can only fall{exception}"

@@ -154,7 +154,7 @@ def test_the_split_of_the_overlap_is_free_but_for_static_disks(split, mass, move
     assert (disks.position[:, 0] - [0, 1.5]).tolist() == list(moved)
 
 
-def test_the_formula_as_printed_pulls_a_separating_pair_together():
+def test_the_formula_as_printed_draws_a_separating_pair_together():
     """It has no condition on the sign of the speed; ours acts on approaching pairs only."""
     for approaching_only, after in ((True, [-1.0, 1.0]), (False, [0.9, -0.9])):
         disks = make_disks([[0, 0], [0.9, 0]], [[-1, 0], [1, 0]], [0.5, 0.5], [1, 1])

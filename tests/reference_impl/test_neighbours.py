@@ -64,7 +64,7 @@ def by_list(disks, world, dt, count):
 def until_astray(disks, world, near):
     """In which step of one the list of near pairs ends to hold: 0, or 1 if it lasts."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
-    return crowd.play(disks, world, DT, 1, collisions, crowd.pull_on(disks, world, DT), near, 0, 0, 0)[0]
+    return crowd.play(disks, world, DT, 1, collisions, crowd.accelerations_of(disks, world, DT), near, 0, 0, 0)[0]
 
 
 def same(a, b):

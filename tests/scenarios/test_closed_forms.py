@@ -55,14 +55,16 @@ def next_events(scene: Scene, x, v):
     for w, (point, normal) in enumerate(zip(*wall_frames(scene))):
         side = np.sign((scene.position - point) @ normal)
         gap = np.maximum((x - point) @ normal * side - scene.radius, 0)
-        speed, pull = v @ normal * side, scene.gravity @ normal * side
+        speed, acceleration = v @ normal * side, scene.gravity @ normal * side
         for i in np.flatnonzero(np.isfinite(scene.mass)):
-            if pull[i] < 0:
-                root = np.sqrt(speed[i] ** 2 - 2 * pull[i] * gap[i])
-                t = 2 * gap[i] / (root - speed[i]) if speed[i] < 0 else (speed[i] + root) / -pull[i]
+            if acceleration[i] < 0:
+                root = np.sqrt(speed[i] ** 2 - 2 * acceleration[i] * gap[i])
+                t = 2 * gap[i] / (root - speed[i]) if speed[i] < 0 else (speed[i] + root) / -acceleration[i]
                 found.append((t, i, -1 - w))
-            elif speed[i] < 0 and speed[i] ** 2 > 2 * pull[i] * gap[i]:
-                found.append((2 * gap[i] / (np.sqrt(speed[i] ** 2 - 2 * pull[i] * gap[i]) - speed[i]), i, -1 - w))
+            elif speed[i] < 0 and speed[i] ** 2 > 2 * acceleration[i] * gap[i]:
+                found.append(
+                    (2 * gap[i] / (np.sqrt(speed[i] ** 2 - 2 * acceleration[i] * gap[i]) - speed[i]), i, -1 - w)
+                )
     return min(found)
 
 

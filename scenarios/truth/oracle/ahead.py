@@ -48,10 +48,10 @@ class Ahead:
 
     def _edges(self, i: int) -> Iterator[Contact]:
         """The edges of the wrap that disk i may be on its way to."""
-        velocity, pull = self.bodies.table[i, 2:4], self.bodies.table[i, 4:6]
+        velocity, acceleration = self.bodies.table[i, 2:4], self.bodies.table[i, 4:6]
         for axis in (0, 1):
             for side in (1, -1):
-                if pull[axis] or side * velocity[axis] >= 0:
+                if acceleration[axis] or side * velocity[axis] >= 0:
                     yield Contact("edge", i, axis, side)
 
     def _holds(self, contact: Contact) -> bool:
@@ -75,7 +75,7 @@ class Ahead:
         bodies, i, j = self.bodies, contact.i, contact.j
         pair = (min(i, j), max(i, j))
         parted = bodies.parted.get(pair) == (bodies.count[pair[0]], bodies.count[pair[1]])
-        alike = bodies.pull[i] == bodies.pull[j]
+        alike = bodies.kind[i] == bodies.kind[j]
         if parted and alike:
             return None
         (x, y, u, v), (px, py, pu, pv) = bodies.state_at(i, now), bodies.state_at(j, now)
@@ -93,7 +93,7 @@ class Ahead:
     def _time_to_wall(self, contact: Contact, now: Number) -> Number | None:
         bodies, i, leg = self.bodies, contact.i, self.bodies.legs[contact.i]
         x, y, u, v = bodies.state_at(i, now)
-        fall = self.k.exact(0.0) if bodies.pull[i] == STATIC else bodies.outward(contact, leg.ax, leg.ay)
+        fall = self.k.exact(0.0) if bodies.kind[i] == STATIC else bodies.outward(contact, leg.ax, leg.ay)
         leans = contact in bodies.leaning[i] and leg.t is now
         gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.radius[i]
         try:
@@ -123,21 +123,21 @@ class Ahead:
         bodies, leg, wall = self.bodies, self.bodies.legs[contact.i], self.bodies.walls[contact.j]
         x, y, u, v = bodies.state_at(contact.i, now)
         foot, speed = bodies.foot(contact.j, x, y), wall.tx * u + wall.ty * v
-        pull = self.k.exact(0.0) if bodies.pull[contact.i] == STATIC else wall.tx * leg.ax + wall.ty * leg.ay
+        acceleration = self.k.exact(0.0) if bodies.kind[contact.i] == STATIC else wall.tx * leg.ax + wall.ty * leg.ay
         left = wall.length - foot if contact.side > 0 else foot
-        return crossing(self.k, left, -contact.side * speed, -contact.side * pull)
+        return crossing(self.k, left, -contact.side * speed, -contact.side * acceleration)
 
     def _time_to_edge(self, contact: Contact, now: Number) -> Number | None:
         i, axis, side = contact.i, contact.j, contact.side
         assert self.scene.wrap is not None
         edge = self.k.exact(float(self.scene.wrap[1 if side > 0 else 0, axis]))
         state, leg = self.bodies.state_at(i, now), self.bodies.legs[i]
-        pull = self.k.exact(0.0) if self.bodies.pull[i] == STATIC else -side * (leg.ax, leg.ay)[axis]
+        acceleration = self.k.exact(0.0) if self.bodies.kind[i] == STATIC else -side * (leg.ax, leg.ay)[axis]
         gap, speed = side * (edge - state[axis]), -side * state[2 + axis]
         # A centre that stands on an edge is not beyond it.
         if self.k.sign(gap) == 0 and self.k.sign(speed) == 0:
             return None
-        return crossing(self.k, gap, speed, pull)
+        return crossing(self.k, gap, speed, acceleration)
 
     def touch(self, contact: Contact, now: Number) -> Touch:
         """The contact with its direction, at `now`."""

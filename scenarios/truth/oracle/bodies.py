@@ -83,14 +83,14 @@ class Bodies:
         nought, still = exact(0.0), ~scene.static
         positions = np.concatenate([scene.position, ends])
         velocities = np.concatenate([scene.velocity, np.zeros_like(ends)])
-        pulls = np.concatenate([still[:, None] * scene.gravity, np.zeros_like(ends)])
-        rows = [[nought, *map(exact, row)] for row in np.hstack([positions, velocities, pulls]).tolist()]
+        accelerations = np.concatenate([still[:, None] * scene.gravity, np.zeros_like(ends)])
+        rows = [[nought, *map(exact, row)] for row in np.hstack([positions, velocities, accelerations]).tolist()]
         self.legs = [Leg(*row) for row in rows]
-        self.pull = [FALLING if moves else STATIC for moves in still] + [STATIC] * len(ends)
+        self.kind = [FALLING if moves else STATIC for moves in still] + [STATIC] * len(ends)
         if not scene.gravity.any():
-            self.pull = [STATIC] * len(self.legs)
+            self.kind = [STATIC] * len(self.legs)
         # What accelerates each while nothing holds it.
-        self.free = [(kind, leg.ax, leg.ay) for kind, leg in zip(self.pull, self.legs)]
+        self.free = [(kind, leg.ax, leg.ay) for kind, leg in zip(self.kind, self.legs)]
         self.count = [0] * len(self.legs)
         self.radii = np.append(scene.radius, np.zeros(len(ends)))
         self.radius = [exact(r) for r in self.radii.tolist()]
@@ -194,7 +194,7 @@ class Bodies:
                 level = square_to(self.scene.walls[walls[0].j], self.scene.gravity)
                 kind, along = (STATIC, self.k.exact(0.0)) if level else (-1 - walls[0].j, along)
             ax, ay = along * tx, along * ty
-        self.pull[i] = kind
+        self.kind[i] = kind
         return ax, ay
 
     def remember(self, touches: Sequence[Touch], collision: set[int]) -> None:

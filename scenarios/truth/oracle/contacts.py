@@ -38,12 +38,12 @@ def crossing(k: Numbers, s: Number, v: Number, a: Number) -> Number | None:
 
     s < 0 is a point already behind the line: it must come out again before it can cross. Raises `Pressed`.
     """
-    side, going, pulled = k.sign(s), k.sign(v), k.sign(a)
+    side, going, curving = k.sign(s), k.sign(v), k.sign(a)
     if side == 0 and going < 0:
         return k.exact(0.0)
-    if side == 0 and going == 0 and pulled < 0:
+    if side == 0 and going == 0 and curving < 0:
         raise Pressed
-    if pulled < 0:
+    if curving < 0:
         under = v * v - 2 * a * s
         if side < 0 and (going <= 0 or k.sign(under) <= 0):
             return None
@@ -51,7 +51,7 @@ def crossing(k: Numbers, s: Number, v: Number, a: Number) -> Number | None:
         return 2 * s / (root - v) if going < 0 else (v + root) / -a
     if side <= 0 or going >= 0:
         return None
-    if pulled == 0:
+    if curving == 0:
         return s / -v
     under = v * v - 2 * a * s
     return 2 * s / (k.sqrt(under) - v) if k.sign(under) > 0 else None

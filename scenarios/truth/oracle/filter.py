@@ -162,17 +162,17 @@ def wall_bound(one: Row, wall: Array, radius: float, side: float) -> float:
     blur = BLUR * far
     gap = nx * (one[X] - px) + ny * (one[Y] - py) - radius
     speed = nx * one[VX] + ny * one[VY] - BLUR * (abs(one[VX]) + abs(one[VY]))
-    pull = nx * one[AX] + ny * one[AY] - BLUR * (abs(one[AX]) + abs(one[AY]))
+    acceleration = nx * one[AX] + ny * one[AY] - BLUR * (abs(one[AX]) + abs(one[AY]))
     if gap < -blur:
         # Behind the line it must come out before it can cross again.
-        falls_back = pull < 0 and speed + 2 * BLUR * (abs(one[VX]) + abs(one[VY])) > 0
+        falls_back = acceleration < 0 and speed + 2 * BLUR * (abs(one[VX]) + abs(one[VY])) > 0
         return 0.0 if falls_back else inf
     gap = max(gap - blur, 0.0)
-    if pull >= 0.0:
-        under = speed * speed - 2 * pull * gap * (1 - SLACK)
+    if acceleration >= 0.0:
+        under = speed * speed - 2 * acceleration * gap * (1 - SLACK)
         return inf if speed >= 0.0 or under < 0.0 else 2 * gap / (sqrt(under) - speed) * (1 - SLACK)
-    root = sqrt(speed * speed - 2 * pull * gap)
-    return (2 * gap / (root - speed) if speed < 0.0 else (speed + root) / -pull) * (1 - SLACK)
+    root = sqrt(speed * speed - 2 * acceleration * gap)
+    return (2 * gap / (root - speed) if speed < 0.0 else (speed + root) / -acceleration) * (1 - SLACK)
 
 
 @kernel

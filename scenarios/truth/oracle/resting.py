@@ -1,7 +1,8 @@
 """What comes to rest: bounces that die out in finite time (rule Z1), what lies still from the start, what slides.
 
-A disk that leaves a line at the speed v and is pulled back at g bounces infinitely often within 2 v / (g (1 - e)), and
-rests from then on (any textbook of mechanics, under "bouncing ball"). If nothing can touch it before, that is exact.
+A disk that leaves a line at the speed v and is accelerated back at g bounces infinitely often within 2 v / (g (1 - e)),
+and rests from then on (any textbook of mechanics, under "bouncing ball"). If nothing can touch it before, that is
+exact.
 """
 
 from __future__ import annotations
@@ -124,10 +125,10 @@ def travel(bodies: Bodies, states: Array, left: float, thrusts: Sequence[Thrust]
     mass = np.append(bodies.scene.mass, np.full(len(states) - bodies.scene.n, np.inf))
     moves = np.isfinite(mass)
     accelerations = [float(np.hypot(*thrust.force)) / mass[thrust.disk] for thrust in thrusts]
-    pull = float(np.hypot(*bodies.scene.gravity)) + sum(accelerations)
+    acceleration = float(np.hypot(*bodies.scene.gravity)) + sum(accelerations)
     hops = np.array([0.0 if leg.hop is None else float(leg.hop.speed) ** 2 for leg in bodies.legs])
     energy = (mass[moves] * ((states[moves, 2:4] ** 2).sum(axis=1) + hops[moves])).sum() / 2
-    speed = np.sqrt(energy) + np.sqrt(mass[moves].sum() / 2) * pull * left
+    speed = np.sqrt(energy) + np.sqrt(mass[moves].sum() / 2) * acceleration * left
     return np.sqrt(2 / mass) * speed * left
 
 
@@ -137,7 +138,7 @@ def hop_height(leg: Leg) -> float:
 
 
 def press(ahead: Ahead, contact: Contact, now: Number) -> bool:
-    """Let a disk that is pulled onto a wall it touches, with no speed across it, rest on it; False if it cannot.
+    """Let a disk that is accelerated onto a wall it touches, with no speed across it, rest on it; False if it cannot.
 
     On a second wall it rests if that stands at right angles to the first, or if it lies still between the two.
     """
@@ -161,7 +162,7 @@ def lie_down(ahead: Ahead) -> list[Contact]:
     """Rest what lies still at the start: disks on walls, and disks straight above each other on those. The contacts."""
     bodies, now = ahead.bodies, ahead.bodies.k.exact(0.0)
     found = start(ahead)
-    lying = [c for c, approach in found if c.kind == "wall" and approach == 0 and _pulled(bodies, c)]
+    lying = [c for c, approach in found if c.kind == "wall" and approach == 0 and _pressed(bodies, c)]
     rested = [c for c in lying if press(ahead, c, now)]
     pairs = [Contact("body", *ends) for c, _ in found if c.kind == "body" for ends in ((c.i, c.j), (c.j, c.i))]
     still = [not row.any() for row in bodies.table[:, 2:4]]
@@ -184,8 +185,8 @@ def next_in_line(ahead: Ahead, contact: Contact, side: int) -> Contact | None:
     return None
 
 
-def _pulled(bodies: Bodies, contact: Contact) -> bool:
-    """Whether what pulls the disk of a contact presses it onto the wall, when nothing holds it."""
+def _pressed(bodies: Bodies, contact: Contact) -> bool:
+    """Whether its acceleration presses the disk of a contact onto the wall, when nothing holds it."""
     _, ax, ay = bodies.free[contact.i]
     return bodies.k.sign(bodies.outward(contact, ax, ay)) < 0
 
@@ -195,7 +196,7 @@ def _carries(bodies: Bodies, contact: Contact) -> bool:
     scene, i, j = bodies.scene, contact.i, contact.j
     if bodies.free[i][0] != FALLING or scene.static[i]:
         return False
-    firm = bool(bodies.held[j]) and bodies.pull[j] == STATIC and not bodies.table[j, 2:4].any()
+    firm = bool(bodies.held[j]) and bodies.kind[j] == STATIC and not bodies.table[j, 2:4].any()
     if not (firm or j >= scene.n or scene.static[j]) or (firm and bodies.free[j][0] != FALLING):
         return False
     (x, y), (px, py) = rational(bodies.table[i, :2]), rational(bodies.table[j, :2])

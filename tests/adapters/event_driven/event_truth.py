@@ -98,7 +98,7 @@ class EventTruth:
         for disk in sorted({thrust.disk for thrust in self.scenario.thrusts}):
             on = [p.force for p in self.scenario.thrusts if p.disk == disk and p.start <= at < p.stop]
             if not scene.static[disk]:
-                engine.pull(disk, at, scene.gravity + sum(on, np.zeros(2)) / scene.mass[disk])
+                engine.accelerate(disk, at, scene.gravity + sum(on, np.zeros(2)) / scene.mass[disk])
 
 
 def float64_truth(scenario: Scenario) -> EventTruth:

@@ -57,19 +57,19 @@ def test_a_disk_comes_to_rest_in_a_wedge(half, e):
 
 def test_into_a_right_angle_both_axes_bounce_on_their_own():
     """Each as a ball above a floor, in closed form, also when the other has come to rest already."""
-    e, pull = 0.5, np.array([3.0, 8.0])
-    engine = EventEngine(disk([1.25, 1.75], [0.0, 0.0], e, walls=box([0, 0], [9, 9]), gravity=-pull))
+    e, acceleration = 0.5, np.array([3.0, 8.0])
+    engine = EventEngine(disk([1.25, 1.75], [0.0, 0.0], e, walls=box([0, 0], [9, 9]), gravity=-acceleration))
     for at in np.linspace(0.02, 6.0, 300):
         engine.advance(at)
         x, _ = engine.look(at)
         for axis, height in enumerate((1.0, 1.5)):
-            there, _ = bouncing(height, pull[axis], e, 6.0).at(np.array([at]))
+            there, _ = bouncing(height, acceleration[axis], e, 6.0).at(np.array([at]))
             assert x[0, axis] == pytest.approx(0.25 + there[0], abs=1e-12)
     assert engine.look(6.0)[1].tolist() == [[0.0, 0.0]]
 
 
 @pytest.mark.parametrize(
-    ("pull", "moves"),
+    ("acceleration", "moves"),
     [
         ((2.0, -8.0), (2.0, 0.0)),  # off the side wall, along the floor
         ((-2.0, 8.0), (0.0, 8.0)),  # up the side wall
@@ -77,24 +77,25 @@ def test_into_a_right_angle_both_axes_bounce_on_their_own():
         ((-9.0, -1.0), (0.0, 0.0)),  # deeper into the corner
     ],
 )
-def test_a_change_of_pull_takes_a_disk_out_of_its_corner(pull, moves):
-    """Which wall still bears it decides how it goes: a t2 / 2 along what is left of the pull."""
+def test_a_change_of_acceleration_takes_a_disk_out_of_its_corner(acceleration, moves):
+    """Which wall still bears it decides how it goes: a t2 / 2 along what is left of the acceleration."""
     engine = EventEngine(disk([0.25, 0.25], walls=box([0, 0], [20, 20]), gravity=[-3.0, -8.0], restitution=0.5))
     engine.advance(1.0)
     assert engine.look(1.0)[1].tolist() == [[0.0, 0.0]]
-    engine.pull(0, 1.0, np.array(pull))
+    engine.accelerate(0, 1.0, np.array(acceleration))
     engine.advance(2.0)
     assert engine.look(2.0)[0][0] == pytest.approx(0.25 + np.array(moves) / 2, abs=1e-13)
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_in_an_obtuse_wedge_a_disk_slides_up_the_wall_that_holds_it_no_more(side):
-    """Of 120 degrees: turned by 45 degrees, the pull still presses it onto both walls, but drives it up one of them."""
+    """Of 120 degrees: turned by 45 degrees, the acceleration still presses it onto both walls, but drives it up one of
+    them."""
     walls = [[[0.0, 0.0], [3 * way * np.sin(np.pi / 3), 3 * np.cos(np.pi / 3)]] for way in (1, -1)]
     engine = EventEngine(disk([0.01, 1.0], walls=walls, gravity=[0.0, -8.0], restitution=0.5))
     engine.advance(5.0)
     assert engine.look(5.0)[1].tolist() == [[0.0, 0.0]]
-    engine.pull(0, 5.0, 8 * np.sqrt(0.5) * np.array([side, -1.0]))
+    engine.accelerate(0, 5.0, 8 * np.sqrt(0.5) * np.array([side, -1.0]))
     engine.advance(5.5)
     up = np.array([side * np.sin(np.pi / 3), np.cos(np.pi / 3)])
     way = 8 * np.cos(np.deg2rad(75)) * 0.5**2 / 2 * up
@@ -154,13 +155,13 @@ def test_collisions_that_accumulate_are_refused_where_the_exact_answer_ends_too(
 
 
 def test_a_disk_driven_into_a_wall_by_another_is_refused():
-    """One that is pulled by nothing, between the wall and one that is."""
+    """One without acceleration, between the wall and one that is."""
     scene = Scene(
         position=[[0.25, 0.0], [1.2, 0.0]], velocity=np.zeros((2, 2)), radius=[0.25, 0.25], mass=[1.0, 1.0],
         restitution=0.6, walls=[[[0.0, -5.0], [0.0, 5.0]]],
     )  # fmt: skip
     engine = EventEngine(scene)
-    engine.pull(1, 0.0, np.array([-5.0, 0.0]))
+    engine.accelerate(1, 0.0, np.array([-5.0, 0.0]))
     with pytest.raises(NoTruth, match=r"the collisions of disk 0 on disk 1( and wall 0)? accumulate at 0\.\d+ s"):
         engine.advance(9.0)
     assert engine.spent < 10_000
@@ -201,7 +202,7 @@ def test_what_would_take_for_ever_is_refused_though_it_is_no_collision():
     engine = EventEngine(
         Scene(position=[[0.0, 0.0]], velocity=[[0.0, 0.0]], radius=[0.25], mass=[1.0], restitution=1.0)
     )
-    engine.pull(0, 0.0, np.array([1e160, 0.0]))
+    engine.accelerate(0, 0.0, np.array([1e160, 0.0]))
     with pytest.raises(NoTruth, match="are too many to follow up to 1 s"):
         engine.advance(1.0)
 
@@ -241,7 +242,7 @@ def all_in_plain_python():
     """Some of the tests above."""
     test_a_disk_comes_to_rest_between_crossing_walls(0.5)
     test_a_disk_comes_to_rest_in_a_wedge(0.7, 0.0)
-    test_a_change_of_pull_takes_a_disk_out_of_its_corner((2.0, -8.0), (2.0, 0.0))
+    test_a_change_of_acceleration_takes_a_disk_out_of_its_corner((2.0, -8.0), (2.0, 0.0))
     test_in_an_obtuse_wedge_a_disk_slides_up_the_wall_that_holds_it_no_more(1)
     test_in_an_obtuse_wedge_a_disk_slides_up_the_wall_that_holds_it_no_more(-1)
     test_collisions_that_accumulate_are_refused_where_the_exact_answer_ends_too()

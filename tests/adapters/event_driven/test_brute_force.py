@@ -38,8 +38,8 @@ def contacts(scene, x, v, a, images):
             (scene.radius[i] + scene.radius[j], j, x[j] + shift, v[j], a[j])
             for j in range(i + 1, scene.n) for shift in images
         ]  # fmt: skip
-        for reach, j, place, speed, pull in [*points, *others]:
-            path = np.array([(a[i] - pull) / 2, v[i] - speed, x[i] - place])
+        for reach, j, place, speed, acceleration in [*points, *others]:
+            path = np.array([(a[i] - acceleration) / 2, v[i] - speed, x[i] - place])
             gap = sum(np.convolve(path[:, axis], path[:, axis]) for axis in range(2)) - [0, 0, 0, 0, reach**2]
             if (t := first_fall(gap)) < np.inf:
                 yield t, i, j, np.array([np.polyval(path[:, axis], t) for axis in range(2)])

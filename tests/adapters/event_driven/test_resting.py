@@ -130,7 +130,7 @@ def test_a_thrust_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
     for upward, height in ((2.0, 1.0), (-4.0, 0.0)):
         engine = EventEngine(scene)
         engine.advance(1.0)
-        engine.pull(0, 1.0, np.array([2.0, upward]))
+        engine.accelerate(0, 1.0, np.array([2.0, upward]))
         engine.advance(2.0)
         x, v = engine.look(2.0)
         assert x[0] == pytest.approx([1.0, 0.5 + height], abs=1e-14)
@@ -231,7 +231,10 @@ def test_rest_in_plain_python_is_the_same(monkeypatch):
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("speed * uy, pull * ux, pull * uy", "speed * uy, a.pull_x, a.pull_y"),  # what lies still falls
+        (
+            "speed * uy, acceleration * ux, acceleration * uy",
+            "speed * uy, a.free_ax, a.free_ay",
+        ),  # what lies still falls
         ("if a.wall >= 0:\n        t = end_time", "if False:\n        t = end_time"),  # a wall without an end
     ],
 )

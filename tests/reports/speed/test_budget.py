@@ -62,7 +62,7 @@ def test_a_planted_engine_gets_its_parts_and_its_bug_is_unexplained():
     assert np.abs(left[..., 0]).max() <= 1e-12
     for habit in (RESTITUTION, POSITION_CORRECTION):
         assert parts[habit].radii > 100 * FLOAT64
-    assert parts[FLIGHT].radii == 0.0  # nothing pulls here
+    assert parts[FLIGHT].radii == 0.0  # nothing accelerates here
 
 
 def test_a_habit_that_nobody_names_is_unexplained_to_its_size():

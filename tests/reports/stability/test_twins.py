@@ -30,7 +30,7 @@ def found(case: str, engine: str) -> tuple[Search, Limit]:
 @pytest.mark.parametrize(
     ("case", "engine", "habits"),
     [
-        ("dt_head_on_equal_e09", "pymunk:matched", LATE),  # one collision, nothing pulls
+        ("dt_head_on_equal_e09", "pymunk:matched", LATE),  # one collision, nothing accelerates
         ("dt_head_on_equal_e09", "box2d_v3:matched", LATE),
         ("dt_wall_to_wall", "reference:lesson", LATE),
         ("dt_wall_to_wall", "reference:exercise", POSITION_CORRECTION),  # each time it is set onto the wall
