@@ -56,7 +56,7 @@ class Box2DEngine:
     within a step; without gravity at e = 1 there is none, because it creates energy in a gas. No friction, sleep or
     wall skin; at e = 1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
 
-    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `sleeping` (None: the profile's),
+    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the profile's),
     `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.
     """
 

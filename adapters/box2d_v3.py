@@ -61,7 +61,7 @@ class Box2DV3:
     lets them be, an eighth of the substeps a second. The values are `MATCHED`, by `crosscheck tune`. The cap on spins
     cannot be lifted: a scene that reaches it is refused.
 
-    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `sleeping` (None: the profile's),
+    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the profile's),
     `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.
     """
 

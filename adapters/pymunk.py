@@ -36,7 +36,7 @@ class Pymunk:
     inherits an impulse that it is not given again, but that is told, and may be taken back; at e = 1 no position
     correction, because it adds energy.
 
-    Changed one at a time by `features.py`, `habits.py` and `crosscheck tune`: `turning` False gives every disk an
+    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `turning` False gives every disk an
     infinite inertia, `spatial_hash` (cell in m, count) replaces the tree of the broad phase; a key of `MATCHED` is the
     matched profile's choice, any other of `settings` an attribute of the space.
     """

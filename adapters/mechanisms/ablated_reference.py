@@ -1,6 +1,6 @@
-"""The exercise's solver with a switch for everything that engines do otherwise: an engine is an order of stages.
+"""The exercise's solver with every mechanism by which engines differ: an engine is an order of stages.
 
-Every stage is a function below, and `Switches` holds the numbers they take. Accelerate, move, pairs, walls is the
+Every stage is a function below, and `Parameters` holds the numbers they take. Accelerate, move, pairs, walls is the
 exercise, to the bit. It asks all pairs and is for some hundred disks. Compiled by numba, as `exercise` is.
 """
 
@@ -37,7 +37,7 @@ STAGES = (
 ) = range(len(STAGES))  # fmt: skip
 
 
-class Switches(NamedTuple):
+class Parameters(NamedTuple):
     """What may be other than in the exercise; the defaults are the exercise's."""
 
     order: np.ndarray  # the stages of a step, as places in STAGES
@@ -62,7 +62,7 @@ class Switches(NamedTuple):
 
 
 @compiled
-def advance(disks: Disks, world: World, on: Switches, kept: Contacts, h: float, count: int) -> list:
+def advance(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, count: int) -> list:
     """Advance `count` steps, each move by `h` s; return the collisions as `exercise.advance` does."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
@@ -78,7 +78,7 @@ def advance(disks: Disks, world: World, on: Switches, kept: Contacts, h: float, 
 
 @compiled
 def act(
-    stage: int, disks: Disks, world: World, on: Switches, kept: Contacts, h: float, k: int, collisions: list
+    stage: int, disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, k: int, collisions: list
 ) -> None:
     """One stage."""
     if stage == ACCELERATE:
@@ -126,7 +126,7 @@ def accelerate(disks: Disks, world: World, h: float) -> None:
 
 
 @compiled
-def move(disks: Disks, world: World, on: Switches, kept: Contacts, h: float) -> None:
+def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -> None:
     """x += v h + drift a h2, and what a nudge adds; the turning alike.
 
     The moves of a step are added up first, as Box2D 3.1 does: it is them that are rounded, not the place.
@@ -143,7 +143,7 @@ def move(disks: Disks, world: World, on: Switches, kept: Contacts, h: float) -> 
 
 
 @compiled
-def pairs(disks: Disks, world: World, on: Switches, k: int, collisions: list) -> None:
+def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list) -> None:
     """Task 2 of the exercise for one pair of disks after the other."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
@@ -153,7 +153,7 @@ def pairs(disks: Disks, world: World, on: Switches, k: int, collisions: list) ->
 
 
 @compiled
-def walls(disks: Disks, world: World, on: Switches, k: int, collisions: list) -> None:
+def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list) -> None:
     """The same for one disk and wall after the other."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
@@ -163,7 +163,7 @@ def walls(disks: Disks, world: World, on: Switches, k: int, collisions: list) ->
 
 
 @compiled
-def meet(disks: Disks, world: World, on: Switches, i: int, j: int, k: int, collisions: list) -> None:
+def meet(disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, collisions: list) -> None:
     """One pair, by the exercise; where nothing is to be projected, both are set back to where they met."""
     x, other = disks.position, max(j, 0)
     xi, yi, xj, yj = x[i, 0], x[i, 1], x[other, 0], x[other, 1]
@@ -205,7 +205,7 @@ def warm_start(disks: Disks, kept: Contacts) -> None:
 
 
 @compiled
-def bounce(disks: Disks, on: Switches, kept: Contacts) -> None:
+def bounce(disks: Disks, on: Parameters, kept: Contacts) -> None:
     """Sequential impulses: go through all contacts again and again; an impulse may be taken back."""
     for _ in range(on.iterations):
         for c in range(kept.found[0]):
@@ -224,7 +224,7 @@ def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
 
 
 @compiled
-def position_correction(disks: Disks, world: World, on: Switches, kept: Contacts) -> None:
+def position_correction(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
     """Undo a share of every overlap beyond the slop, some times in every island."""
     first = 0
     while on.correction_share > 0.0 and first < kept.found[0]:
@@ -239,7 +239,7 @@ def position_correction(disks: Disks, world: World, on: Switches, kept: Contacts
 
 
 @compiled
-def correct_island(disks: Disks, world: World, on: Switches, kept: Contacts, first: int, end: int) -> float:
+def correct_island(disks: Disks, world: World, on: Parameters, kept: Contacts, first: int, end: int) -> float:
     """Once through the contacts from `first` to before `end`; returns the smallest gap in m there was, at most 0."""
     worst = 0.0
     for c in range(first, end):
@@ -253,7 +253,7 @@ def correct_island(disks: Disks, world: World, on: Switches, kept: Contacts, fir
 
 
 @compiled
-def nudge(mass, on: Switches, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
+def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
     """Give overlaps a velocity that lasts for the next move only, and undoes a share of what is beyond the slop."""
     for c in range(kept.found[0]):
         kept.rows[c].nudged = 0.0
@@ -268,7 +268,7 @@ def nudge(mass, on: Switches, kept: Contacts, h: float) -> None:  # type: ignore
 
 
 @compiled
-def soften(disks: Disks, on: Switches, kept: Contacts, h: float, biased: bool) -> None:
+def soften(disks: Disks, on: Parameters, kept: Contacts, h: float, biased: bool) -> None:
     """A damped spring a contact, solved for the end of the substep (E. Catto, Solver2D, 2024: soft step).
 
     Not `biased` is its second pass, which takes the bias out of the velocities again. What is not yet touching may

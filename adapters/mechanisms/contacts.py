@@ -1,4 +1,4 @@
-"""Who touches whom, and their impulses: what `switched` keeps of a step, and from step to step.
+"""Who touches whom, and their impulses: what `ablated_reference` keeps of a step, and from step to step.
 
 A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i and is that of the moment
 it was found. Compiled by numba, as `exercise` is.
@@ -20,7 +20,7 @@ CONTACT = np.dtype([
     ("target", "f8"),  # m/s: the parting speed it is to have
     ("impulse", "f8"), ("slide", "f8"),  # N s along the normal and along the tangent (-ny, nx)
     ("strongest", "f8"),  # N s, of the impulses that one solve added
-    ("nudged", "f8"),  # N s, of `switched.nudge`
+    ("nudged", "f8"),  # N s, of `ablated_reference.nudge`
     ("island", "i8"), ("colour", "i8"),  # from 1; 0: none yet
     ("late", "b1"),  # whether its impulses are those of a step before the last
 ])  # fmt: skip

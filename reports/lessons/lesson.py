@@ -42,7 +42,7 @@ class Slider:
 
 @dataclass(frozen=True)
 class Curve:
-    """name: whose (an engine, `truth`, or `reference:switched` for the reference with a mechanism on); x, y: (k,).
+    """name: whose (an engine, `truth`, or `reference:ablated` for the reference with a mechanism on); x, y: (k,).
 
     dots: whether its points are marked; faint: whether it stands back behind the others.
     """

@@ -65,7 +65,7 @@ SEEN = {
 
 @cache
 def limits_of(name: str) -> list[Limit]:
-    """The limits of a case on every engine, searched now, with their reasons, which engines with one switch test."""
+    """The limits of a case on every engine, searched now, with their reasons, which engines with one change test."""
     case = CASES[name]
     searches = [Search(case, engine, QUICK) for engine in engines_of(case)]
     return explained([tried_out(search, search.limit()) for search in searches])

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.mechanisms.features import changed_box2d
-from adapters.mechanisms.switched import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, Switched
+from adapters.mechanisms.ablated import BOX2D, EXERCISE, MIXING, POSITION_FIRST, PYMUNK, AblatedReference
+from adapters.mechanisms.options import changed_box2d
 from adapters.play import Run, play
 from reports.compare.comparison import answered
 from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
@@ -20,7 +20,7 @@ from scenarios.families.walls import bouncing_ball_e1
 from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.truth.exact import with_oracle
 
-SWITCHED, PLAIN, NO_CCD = "reference:switched", "reference:exercise", "box2d:matched+no_ccd"
+ABLATED, PLAIN, NO_CCD = "reference:ablated", "reference:exercise", "box2d:matched+no_ccd"
 PRECISION = {53: np.float64, 24: np.float32}
 ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed after gravity": BOX2D}
 SHOWN = 0.5  # the e whose collision is replayed in the page on mixing
@@ -33,10 +33,10 @@ def asked(scene: Scene, duration: float) -> Scenario:
     return Scenario("mechanism", "Where does the engine differ?", "", scene, duration, 1 / 60)
 
 
-def runs_of(names: Sequence[str], on: Switched, scenario: Scenario, substeps: int) -> list[Run]:
+def runs_of(names: Sequence[str], on: AblatedReference, scenario: Scenario, substeps: int) -> list[Run]:
     """The engines, the reference as it is, and the reference with what is switched on."""
     runs = [play_once(name, scenario, substeps) for name in (*names, PLAIN)]
-    return [*runs, play(on, SWITCHED, scenario, scenario.dt(substeps))]
+    return [*runs, play(on, ABLATED, scenario, scenario.dt(substeps))]
 
 
 def over_time(runs: Sequence[Run], read: Read) -> list[Curve]:
@@ -45,10 +45,10 @@ def over_time(runs: Sequence[Run], read: Read) -> list[Curve]:
 
 
 def distance(curves: Sequence[Curve], name: str, unit: str) -> tuple[str, str]:
-    """How far the switched reference's curve is from an engine's, at the most."""
+    """How far the ablated reference's curve is from an engine's, at the most."""
     found = {curve.name: np.asarray(curve.y, float) for curve in curves}
-    apart = np.nanmax(np.abs(found[SWITCHED] - found[name]))
-    return f"largest distance of the switched curve from {name}", f"{number(float(apart), 2)} {unit}".strip()
+    apart = np.nanmax(np.abs(found[ABLATED] - found[name]))
+    return f"largest distance of the ablated reference from {name}", f"{number(float(apart), 2)} {unit}".strip()
 
 
 def told(runs: Sequence[Run], setting: str) -> list[tuple[str, str]]:
@@ -89,7 +89,7 @@ def show_threshold(settings: Settings) -> Shown:
     """e of a collision against its closing speed."""
     closing = np.array([0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0])
     scenario = asked(pairs(closing, settings["e"]), 0.5)
-    runs = runs_of(["box2d:shipped"], Switched(threshold=settings["threshold"]), scenario, 4)
+    runs = runs_of(["box2d:shipped"], AblatedReference(threshold=settings["threshold"]), scenario, 4)
     curves = over(closing, runs, parting(closing))
     facts = [*told(runs, "restitution threshold in m/s"), distance(curves, "box2d:shipped", "")]
     curves.append(Curve(TRUTH, closing, np.full(len(closing), settings["e"])))
@@ -100,11 +100,11 @@ def show_threshold(settings: Settings) -> Shown:
 def show_mixing(settings: Settings) -> Shown:
     """e of a collision against the e that is stated on both disks."""
     stated, closing = np.linspace(0.0, 1.0, 11), np.array([2.0])
-    names = ("pymunk:shipped", PLAIN, SWITCHED)
+    names = ("pymunk:shipped", PLAIN, ABLATED)
     found: dict[str, list[float]] = {}
     for e in stated:
         scenario = asked(pairs(closing, float(e)), 0.5)
-        runs = runs_of(names[:1], Switched(mixing=settings["rule"]), scenario, 4)
+        runs = runs_of(names[:1], AblatedReference(mixing=settings["rule"]), scenario, 4)
         for run in runs:
             if run.trajectory is not None:
                 found.setdefault(run.name, []).append(float(parting(closing)(run.trajectory)[0]))
@@ -118,7 +118,7 @@ def show_mixing(settings: Settings) -> Shown:
     )
 
 
-def falling(names: Sequence[str], on: Switched, substeps: int) -> Shown:
+def falling(names: Sequence[str], on: AblatedReference, substeps: int) -> Shown:
     """mm above the parabola of a thrown disk."""
     scenario = free_fall()
     assert scenario.truth is not None
@@ -133,19 +133,19 @@ def falling(names: Sequence[str], on: Switched, substeps: int) -> Shown:
 def show_order(settings: Settings) -> Shown:
     """Velocity then position, or position then velocity."""
     order = {"velocity first": EXERCISE, "position first": POSITION_FIRST}[settings["order"]]
-    return falling(["pymunk:matched"], Switched(order=order), settings["k"])
+    return falling(["pymunk:matched"], AblatedReference(order=order), settings["k"])
 
 
 def show_substeps(settings: Settings) -> Shown:
     """A step cut into smaller ones."""
-    return falling(["box2d_v3:matched"], Switched(substeps=settings["substeps"]), settings["k"])
+    return falling(["box2d_v3:matched"], AblatedReference(substeps=settings["substeps"]), settings["k"])
 
 
 def show_gravity(settings: Settings) -> Shown:
     """Height of a ball that should bounce for ever."""
     scenario = bouncing_ball_e1()
     names = ["box2d:matched", "pymunk:matched"]
-    runs = runs_of(names, Switched(order=ORDERS[settings["order"]]), scenario, settings["k"])
+    runs = runs_of(names, AblatedReference(order=ORDERS[settings["order"]]), scenario, settings["k"])
     curves = over_time(runs, lambda each: each.position[:, 0, 1])
     facts = [distance(curves, name, "m") for name in names]
     assert scenario.truth is not None
@@ -157,7 +157,7 @@ def show_position_correction(settings: Settings) -> Shown:
     """How an overlap that is there at the start is undone."""
     x, still = [[0.0, 0.0], [0.8, 0.0]], np.zeros((2, 2))
     scenario = asked(lay_out(position=x, velocity=still, radius=[0.5] * 2, mass=[np.inf, 2.0], restitution=0.0), 0.4)
-    on = Switched(BOX2D, correction_most=0.2, correction_share=settings["share"], slop=settings["slop"] / 1e3)
+    on = AblatedReference(BOX2D, correction_most=0.2, correction_share=settings["share"], slop=settings["slop"] / 1e3)
     engine = changed_box2d(continuous=False, bullet=False, length_unit=1.0)
     runs = [play(engine, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
     engine.close()
@@ -170,7 +170,7 @@ def show_digits(settings: Settings) -> Shown:
     """How far a disk far out is from x + v t."""
     start, v = np.array([settings["far"], 0.0]), np.array([1.0, 0.3])
     scenario = asked(lay_out(position=[start], velocity=[v], radius=[0.5], mass=[1.0], restitution=0.0), 2.0)
-    runs = runs_of(["box2d:shipped"], Switched(precision=PRECISION[settings["digits"]]), scenario, 4)
+    runs = runs_of(["box2d:shipped"], AblatedReference(precision=PRECISION[settings["digits"]]), scenario, 4)
     exact = start + scenario.times[:, None] * v
     curves = over_time(runs, lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16))
     facts = [*told(runs, "float32 rounding of the start in m"), distance(curves, "box2d:shipped", "m")]
@@ -187,7 +187,7 @@ def show_cap(settings: Settings) -> Shown:
         radius=np.full(15, 0.2), mass=np.ones(15), restitution=0.0,
     )  # fmt: skip
     scenario = asked(scene, 0.1)
-    runs = runs_of(["box2d:shipped"], Switched(order=BOX2D, cap=settings["cap"]), scenario, settings["k"])
+    runs = runs_of(["box2d:shipped"], AblatedReference(order=BOX2D, cap=settings["cap"]), scenario, settings["k"])
     curves = over(given, runs, lambda each: each.velocity[-1, :, 0])
     facts = [*told(runs, "speed cap in m/s"), distance(curves, "box2d:shipped", "m/s")]
     curves.append(Curve(TRUTH, given, given))
@@ -205,7 +205,7 @@ def show_row(settings: Settings) -> Shown:
     scenario = asked(scene, 1.0)
     order = {"pair by pair": EXERCISE, "all at once": BOX2D}[settings["order"]]
     names = ["box2d:matched", "pymunk:matched"]
-    runs = runs_of(names, Switched(order, iterations=settings["iterations"], touching=True), scenario, 4)
+    runs = runs_of(names, AblatedReference(order, iterations=settings["iterations"], touching=True), scenario, 4)
     curves = over(np.arange(n + 1.0), runs, lambda each: each.velocity[-1, :, 0])
     facts = [*told(runs, "velocity, position iterations"), *(distance(curves, name, "m/s") for name in names)]
     film = filmed(scenario, runs)
@@ -220,7 +220,7 @@ def page(
 ) -> Lesson:  # fmt: skip
     """A page of this lesson."""
     exact = () if name == "position correction" else (TRUTH,)  # disks that overlap have no exact answer
-    return Lesson(name, f"6.{part}", title, asks, (text,), sliders, (*names, PLAIN, SWITCHED, *exact), show)
+    return Lesson(name, f"6.{part}", title, asks, (text,), sliders, (*names, PLAIN, ABLATED, *exact), show)
 
 
 MECHANISMS = (

@@ -21,7 +21,7 @@ from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
 from reports.lessons.crowd import EVERY_PAIR
 from reports.lessons.lesson import Lesson
-from reports.lessons.mechanisms import SWITCHED
+from reports.lessons.mechanisms import ABLATED
 from reports.page.documents import looks_as_json, render
 from reports.page.server import in_thread
 from reports.page.style import Look, look
@@ -31,7 +31,7 @@ STYLES = ["lessons/lesson.css"]
 GROUPS = {"A solver, piece by piece": "12345", "How engines differ": "6", "What can be compared, and how far": "78"}
 MEASURING = Lock()  # two pages that ask at once get one measurement
 OWN = {  # who plays in lessons only
-    SWITCHED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
+    ABLATED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
     EVERY_PAIR: look("reference")._replace(dash=(7, 5)),
 }
 

@@ -72,7 +72,7 @@ OTHERS = (
     ("#5a3d9e", "#b7a1ff", "hexagon"), ("#3d6b1f", "#a4d67a", "pentagon"), ("#7a4a21", "#e0a878", "bowtie"),
 )  # fmt: skip
 DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3)}
-SWITCHED = (1, 2)  # a profile with one thing switched, `matched+...`
+CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep to pale on dark.
 HEAT_BOUNDS = (1e-12, 1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
@@ -87,7 +87,7 @@ HEAT_DARK = (
 def look(engine: str, profile: str = "") -> Look:
     """How `engine:profile` is drawn; an engine without a row gets one of `OTHERS` by its name."""
     light, dark, shape = ENGINE.get(engine) or OTHERS[crc32(encoded(engine)) % len(OTHERS)]
-    dash = SWITCHED if "+" in profile else DASHED.get(profile, ())
+    dash = CHANGED if "+" in profile else DASHED.get(profile, ())
     return Look(light, dark, dash, shape, not dash)
 
 

@@ -125,9 +125,9 @@ def checked_lines(folder: Path, kinds: Kinds) -> Iterator[tuple[int, str, dict[s
         yield number, kind, line
 
 
-def no_use(folder: Path, number: int, fault: str, cure: str) -> str:
+def no_use(folder: Path, number: int, fault: str, remedy: str) -> str:
     """A sentence on a line that cannot be used, and what to do."""
-    return f"{folder / JOURNAL}: line {number}: {fault}; {cure}"
+    return f"{folder / JOURNAL}: line {number}: {fault}; {remedy}"
 
 
 def kind_of(line: Any, models: Mapping[str, type[Line]]) -> str:

@@ -1,4 +1,4 @@
-"""Where an engine's error comes from: its habits switched on in the reference one at a time, and what is left over.
+"""Where an engine's error comes from: its mechanisms switched on in the reference one at a time, and what is left over.
 
 As vectors, disk by disk and sample by sample, the parts close: engine - truth = parts + interplay + unexplained.
 """
@@ -13,7 +13,7 @@ import numpy as np
 
 from adapters.engine import Engine
 from adapters.engines import row_of
-from adapters.mechanisms.habits import FLIGHT, Habit, habits_of, with_habits
+from adapters.mechanisms.table import FLIGHT, Mechanism, mechanisms_of, with_mechanisms
 from adapters.play import Run, play
 from reports.compare import laws, scales
 from reports.compare.comparison import cut
@@ -30,9 +30,7 @@ COLUMNS = [
     "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "part", "position_radii",
     "energy", "share", "off_engine_radii", "off_reference_radii", "off_apart_radii", "closed_apart_radii", "note",
 ]  # fmt: skip
-LIMIT = (
-    0.5  # radii by which late collisions alone may put a disk off: where all is far off, no part adds up to anything
-)
+LIMIT = 0.5  # radii by which end-of-step detection alone may put a disk off: where all is far off, no part adds up to anything
 
 
 class NotPlayed(Exception):
@@ -68,7 +66,7 @@ class Offset(NamedTuple):
 
 
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
-    """A row a part of what puts engine `name` of `HABITS` off in a scene, at this many steps a sample interval.
+    """A row a part of what puts engine `name` of `MECHANISMS` off in a scene, at this many steps a sample interval.
 
     Of `COLUMNS`: until_s, how far the scene was followed, horizon_s, how far its exact answer goes, and duration_s, the
     scene itself; position_radii and energy, the root mean square of what the
@@ -85,8 +83,8 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
              "duration_s": open_scene(scene, seed).duration}  # fmt: skip
     try:
         run = at.played(row_of(name).make())
-        budget = Budget(at, habits_of(name, run.settings, scenario.scene, dt), at.offset(run))
-        parts, checks = budget.parts(), budget.switched_off()
+        budget = Budget(at, mechanisms_of(name, run.settings, scenario.scene, dt), at.offset(run))
+        parts, checks = budget.parts(), budget.ablated_in_both()
     except NotPlayed as failure:
         return [known | {"part": TOTAL, "note": str(failure)}]
     checks[FLIGHT] = {"closed_apart_radii": at.flight_apart(parts[FLIGHT], row_of(name).alpha)}
@@ -99,10 +97,10 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
 
 
 def followed(scene: str, seed: int, substeps: int) -> Followed:
-    """The scene up to where late collisions alone put a disk farther off than `LIMIT`."""
+    """The scene up to where end-of-step detection alone puts a disk farther off than `LIMIT`."""
     scenario, truth = held(scene, seed)
     whole = Followed(scenario, truth, scenario.dt(substeps))
-    late = whole.played(with_habits([])).trajectory
+    late = whole.played(with_mechanisms([])).trajectory
     assert late is not None
     off = (laws.deviation(late, truth, scenario.scene) / scenario.scene.radius).max(axis=1)
     last = max(int(np.append(np.flatnonzero(off > LIMIT), len(off))[0]) - 1, 1)
@@ -153,51 +151,51 @@ class Followed:
 
 
 class Budget:
-    """The offset of one engine, and its habits, each of which is played once with the same others."""
+    """The offset of one engine, and its mechanisms, each of which is played once with the same others."""
 
-    def __init__(self, at: Followed, habits: Sequence[Habit], total: Offset) -> None:
-        self.at, self.habits, self.total = at, habits, total
+    def __init__(self, at: Followed, mechanisms: Sequence[Mechanism], total: Offset) -> None:
+        self.at, self.mechanisms, self.total = at, mechanisms, total
         self.known: dict[tuple[str, ...], Offset] = {}
 
     def parts(self) -> dict[str, Offset]:
-        """What each habit changes, then interplay, what is unexplained, the sum, all at once, and the engine.
+        """What each mechanism changes, then interplay, what is unexplained, the sum, all at once, and the engine.
 
-        Each is switched on by itself in the reference with late collisions, or on top of those it acts on; for what the
-        reference has no switch for, the engine is set against itself without it.
+        Each is switched on by itself in the reference with end-of-step detection, or on top of those it acts on; for a
+        mechanism that the reference does not have, the engine is compared with itself without it.
         """
         parts = {TIME: self.reference([])}
-        for habit in self.habits:
-            if habit.switches:
-                below = [each for each in self.habits if each.name in habit.on_top]
-                parts[habit.name] = self.reference([*below, habit]) - self.reference(below)
-            elif habit.without is not None:
-                parts[habit.name] = self.total - self.at.offset(self.at.played(habit.without()))
-        unswitched = [parts[habit.name] for habit in self.habits if not habit.switches]
-        summed, reached = added(parts.values()), added([self.reference(self.habits), *unswitched])
+        for mechanism in self.mechanisms:
+            if mechanism.parameters:
+                below = [each for each in self.mechanisms if each.name in mechanism.on_top]
+                parts[mechanism.name] = self.reference([*below, mechanism]) - self.reference(below)
+            elif mechanism.without is not None:
+                parts[mechanism.name] = self.total - self.at.offset(self.at.played(mechanism.without()))
+        outside = [parts[mechanism.name] for mechanism in self.mechanisms if not mechanism.parameters]
+        summed, reached = added(parts.values()), added([self.reference(self.mechanisms), *outside])
         return parts | {
             INTERPLAY: reached - summed, UNEXPLAINED: self.total - reached, SUM: summed, ALL: reached,
             TOTAL: self.total,
         }  # fmt: skip
 
-    def switched_off(self) -> dict[str, dict[str, float]]:
+    def ablated_in_both(self) -> dict[str, dict[str, float]]:
         """part -> what switching it off changes in the engine, and in the reference with all the rest switched on."""
         found = {}
-        for habit in self.habits:
-            if habit.switches and habit.without is not None:
-                others = [each for each in self.habits if each is not habit]
-                in_engine = self.total - self.at.offset(self.at.played(habit.without()))
-                in_reference = self.reference(self.habits) - self.reference(others)
-                found[habit.name] = {
+        for mechanism in self.mechanisms:
+            if mechanism.parameters and mechanism.without is not None:
+                others = [each for each in self.mechanisms if each is not mechanism]
+                in_engine = self.total - self.at.offset(self.at.played(mechanism.without()))
+                in_reference = self.reference(self.mechanisms) - self.reference(others)
+                found[mechanism.name] = {
                     "off_engine_radii": in_engine.radii, "off_reference_radii": in_reference.radii,
                     "off_apart_radii": (in_engine - in_reference).radii,
                 }  # fmt: skip
         return found
 
-    def reference(self, habits: Sequence[Habit]) -> Offset:
-        """How far the reference with these habits is from the truth."""
-        names = tuple(habit.name for habit in self.habits if habit in habits)
+    def reference(self, mechanisms: Sequence[Mechanism]) -> Offset:
+        """How far the reference with these mechanisms is from the truth."""
+        names = tuple(mechanism.name for mechanism in self.mechanisms if mechanism in mechanisms)
         if names not in self.known:
-            self.known[names] = self.at.offset(self.at.played(with_habits(habits)))
+            self.known[names] = self.at.offset(self.at.played(with_mechanisms(mechanisms)))
         return self.known[names]
 
 

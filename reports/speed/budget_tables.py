@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.mechanisms.habits import NAMES
+from adapters.mechanisms.table import NAMES
 from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED
 from reports.speed.explained import LEAST, TO
 
@@ -17,7 +17,7 @@ WHO = ["engine", "profile"]
 
 
 class Cell(NamedTuple):
-    """A number, and the length of its bar from 0 to 1; nan, and no bar, where an engine has no such habit."""
+    """A number, and the length of its bar from 0 to 1; nan, and no bar, where an engine has no such mechanism."""
 
     value: float
     bar: float
@@ -85,7 +85,7 @@ def overview(budget: pd.DataFrame) -> Table:
     return Table("", np.nan, np.nan, np.nan, columns, rows, {})
 
 
-def switched_off(budget: pd.DataFrame) -> list[dict[str, Any]]:
-    """Every habit that the engine lets one switch off, where that changes anything: the change in both."""
+def ablated_in_both(budget: pd.DataFrame) -> list[dict[str, Any]]:
+    """Every mechanism that can be switched off in the engine, where that changes anything: the change in both."""
     rows = budget[budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST]
     return [{str(key): value for key, value in row.items()} for row in rows.to_dict("records")]

@@ -1,4 +1,4 @@
-"""The charts: error against cost, cost at matched accuracy, cost against the number of disks, features."""
+"""The charts: error against cost, cost at matched accuracy, cost against the number of disks, options."""
 
 from __future__ import annotations
 
@@ -88,10 +88,10 @@ def front_of(drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any],
     }  # fmt: skip
 
 
-def dials(points: pd.DataFrame, relative: bool = False) -> go.Figure:
-    """Error against cost, a line a dial over its values, and one its engine over a ladder of dt.
+def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
+    """Error against cost, a line for each sweep over its values, and one its engine over a ladder of dt.
 
-    relative: both are over those of the engine as it is matched, at the dt at which the dial is turned.
+    relative: both are over those of the engine as it is matched, at the dt at which the parameter is swept.
     """
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis("time / time as matched" if relative else COST, drawn.cost.to_numpy(float))
@@ -115,7 +115,7 @@ def dials(points: pd.DataFrame, relative: bool = False) -> go.Figure:
 
 
 def turned(what: str, row: dict[str, Any], relative: bool) -> str:
-    """What hovering over a point of a dial says."""
+    """What hovering over a point of a sweep says."""
     value = f"{what} {row['change']}<br>" if what else f"dt / {2.0 ** (row['rung'] - 2):g}<br>" if relative else ""
     if not relative:
         return value + told(row)
@@ -169,7 +169,7 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
     return figure(traces, x_axis, y_axis, TALL)
 
 
-def features(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
+def options(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
     """A row a change, a mark a scene: `ratio` ("cost_ratio", "error_ratio") to the unchanged engine, 1: the same; a
     change that failed the scene stands at the right edge.
     """

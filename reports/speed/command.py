@@ -44,7 +44,7 @@ def run_speed(
 ) -> NoReturn:
     """Measure and report into `out`, or go on with what was interrupted there; exits 0, 1 (no result), 2 or 130."""
     effort = FULL if full else QUICK
-    named = checked_scenes(scenes, [], False, seed)  # none named: all that the effort has, sizes and features besides
+    named = checked_scenes(scenes, [], False, seed)  # none named: all that the effort has, sizes and options besides
     effort = replace(effort, scenes=tuple(named)) if named else effort
     plan = Plan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
     header = about(command, seed)

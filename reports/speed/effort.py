@@ -24,8 +24,8 @@ class Effort:
         budget: s of timing for one engine at one dt in one scene, beyond the first rounds.
         sizes: numbers of disks.
         patience: s a step may take before an engine drops out of the sizes.
-        dial_scenes: what iterations and substeps are turned up in: a stack, a crowd, a slide, and collisions in a row.
-        feature_scenes: what changed engines are measured in: three disks, a collision that thresholds matter to, one
+        sweep_scenes: what iterations and substeps are turned up in: a stack, a crowd, a slide, and collisions in a row.
+        option_scenes: what changed engines are measured in: three disks, a collision that thresholds matter to, one
             disk under gravity, many collisions, and a stack at rest.
         budget_scenes: those in which it is asked what the errors are made of.
     """
@@ -37,9 +37,9 @@ class Effort:
     budget: float
     sizes: tuple[int, ...]
     patience: float
-    dial_scenes: tuple[str, ...]
+    sweep_scenes: tuple[str, ...]
     budget_scenes: tuple[str, ...]
-    feature_scenes: tuple[str, ...] = (
+    option_scenes: tuple[str, ...] = (
         "disk_between_static_disks", "slow_collision", "bouncing_ball_e1", "line_gas", "column_of_ten",
     )  # fmt: skip
 
@@ -61,7 +61,7 @@ QUICK = Effort(
         "body_frame_thrust", "asteroids", "gas_of_100",
     ),
     seeds=6, most_steps=4_000, rounds=4, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000, 3000), patience=0.1,
-    dial_scenes=("column_of_ten", "falling_box", "slide_on_incline"),
+    sweep_scenes=("column_of_ten", "falling_box", "slide_on_incline"),
     budget_scenes=(
         "free_fall", "head_on_equal_e09", "oblique_e1", "slow_collision", "mass_ratios", "wall_to_wall", "bouncing_ball_e1",
         "disk_between_static_disks", "line_gas", "cradle_with_gaps", "column_of_ten", "asteroids", "gas_of_100",
@@ -70,6 +70,6 @@ QUICK = Effort(
 FULL = Effort(
     scenes=tuple(SCENARIOS), seeds=16, most_steps=16_000, rounds=15, budget=0.5,
     sizes=(3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000), patience=1.0,
-    dial_scenes=("column_of_ten", "cradle_touching", "line_gas", "gas_of_100", "slide_on_incline"),
+    sweep_scenes=("column_of_ten", "cradle_touching", "line_gas", "gas_of_100", "slide_on_incline"),
     budget_scenes=tuple(SCENARIOS),
 )  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import ceil
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.habits import HABITS
+from adapters.mechanisms.table import MECHANISMS
 from reports.speed import ladder
 from reports.speed.effort import Effort
 from reports.speed.plan import SCENE, Measurement, Plan, Reach
@@ -26,7 +26,7 @@ PAGE = 8.0  # s
 
 def estimate(plan: Plan, measurements: Sequence[Measurement], reach: Reach) -> str:
     """A sentence on how much there is to do and about how long it takes on an idle machine."""
-    apart = APART * len(plan.budget_scenes) * len(set(plan.engines) & set(HABITS))
+    apart = APART * len(plan.budget_scenes) * len(set(plan.engines) & set(MECHANISMS))
     playing = (apart + sum(seconds_to_play(measurement, reach) for measurement in measurements)) / plan.workers
     timed = [measurement for measurement in measurements if measurement.seed == plan.seed]
     timing = sum(seconds_to_time(measurement, reach, plan.effort) for measurement in timed)

@@ -192,8 +192,8 @@ class Truth(Line):
 
 
 RESULTS: dict[tuple[str, ...], type[Line]] = {
-    ("error", "scene"): Errors, ("error", "feature"): Errors, ("error", "dial"): Errors, ("budget",): Budget,
-    ("time", "scene"): Samples, ("time", "feature"): Samples, ("time", "dial"): Samples, ("time", "idle"): Samples,
+    ("error", "scene"): Errors, ("error", "option"): Errors, ("error", "sweep"): Errors, ("budget",): Budget,
+    ("time", "scene"): Samples, ("time", "option"): Samples, ("time", "sweep"): Samples, ("time", "idle"): Samples,
     ("time", "size"): Sizes, ("time", "truth"): Truth,
 }  # fmt: skip
 """How a task begins -> what it gives."""

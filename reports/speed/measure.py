@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from adapters.engines import row_of
-from adapters.mechanisms.habits import HABITS
+from adapters.mechanisms.table import MECHANISMS
 from reports.run.machine import busy_cores
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
@@ -113,10 +113,10 @@ def rung_by_rung(measurement: Measurement, workers: int) -> list[dict]:
 
 
 def measure_budget(plan: Plan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None) -> None:
-    """What the errors are made of, of the engines whose habits are known, at the middle dt."""
+    """What the errors are made of, of the engines whose mechanisms are known, at the middle dt."""
     tasks = {
         ("budget", scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
-        for scene in plan.budget_scenes for name in plan.engines if name in HABITS and reach[scene, plan.seed]
+        for scene in plan.budget_scenes for name in plan.engines if name in MECHANISMS and reach[scene, plan.seed]
     }  # fmt: skip
     results = dict(done(tasks, plan.workers, progress, "parts of the error", kept=kept))
     for task, result in results.items():

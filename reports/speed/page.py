@@ -50,17 +50,17 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         undefined=StrictUndefined,
     )
     environment.filters["number"] = style.number
-    names = (*results.names, *(dial.name for dial in results.plan.dials), style.TRUTH)
+    names = (*results.names, *(sweep.name for sweep in results.plan.sweeps), style.TRUTH)
     looks = {name: style.look(*name.split(":", 1)) for name in names}
     html = environment.get_template("speed.html.j2").render(
         names=results.names, looks=looks, about=about, pooled=pooled_section(results), sizes=sizes_section(results),
-        features=features_section(results), dials=dial_sections(results), dial_rows=charts.records(results.dials),
+        options=options_section(results), sweeps=sweep_sections(results), sweep_rows=charts.records(results.sweeps),
         sections=[section_of(results, name) for name in results.scenes],
         noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
-        driving=charts.records(results.driving), feature_rows=charts.records(results.features), 
+        driving=charts.records(results.driving), option_rows=charts.records(results.options), 
         versus=charts.records(results.versus), own=OWN,
         left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
-        feature_scenes=results.plan.feature_scenes, budget=budget_section(results),
+        option_scenes=results.plan.option_scenes, budget=budget_section(results),
         totals=(*TOTALS, UNEXPLAINED),
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
@@ -161,48 +161,48 @@ def budget_section(results: Results) -> dict[str, Any] | None:
         "absent": [name for name in results.names if name not in parts],
         "overview": budget_tables.overview(budget),
         "scenes": [budget_tables.of_scene(budget, scene) for scene in dict.fromkeys(budget.scenario)],
-        "off": budget_tables.switched_off(budget), "closed": float(budget.closed_apart_radii.max()),
+        "off": budget_tables.ablated_in_both(budget), "closed": float(budget.closed_apart_radii.max()),
     }  # fmt: skip
 
 
-def features_section(results: Results) -> Section | None:
-    """What each unneeded feature costs and breaks."""
-    table = results.features
+def options_section(results: Results) -> Section | None:
+    """What each unneeded option costs and breaks."""
+    table = results.options
     if table.empty:
         return None
     many = np.isfinite(table.cost_ratio).any()
     drawings = {
         "cost": Drawing(
             "What it costs", "Time over that of the matched profile; right of the dotted line it costs more.",
-            charts.features(table, "cost_ratio", "time / time unchanged") if many else None,
+            charts.options(table, "cost_ratio", "time / time unchanged") if many else None,
         ),
         "error": Drawing(
             "What it breaks, or mends", "Error over that of the matched profile; right of the dotted line it is worse.",
-            charts.features(table, "error_ratio", "error / error unchanged"),
+            charts.options(table, "error_ratio", "error / error unchanged"),
         ),
     }  # fmt: skip
-    return section("features", "No more than a scene needs", "", drawings)
+    return section("options", "No more than a scene needs", "", drawings)
 
 
-def dial_sections(results: Results) -> list[Section]:
+def sweep_sections(results: Results) -> list[Section]:
     """What more iterations and substeps buy, and what smaller steps buy for the same time."""
-    if results.dials.empty:
+    if results.sweeps.empty:
         return []
-    count = results.dials.scenario.nunique()
-    without = ", ".join(f"{engine} in {scene}" for engine, scene in tables.without_ratio(results.dials))
+    count = results.sweeps.scenario.nunique()
+    without = ", ".join(f"{engine} in {scene}" for engine, scene in tables.without_ratio(results.sweeps))
     pooled = Drawing(
         "Pooled",
         "Dotted: one dt, and more iterations or substeps to the right, the first and the last named. Solid: the same "
         "engine as matched, from 4 times that dt to an eighth of it. Both over what it costs and how far it is off as "
         f"matched, at that dt, where all lines meet; geometric means of the middle half of {count} scenes."
         + (f" Without a ratio, as there is nothing to divide by: {without}." if without else ""),
-        charts.dials(results.pooled_dials, relative=True),
+        charts.sweeps(results.pooled_sweeps, relative=True),
     )
     each = {
-        str(scene): Drawing(str(scene), tables.asks_of(str(scene))[1], charts.dials(points))
-        for scene, points in results.dials.groupby("scenario", sort=False)
+        str(scene): Drawing(str(scene), tables.asks_of(str(scene))[1], charts.sweeps(points))
+        for scene, points in results.sweeps.groupby("scenario", sort=False)
     }
     return [
-        section("dials", "More work in a step, or more steps", "", {"dials": pooled}),
-        section("dials-each", "The same, scene by scene", "", each),
+        section("sweeps", "More work in a step, or more steps", "", {"sweeps": pooled}),
+        section("sweeps-each", "The same, scene by scene", "", each),
     ]

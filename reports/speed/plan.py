@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 from adapters.engine import Engine
 from adapters.engines import row_of
-from adapters.mechanisms.features import DIALS, FEATURES, Dial, Feature
+from adapters.mechanisms.options import OPTIONS, SWEEPS, Option, Sweep
 from reports.speed import ladder
 from reports.speed.effort import Effort
 
-SCENE, FEATURE, DIAL = "scene", "feature", "dial"
+SCENE, OPTION, SWEEP = "scene", "option", "sweep"
 PLAIN = ""  # the change of an engine that is not changed
 Reach = Mapping[tuple[str, int], int]  # (scene, seed) -> how many sample intervals have an exact answer
 
@@ -21,8 +21,8 @@ Reach = Mapping[tuple[str, int], int]  # (scene, seed) -> how many sample interv
 class Measurement(NamedTuple):
     """An engine in a scene, drawn from a seed, at some steps of the sample interval (coarse to fine).
 
-    kind: which question it is for: the ladders of all scenes, the features, or the dials. `change` is a row of
-    `FEATURES`, a value of a dial, or `PLAIN`.
+    kind: which question it is for: the ladders of all scenes, the options, or the sweeps. `change` is a row of
+    `OPTIONS`, a value of a sweep, or `PLAIN`.
     """
 
     kind: str
@@ -59,24 +59,24 @@ class Plan:
     whole: bool = True
 
     @property
-    def features(self) -> list[Feature]:
-        """The rows of `FEATURES` for the engines that are asked for."""
-        return [feature for feature in FEATURES if self.whole and feature.engine in self.engines]
+    def options(self) -> list[Option]:
+        """The rows of `OPTIONS` for the engines that are asked for."""
+        return [option for option in OPTIONS if self.whole and option.engine in self.engines]
 
     @property
-    def dials(self) -> list[Dial]:
-        """The rows of `DIALS` for the engines that are asked for."""
-        return [dial for dial in DIALS if self.whole and dial.engine in self.engines]
+    def sweeps(self) -> list[Sweep]:
+        """The rows of `SWEEPS` for the engines that are asked for."""
+        return [sweep for sweep in SWEEPS if self.whole and sweep.engine in self.engines]
 
     @property
-    def feature_scenes(self) -> tuple[str, ...]:
+    def option_scenes(self) -> tuple[str, ...]:
         """Where the changed engines are measured, if any are."""
-        return self.effort.feature_scenes if self.features else ()
+        return self.effort.option_scenes if self.options else ()
 
     @property
-    def dial_scenes(self) -> tuple[str, ...]:
-        """Where the dials are turned, if any are."""
-        return self.effort.dial_scenes if self.dials else ()
+    def sweep_scenes(self) -> tuple[str, ...]:
+        """Where parameters are swept, if any are."""
+        return self.effort.sweep_scenes if self.sweeps else ()
 
     @property
     def budget_scenes(self) -> tuple[str, ...]:
@@ -86,7 +86,7 @@ class Plan:
     @property
     def draws(self) -> list[tuple[str, int]]:
         """(scene, seed) of all that an exact answer is needed for."""
-        scenes = dict.fromkeys((*self.scenes, *self.feature_scenes, *self.dial_scenes))
+        scenes = dict.fromkeys((*self.scenes, *self.option_scenes, *self.sweep_scenes))
         draws = [(scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)]
         return draws + [(scene, self.seed) for scene in self.budget_scenes if scene not in scenes]
 
@@ -99,26 +99,26 @@ class Plan:
                 yield from (
                     Measurement(SCENE, scene, seed, name, PLAIN, row_of(name).make, rungs) for name in self.engines
                 )
-            if scene in self.feature_scenes and seed == self.seed:
+            if scene in self.option_scenes and seed == self.seed:
                 yield from self.changed(scene)
-            if scene in self.dial_scenes:
+            if scene in self.sweep_scenes:
                 yield from self.turned(scene, seed)
 
     def changed(self, scene: str) -> Iterator[Measurement]:
         """Every changed engine, after those they are set against, at the dt the report shows."""
         rungs = (middle(scene),)
-        for name in dict.fromkeys(feature.engine for feature in self.features):
-            yield Measurement(FEATURE, scene, self.seed, name, PLAIN, row_of(name).make, rungs)
-        for one in self.features:
-            yield Measurement(FEATURE, scene, self.seed, one.engine, one.change, one.make, rungs)
+        for name in dict.fromkeys(option.engine for option in self.options):
+            yield Measurement(OPTION, scene, self.seed, name, PLAIN, row_of(name).make, rungs)
+        for one in self.options:
+            yield Measurement(OPTION, scene, self.seed, one.engine, one.change, one.make, rungs)
 
     def turned(self, scene: str, seed: int) -> Iterator[Measurement]:
-        """Every dial at every value at the dt the report shows, and its engine over a ladder of dt beside it."""
+        """Every sweep at every value at the dt the report shows, and its engine over a ladder of dt beside it."""
         here = middle(scene)
-        for dial in self.dials:
-            yield Measurement(DIAL, scene, seed, dial.engine, PLAIN, row_of(dial.engine).make, around(here))
-            for value in dial.values:
-                yield Measurement(DIAL, scene, seed, dial.name, str(value), dial.at(value), (here,))
+        for sweep in self.sweeps:
+            yield Measurement(SWEEP, scene, seed, sweep.engine, PLAIN, row_of(sweep.engine).make, around(here))
+            for value in sweep.values:
+                yield Measurement(SWEEP, scene, seed, sweep.name, str(value), sweep.at(value), (here,))
 
 
 def around(here: int) -> tuple[int, ...]:

@@ -71,14 +71,14 @@ class Results:
         return pooled(self.points)
 
     @cached_property
-    def dials(self) -> pd.DataFrame:
-        """See `tables.dials`."""
-        return tables.dials(self.measured, self.plan.seed)
+    def sweeps(self) -> pd.DataFrame:
+        """See `tables.sweeps`."""
+        return tables.sweeps(self.measured, self.plan.seed)
 
     @cached_property
-    def pooled_dials(self) -> pd.DataFrame:
-        """See `tables.pooled_dials`."""
-        return tables.pooled_dials(self.dials)
+    def pooled_sweeps(self) -> pd.DataFrame:
+        """See `tables.pooled_sweeps`."""
+        return tables.pooled_sweeps(self.sweeps)
 
     @cached_property
     def pooled_reached(self) -> pd.DataFrame:
@@ -142,9 +142,9 @@ class Results:
         return tables.grown(self.measured)
 
     @cached_property
-    def features(self) -> pd.DataFrame:
-        """See `tables.features`."""
-        return tables.features(self.measured)
+    def options(self) -> pd.DataFrame:
+        """See `tables.options`."""
+        return tables.options(self.measured)
 
     @cached_property
     def explained(self) -> pd.DataFrame:
@@ -155,7 +155,7 @@ class Results:
     @cached_property
     def versus(self) -> pd.DataFrame:
         """See `versus.against_own`."""
-        return versus.against_own(self.points, self.features)
+        return versus.against_own(self.points, self.options)
 
     @cached_property
     def models(self) -> pd.DataFrame:
@@ -182,8 +182,8 @@ class Results:
         tables = {
             "speed_samples": self.measured.samples, "speed_errors": self.measured.errors, "speed": self.points,
             "speed_pooled": self.pooled, "speed_orders": self.orders, "speed_reached": self.reached,
-            "speed_sizes": self.sizes, "speed_features": self.features, "speed_driving": self.driving,
-            "speed_noise": self.noise, "speed_models": self.models, "speed_dials": self.dials,
+            "speed_sizes": self.sizes, "speed_options": self.options, "speed_driving": self.driving,
+            "speed_noise": self.noise, "speed_models": self.models, "speed_sweeps": self.sweeps,
             "speed_budget": self.measured.budget, "speed_explained": self.explained, "speed_versus": self.versus,
         }  # fmt: skip
         return {f"{name}.csv": table for name, table in tables.items()}

@@ -1,4 +1,4 @@
-"""What the samples and errors come to: points, orders, what an accuracy costs, sizes, features, the noise floor."""
+"""What the samples and errors come to: points, orders, what an accuracy costs, sizes, options, the noise floor."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.features import DIALS
+from adapters.mechanisms.options import SWEEPS
 from reports.speed.ladder import open_scene
 from reports.speed.measure import IDLE, SIZE, Measured
 from reports.speed.order import FINEST, NEARER, Order, median_interval, order_of
 from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
-from reports.speed.plan import DIAL, FEATURE, PLAIN, SCENE
+from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
 from reports.speed.pooling import WHO, pooled
 from reports.speed.sizes import exponent
 from reports.speed.timing import summed_up
@@ -25,21 +25,21 @@ def points(measured: Measured, seed: int) -> pd.DataFrame:
     return found.assign(rung=doublings(found))
 
 
-def dials(measured: Measured, seed: int) -> pd.DataFrame:
-    """The columns of `summed`, and rung: the dials over their values, and their engines over a ladder of dt."""
-    if not (measured.errors.kind == DIAL).any():
+def sweeps(measured: Measured, seed: int) -> pd.DataFrame:
+    """The columns of `summed`, and rung: the sweeps over their values, and their engines over a ladder of dt."""
+    if not (measured.errors.kind == SWEEP).any():
         return pd.DataFrame()
-    found = summed(measured, DIAL, seed)
-    places = {(dial.name, str(value)): k for dial in DIALS for k, value in enumerate(dial.values)}
+    found = summed(measured, SWEEP, seed)
+    places = {(sweep.name, str(value)): k for sweep in SWEEPS for k, value in enumerate(sweep.values)}
     names = found.engine + ":" + found.profile
     turned = [places.get(who, -1) for who in zip(names, found.change)]
     return found.assign(rung=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan)
 
 
-def pooled_dials(found: pd.DataFrame) -> pd.DataFrame:
-    """As `pooled`, of cost and error over those of the matched engine at the dt at which its dial is turned.
+def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
+    """As `pooled`, of cost and error over those of the matched engine at the dt at which its parameter is swept.
 
-    change is the value of the dial; a ladder of dt has none. Scenes of `without_ratio` have no part in it.
+    change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no part in it.
     """
     both = found.merge(beside(found), on=["scenario", "engine"], suffixes=("", "_here"))
     both = both[measurable(both)]
@@ -50,14 +50,14 @@ def pooled_dials(found: pd.DataFrame) -> pd.DataFrame:
 
 
 def without_ratio(found: pd.DataFrame) -> list[tuple[str, str]]:
-    """(engine, scenario) of the dials where the matched engine failed, was not timed, or is right to the last bit."""
+    """(engine, scenario) of the sweeps where the matched engine failed, was not timed, or is right to the last bit."""
     here = beside(found)
     lost = here[~measurable(here)]
     return list(zip(lost.engine, lost.scenario))
 
 
 def beside(found: pd.DataFrame) -> pd.DataFrame:
-    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its dial is turned."""
+    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its parameter is swept."""
     dt = found[found.change != PLAIN].groupby("scenario").dt_s.first()
     here = found[(found.change == PLAIN) & (found.dt_s == found.scenario.map(dt))]
     both = here[["scenario", "engine", "cost", "error"]]
@@ -212,10 +212,10 @@ def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
     return costs, pd.DataFrame(rows)
 
 
-def features(measured: Measured) -> pd.DataFrame:
+def options(measured: Measured) -> pd.DataFrame:
     """A row a scenario, engine and change: cost and error, each over the unchanged engine's; and both errors."""
-    samples = measured.samples[measured.samples.kind == FEATURE]
-    errors = measured.errors[measured.errors.kind == FEATURE]
+    samples = measured.samples[measured.samples.kind == OPTION]
+    errors = measured.errors[measured.errors.kind == OPTION]
     if samples.empty or errors.empty:
         return pd.DataFrame()
     keys = ["scenario", *WHO, "change"]

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from adapters.mechanisms.habits import HABITS
+from adapters.mechanisms.table import MECHANISMS
 from reports.speed.plan import PLAIN
 
 OWN = "reference:exercise"
-LATE = tuple(name for name in HABITS if name != OWN)
+COMPARED = tuple(name for name in MECHANISMS if name != OWN)
 COLUMNS = [
     "engine", "profile", "change", "scenes", "ratio", "low", "high", "cheaper", "cheaper_in", "bare_cheaper",
     "bare_cheaper_in", "not_timed_in",
@@ -21,7 +21,7 @@ COLUMNS = [
 KEYS = ["engine", "profile", "change"]
 
 
-def against_own(points: pd.DataFrame, features: pd.DataFrame) -> pd.DataFrame:
+def against_own(points: pd.DataFrame, options: pd.DataFrame) -> pd.DataFrame:
     """A row an engine with end-of-step detection, and one each of its changed settings, of `COLUMNS`.
 
     ratio, low, high: its cost over that of `OWN` at the same steps, geometric mean, least and most over the scenes;
@@ -31,19 +31,20 @@ def against_own(points: pd.DataFrame, features: pd.DataFrame) -> pd.DataFrame:
     plain = points.assign(change=PLAIN, name=points.engine + ":" + points.profile)
     at = ["scenario", "dt_s"]
     own = plain[plain.name == OWN][[*at, "cost", "idle"]].rename(columns={"cost": "own", "idle": "own_idle"})
-    both = plain[plain.name.isin(LATE)].merge(own, on=at, how="left")
+    both = plain[plain.name.isin(COMPARED)].merge(own, on=at, how="left")
     if own.empty or both.empty:
         return pd.DataFrame(columns=COLUMNS)
-    rows = pd.concat([both, features_over_own(features)]) if len(features) else both
+    rows = pd.concat([both, options_over_own(options)]) if len(options) else both
     found = [row_of(group) for _, group in rows.groupby(KEYS, sort=False)]
     return pd.DataFrame(found, columns=COLUMNS)
 
 
-def features_over_own(features: pd.DataFrame) -> pd.DataFrame:
-    """scenario, engine, profile, change, cost and own of every changed setting of `LATE`, timed in the same rounds."""
-    names = features.engine + ":" + features.profile
-    own = features[names == OWN].groupby("scenario").cost_plain.first()
-    changed = features[names.isin(LATE)]
+def options_over_own(options: pd.DataFrame) -> pd.DataFrame:
+    """scenario, engine, profile, change, cost and own of every changed setting of `COMPARED`, timed in the same
+    rounds."""
+    names = options.engine + ":" + options.profile
+    own = options[names == OWN].groupby("scenario").cost_plain.first()
+    changed = options[names.isin(COMPARED)]
     return changed.assign(own=changed.scenario.map(own), idle=np.nan, own_idle=np.nan)
 
 

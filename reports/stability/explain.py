@@ -1,6 +1,7 @@
 """Gives every limit its reason: the row of the table that fits it, or what was found by playing its failing run again.
 
-A reason is tested by what it predicts, by the limit of a switch, by a cure or by a twin; else it is called likely.
+A reason is tested by what it predicts, by the limit of a variant, by an intervention or by an ablation; else it is
+called likely.
 """
 
 from __future__ import annotations
@@ -8,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from reports.stability.ablations import END_OF_STEP, reason_by_ablation, sufficient_mechanisms
 from reports.stability.cases import CASES
-from reports.stability.cures import SAYS_SO, cure_of, why_played
+from reports.stability.interventions import SAYS_SO, intervention_of, why_played
 from reports.stability.limits import NEVER_FAILS, Limit
 from reports.stability.reasons import Reason, reason_of
 from reports.stability.search import Search
-from reports.stability.twins import LATE, told, twin_of
 
 NEAR = (
     1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a collision lost by degrees
@@ -21,19 +22,20 @@ NEAR = (
 
 
 def tried_out(search: Search, limit: Limit) -> Limit:
-    """The limit with what was found by playing its failing run again: a twin that has it, too, or what cures it.
+    """The limit with what was found by playing its failing run again: the mechanisms that suffice for it, or an
+    intervention that removes it.
 
-    Where a reason is written down, only a twin can bear it out; what it predicts is enough.
+    Where a reason is written down, only an ablation can confirm it; what it predicts is enough.
     """
     reason = reason_of(limit)
     if reason is not None and reason.predicts is not None and brackets(limit, reason.predicts):
         return limit
-    limit = replace(limit, twin=twin_of(search, limit))
-    return limit if limit.twin or reason else replace(limit, cured=cure_of(search, limit))
+    limit = replace(limit, mechanisms=sufficient_mechanisms(search, limit))
+    return limit if limit.mechanisms or reason else replace(limit, intervention=intervention_of(search, limit))
 
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
-    """The limits with their reasons, each tested if it can be: by itself, or by the limit of its switch among them."""
+    """The limits with their reasons, each tested if it can be: by itself, or by the limit of its variant among them."""
     by_name = {(limit.case, limit.engine): limit for limit in limits}
     return [with_reason(limit, by_name) for limit in limits]
 
@@ -41,7 +43,7 @@ def explained(limits: Sequence[Limit]) -> list[Limit]:
 def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit:
     """The limit with its reason and with how that was tested: "" if it was not, or did not hold.
 
-    A written reason that holds by nothing else gives way to a twin that shows another.
+    A written reason that holds by nothing else gives way to an ablation that shows another.
     """
     if limit.status != "ok":
         return limit
@@ -51,11 +53,11 @@ def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit
         text, source, tested = why_played(limit, varied)
         return replace(limit, reason=text, source=source, tested=tested)
     tests = tests_of(limit, reason, by_name)
-    if limit.twin:
-        text, source, shown = told(limit)
-        if reason.habit in limit.twin.split(", "):
+    if limit.mechanisms:
+        text, source, shown = reason_by_ablation(limit)
+        if reason.mechanism in limit.mechanisms.split(", "):
             tests.append(shown)
-        elif reason.habit == LATE:  # which every twin has
+        elif reason.mechanism == END_OF_STEP:  # which every ablation has
             text, source = f"{reason.text}; {text}", f"{reason.source}; {source}"
             return replace(limit, reason=text, source=source, tested="; ".join([*tests, shown]))
         elif not tests:
@@ -64,12 +66,16 @@ def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit
 
 
 def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Limit]) -> list[str]:
-    """What bears the reason out, but for a twin."""
+    """What confirms the reason, apart from an ablation."""
     tests = []
     if reason.predicts is not None and brackets(limit, reason.predicts):
         tests.append(f"predicts {reason.predicts:.4g}")
-    if reason.switch != limit.engine and (other := by_name.get((limit.case, reason.switch))) and farther(other, limit):
-        tests.append(f"{reason.switch} gets farther")
+    if (
+        reason.variant != limit.engine
+        and (other := by_name.get((limit.case, reason.variant)))
+        and farther(other, limit)
+    ):
+        tests.append(f"{reason.variant} gets farther")
     if limit.failing is not None and limit.failing.broken == "refused":
         tests.append(SAYS_SO)
     return tests

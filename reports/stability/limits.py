@@ -62,7 +62,7 @@ class Case:
         predicate: what failing means.
         runs: at a value: 1 where nothing differs, else phases of the collision within a step, or seeds.
         whole: whether the parameter counts something.
-        also: engines of `VARIANTS` besides those of `ENGINES`: an engine with one thing switched.
+        also: engines of `VARIANTS` besides those of `ENGINES`: an engine with one thing changed.
         play: engine and scenario -> the run and what it is judged by, where that takes more than one call of `play`.
         quick_values: to scan in the quick form, where a run is long: some of `values`.
         refines: whether the first edge is bisected, and the full form scans between the values (not with `by_chance`).
@@ -159,8 +159,9 @@ class Limit:
             or fails at the gentlest as well.
         spacing: the resolution: the largest ratio of two neighbours among the values tried, up to the first failure.
         seconds: of processor time that the search took.
-        cured: the change of `CURES` with which the failing run works; "" if none was found, or looked for.
-        twin: the habits with which the reference has this limit, as `twin_of`; "" likewise.
+        intervention: the change of `INTERVENTIONS` with which the failing run works; "" if none was found, or looked
+            for.
+        mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; "" likewise.
         reason, source, tested: why, where that stands, and how it was tested: "" is a likely reason.
     """
 
@@ -173,8 +174,8 @@ class Limit:
     trials: tuple[Trial, ...]
     monotone: bool = True
     spacing: float = nan
-    cured: str = ""
-    twin: str = ""
+    intervention: str = ""
+    mechanisms: str = ""
     reason: str = ""
     source: str = ""
     tested: str = ""
@@ -215,5 +216,5 @@ class Limit:
 
 
 def engines_of(case: Case) -> list[str]:
-    """Who plays a case: every row of `ENGINES`, and the case's own switches, in the order of `VARIANTS`."""
-    return [name for name, engine in VARIANTS.items() if not engine.switch or name in case.also]
+    """Who plays a case: every row of `ENGINES`, and the case's own variants, in the order of `VARIANTS`."""
+    return [name for name, engine in VARIANTS.items() if not engine.change or name in case.also]

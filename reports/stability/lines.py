@@ -11,8 +11,9 @@ from pydantic import Field, model_validator
 
 from adapters.engines import ENGINES
 from reports.run.journal_lines import Count, EngineProfile, File, Kinds, Line, Machine, Number, Seconds, Seed, Words
+from reports.stability.ablations import reason_by_ablation
 from reports.stability.cases import CASES
-from reports.stability.cures import CURES
+from reports.stability.interventions import INTERVENTIONS
 from reports.stability.limits import (
     FORMS,
     LIMIT,
@@ -26,7 +27,6 @@ from reports.stability.limits import (
 )  # fmt: skip
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import GAPS, TOUCHING, LawOf
-from reports.stability.twins import told
 from reports.stability.vary import VARIES
 
 MOST = 10**6  # runs, and disks
@@ -103,8 +103,8 @@ class LimitRow(Line):
     trials: Annotated[list[TrialRow], Field(min_length=1, max_length=10_000)]
     monotone: bool
     spacing: Number
-    cured: Literal["", *CURES]  # type: ignore[valid-type]
-    twin: Words
+    intervention: Literal["", *INTERVENTIONS]  # type: ignore[valid-type]
+    mechanisms: Words
     reason: Words
     source: Words
     tested: Words
@@ -228,10 +228,10 @@ def impossible(limit: Limit, case: Case) -> str:
         if (value not in values) if there else not isnan(value):
             return f"limit.{name} = {value!r}: must be {'one of the values tried' if there else 'nan'}"
     try:
-        if limit.twin:
-            told(limit)
+        if limit.mechanisms:
+            reason_by_ablation(limit)
     except StopIteration:
-        return f"limit.twin = {limit.twin[:60]!r}: must name what the engine does otherwise"
+        return f"limit.mechanisms = {limit.mechanisms[:60]!r}: must name mechanisms of the engine"
     return ""
 
 

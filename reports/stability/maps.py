@@ -18,7 +18,7 @@ from reports.stability.cases_stacks import column
 from reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
 from reports.stability.predicates_crowds import STANDS
 from reports.stability.predicates_gas import ENERGY_DRIFTS
-from reports.stability.variants import Switched, play_as
+from reports.stability.variants import Changed, play_as
 from scenarios.model import Scenario
 
 
@@ -95,11 +95,11 @@ def set_iterations(count: int, engine: Any) -> None:
 
 def with_iterations(engine: str, scenario: Scenario, _ratio: float, count: float) -> Run:
     """Play with so many iterations."""
-    switched = Switched(ENGINES[engine].make(), partial(set_iterations, int(count)))
+    changed = Changed(ENGINES[engine].make(), partial(set_iterations, int(count)))
     try:
-        return play(switched, engine, scenario, scenario.dt(1))
+        return play(changed, engine, scenario, scenario.dt(1))
     finally:
-        switched.close()
+        changed.close()
 
 
 def collision_at(x: float, y: float, run: int) -> Scenario:

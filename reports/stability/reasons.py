@@ -6,10 +6,10 @@ from fnmatch import fnmatch
 from math import atan, pi, sqrt
 from typing import NamedTuple
 
-from adapters.mechanisms.habits import DIGITS, FLIGHT, IMPULSE, POSITION_CORRECTION, RESTITUTION
+from adapters.mechanisms.table import DIGITS, FLIGHT, IMPULSE, POSITION_CORRECTION, RESTITUTION
+from reports.stability.ablations import B2_SETTINGS, B2_TYPES, END_OF_STEP, OF_PYMUNK, PRODUCT, THRESHOLD, THRESHOLDS
 from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, Limit
-from reports.stability.twins import B2_SETTINGS, B2_TYPES, LATE, OF_PYMUNK, PRODUCT, THRESHOLD, THRESHOLDS
 
 
 class Reason(NamedTuple):
@@ -20,8 +20,9 @@ class Reason(NamedTuple):
         text: the sentence.
         source: where it is written down.
         predicts: the limit that follows from it.
-        switch: an engine that differs in this thing only, or in little else, and must get farther.
-        habit: of `adapters.mechanisms.habits`, or `LATE`: what it speaks of, and a twin that has the limit must do.
+        variant: an engine that differs in this thing only, or in little else, and must get farther.
+        mechanism: of `adapters.mechanisms.table`, or `END_OF_STEP`: what it speaks of; an ablation that has the limit
+            must have it.
     """
 
     cases: str
@@ -29,8 +30,8 @@ class Reason(NamedTuple):
     text: str
     source: str
     predicts: float | None = None
-    switch: str = ""
-    habit: str = ""
+    variant: str = ""
+    mechanism: str = ""
 
 
 DISCRETE = "contacts are looked for at the ends of steps only, and lost once the centres have passed each other"
@@ -41,7 +42,7 @@ EULER_OUT = (
 QUARTER = "nothing turns by more than pi/2 a step"
 MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES"
 SWEEP = "restitution is one sweep after the substeps, so a disk that touches two others in a step loses energy"
-FINDS_LATE = "a collision is found up to a step late, and each one lasts about a step longer than it should"
+FOUND_LATE = "a collision is found up to a step late, and each one lasts about a step longer than it should"
 
 
 def growth_limit(share: float) -> float:
@@ -53,7 +54,7 @@ REASONS = (
     # One collision.
     *(
         Reason(
-            case, engine, DISCRETE, GEOMETRY, limit, f"{engine}+bullets" if engine.startswith("box2d") else "", LATE
+            case, engine, DISCRETE, GEOMETRY, limit, f"{engine}+bullets" if engine.startswith("box2d") else "", END_OF_STEP
         )
         for case, limit in (
             ("tunnelling_head_on", 2.0), ("tunnelling_offset", 2 * sqrt(1 - 0.49)), ("tunnelling_thin_wall", 1.0),
@@ -63,9 +64,9 @@ REASONS = (
         if (case, engine) != ("grazing", "box2d_v3:matched")
     ),
     Reason("tunnelling_*", "*", DISCRETE + "; disks are not swept unless one is a bullet", "Box2D manual, bullets",
-           habit=LATE),
+           mechanism=END_OF_STEP),
     Reason("grazing", "*", DISCRETE + "; the chord of a grazing collision is shorter than v dt", GEOMETRY,
-           habit=LATE),
+           mechanism=END_OF_STEP),
     Reason(
         "near_miss", "box2d_v3:*", "a contact counts from a gap of four slops on, with a normal fixed before the step",
         "Box2D 3.1 src/constants.h: B2_SPECULATIVE_DISTANCE", None, "box2d_v3:matched", IMPULSE,
@@ -87,7 +88,7 @@ REASONS = (
         )
         for engine in ("pymunk:shipped", "pymunk:matched+position_correction")
     ),
-    Reason("bounce_drift", "pymunk:matched", "v dt exceeds the radius, and the floor is missed", GEOMETRY, habit=LATE),
+    Reason("bounce_drift", "pymunk:matched", "v dt exceeds the radius, and the floor is missed", GEOMETRY, mechanism=END_OF_STEP),
     *(
         Reason(
             "bounce_drift", engine, "the velocity after gravity is reflected: every bounce gains |v| dt of height",
@@ -163,25 +164,25 @@ REASONS = (
     Reason("overlap_recovery", "reference:ordered", "overlaps that no collision made are not corrected",
            "reference_impl/ordered.py"),
     Reason("column", "reference:*", "each pair is projected once a step, without regard to the others",
-           "exercise 11, task 2", habit=POSITION_CORRECTION),
+           "exercise 11, task 2", mechanism=POSITION_CORRECTION),
     Reason("heavy_on_light", "reference:*", "each pair is projected once a step, without regard to the others",
-           "exercise 11, task 2", habit=POSITION_CORRECTION),
+           "exercise 11, task 2", mechanism=POSITION_CORRECTION),
     Reason("column", "pymunk:*", "overlaps are corrected by a share per step, down to a slop a contact",
-           "Munk2D src/cpArbiter.c, cpArbiterPreStep", habit=POSITION_CORRECTION),
+           "Munk2D src/cpArbiter.c, cpArbiterPreStep", mechanism=POSITION_CORRECTION),
     Reason("heavy_on_light", "pymunk:shipped", "10 sequential impulses do not carry a heavy disk on a light one",
            "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched", IMPULSE),
     Reason("heavy_on_light", "*", "sequential impulses converge as slowly as the masses are unequal",
-           "Catto, Iterative dynamics with temporal coherence, 2005", habit=IMPULSE),
+           "Catto, Iterative dynamics with temporal coherence, 2005", mechanism=IMPULSE),
     Reason("column", "*", "every contact may keep its slop, and soft ones give way as the load grows",
-           "Box2D, b2_linearSlop; contact softness in 3.1", habit=POSITION_CORRECTION),
+           "Box2D, b2_linearSlop; contact softness in 3.1", mechanism=POSITION_CORRECTION),
     Reason("overlap_recovery", "pymunk:shipped", "overlaps up to a slop of 0.1 m, here 0.4 radii, are left",
            "Munk2D src/cpSpace.c, collisionSlop", 0.02, "pymunk:matched", POSITION_CORRECTION),
     Reason("overlap_recovery", "box2d:shipped", "overlaps up to a slop of 5 mm, here 0.02 radii, are left",
            B2_SETTINGS + "b2_linearSlop", 0.02, "box2d:matched", POSITION_CORRECTION),
     Reason("overlap_*", "*", "an overlap is corrected by a share per step", "the engine's position correction",
-           habit=POSITION_CORRECTION),
+           mechanism=POSITION_CORRECTION),
     Reason("overfull_box", "*", "disks are moved beyond a wall, and from there on outwards", "walls have two sides",
-           habit=POSITION_CORRECTION),
+           mechanism=POSITION_CORRECTION),
     Reason("*_comes_to_rest", "box2d:matched", "without a threshold a lying disk chatters at e g dt / (1 - e)",
            "fixed point of v' = e (v + g dt)", None, "box2d:shipped"),
     Reason("*_comes_to_rest", "box2d:shipped", "chatter above the threshold of 1 m/s goes on for ever",
@@ -195,7 +196,7 @@ REASONS = (
         for box, source in THRESHOLDS.items()
     ),
     *(
-        Reason(case, "box2d_v3:*", SWEEP, "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask", habit=IMPULSE)
+        Reason(case, "box2d_v3:*", SWEEP, "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask", mechanism=IMPULSE)
         for case in ("dense_gas", "fast_gas", "long_gas", "heavy_in_gas", "equipartition", "thermometer")
     ),
     Reason("dense_gas", "pymunk:shipped", "10 sequential impulses do not solve a cluster of contacts",
@@ -206,12 +207,12 @@ REASONS = (
         for case in ("fast_gas", "long_gas")
     ),
     Reason("long_wrapped_gas", "box2d*", "impulses are rounded to float32, and what is left over adds up", "IEEE 754",
-           habit=DIGITS),
+           mechanism=DIGITS),
     Reason("*_gas", "box2d:matched", "parting contacts aim at 0 and closing ones at e v in one solve",
-           "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp", habit=IMPULSE),
+           "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp", mechanism=IMPULSE),
     Reason("*_gas", "*", "sequential impulses do not solve a cluster of contacts in a step",
-           "Catto, Iterative dynamics with temporal coherence, 2005", habit=IMPULSE),
-    Reason("thermometer", "*", FINDS_LATE, "penetration and return: one dt a collision", habit=LATE),
+           "Catto, Iterative dynamics with temporal coherence, 2005", mechanism=IMPULSE),
+    Reason("thermometer", "*", FOUND_LATE, "penetration and return: one dt a collision", mechanism=END_OF_STEP),
     Reason("equipartition", "*", "energy is lost at unequal rates by light and heavy disks", "e < 1 in some collisions"),
     Reason("insertion_order", "*", "sums and contacts are taken in the order of insertion, and chaos magnifies it",
            "Lyapunov exponent of the gas"),

@@ -1,4 +1,4 @@
-"""Who is put to the test: every row of `ENGINES`, and engines with one thing switched, to test a reason by."""
+"""Who is put to the test: every row of `ENGINES`, and engines with one thing changed, to test a reason by."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from typing import Any, NamedTuple
 
 from adapters.engine import Engine
 from adapters.engines import ENGINES
-from adapters.mechanisms.features import changed_box2d, changed_box2d_v3, changed_pymunk
+from adapters.mechanisms.options import changed_box2d, changed_box2d_v3, changed_pymunk
 from adapters.play import Run, play
 from scenarios.model import Scenario, Scene
 
 
 class Variant(NamedTuple):
-    """A name, engine:profile; how to make its engine; and what is switched in it: "" for a row of `ENGINES`."""
+    """A name, engine:profile; how to make its engine; and what is changed in it: "" for a row of `ENGINES`."""
 
     name: str
     make: Callable[[], Engine]
-    switch: str = ""
+    change: str = ""
 
 
-class Switched:
+class Changed:
     """An engine with one thing changed right after `load`; all else is passed on."""
 
     def __init__(self, engine: Engine, change: Callable[[Any], None]) -> None:
@@ -44,11 +44,11 @@ def fly(engine: Any) -> None:
 
 def with_bullets(make: Callable[..., Engine]) -> Callable[[], Any]:
     """What makes an engine with continuous collision in which the disks that move at the start are bullets."""
-    return lambda: Switched(make(continuous=True), fly)
+    return lambda: Changed(make(continuous=True), fly)
 
 
 BULLETS = "continuous collision, what moves is a bullet"
-SWITCHED = (
+CHANGED = (
     Variant("pymunk:matched+fifty_iterations", partial(changed_pymunk, iterations=50), "50 iterations for 10"),
     Variant(
         "pymunk:matched+position_correction", partial(changed_pymunk, collision_bias=(1 - 0.1) ** 60),
@@ -59,7 +59,7 @@ SWITCHED = (
     Variant("box2d_v3:matched+16_substeps", partial(changed_box2d_v3, substeps=16), "16 substeps for 4"),
 )  # fmt: skip
 VARIANTS: dict[str, Variant] = {
-    variant.name: variant for variant in (*(Variant(name, row.make) for name, row in ENGINES.items()), *SWITCHED)
+    variant.name: variant for variant in (*(Variant(name, row.make) for name, row in ENGINES.items()), *CHANGED)
 }
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from adapters.engine import Engine
-from adapters.mechanisms.features import changed_box2d, changed_box2d_v3, changed_pymunk
+from adapters.mechanisms.options import changed_box2d, changed_box2d_v3, changed_pymunk
 
 
 @dataclass(frozen=True)
@@ -108,14 +108,14 @@ PAIRS: tuple[Pair, ...] = (
     Pair("box2d_v3", ("continuous", "bullet"), ((True,), (True,))),
 )
 
-GEOMETRY = "it would move what the scene states, so that a late collision and a wrong place make up for each other"
+GEOMETRY = "it would move what the scene states, so that the detection delay and a wrong place make up for each other"
 NOT_SEARCHED: tuple[NotSearched, ...] = (
     NotSearched("pymunk", "elasticity", "sqrt(e) on every shape: the engine multiplies two"),
     NotSearched("pymunk", "shape radius of a wall", GEOMETRY),
     NotSearched("pymunk", "position_func, velocity_func", "Python code in place of the engine's own integrator"),
     NotSearched("pymunk", "pre_solve callbacks", "Python code in place of the engine's own collision law"),
     NotSearched("pymunk", "damping, friction, sleep_time_threshold", "1, 0 and none by default: as the scene states"),
-    NotSearched("pymunk", "use_spatial_hash, threads", "change the time alone: see the features of crosscheck speed"),
+    NotSearched("pymunk", "use_spatial_hash, threads", "change the time alone: see the engine options in crosscheck speed"),
     NotSearched("box2d", "radius of an edge (wall skin)", f"0: {GEOMETRY}"),
     NotSearched("box2d", "walls of boxes or chains", "two-sided segments are what the scene states"),
     NotSearched("box2d", "b2_velocityThreshold, b2_linearSlop, b2_maxTranslation, b2_baumgarte, b2_toiSlop",

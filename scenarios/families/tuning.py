@@ -162,7 +162,9 @@ def long_bounce(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """The same for forty bounces, of which only conservation of energy is asked."""
     ball = dropped(rng, r, v, ELASTIC, 80.0)
     asks = "Does a ball keep its energy over many bounces?"
-    return replace(ball, asks=asks, truth=None, without_truth="after so many bounces a late collision is all there is")
+    return replace(
+        ball, asks=asks, truth=None, without_truth="after so many bounces the detection delay is all there is"
+    )
 
 
 def coming_to_rest(rng: np.random.Generator, r: float, v: float) -> Scenario:

@@ -206,8 +206,8 @@ def _overlaps(scene: Scene, free_walls: int) -> Iterator[str]:
     found = sorted(islice(_overlapping(scene), MOST_FAULTS + 1), key=lambda each: each[:2])
     for first, second, overlap, (x, y) in found:
         where = f"{names[second]}.position = {scene.position[second - len(scene.walls)].tolist()}"
-        cure = f"must be shifted by [{x:.15g}, {y:.15g}] m or more"
-        yield f"{where}: overlaps {names[first]} by {overlap:.6g} m; {cure}"
+        remedy = f"must be shifted by [{x:.15g}, {y:.15g}] m or more"
+        yield f"{where}: overlaps {names[first]} by {overlap:.6g} m; {remedy}"
 
 
 def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:

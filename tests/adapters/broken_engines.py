@@ -254,7 +254,7 @@ class RaisesInStep(Sound):
 
 
 class Exact(Reference):
-    """The solver that takes collisions in their order: beside it a wrong energy is not lost among late collisions."""
+    """The solver that takes collisions in their order: beside it a wrong energy is not lost among detection delays."""
 
     def __init__(self) -> None:
         super().__init__(ordered)

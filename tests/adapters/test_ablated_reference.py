@@ -1,4 +1,5 @@
-"""The solver with switches: off it is the exercise, on it is an engine, and every switch does what its formula says."""
+"""The ablated reference: with no mechanism on it is the exercise, with all it is an engine, and each does what its
+formula says."""
 
 from __future__ import annotations
 
@@ -13,17 +14,17 @@ import numpy as np
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.habits import (
+from adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReference
+from adapters.mechanisms.table import (
+    END_OF_STEP,
     FLIGHT,
-    HABITS,
     IMPULSE,
-    LATE,
+    MECHANISMS,
     POSITION_CORRECTION,
     RESTITUTION,
-    habits_of,
-    with_habits,
+    mechanisms_of,
+    with_mechanisms,
 )
-from adapters.mechanisms.switched import BOX2D, BOX2D_V3, PYMUNK, Switched
 from adapters.play import Run, play
 from adapters.reference import Reference
 from reference_impl import exercise
@@ -37,7 +38,7 @@ ORDERS = {"pymunk": PYMUNK, "box2d": BOX2D, "box2d_v3": BOX2D_V3}
 
 def positions(engine: Any, scene: Scenario, dt: float) -> Array:
     """(k, n, 2) m."""
-    run = play(engine, "switched:reference", scene, dt)
+    run = play(engine, "reference:ablated", scene, dt)
     assert run.trajectory is not None, run.reason
     return run.trajectory.position
 
@@ -48,26 +49,26 @@ def positions(engine: Any, scene: Scenario, dt: float) -> Array:
 def test_with_nothing_switched_on_it_is_the_exercise_to_the_bit(name: str):
     """Pairs, walls, the wrap, forces, and disks that stand still; positions and collisions."""
     scene = scenario(name)
-    plain, switched = (
+    plain, ablated = (
         play(engine, "one:run", scene, scene.dt(scene.substeps[1])).trajectory
-        for engine in (Reference(exercise), Switched())
+        for engine in (Reference(exercise), AblatedReference())
     )
 
     assert plain is not None
-    assert switched is not None
-    assert np.array_equal(plain.position, switched.position)
-    assert np.array_equal(plain.angle, switched.angle)
-    assert np.array_equal(plain.collisions.impulse, switched.collisions.impulse)
+    assert ablated is not None
+    assert np.array_equal(plain.position, ablated.position)
+    assert np.array_equal(plain.angle, ablated.angle)
+    assert np.array_equal(plain.collisions.impulse, ablated.collisions.impulse)
 
 
-@pytest.mark.parametrize("order", [LATE["order"], *ORDERS.values()])
+@pytest.mark.parametrize("order", [END_OF_STEP["order"], *ORDERS.values()])
 @pytest.mark.parametrize("alpha", [0.0, 0.5, 0.625, 1.0])
 def test_free_flight_is_off_by_its_closed_form_in_any_order(order: tuple[str, ...], alpha: float):
     """(alpha - 1/2) a dt t, whichever stage comes first and however many moves there are."""
     scene = scenario("free_fall")
     dt = scene.dt(2)
     assert scene.truth is not None
-    off = positions(Switched(order, alpha=alpha), scene, dt)[:, 0] - scene.truth(scene.times).position[:, 0]
+    off = positions(AblatedReference(order, alpha=alpha), scene, dt)[:, 0] - scene.truth(scene.times).position[:, 0]
     expected = (alpha - 0.5) * dt * scene.times[:, None] * scene.scene.gravity
 
     # 720 moves that each round a height of up to 10 m.
@@ -82,7 +83,7 @@ def test_a_late_collision_is_off_by_the_change_of_velocity_times_its_delay():
     at = (np.linalg.norm(b - a) - scene.scene.radius.sum()) / np.linalg.norm(closing)
     delay = np.ceil(at / dt) * dt - at
     assert scene.truth is not None
-    off = positions(Switched(**LATE), scene, dt) - scene.truth(scene.times).position
+    off = positions(AblatedReference(**END_OF_STEP), scene, dt) - scene.truth(scene.times).position
 
     assert delay > dt / 10
     assert off[-1, 0] == pytest.approx(closing * delay, abs=1e-13)
@@ -97,7 +98,7 @@ def test_a_ball_gains_speed_times_dt_of_height_where_it_bounces_off_a_velocity_a
     scene = scenario("bouncing_ball_e1")
     dt, g = scene.dt(4), -scene.scene.gravity[1]
     fall = scene.scene.position[0, 1] - scene.scene.radius[0]
-    heights = positions(Switched(order), scene, dt)[:, 0, 1]
+    heights = positions(AblatedReference(order), scene, dt)[:, 0, 1]
     collision = int(np.sqrt(2 * fall / g) / scene.sample_interval)
     apex = heights[collision + 2 : 3 * collision].max() - heights[: collision // 2].max()
     speed = np.sqrt(2 * g * fall)
@@ -131,24 +132,24 @@ def run_of(name: str, scene: Scenario, dt: float) -> Run:
         ("box2d_v3:matched", "bouncing_ball_e1", 600, 2400 * FLOAT32),
     ],
 )
-def test_with_all_its_habits_the_reference_is_the_engine(name: str, scene: str, samples: int, bound: float):
+def test_with_all_its_mechanisms_the_reference_is_the_engine(name: str, scene: str, samples: int, bound: float):
     """And without them it is far from it."""
     played = scenario(scene)
     played = replace(played, duration=samples * played.sample_interval)
     dt = played.dt(4)
     run = run_of(name, played, dt)
     assert run.trajectory is not None
-    habits = habits_of(name, run.settings, played.scene, dt)
-    everything = positions(with_habits(habits), played, dt)
+    mechanisms = mechanisms_of(name, run.settings, played.scene, dt)
+    everything = positions(with_mechanisms(mechanisms), played, dt)
     k = len(run.trajectory)
 
     assert np.abs(everything - run.trajectory.position)[:k].max() <= bound
-    plain = positions(with_habits([]), played, dt)
+    plain = positions(with_mechanisms([]), played, dt)
     assert np.abs(plain - run.trajectory.position)[:k].max() > 50 * bound
 
 
 @pytest.mark.parametrize(
-    ("name", "scene", "habit"),
+    ("name", "scene", "mechanism"),
     [
         ("pymunk:shipped", "oblique_e09", RESTITUTION),
         ("pymunk:matched", "bouncing_ball_e09", POSITION_CORRECTION),
@@ -156,37 +157,37 @@ def test_with_all_its_habits_the_reference_is_the_engine(name: str, scene: str, 
         ("box2d:shipped", "box_billiard", "friction"),
     ],
 )
-def test_what_is_switched_off_in_the_engine_is_what_is_left_out_in_the_reference(name: str, scene: str, habit: str):
+def test_what_is_switched_off_in_the_engine_is_what_is_left_out_in_the_reference(name: str, scene: str, mechanism: str):
     """The engine without it is the reference with all but it."""
     played = scenario(scene)
     dt = played.dt(4)
-    habits = habits_of(name, run_of(name, played, dt).settings, played.scene, dt)
-    left_out = next(each for each in habits if each.name == habit)
+    mechanisms = mechanisms_of(name, run_of(name, played, dt).settings, played.scene, dt)
+    left_out = next(each for each in mechanisms if each.name == mechanism)
     assert left_out.without is not None
     engine = left_out.without()
     without = positions(engine, played, dt)
-    others = positions(with_habits([each for each in habits if each is not left_out]), played, dt)
-    everything = positions(with_habits(habits), played, dt)
+    others = positions(with_mechanisms([each for each in mechanisms if each is not left_out]), played, dt)
+    everything = positions(with_mechanisms(mechanisms), played, dt)
 
     assert np.abs(without - others).max() <= 2000 * 4 * FLOAT32
     assert np.abs(without - everything).max() > 0.001
 
 
-def test_every_engine_with_habits_is_known_and_flies_as_its_row_says():
-    """The table of habits names rows of `ENGINES`; the impulse is what an engine's own order of stages is."""
-    assert set(HABITS) < set(ENGINES)
+def test_every_engine_with_mechanisms_is_known_and_flies_as_its_row_says():
+    """The table of mechanisms names rows of `ENGINES`; the impulse is what an engine's own order of stages is."""
+    assert set(MECHANISMS) < set(ENGINES)
     scene = scenario("head_on_equal_e09")
-    for name in HABITS:
-        habits = {
-            each.name: each for each in habits_of(name, run_of(name, scene, 0.1 / 6).settings, scene.scene, 0.1 / 6)
+    for name in MECHANISMS:
+        mechanisms = {
+            each.name: each for each in mechanisms_of(name, run_of(name, scene, 0.1 / 6).settings, scene.scene, 0.1 / 6)
         }
-        assert habits[FLIGHT].switches == {"alpha": ENGINES[name].alpha}
-        assert name.startswith("reference") or "order" in habits[IMPULSE].switches
+        assert mechanisms[FLIGHT].parameters == {"alpha": ENGINES[name].alpha}
+        assert name.startswith("reference") or "order" in mechanisms[IMPULSE].parameters
 
 
 PLAIN = """
 import sys, numpy as np
-from adapters.mechanisms.switched import BOX2D, BOX2D_V3, EXERCISE, PYMUNK, Switched
+from adapters.mechanisms.ablated import BOX2D, BOX2D_V3, EXERCISE, PYMUNK, AblatedReference
 from scenarios.families.placing import box, lay_out
 grid = np.stack(np.meshgrid(np.arange(3), np.arange(3)), -1).reshape(-1, 2) * 1.0
 n = np.arange(9)
@@ -198,7 +199,7 @@ scene = lay_out(
 )
 on = {"friction": 0.3, "correction_share": 0.1, "slop": 0.01, "push_speed": 3.0, "margin": 0.01}
 for order in (EXERCISE, BOX2D, PYMUNK, BOX2D_V3):
-    engine = Switched(order, **on)
+    engine = AblatedReference(order, **on)
     engine.load(scene, 0.01)
     engine.step(300)
     assert len(engine.collisions()) > 20
@@ -227,7 +228,7 @@ ROW = lay_out(
 
 def found(stage: str) -> list[tuple[int, int]]:
     """The contacts of `ROW`, three disks and two, all on a floor, as a stage orders them."""
-    engine = Switched(("accelerate", "detect", stage, "move"), touching=True, margin=0.01)
+    engine = AblatedReference(("accelerate", "detect", stage, "move"), touching=True, margin=0.01)
     engine.load(ROW, 0.001)
     engine.step(1)
     return [(int(row.i), int(row.j)) for row in engine.kept.rows[: engine.kept.found[0]]]

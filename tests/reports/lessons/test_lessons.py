@@ -1,4 +1,4 @@
-"""What the lessons claim: off, the switches give the reference; on, the engine; and every number is of a run."""
+"""What the lessons claim: off, the mechanisms give the reference; on, the engine; and every number is of a run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.switched import Switched
+from adapters.mechanisms.ablated import AblatedReference
 from adapters.play import play
 from reports.commands.serve import application
 from reports.game.server import Game
@@ -19,7 +19,7 @@ from reports.lessons import pages
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson, play_once
-from reports.lessons.mechanisms import SWITCHED
+from reports.lessons.mechanisms import ABLATED
 from reports.lessons.meeting import collision_of_the_reference, two
 from reports.page.style import TRUTH
 from scenarios.catalogue import scenario
@@ -31,16 +31,16 @@ EVERY = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for
 
 
 @pytest.mark.parametrize("name", ["oblique_e09", "bouncing_ball_e1", "free_fall"])
-def test_with_nothing_switched_on_the_switches_give_the_reference(name: str):
+def test_with_nothing_switched_on_the_mechanisms_give_the_reference(name: str):
     """To the bit."""
     scene = scenario(name)
     plain = play_once("reference:exercise", scene, 2).trajectory
-    switched = play(Switched(), SWITCHED, scene, scene.dt(2)).trajectory
+    ablated = play(AblatedReference(), ABLATED, scene, scene.dt(2)).trajectory
 
     assert plain is not None
-    assert switched is not None
-    assert np.array_equal(plain.position, switched.position)
-    assert np.array_equal(plain.velocity, switched.velocity)
+    assert ablated is not None
+    assert np.array_equal(plain.position, ablated.position)
+    assert np.array_equal(plain.velocity, ablated.velocity)
 
 
 @pytest.mark.parametrize(
@@ -65,14 +65,14 @@ def test_with_nothing_switched_on_the_switches_give_the_reference(name: str):
         ("row", "pymunk:matched", (0, 3, 1), (1, 3, 1), 1e-12),
     ],
 )  # fmt: skip
-def test_the_switched_reference_lies_on_the_engine(
+def test_the_ablated_reference_lies_on_the_engine(
     name: str, engine: str, on: tuple[int, ...], off: tuple[int, ...], bound: float
 ):
     """Within the rounding of the engine where the right mechanism is on; far off with another setting."""
 
     def apart(places: tuple[int, ...]) -> float:
         curves = {curve.name: np.asarray(curve.y, float) for curve in LESSONS[name].at(places).charts[0].curves}
-        return float(np.nanmax(np.abs(curves[SWITCHED] - curves[engine])))
+        return float(np.nanmax(np.abs(curves[ABLATED] - curves[engine])))
 
     assert apart(on) <= bound
     assert apart(off) > 300 * bound

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.features import changed_box2d
+from adapters.mechanisms.options import changed_box2d
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.limits import HARSHNESS, SEEN, limits_of
 from reports.page.style import TRUTH

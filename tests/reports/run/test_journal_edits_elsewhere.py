@@ -183,7 +183,7 @@ def test_a_line_that_is_there_twice_counts_once(journal: tuple, tmp_path: Path):
         ("atlas", 0, ("header", "form"), "x", "header.form = 'x': must be 'quick' or 'full'"),
         ("atlas", 0, ("header", "files"), {"../x": "y"}, "header.files.../x = 'y': must match pattern"),
         ("atlas", 1, ("limit", "trials", 0, "value"), 1e9, "limit.trials[0].value = 1000000000.0: must be from"),
-        ("atlas", 1, ("limit", "cured"), "x", "limit.cured = 'x': must be"),
+        ("atlas", 1, ("limit", "intervention"), "x", "limit.intervention = 'x': must be"),
         ("atlas", 1, ("limit", "case"), "../x.toml:dt", "limit: must be of the task's name and engine"),
         ("atlas", 2, ("law", "gaps", 0, 5), [[1]], "gaps[0][5]: must hold numbers"),
         ("atlas", 3, ("map", "cells", 0, 0), 17, "cells: must be those of the map's grid"),

@@ -14,7 +14,7 @@ from adapters.engines import ENGINES
 from reports.speed import explained, figures
 from reports.speed.figures import AGAINST, AGAINST_BARE
 from reports.speed.tables import no_nearer
-from reports.speed.versus import LATE, OWN
+from reports.speed.versus import COMPARED, OWN
 
 SHIPPED = tuple(name for name in ENGINES if name.endswith(":shipped"))
 MATCHED = tuple(name for name in ENGINES if name.endswith(":matched"))
@@ -35,7 +35,7 @@ def caption(kept: pd.DataFrame) -> str:
     got = {name: of(rows.note[name])[0] for name in rows.index}
     failed = named(kept[kept.figure == "pooled error"])
     lost = max(int(of(note)[0]) for note in failed[failed.name == "event_driven:float64"].note)
-    reached = [got[name] for name in (OWN, *LATE)]
+    reached = [got[name] for name in (OWN, *COMPARED)]
     return (
         f"half the step divides the error by {falls.min():.1f} to {falls.max():.1f} and multiplies the cost by "
         f"{grows.min():.1f} to {grows.max():.1f}. They reach a millionth of a radius in {min(reached)} to "

@@ -11,8 +11,16 @@ import pytest
 
 from adapters.engine import Row
 from adapters.engines import ENGINES
-from adapters.mechanisms.habits import DIGITS, FLIGHT, HABITS, LATE, POSITION_CORRECTION, RESTITUTION, Habit
-from adapters.mechanisms.switched import Switched
+from adapters.mechanisms.ablated import AblatedReference
+from adapters.mechanisms.table import (
+    DIGITS,
+    END_OF_STEP,
+    FLIGHT,
+    MECHANISMS,
+    POSITION_CORRECTION,
+    RESTITUTION,
+    Mechanism,
+)
 from reports.compare import scales
 from reports.speed import budget, budget_tables
 from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED, Budget, Offset, budget_of, followed
@@ -20,14 +28,14 @@ from scenarios.model import Array, State
 
 FLOAT64 = 2.0**-53
 KNOWN = [
-    Habit(FLIGHT, {"alpha": 1.0}),
-    Habit(RESTITUTION, {"mixing": "the product"}),
-    Habit(POSITION_CORRECTION, {"project": True}),
+    Mechanism(FLIGHT, {"alpha": 1.0}),
+    Mechanism(RESTITUTION, {"mixing": "the product"}),
+    Mechanism(POSITION_CORRECTION, {"project": True}),
 ]
 
 
-class Drifting(Switched):
-    """An engine with the habits of `KNOWN` and a bug nobody knows of: what is read lies `bug` m too far up."""
+class Drifting(AblatedReference):
+    """An engine with the mechanisms of `KNOWN` and a bug nobody knows of: what is read lies `bug` m too far up."""
 
     bug = 0.003
 
@@ -37,15 +45,15 @@ class Drifting(Switched):
         return replace(state, position=state.position + np.array([0.0, self.bug]))
 
 
-def planted(habits: list[Habit]) -> Drifting:
+def planted(mechanisms: list[Mechanism]) -> Drifting:
     """An engine with just these."""
-    switches: dict[str, Any] = dict(LATE)
-    for habit in habits:
-        switches |= habit.switches
-    return Drifting(**switches)
+    parameters: dict[str, Any] = dict(END_OF_STEP)
+    for mechanism in mechanisms:
+        parameters |= mechanism.parameters
+    return Drifting(**parameters)
 
 
-def taken_apart(scene: str, known: list[Habit], substeps: int = 4) -> tuple[dict[str, Offset], Budget]:
+def taken_apart(scene: str, known: list[Mechanism], substeps: int = 4) -> tuple[dict[str, Offset], Budget]:
     """The budget of the planted engine for somebody who knows only of `known`."""
     at = followed(scene, 0, substeps)
     made = Budget(at, known, at.offset(at.played(planted(KNOWN))))
@@ -60,12 +68,12 @@ def test_a_planted_engine_gets_its_parts_and_its_bug_is_unexplained():
     left = parts[UNEXPLAINED].position
     assert left[..., 1] == pytest.approx(np.broadcast_to(Drifting.bug / moving, left.shape[:2]), abs=1e-12)
     assert np.abs(left[..., 0]).max() <= 1e-12
-    for habit in (RESTITUTION, POSITION_CORRECTION):
-        assert parts[habit].radii > 100 * FLOAT64
+    for mechanism in (RESTITUTION, POSITION_CORRECTION):
+        assert parts[mechanism].radii > 100 * FLOAT64
     assert parts[FLIGHT].radii == 0.0  # nothing accelerates here
 
 
-def test_a_habit_that_nobody_names_is_unexplained_to_its_size():
+def test_a_mechanism_that_nobody_names_is_unexplained_to_its_size():
     """Negative control: without the restitution rule in the list, what is left over is as large as it and the bug."""
     known, _ = taken_apart("oblique_e09", KNOWN)
     missed, _ = taken_apart("oblique_e09", [each for each in KNOWN if each.name != RESTITUTION])
@@ -102,12 +110,12 @@ def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
 
 
 def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce():
-    """All eight with known habits; float32 alone leaves less than a thousandth of an engine's error."""
+    """All eight with known mechanisms; float32 alone leaves less than a thousandth of an engine's error."""
     scenes = ("head_on_equal_e09", "wall_to_wall")
-    rows = pd.DataFrame([row for scene in scenes for name in HABITS for row in budget_of(scene, 0, name, 4)])
+    rows = pd.DataFrame([row for scene in scenes for name in MECHANISMS for row in budget_of(scene, 0, name, 4)])
     wide = rows.pivot(index=["scenario", "engine", "profile"], columns="part", values="position_radii")
 
-    assert len(wide) == 2 * len(HABITS)
+    assert len(wide) == 2 * len(MECHANISMS)
     assert (wide[UNEXPLAINED] <= 1e-3 * wide[TOTAL]).all()
     assert (wide[TOTAL] > 1e-3).all()
     assert (wide[DIGITS].dropna() > 0).all()

@@ -50,7 +50,7 @@ def no_reach(*_: object) -> tuple[int, str]:
 
 
 def test_one_scene_and_one_engine_are_measured_by_themselves(tmp_path: Path):
-    """Exit 0; tables and a page, without sizes and features; a second run may replace it."""
+    """Exit 0; tables and a page, without sizes and options; a second run may replace it."""
     arguments = ["speed", "free_fall", "--engine", "reference", "--out", str(tmp_path / "out")]
     for _ in range(2):
         done = CliRunner().invoke(app, arguments)

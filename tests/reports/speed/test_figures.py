@@ -9,13 +9,13 @@ import pandas as pd
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.habits import HABITS
+from adapters.mechanisms.table import MECHANISMS
 from reports.speed import budget, explained, figures, ladder, tables
 from reports.speed.budget import budget_of
 from reports.speed.effort import FULL, QUICK
 from reports.speed.measure import Measured
 from reports.speed.plan import SCENE, middle
-from reports.speed.versus import LATE, OWN
+from reports.speed.versus import COMPARED, OWN
 from scenarios.catalogue import SCENARIOS, scenario
 from tests.reports.speed import statements as speed_figures
 from tests.reports.speed.statements import MATCHED, SHIPPED
@@ -45,7 +45,7 @@ def test_the_kept_orders_are_those_of_the_code(name: str):
         assert kept.slope == pytest.approx(now.slope, rel=DIGITS, nan_ok=True)
 
 
-@pytest.mark.parametrize("name", list(HABITS))
+@pytest.mark.parametrize("name", list(MECHANISMS))
 def test_the_kept_budget_is_that_of_the_code(name: str):
     """One scene: the error and how far it was followed; what is left unexplained may be rounding."""
     scene = "slow_collision"
@@ -64,7 +64,7 @@ def test_the_kept_tables_have_every_scene_and_engine():
     orders, budgets = (speed_figures.named(figures.read(path)) for path in (figures.ORDERS, figures.EXPLAINED))
 
     assert set(zip(orders.scenario, orders.name)) == {(scene, name) for scene in SCENARIOS for name in ENGINES}
-    assert set(zip(budgets.scenario, budgets.name)) == {(scene, name) for scene in SCENARIOS for name in HABITS}
+    assert set(zip(budgets.scenario, budgets.name)) == {(scene, name) for scene in SCENARIOS for name in MECHANISMS}
 
 
 def orders(**stays: int) -> pd.DataFrame:
@@ -105,8 +105,8 @@ def row(figure: str, name: str, at: str, value: float, note: str = "") -> dict:
 
 def against(cheaper: dict[str, str], bare: dict[str, str], changed: str = "") -> pd.DataFrame:
     """Figures of two scenes in which these engines cost less than our own solver, in "k of 2: scenes"."""
-    rows = [row(figures.AGAINST, name, "", 2.0, cheaper.get(name, "0 of 2: ")) for name in LATE]
-    rows += [row(figures.AGAINST_BARE, name, "", np.nan, bare.get(name, "0 of 2: ")) for name in LATE]
+    rows = [row(figures.AGAINST, name, "", 2.0, cheaper.get(name, "0 of 2: ")) for name in COMPARED]
+    rows += [row(figures.AGAINST_BARE, name, "", np.nan, bare.get(name, "0 of 2: ")) for name in COMPARED]
     return pd.DataFrame([*rows, row(figures.AGAINST, "pymunk:matched", "sleeping", 2.0, changed or "0 of 1: ")])
 
 
@@ -138,7 +138,7 @@ def pooled(worse: str = "") -> pd.DataFrame:
             error = 0.1 * (3.0 if name == worse else 1.0) / 2**rung
             lost = "failed in 1 of 2" if name == "event_driven:float64" else "failed in 0 of 2"
             rows += [row("pooled error", name, str(rung), error, lost), row("pooled cost", name, str(rung), 2.0**rung)]
-        rows.append(row("cost at accuracy", name, "1e-6", 1.0, "0 of 2, never in 2" if name in LATE else "1 of 2"))
+        rows.append(row("cost at accuracy", name, "1e-6", 1.0, "0 of 2, never in 2" if name in COMPARED else "1 of 2"))
     return pd.DataFrame(rows)
 
 

@@ -67,17 +67,17 @@ def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_
     assert "failed in 1 of 1" in edge.text[1]
 
 
-def dial(value: str, rung: int, **more: object) -> dict:
-    """A row of a dial turned to `value`, at the dt of the row `point(rung=2)`."""
+def sweep(value: str, rung: int, **more: object) -> dict:
+    """A row of a sweep at `value`, at the dt of the row `point(rung=2)`."""
     return point(rung=rung, profile="matched+iterations", change=value, dt_s=0.1) | more
 
 
-def test_a_dial_that_fails_most_scenes_stays_on_the_pooled_chart():
+def test_a_sweep_that_fails_most_scenes_stays_on_the_pooled_chart():
     """At the edge: a ratio of infinity. It was not drawn at all."""
     rows = [row | {"scenario": scene} for scene in ("one", "two") for row in
-            (point(rung=2), dial("1", 0), dial("9", 1, cost=np.nan, error=np.inf, failed=1))]  # fmt: skip
-    pool = tables.pooled_dials(pd.DataFrame(rows))
-    edge = next(trace for trace in charts.dials(pool, relative=True).data if trace.mode == "markers")
+            (point(rung=2), sweep("1", 0), sweep("9", 1, cost=np.nan, error=np.inf, failed=1))]  # fmt: skip
+    pool = tables.pooled_sweeps(pd.DataFrame(rows))
+    edge = next(trace for trace in charts.sweeps(pool, relative=True).data if trace.mode == "markers")
 
     assert pool.set_index("change").failed.to_dict() == {"": 0, "1": 0, "9": 2}
     assert "failed in 2 of 2" in edge.text[0]
@@ -86,14 +86,14 @@ def test_a_dial_that_fails_most_scenes_stays_on_the_pooled_chart():
 def test_a_scene_without_a_ratio_is_named():
     """Right to the last bit, or failed: nothing to divide by; the pool says of how many scenes it is."""
     rows = [
-        point("one", 2), dial("1", 0),
-        point("exact", 2, error=0.0), dial("1", 0, scenario="exact"),
-        point("gone", 2, cost=np.nan, error=np.inf), dial("1", 0, scenario="gone"),
+        point("one", 2), sweep("1", 0),
+        point("exact", 2, error=0.0), sweep("1", 0, scenario="exact"),
+        point("gone", 2, cost=np.nan, error=np.inf), sweep("1", 0, scenario="gone"),
     ]  # fmt: skip
     found = pd.DataFrame(rows)
 
     assert tables.without_ratio(found) == [("pymunk", "exact"), ("pymunk", "gone")]
-    assert set(tables.pooled_dials(found)["of"]) == {1}
+    assert set(tables.pooled_sweeps(found)["of"]) == {1}
 
 
 def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
@@ -105,7 +105,7 @@ def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
         "low": 1.0, "high": 1.0, "best": 1.0,
     })  # fmt: skip
     for ratio in ("error_ratio", "cost_ratio"):
-        figure = charts.features(table, ratio, "")
+        figure = charts.options(table, ratio, "")
         trace = figure.data[-1]
         assert trace.x[1] > 1.5
         assert FAILED in figure.layout.xaxis.ticktext
@@ -158,12 +158,12 @@ def test_an_engine_that_is_cheaper_than_our_own_solver_is_named_with_the_scene()
 def test_a_changed_setting_that_is_cheaper_than_our_own_solver_is_named():
     """Against our solver unchanged, in the same scene."""
     known = {"scenario": "one"}
-    features = pd.DataFrame([
+    options = pd.DataFrame([
         known | {"engine": "reference", "profile": "exercise", "change": "float32", "cost": 9.0, "cost_plain": 2.0},
         known | {"engine": "pymunk", "profile": "matched", "change": "sleeping", "cost": 1.0, "cost_plain": 5.0},
     ])  # fmt: skip
-    table = versus.against_own(pd.DataFrame([own("one", 2.0), point("one", cost=5.0)]), features)
+    table = versus.against_own(pd.DataFrame([own("one", 2.0), point("one", cost=5.0)]), options)
     row = table.set_index("change").loc["sleeping"]
 
     assert (row.ratio, row.cheaper, row.cheaper_in) == (0.5, 1, "one")
-    assert versus.against_own(pd.DataFrame([point("one")]), features).empty  # our own solver was not asked for
+    assert versus.against_own(pd.DataFrame([point("one")]), options).empty  # our own solver was not asked for

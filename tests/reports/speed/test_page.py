@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.mechanisms.features import FEATURES
-from adapters.mechanisms.habits import HABITS
+from adapters.mechanisms.options import OPTIONS
+from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play
 from reports.run.machine import about
 from reports.speed import charts, figures
@@ -35,7 +35,7 @@ pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half 
 SCENES = ("head_on_equal_e09", "asteroids")
 PLAYED = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
 LITTLE = replace(QUICK, seeds=3, most_steps=1000, rounds=2, budget=0.0, sizes=(3, 10, 100, 1000), patience=1.0,
-    feature_scenes=("bouncing_ball_e1",), dial_scenes=("slide_on_incline", "falling_box"),
+    option_scenes=("bouncing_ball_e1",), sweep_scenes=("slide_on_incline", "falling_box"),
     budget_scenes=("head_on_equal_e09",))  # fmt: skip
 SAID = {"load": 0.0, "seconds": 1.0}
 
@@ -141,10 +141,10 @@ def test_a_pooled_failure_counts_as_infinitely_wrong(results: Results):
     assert (row.failed, np.isinf(row.error_high)) == (1, True)
 
 
-def test_every_feature_of_an_engine_is_set_against_it_in_every_scene(results: Results):
+def test_every_option_of_an_engine_is_set_against_it_in_every_scene(results: Results):
     """Time and error together; an engine changed in nothing reads 1 in both, so it is not listed."""
-    expected = {feature.change for feature in FEATURES if feature.engine in PLAYED}
-    table = results.features
+    expected = {option.change for option in OPTIONS if option.engine in PLAYED}
+    table = results.options
 
     assert set(table.change) == expected
     assert (table.groupby("scenario").size() == len(expected)).all()
@@ -153,34 +153,34 @@ def test_every_feature_of_an_engine_is_set_against_it_in_every_scene(results: Re
 
 
 def test_float32_breaks_what_it_must(results: Results):
-    """Negative control of the feature table: in a bouncing ball 2**-24 a step shows, and is not 1."""
-    row = results.features[(results.features.scenario == "bouncing_ball_e1") & (results.features.engine == "reference")]
+    """Negative control of the option table: in a bouncing ball 2**-24 a step shows, and is not 1."""
+    row = results.options[(results.options.scenario == "bouncing_ball_e1") & (results.options.engine == "reference")]
 
     assert abs(row.error_ratio.iloc[0] - 1) > 1e-3
 
 
-def test_a_dial_meets_its_engine_where_it_is_matched(results: Results):
+def test_a_sweep_meets_its_engine_where_it_is_matched(results: Results):
     """10 iterations are what pymunk has as matched: the same error, to the bit, and 1 of 1 where all are pooled."""
-    table = results.dials
+    table = results.sweeps
     here = table[(table.engine == "pymunk") & (table.scenario == "slide_on_incline")]
     turned = here[here.change == "10"].iloc[0]
     same = here[(here.change == "") & (here.dt_s == turned.dt_s)].iloc[0]
-    pooled = results.pooled_dials
+    pooled = results.pooled_sweeps
 
     assert turned.error == same.error
     assert pooled[pooled.change == "10"].error.iloc[0] == 1.0
-    assert {dial.name for dial in results.plan.dials} == {"pymunk:matched+iterations"}
+    assert {sweep.name for sweep in results.plan.sweeps} == {"pymunk:matched+iterations"}
     assert table[table.scenario == "falling_box"].seeds.eq(3).all()
 
 
-def test_a_line_a_dial_goes_over_all_its_values_from_cheap_to_dear(results: Results):
+def test_the_line_of_a_sweep_goes_over_all_its_values_from_cheap_to_expensive(results: Results):
     """Its ends are named; beside it the ladder of its engine, from four times its dt to an eighth of it."""
-    points = results.dials[results.dials.scenario == "falling_box"]
-    drawn = {trace.name: trace for trace in charts.dials(points).data}
-    dial = drawn["pymunk:matched+iterations"]
+    points = results.sweeps[results.sweeps.scenario == "falling_box"]
+    drawn = {trace.name: trace for trace in charts.sweeps(points).data}
+    sweep = drawn["pymunk:matched+iterations"]
 
-    assert len(dial.x) == len(dial.y) == 8
-    assert (dial.texttemplate[0], dial.texttemplate[-1]) == ("1", "200")
+    assert len(sweep.x) == len(sweep.y) == 8
+    assert (sweep.texttemplate[0], sweep.texttemplate[-1]) == ("1", "200")
     assert len(drawn["pymunk:matched"].x) == 6
 
 
@@ -228,7 +228,7 @@ def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
     """How much one scene moves the curve, what failed, who costs less than our own solver; and of a budget that is cut,
     which scene, when, of how long, and over how many seconds the share is. Without the cut scene none of the latter.
     """
-    rows = [row for name in HABITS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYED]
+    rows = [row for name in MECHANISMS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYED]
     both = pd.concat([results.measured.budget, pd.DataFrame(rows, columns=results.measured.budget.columns)])
     cut = Results(results.plan, replace(results.measured, budget=both))
     whole, shorter = (page_of(each, tmp_path) for each in (results, cut))
@@ -266,6 +266,6 @@ def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
         plot.locator(".main-svg").first.wait_for()
     assert tab.locator(".plot").count() == 2 + 2 + 3 + 1 + 2 * len(SCENES)
     assert overhang(tab) <= 0
-    assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with habits: three engines; two switched off
+    assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with mechanisms: three engines; two switched off
     assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
     assert heard == []

@@ -8,7 +8,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from adapters.mechanisms.features import changed_pymunk
+from adapters.mechanisms.options import changed_pymunk
 from adapters.play import play
 from adapters.pymunk import Pymunk
 from reports.compare import laws
@@ -35,7 +35,7 @@ from scenarios.catalogue import SCENARIOS
 from scenarios.model import Scenario, Trajectory, frozen
 
 EXACT = "event_driven:float64"
-LATE_AND_NOT = ("pymunk:matched", "reference:ordered")
+AT_END_AND_IN_ORDER = ("pymunk:matched", "reference:ordered")
 
 
 def played(engine: str, scenario: Scenario) -> Trajectory:
@@ -158,8 +158,8 @@ def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
     """At packing 0.6 an engine that waits for the end of a step collisions a tenth too seldom; in order within it,
     not."""
     scenario = CASES["thermometer"].scene(0.6, 0)
-    late, in_order = (judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in LATE_AND_NOT)
-    ought, one = literature(scenario), played(LATE_AND_NOT[0], scenario)
+    late, in_order = (judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in AT_END_AND_IN_ORDER)
+    ought, one = literature(scenario), played(AT_END_AND_IN_ORDER[0], scenario)
     collisions = one.collisions
     rate = counted(one, collisions.j >= 0, np.ones(len(collisions))).mean() / ought.rate
     pressure = counted(one, collisions.j < 0, collisions.impulse).mean() / ought.force

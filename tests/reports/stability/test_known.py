@@ -9,7 +9,7 @@ from math import atan, pi, sqrt
 import numpy as np
 import pytest
 
-from adapters.mechanisms.features import changed_box2d, changed_box2d_v3
+from adapters.mechanisms.options import changed_box2d, changed_box2d_v3
 from reports.stability.cases import CASES
 from reports.stability.cases_alone import ball, far, on_spring, oscillator
 from reports.stability.limits import QUICK, Limit
@@ -50,7 +50,7 @@ def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(case
 @pytest.mark.parametrize("engine", ["box2d:matched+bullets", "box2d_v3:matched+bullets", "event_driven:float64"])
 @pytest.mark.parametrize("case", ["tunnelling_head_on", "tunnelling_thin_wall"])
 def test_nothing_is_missed_by_what_sweeps(case: str, engine: str):
-    """The switch that shows it: the same engines with continuous collision and bullets, and no steps at all."""
+    """The change that shows it: the same engines with continuous collision and bullets, and no steps at all."""
     assert limit(case, engine).verdict == "does not fail"
 
 

@@ -12,8 +12,8 @@ import pytest
 
 from reports.cli import VARIED
 from reports.stability.cases import CASES
-from reports.stability.cures import CURES, cure_of, faster, larger, slower, smaller, why_played
 from reports.stability.explain import explained, tried_out
+from reports.stability.interventions import INTERVENTIONS, faster, intervention_of, larger, slower, smaller, why_played
 from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
 from reports.stability.reasons import reason_of
 from reports.stability.search import Search
@@ -27,11 +27,12 @@ SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 
 @cache
 def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
-    """The limit on a scene of tests/data/scenes, with what cures its failure, asked without a twin."""
+    """The limit on a scene of tests/data/scenes, with the intervention that removes its failure, asked without an
+    ablation."""
     path = str(SCENES / scene)
     search = Search(case_of_file(path, what), engine, QUICK)
     limit = search.limit()
-    [known] = explained([replace(limit, case=f"{path}:{what}", cured=cure_of(search, limit))])
+    [known] = explained([replace(limit, case=f"{path}:{what}", intervention=intervention_of(search, limit))])
     return known
 
 
@@ -42,7 +43,7 @@ def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
         ("offset", "box2d_v3:matched", "positions are float32"),
         ("scale", "box2d:shipped", "threshold of restitution"),
         ("scale", "box2d_v3:shipped", "cap on speed"),
-        ("speed", "reference:exercise", "a collision waits for the end of its step"),
+        ("speed", "reference:exercise", "a collision takes effect at the end of the step in which it is found"),
     ],
 )
 def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, tells: str):
@@ -61,18 +62,18 @@ def test_a_threshold_shows_where_the_scene_closes_at_it():
     assert found("scale", "box2d:matched").verdict == "does not fail"
 
 
-def test_where_nothing_cures_it_a_twin_may_tell_and_else_it_is_called_not_known():
-    """Where the step is what is varied, a finer one is no proof: late collisions alone have the limit. Or nothing
+def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_called_not_known():
+    """Where the step is what is varied, a finer one is no proof: end-of-step detection alone has the limit. Or nothing
     helps."""
     path = str(SCENES / "two.toml")
     search = Search(case_of_file(path, "dt"), "pymunk:matched", QUICK)
     [limit] = explained([tried_out(search, replace(search.limit(), case=f"{path}:dt"))])
-    assert limit.why == "a collision waits for the end of its step"
-    assert limit.tested == "the reference with late collisions and nothing else has this limit"
+    assert limit.why == "a collision takes effect at the end of the step in which it is found"
+    assert limit.tested == "the reference with end-of-step detection and nothing else has this limit"
 
     failing = limit.failing
     assert failing is not None
-    nothing = replace(limit, case="x.toml:speed", twin="", trials=(replace(failing, broken="collisions"),))
+    nothing = replace(limit, case="x.toml:speed", mechanisms="", trials=(replace(failing, broken="collisions"),))
     reason, _, tested = why_played(nothing, "speed")
     assert reason.startswith(NOT_KNOWN)
     assert "in steps of an eighth" in reason
@@ -124,8 +125,8 @@ def test_every_change_is_tried_on_somebody():
     """None is left over."""
     engines = ("reference:exercise", "pymunk:shipped", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
                "box2d_v3:matched")  # fmt: skip
-    for name, cure in CURES.items():
-        assert any(cure.fits(engine, what) for engine in engines for what in ("dt", "speed", "offset")), name
+    for name, intervention in INTERVENTIONS.items():
+        assert any(intervention.fits(engine, what) for engine in engines for what in ("dt", "speed", "offset")), name
 
 
 def test_a_collision_that_nobody_makes_fails_however_near_to_the_start_it_is():

@@ -232,7 +232,7 @@ def test_a_limit_comes_back_from_the_journal_as_it_was():
 
 
 def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
-    """A prediction outside the bracket, or a switch that gets no farther, tests nothing."""
+    """A prediction outside the bracket, or a variant that gets no farther, tests nothing."""
     slow = Search(CASES["slow_collision"], "box2d:shipped", QUICK).limit()
     free = Search(CASES["slow_collision"], "box2d:matched", QUICK).limit()
     elsewhere = replace(slow, works_at=4.0, fails_at=3.9)

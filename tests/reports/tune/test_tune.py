@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adapters.matched import chosen, searched
-from adapters.mechanisms.features import changed_box2d_v3, changed_pymunk
+from adapters.mechanisms.options import changed_box2d_v3, changed_pymunk
 from adapters.pymunk import MATCHED as PYMUNK
 from reports.tune.grid import GRID, MAKES, NOT_SEARCHED, PAIRS, matched_of, settings_of
 from reports.tune.score import FLOOR, Played, against, at_cost, faults_of, measured, posed

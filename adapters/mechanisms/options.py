@@ -1,4 +1,5 @@
-"""What an engine costs with one thing more, or one less, than its matched profile: a row a feature, or a dial."""
+"""What an engine costs with one option changed against its matched profile: a row an option, or a sweep of one
+parameter."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from adapters.engines import ENGINES
 
 
 @dataclass(frozen=True)
-class Feature:
+class Option:
     """One change to one engine.
 
     Attributes:
@@ -79,13 +80,13 @@ def listing() -> Any:
     return SimpleNamespace(__name__="crowd", advance=njit(error_model="numpy")(advance))
 
 
-def _rows(engine: str, make: Callable[..., Engine], changes: dict[str, dict[str, Any]]) -> list[Feature]:
-    return [Feature(engine, change, partial(make, **settings)) for change, settings in changes.items()]
+def _rows(engine: str, make: Callable[..., Engine], changes: dict[str, dict[str, Any]]) -> list[Option]:
+    return [Option(engine, change, partial(make, **settings)) for change, settings in changes.items()]
 
 
-FEATURES: tuple[Feature, ...] = (
-    Feature("reference:exercise", "kept in float32", _float32),
-    Feature("reference:exercise", "broad phase, always", _always_listing),
+OPTIONS: tuple[Option, ...] = (
+    Option("reference:exercise", "kept in float32", _float32),
+    Option("reference:exercise", "broad phase, always", _always_listing),
     *_rows("pymunk:matched", changed_pymunk, {
         "50 iterations, not 10": {"iterations": 50},
         "200 iterations, not 10": {"iterations": 200},
@@ -117,15 +118,15 @@ warm start, and no outside engine lets its broad phase be switched off."""
 
 
 @dataclass(frozen=True)
-class Dial:
-    """What an engine lets one spend time on instead of smaller steps.
+class Sweep:
+    """A parameter of an engine over its values: what time can be spent on instead of smaller steps.
 
     Attributes:
-        engine: the row of `ENGINES` it is turned in, `engine:profile`.
-        what: the number that is turned.
+        engine: the row of `ENGINES` whose parameter is swept, `engine:profile`.
+        what: the parameter, in a word.
         change: the engine by its parameters.
-        parameter: the name of that number among them.
-        values: from cheap to dear.
+        parameter: the name of the swept one among them.
+        values: from cheap to expensive.
     """
 
     engine: str
@@ -136,7 +137,7 @@ class Dial:
 
     @property
     def name(self) -> str:
-        """The engine and a profile that says what is turned, as `reports.page.style` knows it."""
+        """The engine and a profile that says what is swept, as `reports.page.style` knows it."""
         return f"{self.engine}+{self.what}"
 
     def at(self, value: int) -> Callable[[], Engine]:
@@ -144,8 +145,8 @@ class Dial:
         return partial(self.change, **{self.parameter: value})
 
 
-DIALS: tuple[Dial, ...] = (
-    Dial("pymunk:matched", "iterations", changed_pymunk, "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
-    Dial("box2d:matched", "iterations", changed_box2d, "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
-    Dial("box2d_v3:matched", "substeps", changed_box2d_v3, "substeps", (1, 2, 4, 8, 16)),
+SWEEPS: tuple[Sweep, ...] = (
+    Sweep("pymunk:matched", "iterations", changed_pymunk, "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
+    Sweep("box2d:matched", "iterations", changed_box2d, "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
+    Sweep("box2d_v3:matched", "substeps", changed_box2d_v3, "substeps", (1, 2, 4, 8, 16)),
 )

@@ -1,4 +1,4 @@
-"""The hand-written solver with switches, as an engine: the exercise's, or what an engine does instead."""
+"""The ablated reference as an engine: the exercise's solver with the mechanisms of other engines switched on or off."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Collision
-from adapters.mechanisms import ablated_reference as switched
-from adapters.mechanisms.ablated_reference import STAGES, Switches
+from adapters.mechanisms import ablated_reference
+from adapters.mechanisms.ablated_reference import STAGES, Parameters
 from adapters.mechanisms.contacts import no_contacts
 from adapters.reference import Reference
 from scenarios.model import Scene
@@ -33,25 +33,25 @@ MIXING: dict[str, Callable[[float, float], float]] = {
 }
 
 
-class Switched(Reference):
-    """`adapters.mechanisms.ablated_reference` with these switches; without any the exercise's solver, to the bit.
+class AblatedReference(Reference):
+    """`adapters.mechanisms.ablated_reference` with these parameters; without any the exercise's solver, to the bit.
 
     order: the stages of a step; substeps: how often it is gone through in a dt, whose share falls to every move.
     alpha: free flight advances by v dt + alpha a dt2 a step, whatever the order; None: as the order has it.
-    mixing: how the restitutions of two disks make that of the pair, a key of `MIXING`. `switches`: fields of
-    `adapters.mechanisms.ablated_reference.Switches`.
+    mixing: how the restitutions of two disks make that of the pair, a key of `MIXING`. `parameters`: fields of
+    `adapters.mechanisms.ablated_reference.Parameters`.
     """
 
     def __init__(
         self, order: Sequence[str] = EXERCISE, *, substeps: int = 1, alpha: float | None = None,
-        mixing: str = "as stated", precision: type = np.float64, **switches: Any,
+        mixing: str = "as stated", precision: type = np.float64, **parameters: Any,
     ) -> None:  # fmt: skip
-        super().__init__(switched, precision=precision)
+        super().__init__(ablated_reference, precision=precision)
         self.order, self.substeps, self.alpha, self.mixing = tuple(order), substeps, alpha, mixing
         self.moves = substeps * self.order.count("move")
-        kinds = Switches._field_defaults  # the solver is compiled once: an int in place of a float would be another
-        numbers = {name: type(kinds[name])(value) for name, value in switches.items()}
-        self.on = Switches(np.array([STAGES.index(stage) for stage in self.order]), self._drift(), **numbers)
+        kinds = Parameters._field_defaults  # the solver is compiled once: an int in place of a float would be another
+        numbers = {name: type(kinds[name])(value) for name, value in parameters.items()}
+        self.on = Parameters(np.array([STAGES.index(stage) for stage in self.order]), self._drift(), **numbers)
 
     def _drift(self) -> float:
         """What each of the moves of a step has to add to v h, in a h2, for the whole step to have alpha."""
@@ -69,7 +69,7 @@ class Switched(Reference):
 
     def _advance(self, count: int) -> None:
         h = self.precision(self.dt / self.moves)
-        collisions = switched.advance(self.disks, self.world, self.on, self.kept, h, count * self.substeps)
+        collisions = ablated_reference.advance(self.disks, self.world, self.on, self.kept, h, count * self.substeps)
         if self.listening:
             self.log += [Collision(self.steps + k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions]
         self.steps += count

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from reports.stability.ablations import ACTS_AT_END, reason_by_ablation
 from reports.stability.limits import NOT_KNOWN, Limit
 from reports.stability.predicates import judge
 from reports.stability.search import Search
-from reports.stability.twins import COLLISIONS_WAIT, told
 from reports.stability.variants import play_as
 from reports.stability.vary import at_offset, at_scale, at_tempo
 from scenarios.model import Scenario
@@ -56,12 +56,12 @@ def unchanged(one: Scenario) -> Scenario:
     return one
 
 
-class Cure(NamedTuple):
+class Intervention(NamedTuple):
     """One change to a failing run.
 
     Attributes:
         engines, varied: patterns of engines and of what is varied, for which it is tried.
-        tells: why it failed, if it works with the change.
+        reason: why it failed, if it works with the change.
         how: the change in words.
         change: what is done to the scene.
         engine: who plays it instead; "" is the same.
@@ -69,7 +69,7 @@ class Cure(NamedTuple):
 
     engines: str
     varied: str
-    tells: str
+    reason: str
     how: str
     change: Callable[[Scenario], Scenario] = unchanged
     engine: str = ""
@@ -80,33 +80,33 @@ class Cure(NamedTuple):
 
 
 SAYS_SO = "it says so"
-CURES = {
-    "at_home": Cure("box2d*", "offset", "positions are float32, too coarse so far out", "at the origin", at_home),
-    "faster": Cure(
+INTERVENTIONS = {
+    "at_home": Intervention("box2d*", "offset", "positions are float32, too coarse so far out", "at the origin", at_home),
+    "faster": Intervention(
         "[pb]*", "*", "too slow for a time of the engine's own (threshold of restitution, rate of position correction)",
         "32 times as fast", faster,
     ),
-    "slower": Cure(
+    "slower": Intervention(
         "[pb]*", "*", "too fast for a time of the engine's own (cap on speed, rate of position correction)",
         "32 times as slow", slower,
     ),
-    "larger": Cure(
+    "larger": Intervention(
         "[pb]*", "*", "too small for a length of the engine's own (slop, margin, skin)",
         "32 times as large, at the same speeds", larger,
     ),
-    "smaller": Cure(
+    "smaller": Intervention(
         "[pb]*", "*", "too large for a length of the engine's own (cap on the way in a step, slop)",
         "32 times as small, at the same speeds", smaller,
     ),
-    "in_order": Cure("reference:[el]*", "*", COLLISIONS_WAIT, "as reference:ordered", engine="reference:ordered"),
-    "finer": Cure("*", "[!d]*", f"{COLLISIONS_WAIT}, and the step is too coarse for that", "in steps of an eighth", finer),
+    "in_order": Intervention("reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"),
+    "finer": Intervention("*", "[!d]*", f"{ACTS_AT_END}, and the step is too coarse for that", "in steps of an eighth", finer),
     **{
-        f"{box}_swept": Cure(f"{box}:matched", "*", "disks are not swept against each other",
+        f"{box}_swept": Intervention(f"{box}:matched", "*", "disks are not swept against each other",
                              f"as {box}:matched+bullets", engine=f"{box}:matched+bullets")
         for box in ("box2d", "box2d_v3")
     },
     **{
-        f"{engine}_matched": Cure(f"{engine}:shipped", "*", "a default of the engine that the matched profile changes",
+        f"{engine}_matched": Intervention(f"{engine}:shipped", "*", "a default of the engine that the matched profile changes",
                                   f"as {engine}:matched", engine=f"{engine}:matched")
         for engine in ("pymunk", "box2d", "box2d_v3")
     },
@@ -117,7 +117,7 @@ Where the step itself is varied, a finer one is no news.
 """
 
 
-def cure_of(search: Search, limit: Limit) -> str:
+def intervention_of(search: Search, limit: Limit) -> str:
     """The first change with which the run that failed at the limit works; "" if none does, or nothing failed.
 
     What an engine refuses is explained by itself.
@@ -126,10 +126,10 @@ def cure_of(search: Search, limit: Limit) -> str:
     if seen is None or seen[1].status == "unsupported":
         return ""
     scenario, _ = seen
-    for name, cure in CURES.items():
-        if cure.fits(search.engine, search.case.parameter):
-            changed = cure.change(scenario)
-            if not judge(search.case.predicate, changed, play_as(cure.engine or search.engine, changed)).failed:
+    for name, intervention in INTERVENTIONS.items():
+        if intervention.fits(search.engine, search.case.parameter):
+            changed = intervention.change(scenario)
+            if not judge(search.case.predicate, changed, play_as(intervention.engine or search.engine, changed)).failed:
                 return name
     return ""
 
@@ -139,11 +139,11 @@ def why_played(limit: Limit, varied: str) -> tuple[str, str, str]:
     failing = limit.failing
     if failing is None:
         return "", "", ""
-    if limit.twin:
-        return told(limit)
-    if cure := CURES.get(limit.cured):
-        return cure.tells, "", f"works {cure.how}"
+    if limit.mechanisms:
+        return reason_by_ablation(limit)
+    if intervention := INTERVENTIONS.get(limit.intervention):
+        return intervention.reason, "", f"works {intervention.how}"
     if failing.broken == "refused":
         return "the engine refuses it", "", SAYS_SO
-    tried = [cure.how for cure in CURES.values() if cure.fits(limit.engine, varied)]
+    tried = [intervention.how for intervention in INTERVENTIONS.values() if intervention.fits(limit.engine, varied)]
     return f"{NOT_KNOWN}; it also fails {', '.join(tried)}" if tried else NOT_KNOWN, "", ""

@@ -1,0 +1,185 @@
+"""The mechanisms of every engine: what it does otherwise than exact flight with end-of-step detection.
+
+Each can be switched on in `adapters.mechanisms.ablated_reference`; some can be switched off in the engine, too.
+The numbers are read off the engine. With all of its mechanisms the reference plays what the engine plays, mostly to
+rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import FLOAT32, NOT_TOLD, Engine
+from adapters.engines import row_of
+from adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReference
+from scenarios.model import Scene
+
+NAMES = (
+    "flight", "restitution", "impulse", "friction", "wall skin", "position correction", "float32", "CCD, sleep",
+)  # fmt: skip
+FLIGHT, RESTITUTION, IMPULSE, FRICTION, SKIN, POSITION_CORRECTION, DIGITS, SWEPT = NAMES
+# Exact flight; what overlaps at the end of a step gets its impulse there and then; nothing is moved out of it.
+END_OF_STEP: dict[str, Any] = {
+    "order": ("move", "accelerate", "pairs", "walls"), "alpha": 0.5, "project": False, "project_walls": False,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """One mechanism by which an engine differs from exact flight with end-of-step detection.
+
+    Attributes:
+        name: one of `NAMES`.
+        parameters: of `AblatedReference`; none: the reference does not have the mechanism.
+        on_top: the mechanisms it acts on, and is therefore switched on with.
+        without: makes the engine without it, where it has a parameter for that.
+    """
+
+    name: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    on_top: tuple[str, ...] = ()
+    without: Callable[[], Engine] | None = None
+
+
+def mechanisms_of(name: str, settings: Mapping[str, tuple[Any, Any]], scene: Scene, dt: float) -> list[Mechanism]:
+    """The mechanisms of an engine in `MECHANISMS`, in this scene at this dt; `settings` are those it reported once
+    loaded."""
+    # What cannot be read back is as it was asked for.
+    resolved = {setting: asked if used in NOT_TOLD else used for setting, (asked, used) in settings.items()}
+    flight = Mechanism(FLIGHT, {"alpha": row_of(name).alpha})
+    single = [Mechanism(DIGITS, {"precision": np.float32})] if row_of(name).rounding == FLOAT32 else []
+    return [flight, *MECHANISMS[name](resolved, scene, dt), *single]
+
+
+def with_mechanisms(mechanisms: Sequence[Mechanism]) -> AblatedReference:
+    """The reference with all these mechanisms that it has parameters for."""
+    parameters = dict(END_OF_STEP)
+    for mechanism in mechanisms:
+        parameters |= mechanism.parameters
+    return AblatedReference(**parameters)
+
+
+def _exercise(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+    return [Mechanism(POSITION_CORRECTION, {"project": True, "project_walls": True})]
+
+
+def _lesson(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+    # Walls come first, and flip a velocity without moving the disk.
+    return [
+        Mechanism(IMPULSE, {"order": ("move", "accelerate", "walls", "pairs")}),
+        Mechanism(POSITION_CORRECTION, {"project": True}),
+    ]
+
+
+def _pymunk(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
+    from adapters.pymunk import Pymunk
+
+    # Its bounce reverses whatever speed a contact has, also one at which the two part (cpArbiterPreStep).
+    impulse = {
+        "order": PYMUNK, "iterations": told["iterations"], "threshold": -np.inf,
+        "memory": told["collision_persistence"],
+    }  # fmt: skip
+    correction = {"correction_share": 1.0 - told["collision_bias"] ** dt, "slop": told["collision_slop"]}
+    return [
+        Mechanism(IMPULSE, impulse),
+        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), partial(Pymunk, profile, collision_bias=1.0)),
+    ]
+
+
+def _pymunk_shipped(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
+    from adapters.pymunk import Pymunk
+
+    as_stated = partial(Pymunk, "shipped", elasticity=float(np.sqrt(scene.restitution)))
+    return [Mechanism(RESTITUTION, {"mixing": "the product"}, without=as_stated), *_pymunk(told, scene, dt, "shipped")]
+
+
+def _box2d(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
+    from adapters.box2d import Box2DEngine
+
+    velocity, position = (int(count) for count in told["velocity, position iterations"].split(","))
+    cap = told["speed cap in m/s"] * dt
+    impulse = {"order": BOX2D, "iterations": velocity, "touching": True, "cap": cap}
+    # b2_baumgarte 0.2; b2_maxLinearCorrection 0.2 is a tenth of b2_maxTranslation, the cap.
+    correction = {
+        "correction_share": 0.2 if position else 0.0, "correction_iterations": position, "slop": told["linear slop in m"],
+        "correction_most": 0.1 * cap,
+    }  # fmt: skip
+    without = partial(Box2DEngine, profile, position_iterations=0, elastic_position_iterations=0)
+    return [
+        Mechanism(RESTITUTION, {"threshold": told["restitution threshold in m/s"]}),
+        Mechanism(IMPULSE, impulse),
+        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), without),
+    ]
+
+
+def _box2d_matched(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
+    from adapters.box2d import Box2DEngine
+
+    unswept = partial(
+        Box2DEngine, "matched", continuous=False, bullet=False, elastic_continuous=False, elastic_bullet=False
+    )
+    swept = [Mechanism(SWEPT, without=unswept)] if told["continuous collision"] else []
+    return [*_box2d(told, scene, dt, "matched"), *swept]
+
+
+def _box2d_shipped(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
+    from adapters.box2d import Box2DEngine
+
+    shipped = partial(Box2DEngine, "shipped")
+    return [
+        *_box2d(told, scene, dt, "shipped"),
+        Mechanism(FRICTION, {"friction": told["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
+        # b2_polygonRadius, which an edge has, too: twice the slop.
+        Mechanism(SKIN, {"skin": 2 * told["linear slop in m"]}, (IMPULSE, POSITION_CORRECTION)),
+        Mechanism(SWEPT, without=partial(shipped, continuous=False, elastic_continuous=False, sleeping=False)),
+    ]
+
+
+def _box2d_v3(told: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Mechanism]:
+    # b2_speculativeDistance: four slops of 0.005 units.
+    impulse = {
+        "order": BOX2D_V3, "touching": True, "margin": 0.02 * told["length unit in m"], "hertz": chosen["hertz"],
+        "damping": chosen["damping_ratio"],
+    }  # fmt: skip
+    return [
+        Mechanism(IMPULSE, impulse),
+        Mechanism(POSITION_CORRECTION, {"push_speed": chosen["push_speed"]}, (IMPULSE,)),
+    ]
+
+
+def _box2d_v3_matched(told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+    from adapters.box2d_v3 import MATCHED
+
+    return _box2d_v3(told, MATCHED)
+
+
+def _box2d_v3_shipped(told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+    from adapters.box2d_v3 import SHIPPED, Box2DV3
+
+    shipped = partial(Box2DV3, "shipped")
+    # At the threshold itself it bounces, where Box2D 2.3 does not.
+    threshold = float(np.nextafter(np.float32(told["restitution threshold in m/s"]), np.float32(0)))
+    return [
+        Mechanism(RESTITUTION, {"threshold": threshold}, without=partial(shipped, restitution_threshold=0.0)),
+        *_box2d_v3(told, SHIPPED),
+        Mechanism(FRICTION, {"friction": told["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
+        Mechanism(SWEPT, without=partial(shipped, continuous=False, sleeping=False)),
+    ]
+
+
+MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism]]] = {
+    "reference:exercise": _exercise,
+    "reference:lesson": _lesson,
+    "pymunk:shipped": _pymunk_shipped,
+    "pymunk:matched": partial(_pymunk, profile="matched"),
+    "box2d:shipped": _box2d_shipped,
+    "box2d:matched": _box2d_matched,
+    "box2d_v3:shipped": _box2d_v3_shipped,
+    "box2d_v3:matched": _box2d_v3_matched,
+}
+"""The engines whose mechanisms are known."""
