@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
-from adapters.engine import PASSED, UNREAD, Collision
+from adapters.engine import NOT_READABLE, PASSED, Collision
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from scenarios.model import Array, Scene, State
 
@@ -219,13 +219,13 @@ class Box2DV3:
         return {
             "length unit in m": (self.unit if matched else None, self.unit_found),
             "restitution threshold in m/s": (options.get("restitution_threshold"), world.restitution_threshold),
-            "speed cap in m/s": (options.get("maximum_linear_speed"), UNREAD),
-            "spin cap in rad/s": (None, UNREAD),
-            "linear slop in m": (None, UNREAD),
-            "speculative margin in m": (None, UNREAD),
+            "speed cap in m/s": (options.get("maximum_linear_speed"), NOT_READABLE),
+            "spin cap in rad/s": (None, NOT_READABLE),
+            "linear slop in m": (None, NOT_READABLE),
+            "speculative margin in m": (None, NOT_READABLE),
             "contact tuning (hertz, damping ratio, push speed in m/s)": (
                 "{:g}, {:g}, {:g}".format(*self._tuning()) if matched else None,
-                UNREAD,
+                NOT_READABLE,
             ),
             "friction": (self.friction, self.bodies[0].shapes[0].friction),
             "restitution": (self.scene.restitution, self.bodies[0].shapes[0].restitution),

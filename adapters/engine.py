@@ -9,10 +9,10 @@ from typing import Any, NamedTuple, Protocol
 from scenarios.model import Array, Scene, State
 
 # What stands in place of what an engine resolved a setting to, where its binding does not tell.
-UNREAD = "not readable"
+NOT_READABLE = "not readable"
 PASSED = "passed with every step"  # the engine keeps no such setting
 KEPT = "kept by the adapter"  # the engine knows no such setting
-NOT_TOLD = (UNREAD, PASSED, KEPT)
+NOT_REPORTED = (NOT_READABLE, PASSED, KEPT)
 
 
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53  # the relative rounding of a number
@@ -90,7 +90,8 @@ class Row:
         rounding: the relative rounding of the numbers the engine keeps.
         leaves_state: what it played before changes what it plays next, so that each cell needs a process of its own;
             true of none below (a test plays each after others, bit for bit).
-        source: what tells a solver's file that was saved from what it was; "" for an engine of this program.
+        source: what distinguishes a solver's file that was saved from its earlier text; "" for an engine of this
+            program.
     """
 
     make: Callable[[], Engine]

@@ -33,7 +33,7 @@ class Pymunk:
     `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; and `MATCHED`, by `crosscheck tune`: ten
     iterations, because more cost time and are no nearer; hardly any slop, because the default 0.1 is a length in the
     scene's units; contacts are forgotten as soon as they part, because one that touches again within three steps
-    inherits an impulse that it is not given again, but that is told, and may be taken back; at e = 1 no position
+    inherits an impulse that it is not given again, but that is reported, and may be taken back; at e = 1 no position
     correction, because it adds energy.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `turning` False gives every disk an

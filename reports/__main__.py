@@ -1,4 +1,5 @@
-"""The command `crosscheck`, or `python -m reports`: it can be told to stop before it has imported what it needs."""
+"""The command `crosscheck`, or `python -m reports`: it can be stopped by a signal before it has imported what it
+needs."""
 
 import sys
 
@@ -8,10 +9,10 @@ from reports.terminal.safe_path import leave_out_current_folder
 def main() -> None:
     """Do what the command line asks for."""
     leave_out_current_folder()  # before anything else is imported
-    from reports.terminal.exits import ends_when_told, refuse
+    from reports.terminal.exits import ends_on_signals, refuse
     from reports.terminal.streams import printing
 
-    with ends_when_told(), printing():
+    with ends_on_signals(), printing():
         if sys.flags.optimize > 1:
             refuse(
                 ["PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are explained by; unset it"]

@@ -15,8 +15,8 @@ from adapters.conformance.probe import (
     loaded,
     one_disk,
     plain,
+    reported,
     scene_of,
-    told,
 )
 from adapters.engine import Row
 from adapters.play import fault_of
@@ -175,14 +175,14 @@ def same_instant(row: Row) -> Reading:
     return Reading(speed, gravity * steps * DT, row.rounding * steps * gravity)
 
 
-def collisions_are_told(row: Row) -> Reading:
+def collisions_are_reported(row: Row) -> Reading:
     """One collision of disks 1 and 2 of three gives one collision, of these two."""
     with loaded(row, head_on(2.0)) as engine:
         engine.step(12)
-        return Reading(told(engine), "disk 1 and disk 2")
+        return Reading(reported(engine), "disk 1 and disk 2")
 
 
-def walls_are_told(row: Row) -> Reading:
+def walls_are_reported(row: Row) -> Reading:
     """One collision on the second of two walls gives one collision, with this wall."""
     scene = scene_of(
         position=[[0.0, 9.0], [0.0, 0.0]], velocity=[[0.0, 0.0], [2.0, 0.0]], radius=[0.5, 0.5], mass=[1.0, 1.0],
@@ -190,7 +190,7 @@ def walls_are_told(row: Row) -> Reading:
     )  # fmt: skip
     with loaded(row, scene) as engine:
         engine.step(12)
-        return Reading(told(engine), "disk 1 and wall 1")
+        return Reading(reported(engine), "disk 1 and wall 1")
 
 
 def collisions_name_their_step(row: Row) -> Reading:
@@ -205,15 +205,15 @@ def collisions_name_their_step(row: Row) -> Reading:
     return Reading(steps[0] if steps else np.nan, changed - 1)
 
 
-def impulse_is_told(row: Row) -> Reading:
-    """The impulses told add up to the momentum that changed hands; an engine may also tell none (NaN)."""
+def impulse_is_reported(row: Row) -> Reading:
+    """The impulses reported add up to the momentum that changed hands; an engine may also report none (NaN)."""
     with loaded(row, head_on(2.0)) as engine:
         before = engine.read().velocity[2, 0]
         engine.step(12)
         moved = engine.read().velocity[2, 0] - before
         impulses = [collision.impulse for collision in engine.collisions()]
     if np.isnan(impulses).any():
-        return Reading("not told", "not told", note="the engine's events carry no impulse")
+        return Reading("not reported", "not reported", note="the engine's events carry no impulse")
     return Reading(float(sum(impulses)), float(moved), ROUNDINGS * row.rounding * abs(moved))
 
 
@@ -228,10 +228,11 @@ def static_stays(row: Row) -> Reading:
         for _ in range(12):
             engine.apply_force(1, np.array([5.0, 5.0]), 5.0)
             engine.step()
-        after, collisions = engine.read(), told(engine)
+        after, collisions = engine.read(), reported(engine)
     moved = [name for name, array in vars(after).items() if (array[1] != getattr(before, name)[1]).any()]
     return Reading(
-        "; ".join(f"{name} changed" for name in moved) or f"stays, told {collisions}", "stays, told disk 0 and disk 1"
+        "; ".join(f"{name} changed" for name in moved) or f"stays, reported {collisions}",
+        "stays, reported disk 0 and disk 1",
     )
 
 
@@ -249,11 +250,13 @@ CONTRACT: dict[str, Probe] = {
     "mass_by_force": Probe("What mass does a force see? (kg)", mass_by_force, "breaks"),
     "inertia_by_torque": Probe("What inertia does a torque see? (kg m2)", inertia_by_torque, "breaks"),
     "same_instant": Probe("How fast is a disk after 1 s under 9.81 m/s2? (m/s)", same_instant, "breaks"),
-    "collisions_are_told": Probe(
-        "Which collisions are told when disks 1 and 2 meet once?", collisions_are_told, "breaks"
+    "collisions_are_reported": Probe(
+        "Which collisions are reported when disks 1 and 2 meet once?", collisions_are_reported, "breaks"
     ),
-    "walls_are_told": Probe("Which collisions are told when disk 1 meets wall 1 once?", walls_are_told, "breaks"),
-    "collisions_name_their_step": Probe("In which step is a collision told?", collisions_name_their_step, "breaks"),
-    "impulse_is_told": Probe("Which impulse is told of a collision? (N s)", impulse_is_told, "breaks"),
+    "walls_are_reported": Probe(
+        "Which collisions are reported when disk 1 meets wall 1 once?", walls_are_reported, "breaks"
+    ),
+    "collisions_name_their_step": Probe("In which step is a collision reported?", collisions_name_their_step, "breaks"),
+    "impulse_is_reported": Probe("Which impulse is reported for a collision? (N s)", impulse_is_reported, "breaks"),
     "static_stays": Probe("Does a static disk that is struck and under a force stay?", static_stays, "breaks"),
 }

@@ -93,8 +93,8 @@ def plain() -> Scene:
     )  # fmt: skip
 
 
-def told(engine: Engine, dt: float = DT) -> str:
-    """The collisions an engine tells, as "disk 0 and disk 1, disk 0 and wall 2"."""
+def reported(engine: Engine, dt: float = DT) -> str:
+    """The collisions an engine reports, as "disk 0 and disk 1, disk 0 and wall 2"."""
     collisions = first_collisions(engine.collisions(), dt)
     names = [(f"disk {i}", f"disk {j}" if j >= 0 else f"wall {-1 - j}") for i, j in zip(collisions.i, collisions.j)]
     return ", ".join(" and ".join(pair) for pair in names) or "none"

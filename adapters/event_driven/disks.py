@@ -25,7 +25,7 @@ NONE = np.uint32(2**32 - 1)  # ends a chain; without a sign, so that nobody must
 NOBODY = -(2**31)
 DONE, GOES_ON, LOG_FULL, ACCUMULATION, REENTRY, ROUND_END = range(6)  # what the loop says
 BASE, STOP = 0, 1  # columns of Arena.clock
-LOGGED, WHO, WHOM, LEFT = range(4)  # and of Arena.told
+LOGGED, WHO, WHOM, LEFT = range(4)  # and of Arena.counters
 EDGE, WRAP, END, WALL = 0, 4, 8, 9  # by itself: + side (left, right, bottom, top); the wall's end; + 3 wall + part
 
 # A disk in three lines of the cache: what a search for contacts reads of others, its record, what only some need.
@@ -114,7 +114,7 @@ class Arena(NamedTuple):
     walls: Walls
     clock: Array  # s: when the present epoch began, when the answer ends
     log: Array  # (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
-    told: Ints  # rows in the log; the two for whom the answer ends, as in the log; events until the loop comes back
+    counters: Ints  # rows in the log; the two for whom the answer ends, as in the log; events until the loop comes back
     runs: Runs  # untouched where there is no scenery
 
 

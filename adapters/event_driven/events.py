@@ -66,7 +66,7 @@ class EventEngine:
         self.arena = Arena(
             disks_of(scene, position, low), empty_queue(scene.n), head=np.full(np.prod(grid.shape), NONE),
             near=np.full(scene.n + 9, NONE), grid=grid, rules=rules, walls=walls_of(scene, grid, low),
-            clock=np.zeros(2), log=np.zeros((LOG_ROWS, 5)), told=np.zeros(4, np.int64),
+            clock=np.zeros(2), log=np.zeros((LOG_ROWS, 5)), counters=np.zeros(4, np.int64),
             runs=np.zeros(scene.n, RUN).view(np.recarray),
         )  # fmt: skip
         self.kept: list[Array] = []
@@ -77,15 +77,15 @@ class EventEngine:
 
     def advance(self, until: float) -> None:
         """Let all events up to `until` s happen; `NoTruth` if the answer ends before."""
-        status, told = GOES_ON, self.arena.told
+        status, counters = GOES_ON, self.arena.counters
         while status in (GOES_ON, LOG_FULL):
-            told[LEFT] = EVENTS
+            counters[LEFT] = EVENTS
             status = event_loop.advance(self.arena, self.scenery, until)
-            self.spent += EVENTS - int(told[LEFT])
+            self.spent += EVENTS - int(counters[LEFT])
             self.drain()
             if self.spent >= MOST:
                 self.refuse_crawl(until)
-        at, i, j = float(self.arena.clock[STOP]), int(told[WHO]), int(told[WHOM])
+        at, i, j = float(self.arena.clock[STOP]), int(counters[WHO]), int(counters[WHOM])
         if status == ACCUMULATION:
             raise NoTruth(f"the collisions of disk {i} on {self.partners(i, j, at)} accumulate at {at:.9g} s", at)
         if status == REENTRY:
@@ -123,10 +123,10 @@ class EventEngine:
 
     def drain(self) -> None:
         """Keep what is in the log and empty it."""
-        told = self.arena.told
-        if told[LOGGED]:
-            self.kept.append(self.arena.log[: told[LOGGED]].copy())
-            told[LOGGED] = 0
+        counters = self.arena.counters
+        if counters[LOGGED]:
+            self.kept.append(self.arena.log[: counters[LOGGED]].copy())
+            counters[LOGGED] = 0
 
     def accelerate(self, disk: int, at: float, acceleration: Array) -> None:
         """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so, (2,) m/s2."""

@@ -1,7 +1,7 @@
 """What a collision does in the event engine: Newton's restitution along the line of centres, without friction; and its
 note.
 
-A collision is logged and counted, so that those without an end are noticed: between which float64 tells no time, or
+A collision is logged and counted, so that those without an end are noticed: between which float64 resolves no time, or
 between which nothing flies.
 """
 
@@ -69,20 +69,20 @@ def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) ->
 @inlined
 def tell(arena: Arena, now: float, i: int, j: int, impulse: float, cosine: float) -> None:
     """Write a collision into the log."""
-    log, k = arena.log, arena.told[LOGGED]
+    log, k = arena.log, arena.counters[LOGGED]
     log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = arena.clock[BASE] + now, i, j, impulse, cosine
-    arena.told[LOGGED] += 1
+    arena.counters[LOGGED] += 1
 
 
 @inlined
 def stop(arena: Arena, now: float, i: int, j: int) -> None:
     """Tell when and for whom the answer ends, should it."""
-    arena.clock[STOP], arena.told[WHO], arena.told[WHOM] = arena.clock[BASE] + now, i, j
+    arena.clock[STOP], arena.counters[WHO], arena.counters[WHOM] = arena.clock[BASE] + now, i, j
 
 
 @inlined
 def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) -> bool:
-    """Count and log a collision; True if collisions of disk `i` follow each other faster than float64 tells times
+    """Count and log a collision; True if collisions of disk `i` follow each other faster than float64 resolves times
     apart."""
     a.count += 1
     if impulse > 0.0:

@@ -49,17 +49,18 @@ EPOCH = 256.0  # s; the clock starts again after as many, so that its last place
 def advance(arena: Arena, scenery: Scenery, until: float) -> int:
     """Let everything up to `until` s happen.
 
-    Returns DONE; GOES_ON after told[LEFT] events, or LOG_FULL, to be called again with told[LOGGED] = 0; or
-    ACCUMULATION, REENTRY or ROUND_END, with clock[STOP], told[WHO] and told[WHOM] when and for whom the answer ends.
+    Returns DONE; GOES_ON after counters[LEFT] events, or LOG_FULL, to be called again with counters[LOGGED] = 0; or
+    ACCUMULATION, REENTRY or ROUND_END, with clock[STOP], counters[WHO] and counters[WHOM] when and for whom the answer
+    ends.
     """
     disks, clock = arena.disks, arena.clock
-    while arena.told[LEFT] > 0:
-        arena.told[LEFT] -= 1
+    while arena.counters[LEFT] > 0:
+        arena.counters[LEFT] -= 1
         now = arena.tree[1].time
         i: Any = np.int64(arena.tree[1].who)
         if clock[BASE] + now > until:
             return DONE
-        if arena.told[LOGGED] == len(arena.log):
+        if arena.counters[LOGGED] == len(arena.log):
             return LOG_FULL
         if now > EPOCH:
             begin_epoch(disks, arena.tree, arena.runs, clock)
@@ -158,7 +159,7 @@ def wrap(arena: Arena, i: int, side: int) -> int:
     unlink(arena.disks, arena.head, arena.grid, i)
     settle(arena.disks, arena.head, arena.grid, i)
     stop(arena, a.t, i, covered(arena.disks, i))
-    return REENTRY if arena.told[WHOM] >= 0 else GOES_ON
+    return REENTRY if arena.counters[WHOM] >= 0 else GOES_ON
 
 
 @kernel

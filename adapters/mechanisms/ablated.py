@@ -76,5 +76,5 @@ class AblatedReference(Reference):
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """What is switched on."""
-        told = {"mixing": self.mixing, "substeps": self.substeps, "alpha": self.alpha} | self.on._asdict()
-        return {name: (value, value) for name, value in (told | {"order": ", ".join(self.order)}).items()}
+        reported = {"mixing": self.mixing, "substeps": self.substeps, "alpha": self.alpha} | self.on._asdict()
+        return {name: (value, value) for name, value in (reported | {"order": ", ".join(self.order)}).items()}

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import FLOAT32, NOT_TOLD, Engine
+from adapters.engine import FLOAT32, NOT_REPORTED, Engine
 from adapters.engines import row_of
 from adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReference
 from scenarios.model import Scene
@@ -50,7 +50,7 @@ def mechanisms_of(name: str, settings: Mapping[str, tuple[Any, Any]], scene: Sce
     """The mechanisms of an engine in `MECHANISMS`, in this scene at this dt; `settings` are those it reported once
     loaded."""
     # What cannot be read back is as it was asked for.
-    resolved = {setting: asked if used in NOT_TOLD else used for setting, (asked, used) in settings.items()}
+    resolved = {setting: asked if used in NOT_REPORTED else used for setting, (asked, used) in settings.items()}
     flight = Mechanism(FLIGHT, {"alpha": row_of(name).alpha})
     single = [Mechanism(DIGITS, {"precision": np.float32})] if row_of(name).rounding == FLOAT32 else []
     return [flight, *MECHANISMS[name](resolved, scene, dt), *single]
@@ -64,11 +64,11 @@ def with_mechanisms(mechanisms: Sequence[Mechanism]) -> AblatedReference:
     return AblatedReference(**parameters)
 
 
-def _exercise(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+def _exercise(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
     return [Mechanism(POSITION_CORRECTION, {"project": True, "project_walls": True})]
 
 
-def _lesson(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+def _lesson(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
     # Walls come first, and flip a velocity without moving the disk.
     return [
         Mechanism(IMPULSE, {"order": ("move", "accelerate", "walls", "pairs")}),
@@ -76,74 +76,77 @@ def _lesson(_told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechani
     ]
 
 
-def _pymunk(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
+def _pymunk(reported: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
     from adapters.pymunk import Pymunk
 
     # Its bounce reverses whatever speed a contact has, also one at which the two part (cpArbiterPreStep).
     impulse = {
-        "order": PYMUNK, "iterations": told["iterations"], "threshold": -np.inf,
-        "memory": told["collision_persistence"],
+        "order": PYMUNK, "iterations": reported["iterations"], "threshold": -np.inf,
+        "memory": reported["collision_persistence"],
     }  # fmt: skip
-    correction = {"correction_share": 1.0 - told["collision_bias"] ** dt, "slop": told["collision_slop"]}
+    correction = {"correction_share": 1.0 - reported["collision_bias"] ** dt, "slop": reported["collision_slop"]}
     return [
         Mechanism(IMPULSE, impulse),
         Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), partial(Pymunk, profile, collision_bias=1.0)),
     ]
 
 
-def _pymunk_shipped(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
+def _pymunk_shipped(reported: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
     from adapters.pymunk import Pymunk
 
     as_stated = partial(Pymunk, "shipped", elasticity=float(np.sqrt(scene.restitution)))
-    return [Mechanism(RESTITUTION, {"mixing": "the product"}, without=as_stated), *_pymunk(told, scene, dt, "shipped")]
+    return [
+        Mechanism(RESTITUTION, {"mixing": "the product"}, without=as_stated),
+        *_pymunk(reported, scene, dt, "shipped"),
+    ]
 
 
-def _box2d(told: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
+def _box2d(reported: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
     from adapters.box2d import Box2DEngine
 
-    velocity, position = (int(count) for count in told["velocity, position iterations"].split(","))
-    cap = told["speed cap in m/s"] * dt
+    velocity, position = (int(count) for count in reported["velocity, position iterations"].split(","))
+    cap = reported["speed cap in m/s"] * dt
     impulse = {"order": BOX2D, "iterations": velocity, "touching": True, "cap": cap}
     # b2_baumgarte 0.2; b2_maxLinearCorrection 0.2 is a tenth of b2_maxTranslation, the cap.
     correction = {
-        "correction_share": 0.2 if position else 0.0, "correction_iterations": position, "slop": told["linear slop in m"],
+        "correction_share": 0.2 if position else 0.0, "correction_iterations": position, "slop": reported["linear slop in m"],
         "correction_most": 0.1 * cap,
     }  # fmt: skip
     without = partial(Box2DEngine, profile, position_iterations=0, elastic_position_iterations=0)
     return [
-        Mechanism(RESTITUTION, {"threshold": told["restitution threshold in m/s"]}),
+        Mechanism(RESTITUTION, {"threshold": reported["restitution threshold in m/s"]}),
         Mechanism(IMPULSE, impulse),
         Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), without),
     ]
 
 
-def _box2d_matched(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
+def _box2d_matched(reported: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
     from adapters.box2d import Box2DEngine
 
     unswept = partial(
         Box2DEngine, "matched", continuous=False, bullet=False, elastic_continuous=False, elastic_bullet=False
     )
-    swept = [Mechanism(SWEPT, without=unswept)] if told["continuous collision"] else []
-    return [*_box2d(told, scene, dt, "matched"), *swept]
+    swept = [Mechanism(SWEPT, without=unswept)] if reported["continuous collision"] else []
+    return [*_box2d(reported, scene, dt, "matched"), *swept]
 
 
-def _box2d_shipped(told: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
+def _box2d_shipped(reported: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
     from adapters.box2d import Box2DEngine
 
     shipped = partial(Box2DEngine, "shipped")
     return [
-        *_box2d(told, scene, dt, "shipped"),
-        Mechanism(FRICTION, {"friction": told["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
+        *_box2d(reported, scene, dt, "shipped"),
+        Mechanism(FRICTION, {"friction": reported["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
         # b2_polygonRadius, which an edge has, too: twice the slop.
-        Mechanism(SKIN, {"skin": 2 * told["linear slop in m"]}, (IMPULSE, POSITION_CORRECTION)),
+        Mechanism(SKIN, {"skin": 2 * reported["linear slop in m"]}, (IMPULSE, POSITION_CORRECTION)),
         Mechanism(SWEPT, without=partial(shipped, continuous=False, elastic_continuous=False, sleeping=False)),
     ]
 
 
-def _box2d_v3(told: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Mechanism]:
+def _box2d_v3(reported: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Mechanism]:
     # b2_speculativeDistance: four slops of 0.005 units.
     impulse = {
-        "order": BOX2D_V3, "touching": True, "margin": 0.02 * told["length unit in m"], "hertz": chosen["hertz"],
+        "order": BOX2D_V3, "touching": True, "margin": 0.02 * reported["length unit in m"], "hertz": chosen["hertz"],
         "damping": chosen["damping_ratio"],
     }  # fmt: skip
     return [
@@ -152,22 +155,22 @@ def _box2d_v3(told: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Mechan
     ]
 
 
-def _box2d_v3_matched(told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+def _box2d_v3_matched(reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
     from adapters.box2d_v3 import MATCHED
 
-    return _box2d_v3(told, MATCHED)
+    return _box2d_v3(reported, MATCHED)
 
 
-def _box2d_v3_shipped(told: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+def _box2d_v3_shipped(reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
     from adapters.box2d_v3 import SHIPPED, Box2DV3
 
     shipped = partial(Box2DV3, "shipped")
     # At the threshold itself it bounces, where Box2D 2.3 does not.
-    threshold = float(np.nextafter(np.float32(told["restitution threshold in m/s"]), np.float32(0)))
+    threshold = float(np.nextafter(np.float32(reported["restitution threshold in m/s"]), np.float32(0)))
     return [
         Mechanism(RESTITUTION, {"threshold": threshold}, without=partial(shipped, restitution_threshold=0.0)),
-        *_box2d_v3(told, SHIPPED),
-        Mechanism(FRICTION, {"friction": told["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
+        *_box2d_v3(reported, SHIPPED),
+        Mechanism(FRICTION, {"friction": reported["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
         Mechanism(SWEPT, without=partial(shipped, continuous=False, sleeping=False)),
     ]
 

@@ -65,7 +65,7 @@ class Whole:
         return np.column_stack([state.position, state.velocity, state.angle, state.angular_velocity]).tolist()
 
     def whole_collisions(self, _argument: Any) -> list[list[float]]:
-        """(step, i, j, impulse), as `advance` told them."""
+        """(step, i, j, impulse), as `advance` reported them."""
         return [[int(step), int(i), int(j), float(impulse)] for step, i, j, impulse in self.engine.collisions()]
 
 

@@ -220,14 +220,14 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     p.y = p.y < bottom ? top : p.y > top ? bottom : p.y;
   }
 
-  function told(lines) {
+  function reported(lines) {
     let all = "";
     for (let k = 0; k < lines.length; k++) all += (k ? "," : "") + lines[k];
     return "[" + all + "]";
   }
 
   const commands = {
-    ask, load, step, read: () => rows(world.spheres), collisions: () => told(world.collisions), contacts: () => told(world.log),
+    ask, load, step, read: () => rows(world.spheres), collisions: () => reported(world.collisions), contacts: () => reported(world.log),
     begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
   };
 

@@ -93,7 +93,7 @@ class Student:
         return State(*(np.ascontiguousarray(rows[:, part]) for part in (slice(0, 2), slice(2, 4), angle, spin)))
 
     def collisions(self) -> list[Collision]:
-        """What `advance` told, or every call of the collision function that changed a velocity."""
+        """What `advance` reported, or every call of the collision function that changed a velocity."""
         rows = self.process.do("whole_collisions" if self.whole else "collisions")
         return [Collision(int(step), int(i), int(j), impulse) for step, i, j, impulse in rows]
 

@@ -79,7 +79,7 @@ class JavaScriptSolver:
         return {"mini-racer": version("mini-racer"), "V8": self.engine.v8_version}
 
     def failure(self, error: JSEvalException, limit: float, when: str) -> SolverFailed:
-        """What V8 says, in a sentence, with line and column where it tells."""
+        """What V8 says, in a sentence, with line and column where it reports them."""
         if isinstance(error, JSTimeoutException):
             return SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
         if isinstance(error, JSOOMException):

@@ -15,7 +15,7 @@ from scenarios.model import Array, Collisions, Scene, Trajectory
 
 # Collisions and steps lie on one grid, and so do halves of the time between collisions. No bound is one of it, where
 # rounding would decide: all are roots of numbers that have none.
-CROWDED = 5**0.5  # dt; true collisions of a pair that are closer cannot be told apart by any step
+CROWDED = 5**0.5  # dt; true collisions of a pair that are closer cannot be distinguished by any step
 FAR = 401**0.5  # dt; so late, or early, a match may always be
 ROUNDING = 1e-12  # of a sum of thousands of times
 HALF = 0.26**0.5  # of the time to the nearest other true collision: so late it may be too
@@ -184,7 +184,7 @@ class Restitutions(NamedTuple):
     below: int
 
 
-CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold collision far more
+CLEAN = 1e-4  # of the change of velocity; float32 leaves about 1e-7 of the velocity, an unreported collision far more
 FLOOR = 100  # times the rounding of the velocities that a change must have: e is then read to a hundredth or so
 
 
@@ -256,15 +256,15 @@ def speeds_along_normal(
     normal = between / (np.linalg.norm(between) or 1.0)
     if j >= 0 and not scene.static[j]:
         kicks = scene.mass[i] * one, scene.mass[j] * two
-        untold = np.linalg.norm(kicks[0] + kicks[1]) > CLEAN * max(map(np.linalg.norm, kicks))
+        unreported = np.linalg.norm(kicks[0] + kicks[1]) > CLEAN * max(map(np.linalg.norm, kicks))
         slid = (turned[[i, j]] > CLEAN * laws.lengths(change[[i, j]])).any()
     elif j < 0:
         start, end = scene.walls[-1 - j]
-        untold = abs(one @ (end - start)) > CLEAN * np.linalg.norm(end - start) * np.linalg.norm(one)
+        unreported = abs(one @ (end - start)) > CLEAN * np.linalg.norm(end - start) * np.linalg.norm(one)
         slid = turned[i] > CLEAN * np.linalg.norm(one)
     else:
-        untold, slid = False, turned[i] > CLEAN * np.linalg.norm(one)
-    if untold or slid:
+        unreported, slid = False, turned[i] > CLEAN * np.linalg.norm(one)
+    if unreported or slid:
         return np.nan, np.nan
     before, after = (earlier[i] - earlier[j], later[i] - later[j]) if j >= 0 else (earlier[i], later[i])
     return float(-before @ normal), float(after @ normal)

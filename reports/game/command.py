@@ -31,7 +31,7 @@ def game_of(flight: Path | None, engines: Sequence[str]) -> Game:
     if len(chosen) > MOST_ENGINES:
         refuse([f"--engine: {len(chosen)} engines; at most {MOST_ENGINES} fly at once: name fewer"])
     file = read_flight(flight) if flight else None
-    # A solver's file is a row like any other while it flies; one that cannot fly at all is told before.
+    # A solver's file is a row like any other while it flies; one that cannot fly at all is reported before.
     ENGINES.update(own_rows([name for name in chosen if name.endswith(OWN)]))
     return Game(chosen, file)
 

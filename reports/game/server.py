@@ -59,7 +59,7 @@ class Game:
     async def fly(self, socket: WebSocket) -> None:
         """A tab, as long as it keeps the rules."""
         if not same_origin(socket):
-            await socket.close(POLICY)  # before it is accepted: the browser is told 403
+            await socket.close(POLICY)  # before it is accepted: the browser gets 403
             return
         await socket.accept()
         if self.tabs >= MOST_TABS:

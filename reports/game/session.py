@@ -74,7 +74,7 @@ class Session:
         ship = flight.solid.state
         return {
             "kind": "frame", "frame": flight.frame, "t": flight.frame * flight.scenario.sample_interval,
-            "solid": flight.flyers.index(flight.solid), "flyers": [self.told(flyer) for flyer in flight.flyers],
+            "solid": flight.flyers.index(flight.solid), "flyers": [self.to_json(flyer) for flyer in flight.flyers],
             "ship": [*ship.position[SHIP].tolist(), *ship.velocity[SHIP].tolist(),
                      float(ship.angle[SHIP]), float(ship.angular_velocity[SHIP])],
             "force": self.force(), "won": flight.won, "over": flight.over, "left_at": flight.left_at,
@@ -91,7 +91,7 @@ class Session:
         force = sum(forces, np.zeros(2))
         return [*force.tolist(), float(sum(thrust.torque for thrust in on))]
 
-    def told(self, flyer: Flyer) -> dict[str, Any]:
+    def to_json(self, flyer: Flyer) -> dict[str, Any]:
         """One engine's disks, its measures, and where it parted or why it left."""
         parted = None
         if flyer.parting is not None:

@@ -14,7 +14,7 @@ from adapters.engines import ENGINES
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson
-from reports.lessons.pages import ALONE, FILES, Links, index_page, offline, told
+from reports.lessons.pages import ALONE, FILES, Links, answer_json, index_page, offline
 from reports.run.arguments import unknown
 from reports.run.folders import made_anew, place_of
 from reports.run.made import Kind, may_overwrite, writing
@@ -90,7 +90,9 @@ def write_pages(pages: Mapping[Path, Lesson], links: Links, besides: dict[str, C
     if one of them fails.
     """
     tasks: dict[Hashable, Callable[[], Any]] = {
-        (path, places): partial(told, lesson.name, places) for path, lesson in pages.items() for places in lesson.grid
+        (path, places): partial(answer_json, lesson.name, places)
+        for path, lesson in pages.items()
+        for places in lesson.grid
     }
     tasks.update(besides)
     answers: dict[Path, dict[tuple[int, ...], Any]] = {path: {} for path in pages}

@@ -53,7 +53,7 @@ class Curve:
     dots: bool = False
     faint: bool = False
 
-    def told(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """For JSON: thinned out and rounded to what can be seen; what is not finite is left out."""
         x, y = np.asarray(self.x, float), np.asarray(self.y, float)
         kept = np.linspace(0, len(x) - 1, min(POINTS, len(x))).round().astype(int)
@@ -80,11 +80,11 @@ class Chart:
     guides: Sequence[tuple[str, float, str]] = ()
     reverse: bool = False
 
-    def told(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "title": self.title, "x": self.x, "y": self.y, "log": self.log, "guides": list(self.guides),
-            "reverse": self.reverse, "curves": [curve.told() for curve in self.curves],
+            "reverse": self.reverse, "curves": [curve.to_json() for curve in self.curves],
         }  # fmt: skip
 
 
@@ -108,7 +108,7 @@ class Shown:
     opening: Mapping[str, Any] = field(default_factory=dict)
     said: Mapping[str, str] = field(default_factory=dict)
 
-    def told(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """For JSON."""
         film = None
         if self.film is not None:
@@ -116,7 +116,7 @@ class Shown:
             pack = pack_layers(self.film.scenario, layers, more=self.opening)
             film = {"pack": pack, "ratio": ratio_of(self.film.scenario, layers)}
         return {
-            "charts": [chart.told() for chart in self.charts], "film": film,
+            "charts": [chart.to_json() for chart in self.charts], "film": film,
             "facts": list(self.facts), "steps": list(self.steps), "said": dict(self.said),
         }  # fmt: skip
 

@@ -143,7 +143,7 @@ def in_numbers(case: Case, trial: Trial, limit: Limit) -> list[tuple[str, str]]:
     if case.predicate.bound:
         bound = f", by more than {measured(case, case.predicate.bound)}"
         read = read or f"off by {measured(case, trial.worst)}"
-    told = [
+    facts = [
         ("Failing means", f"{case.predicate.means}{bound}."),
         ("Here", f"{counted(trial)}{f': {read}' if read else ''}."),
         (limit.engine, f"{in_words(limit, case)}."),
@@ -151,8 +151,8 @@ def in_numbers(case: Case, trial: Trial, limit: Limit) -> list[tuple[str, str]]:
     if limit.verdict != NEVER_FAILS:
         tested = f" Tested: {limit.tested}." if limit.tested else ""
         source = f" Source: {limit.source}." if limit.source else ""
-        told.append(("Why", f"{why(limit)}{tested}{source}"))
-    return told
+        facts.append(("Why", f"{why(limit)}{tested}{source}"))
+    return facts
 
 
 def counted(trial: Trial) -> str:

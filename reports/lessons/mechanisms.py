@@ -51,7 +51,7 @@ def distance(curves: Sequence[Curve], name: str, unit: str) -> tuple[str, str]:
     return f"largest distance of the ablated reference from {name}", f"{number(float(apart), 2)} {unit}".strip()
 
 
-def told(runs: Sequence[Run], setting: str) -> list[tuple[str, str]]:
+def setting_rows(runs: Sequence[Run], setting: str) -> list[tuple[str, str]]:
     """What the engines themselves say of a setting."""
     return [(f"{run.name}, {setting}", number(run.settings[setting][1])) for run in runs if setting in run.settings]
 
@@ -91,7 +91,7 @@ def show_threshold(settings: Settings) -> Shown:
     scenario = asked(pairs(closing, settings["e"]), 0.5)
     runs = runs_of(["box2d:shipped"], AblatedReference(threshold=settings["threshold"]), scenario, 4)
     curves = over(closing, runs, parting(closing))
-    facts = [*told(runs, "restitution threshold in m/s"), distance(curves, "box2d:shipped", "")]
+    facts = [*setting_rows(runs, "restitution threshold in m/s"), distance(curves, "box2d:shipped", "")]
     curves.append(Curve(TRUTH, closing, np.full(len(closing), settings["e"])))
     chart = Chart("Parting over closing speed", "closing speed in m/s", "e of the collision", curves, "x")
     return Shown([chart], filmed(scenario, runs), facts)
@@ -125,7 +125,7 @@ def falling(names: Sequence[str], on: AblatedReference, substeps: int) -> Shown:
     exact = scenario.truth(scenario.times).position
     runs = runs_of(names, on, scenario, substeps)
     curves = over_time(runs, lambda each: 1e3 * (each.position - exact)[:, 0, 1])
-    facts = [*told(runs[:1], "substeps"), *(distance(curves, name, "mm") for name in names)]
+    facts = [*setting_rows(runs[:1], "substeps"), *(distance(curves, name, "mm") for name in names)]
     curves.append(Curve(TRUTH, scenario.times, np.zeros(scenario.samples + 1)))
     return Shown([Chart("Above the parabola", "time in s", "mm", curves)], filmed(scenario, runs), facts)
 
@@ -162,7 +162,7 @@ def show_position_correction(settings: Settings) -> Shown:
     runs = [play(engine, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
     engine.close()
     curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
-    facts = [*told(runs, "linear slop in m"), distance(curves, NO_CCD, "mm")]
+    facts = [*setting_rows(runs, "linear slop in m"), distance(curves, NO_CCD, "mm")]
     return Shown([Chart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")], filmed(scenario, runs), facts)
 
 
@@ -173,7 +173,7 @@ def show_digits(settings: Settings) -> Shown:
     runs = runs_of(["box2d:shipped"], AblatedReference(precision=PRECISION[settings["digits"]]), scenario, 4)
     exact = start + scenario.times[:, None] * v
     curves = over_time(runs, lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16))
-    facts = [*told(runs, "float32 rounding of the start in m"), distance(curves, "box2d:shipped", "m")]
+    facts = [*setting_rows(runs, "float32 rounding of the start in m"), distance(curves, "box2d:shipped", "m")]
     curves.append(Curve(TRUTH, scenario.times, np.full(scenario.samples + 1, 1e-16)))
     chart = Chart("Distance from x + v t", "time in s", "m, 0 drawn as 10⁻¹⁶", curves, "y")
     return Shown([chart], filmed(scenario, runs), facts)
@@ -189,7 +189,7 @@ def show_cap(settings: Settings) -> Shown:
     scenario = asked(scene, 0.1)
     runs = runs_of(["box2d:shipped"], AblatedReference(order=BOX2D, cap=settings["cap"]), scenario, settings["k"])
     curves = over(given, runs, lambda each: each.velocity[-1, :, 0])
-    facts = [*told(runs, "speed cap in m/s"), distance(curves, "box2d:shipped", "m/s")]
+    facts = [*setting_rows(runs, "speed cap in m/s"), distance(curves, "box2d:shipped", "m/s")]
     curves.append(Curve(TRUTH, given, given))
     chart = Chart("Speed of a free disk", "speed it was given in m/s", "m/s", curves, "xy")
     return Shown([chart], filmed(scenario, runs), facts, opening={"pace": 0.1 / SECONDS})
@@ -207,7 +207,7 @@ def show_row(settings: Settings) -> Shown:
     names = ["box2d:matched", "pymunk:matched"]
     runs = runs_of(names, AblatedReference(order, iterations=settings["iterations"], touching=True), scenario, 4)
     curves = over(np.arange(n + 1.0), runs, lambda each: each.velocity[-1, :, 0])
-    facts = [*told(runs, "velocity, position iterations"), *(distance(curves, name, "m/s") for name in names)]
+    facts = [*setting_rows(runs, "velocity, position iterations"), *(distance(curves, name, "m/s") for name in names)]
     film = filmed(scenario, runs)
     if film.truth is not None:
         curves.append(Curve(TRUTH, np.arange(n + 1.0), film.truth.velocity[-1, :, 0]))

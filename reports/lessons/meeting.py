@@ -34,7 +34,7 @@ def two(restitution: float, ratio: float, offset: float) -> Scenario:
 
 
 def collision_of_the_reference(scene: Scene, dt: float) -> tuple[State, State, float]:
-    """The reference's state before and after the step with its collision, and the impulse it tells, N s."""
+    """The reference's state before and after the step with its collision, and the impulse it reports, N s."""
     engine = ENGINES["reference:exercise"].make()
     engine.load(scene, dt)
     before = engine.read()
@@ -46,7 +46,7 @@ def collision_of_the_reference(scene: Scene, dt: float) -> tuple[State, State, f
 
 def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
     """Detection, projection, impulse and momentum, each with the numbers of this collision."""
-    before, after, told = collision_of_the_reference(scene, dt)
+    before, after, reported = collision_of_the_reference(scene, dt)
     (m1, m2), e = scene.mass, scene.restitution
     x = before.position + before.velocity * dt  # no force acts, so symplectic Euler moves by v dt
     gap = x[0] - x[1]
@@ -65,7 +65,7 @@ def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
                     f"x₂ by {number(1e3 * overlap * (1 - share))} mm against it"),
         ("Impulse", f"v₁ − v₂ along n is {number(closing)} m/s; J = −(1 + e)(v₁ − v₂)·n / (1/m₁ + 1/m₂) = "
                     f"{number(1 + e)} · {number(-closing)} / {number(1 / m1 + 1 / m2)} = {number(impulse)} N s; "
-                    f"the solver tells {number(told)} N s"),
+                    f"the solver reports {number(reported)} N s"),
         ("Update", f"v₁' = v₁ + J n/m₁ = {pair(after.velocity[0])} m/s, "
                    f"v₂' = v₂ − J n/m₂ = {pair(after.velocity[1])} m/s; "
                    f"parting over closing speed: {number(-parting / closing, 6)}"),

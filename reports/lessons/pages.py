@@ -57,9 +57,9 @@ def about() -> dict[str, str]:
     return {"made": datetime.now(UTC).isoformat(timespec="seconds")[:16].replace("T", " ") + " UTC"} | versions()
 
 
-def told(name: str, places: Sequence[int]) -> dict[str, Any]:
+def answer_json(name: str, places: Sequence[int]) -> dict[str, Any]:
     """What the lesson of that name shows with its sliders at these indices, for JSON; as what a worker does."""
-    return LESSONS[name].at(places).told()
+    return LESSONS[name].at(places).to_json()
 
 
 def lesson_page(lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, grid: str = "") -> str:
@@ -77,7 +77,7 @@ def lesson_page(lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, g
 
 
 def offline(lesson: Lesson, answers: Mapping[tuple[int, ...], Any], links: Links = ALONE) -> str:
-    """One page with the answer, as of `told`, to every setting of the sliders."""
+    """One page with the answer, as of `answer_json`, to every setting of the sliders."""
     grid = {",".join(map(str, places)): answers[places] for places in lesson.grid}
     packed = zlib.compress(json.dumps(grid, separators=(",", ":")).encode(), 9)
     return lesson_page(lesson, answers[lesson.start], links, base64.b64encode(packed).decode())
@@ -126,7 +126,7 @@ async def page(request: Request) -> Response:
     lesson = LESSONS.get(request.path_params["name"])
     if lesson is None:
         return PlainTextResponse(f"There is no such lesson; there are {', '.join(LESSONS)}.", 404)
-    return HTMLResponse(await in_thread(lambda: lesson_page(lesson, told(lesson.name, lesson.start))))
+    return HTMLResponse(await in_thread(lambda: lesson_page(lesson, answer_json(lesson.name, lesson.start))))
 
 
 async def shown(request: Request) -> Response:
@@ -139,7 +139,7 @@ async def shown(request: Request) -> Response:
         found = await in_thread(lesson.at, places)
     except ValueError as fault:
         return JSONResponse({"fault": str(fault)}, 400)
-    return JSONResponse(found.told())
+    return JSONResponse(found.to_json())
 
 
 ROUTES: list[BaseRoute] = [

@@ -12,7 +12,7 @@ TRUTH = "truth"
 
 
 class Look(NamedTuple):
-    """How an engine and profile are drawn; the shape tells the engine and the dash the profile without colour.
+    """How an engine and profile are drawn; the shape shows the engine and the dash the profile without colour.
 
     Attributes:
         light, dark: hex colour on a light and on a dark page.

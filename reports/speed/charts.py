@@ -34,7 +34,7 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
             "error_x": bars(fine.cost, fine.low, fine.high),
             "error_y": bars(*(fine[name].clip(lower=LOWEST) for name in ("error", "error_low", "error_high"))),
         }  # fmt: skip
-        text = [told(row) for row in records(fine)]
+        text = [hover_text(row) for row in records(fine)]
         traces.append(line(engine, profile, fine.cost, fine.error.clip(lower=LOWEST), text, spreads))
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
     traces += at_the_edge(lost, drawn, x_axis, y_axis)
@@ -58,7 +58,7 @@ def at_the_edge(
         corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside: what is outside is not drawn
         x = cost.fillna(corner).clip(upper=corner)
         y = group.error.clip(lower=LOWEST).where(np.isfinite(group.error), top)
-        trace = line(engine, profile, x, y, [told(row) for row in records(group)])
+        trace = line(engine, profile, x, y, [hover_text(row) for row in records(group)])
         traces.append(trace | {"mode": "markers", "cliponaxis": False})
     return traces
 
@@ -118,7 +118,7 @@ def turned(what: str, row: dict[str, Any], relative: bool) -> str:
     """What hovering over a point of a sweep says."""
     value = f"{what} {row['change']}<br>" if what else f"dt / {2.0 ** (row['rung'] - 2):g}<br>" if relative else ""
     if not relative:
-        return value + told(row)
+        return value + hover_text(row)
     return f"{value}{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
 
 
@@ -237,7 +237,7 @@ def bars(middle: Any, low: Any, high: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def told(row: dict[str, Any]) -> str:
+def hover_text(row: dict[str, Any]) -> str:
     """What hovering over a point says."""
     if row["failed"] and not np.isfinite(row["error"]):
         why = f": {row['status']}, {row['reason']}" if row["reason"] else ""

@@ -64,7 +64,7 @@ def measure(plan: Plan, progress: Progress, kept: Kept | None = None) -> Measure
 
 
 def find_reach(plan: Plan, measured: Measured, progress: Progress) -> Reach:
-    """(scene, seed) -> how many sample intervals have an exact answer; those that have none are told of."""
+    """(scene, seed) -> how many sample intervals have an exact answer; those that have none are reported."""
     # In workers, which can be stopped whatever they are doing.
     asked = {draw: partial(ladder.reach_of, *draw) for draw in plan.draws}
     results = dict(done(asked, plan.workers, progress, "exact answer"))
@@ -183,8 +183,8 @@ def scene_rows(
     scenario, rows = ladder.open_scene(scene, seed), []
     for sample in ladder.times_of(scene, seed, measurements, **often):
         (name, change), k, copy = sample.key
-        told = {"scenario": scenario.name, "change": change, "dt_s": scenario.dt(k), "copy_of": copy}
-        rows.append(sample_row(kind, name, sample, **told))
+        identity = {"scenario": scenario.name, "change": change, "dt_s": scenario.dt(k), "copy_of": copy}
+        rows.append(sample_row(kind, name, sample, **identity))
     return rows
 
 
@@ -201,11 +201,11 @@ def idle_rows(makes: Mapping[str, Callable], seed: int, often: Mapping[str, Any]
     return [sample_row(IDLE, sample.key[0], sample, singly=sample.key[1]) for sample in found]
 
 
-def sample_row(kind: str, name: str, sample: Sample, **told: Any) -> dict[str, Any]:
+def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[str, Any]:
     """A sample as a row of `Measured.samples`."""
     engine, profile = name.split(":")
     unknown = {"scenario": "", "change": PLAIN, "dt_s": float("nan"), "n": 0, "copy_of": 0, "singly": False}
-    return {"kind": kind, "engine": engine, "profile": profile} | unknown | told | {
+    return {"kind": kind, "engine": engine, "profile": profile} | unknown | identity | {
         "round": sample.round, "place": sample.place, "cost": sample.cost, "wrapping": sample.wrapping,
         "runs": sample.runs,
     }  # fmt: skip
@@ -225,6 +225,6 @@ def done(
         failed = isinstance(result, Failure)
         if kept is not None and not failed:
             kept.add(task, result)
-        told = " ".join(str(part) for part in task if part not in (what, PLAIN))
-        progress.done(f"{what}: {told}", *(result[:2] if failed else ("ok", "")))
+        label = " ".join(str(part) for part in task if part not in (what, PLAIN))
+        progress.done(f"{what}: {label}", *(result[:2] if failed else ("ok", "")))
         yield task, result

@@ -90,12 +90,12 @@ def said_of_pool(found: pd.DataFrame) -> str:
     """How much one scene can move a pooled point of `pooled`, and what failed; in words."""
     failed = found[found.failed > 0].groupby(WHO, sort=False).failed.max().reset_index()
     lost = ", ".join(f"{row.engine}:{row.profile} {row.failed}" for row in failed.itertuples())
-    told = f"Scenes failed: {lost}." if lost else "No engine failed a scene."
+    failures = f"Scenes failed: {lost}." if lost else "No engine failed a scene."
     if found.of.max() < 2:
-        return f"One scene, so nothing is pooled. {told}"
+        return f"One scene, so nothing is pooled. {failures}"
     worst, cost = found.iloc[int(found.moved.to_numpy(float).argmax())], found.cost_moved.max()
     said = (
         f"Leaving out any one of the {found.of.max()} scenes moves no pooled error by more than a factor of "
         f"{worst.moved:.2g} ({worst.engine}:{worst.profile} without {worst.moved_by})"
     )
-    return f"{said}{f' and no pooled cost by more than {cost:.2g}' if np.isfinite(cost) else ''}. {told}"
+    return f"{said}{f' and no pooled cost by more than {cost:.2g}' if np.isfinite(cost) else ''}. {failures}"

@@ -96,11 +96,11 @@ class Results:
                 "untimed": int((group.why == NOT_TIMED).sum()),
             }  # fmt: skip
             median = float(np.median(group.cost.fillna(np.inf)))
-            told = [f"{what} in {counts[what]}" for what in ("never", "failed", "untimed") if counts[what]]
+            others = [f"{what} in {counts[what]}" for what in ("never", "failed", "untimed") if counts[what]]
             rows.append({
                 "scenario": POOLED, "engine": engine, "profile": profile, "accuracy": accuracy,
                 "cost": median if np.isfinite(median) else np.nan, "dt_s": np.nan,
-                "why": ", ".join([f"{counts['got']} of {len(group)}", *told]),
+                "why": ", ".join([f"{counts['got']} of {len(group)}", *others]),
                 "lost": 2 * int(group.lost.sum()) >= len(group), **counts,
             })  # fmt: skip
         return pd.DataFrame(rows)

@@ -23,9 +23,9 @@ class Spent(NamedTuple):
 
 
 class Timed(NamedTuple):
-    """One thing to be timed: `run` makes ready, runs once, and tells what it spent; one run is `amount` of something.
+    """One thing to be timed: `run` makes ready, runs once, and returns what it spent; one run is `amount` of something.
 
-    `amount` is in the unit that the cost is to be told by: simulated seconds, or steps.
+    `amount` is in the unit in which the cost is given: simulated seconds, or steps.
     """
 
     key: Any

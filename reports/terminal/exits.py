@@ -1,4 +1,4 @@
-"""How a command ends: its exit status, what it says on standard error, and that it does end when it is told to."""
+"""How a command ends: its exit status, what it says on standard error, and that it does end when it is signalled to."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from reports.terminal.foreign_text import legible
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 STATUS = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}
-AGAIN = 1.0  # s between two times that a command is told
+AGAIN = 1.0  # s between two times that a command is signalled
 
 
 class Stopped(KeyboardInterrupt):
@@ -77,7 +77,7 @@ def stoppable() -> Iterator[Listening]:
 
 @contextmanager
 def deaf() -> Iterator[None]:
-    """Within it a command that is ending is not told again; the timer is off for good."""
+    """Within it a command that is ending is not signalled again; the timer is off for good."""
     signal.setitimer(signal.ITIMER_REAL, 0)
     before = {number: signal.signal(number, signal.SIG_IGN) for number in STATUS}
     try:
@@ -98,8 +98,8 @@ def unbroken() -> Iterator[None]:
 
 
 @contextmanager
-def ends_when_told() -> Iterator[None]:
-    """A command from its first word to its last; told to stop it exits with 130 or 143 and waits for no thread.
+def ends_on_signals() -> Iterator[None]:
+    """A command from its first word to its last; signalled to stop it exits with 130 or 143 and waits for no thread.
 
     What a thread still has under way is in another process, which ends with this one.
     """

@@ -44,7 +44,7 @@ class Progress:
     def start(self, missing: int, total: int, what: str = "") -> None:
         """From now on count to `total`, of which some may be `missing` only."""
         self.counted, self.since = 0, perf_counter()
-        self.told, self.missing = self.since, missing
+        self.reported, self.missing = self.since, missing
         what = what or "starting workers (the first run compiles: some 20 s more)"
         self.bar.reset(self.task, total=total, completed=total - missing, description=what, each="")
 
@@ -56,8 +56,8 @@ class Progress:
         self.counted += 1
         now = perf_counter()
         each = (now - self.since) / self.counted
-        if not self.bar.console.is_terminal and now - self.told > QUIET:
-            self.told = now
+        if not self.bar.console.is_terminal and now - self.reported > QUIET:
+            self.reported = now
             self.note(f"{what}: {self.counted} of {self.missing}, {each:.2g} s each")
         self.bar.update(self.task, description=what, advance=1, each=f"{each:.2g} s each")
 

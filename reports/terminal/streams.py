@@ -35,7 +35,7 @@ class Outlet(io.FileIO):
 def printing() -> Iterator[None]:
     """Within it nothing that a command prints ends it: letters that a stream does not know are written in code.
 
-    Exits 1, and says why, if standard output did not take all; what fails on standard error has nowhere to be told.
+    Exits 1, and says why, if standard output did not take all; what fails on standard error has nowhere to be reported.
     """
     fill_gaps()
     outlet = open_stream("stdout", 1)

@@ -52,7 +52,7 @@ class Trial(NamedTuple):
 
 @dataclass
 class Search:
-    """The search for one engine; `say` is told of every trial."""
+    """The search for one engine; `say` is called with every trial."""
 
     engine: str
     families: tuple[str, ...] = tuple(each.__name__ for each in FAMILIES)

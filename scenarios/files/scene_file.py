@@ -239,7 +239,7 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
             normal = away[k] / distance[k] if distance[k] > rounding else np.array([-unit[1], unit[0]])
             one, two = number[row], number[w + first[row] + k]
             if overlap[k] > rounding:
-                # Where the side cannot be told, the way out may lead across the middle: it is longer by that.
+                # Where the side is not known, the way out may lead across the middle: it is longer by that.
                 reach = thick[row] + radius[near][k] - away[k] @ normal
                 yield min(one, two), max(one, two), overlap[k], normal * reach * np.sign(two - one) + 0.0
 

@@ -1,4 +1,4 @@
-"""The tables a scene file is made of, and what each key may hold; how a fault is told is not said here.
+"""The tables a scene file is made of, and what each key may hold; how a fault is reported is not defined here.
 
 A description completes the sentence "KEY = VALUE: must be ...". A check that needs two keys sits on the later
 one, so that a fault in one key never hides the faults of another.

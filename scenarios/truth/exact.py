@@ -19,7 +19,7 @@ from scenarios.truth.oracle.path import Path
 from scenarios.truth.oracle.work import Clock, Work
 from scenarios.truth.record import TruthRecord, record_of
 
-FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be told apart
+FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be distinguished
 LEAST_GAIN = 1.05  # times as far must half as many bits again reach, or more will not help
 SPARE, LEFT = 1.3, 64  # times as many bits as the rate so far asks for, and so many to be left for the accuracy
 MOST_DISKS = 200
@@ -111,7 +111,7 @@ def computed(
 def certified(scenario: Scenario, forced: Sequence[Thrust], clock: Clock) -> TruthRecord | None:
     """The record by interval arithmetic, which proves every comparison; None where no precision decides one.
 
-    How far the first bits reach tells how many are needed for all: a motion loses them at a steady rate. When the
+    How far the first bits reach shows how many are needed for all: a motion loses them at a steady rate. When the
     `clock` is over it is that of the attempt which got farthest.
     """
     bits, before, until, accuracy = FEWEST_BITS, 0.0, scenario.duration, accuracy_of(scenario)

@@ -177,7 +177,7 @@ class StaticGivesWay(Sound):
         super().load(replace(scene, mass=np.where(scene.static, 1e6, scene.mass), inertia=None), dt)
 
 
-class TellsNoCollisions(Sound):
+class ReportsNoCollisions(Sound):
     """The contact listener was never registered."""
 
     def collisions(self):
@@ -201,8 +201,8 @@ class CountsStepsFromOne(Sound):
         return [collision._replace(step=collision.step + 1) for collision in self.log]
 
 
-class TellsImpulsePerSecond(Sound):
-    """A contact force is told where an impulse is asked for."""
+class ReportsImpulsePerSecond(Sound):
+    """A contact force is reported where an impulse is asked for."""
 
     def collisions(self):
         return [collision._replace(impulse=collision.impulse / self.dt) for collision in self.log]
@@ -318,10 +318,10 @@ CAUGHT_BY: dict[type[Engine], str] = {
     MassFromDensity: "mass_by_force",
     SolidDiskInertia: "inertia_by_torque",
     VelocityHalfAStepOff: "same_instant",
-    TellsNoCollisions: "collisions_are_told",
-    NumbersWallsFromTheEnd: "walls_are_told",
+    ReportsNoCollisions: "collisions_are_reported",
+    NumbersWallsFromTheEnd: "walls_are_reported",
     CountsStepsFromOne: "collisions_name_their_step",
-    TellsImpulsePerSecond: "impulse_is_told",
+    ReportsImpulsePerSecond: "impulse_is_reported",
     StaticGivesWay: "static_stays",
     OtherOrderOfUpdates: "free_flight",
     FallsAsleep: "slow_flight",

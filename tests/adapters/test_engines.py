@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapters.conformance.probe import first_difference, history, loaded, one_disk, plain
-from adapters.engine import NOT_TOLD
+from adapters.engine import NOT_REPORTED
 from adapters.engines import ENGINES
 from adapters.play import STATUSES, play, thrust_steps
 from adapters.reference import Reference
@@ -234,7 +234,7 @@ def test_what_was_asked_of_an_engine_is_what_it_resolved(name, e):
     assert versions
     for setting, (wanted, resolved) in settings.items():
         assert resolved is not None, setting
-        if resolved in NOT_TOLD or resolved == "no wall":
+        if resolved in NOT_REPORTED or resolved == "no wall":
             continue
         if isinstance(wanted, float):
             assert resolved == pytest.approx(wanted, rel=2.0**-24), setting  # float32
@@ -254,7 +254,7 @@ def test_matched_pymunk_resolves_slop_and_iterations_as_asked():
 
 
 def test_box2d_v3_reads_its_length_unit_off_the_engine():
-    """Off a default that is a multiple of it; negative control: what was asked for is not simply told again."""
+    """Off a default that is a multiple of it; negative control: what was asked for is not simply repeated."""
     import pyb2d3
 
     with loaded(ENGINES["box2d_v3:matched"], plain()) as engine:

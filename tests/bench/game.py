@@ -28,7 +28,7 @@ LISTEN = """() => {
     arrive.call(game, frame);
   };
 }"""
-TOLD = {
+MEANINGS = {
     "between two pictures": "60 a second are 16.7 ms",
     "to draw a picture": "of these",
     "engines, for a frame": f"must stay below {1e3 * FRAME:.1f} ms, which a frame lasts",
@@ -50,7 +50,7 @@ def measure(seconds: float) -> tuple[dict[str, np.ndarray], float]:
         page.context.close()
     assert heard == [], heard
     rows = np.diff(found["drawn"]), found["drawing"], found["engines"], found["answer"]
-    return dict(zip(TOLD, rows)), 1e3 * (after[0] - before[0]) / (after[1] - before[1])
+    return dict(zip(MEANINGS, rows)), 1e3 * (after[0] - before[0]) / (after[1] - before[1])
 
 
 def main(seconds: float) -> None:
@@ -59,7 +59,7 @@ def main(seconds: float) -> None:
     print(f"{len(FIRST)} engines, 21 disks, {seconds:g} s: {', '.join(FIRST)}")
     print(f"{'ms':24}{'mean':>8}{'95 %':>8}{'most':>8}")
     for name, ms in rows.items():
-        print(f"{name:24}{ms.mean():8.2f}{np.quantile(ms, 0.95):8.2f}{ms.max():8.2f}  {TOLD[name]}")
+        print(f"{name:24}{ms.mean():8.2f}{np.quantile(ms, 0.95):8.2f}{ms.max():8.2f}  {MEANINGS[name]}")
     rate = 1e3 / rows["between two pictures"].mean()
     print(f"{rate:.1f} pictures a second; the flight goes at {pace:.1%} of the clock's pace")
 

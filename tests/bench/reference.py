@@ -1,7 +1,7 @@
 """How fast the reference is beside the engines: `python -m tests.bench.reference` prints and writes its figures.
 
 A gas of equal disks between walls (area fraction 0.3, e = 1, dt 1/240 s, kT = m = diameter = 1), played by every engine
-in turn, round by round in shuffled order: nothing is read and no collision is told while the clock runs, and Python
+in turn, round by round in shuffled order: nothing is read and no collision is reported while the clock runs, and Python
 calls the engine once a step where it cannot take many. Each engine's own state goes on from round to round. The clock
 is that of the thread, which does not run while others have the processor; they still take its caches: leave the machine
 alone.
@@ -210,8 +210,8 @@ def in_order() -> Iterator[Figure]:
 
 def header() -> str:
     """Machine and versions, as comment lines."""
-    told = about("python -m tests.bench.reference", 0)
-    lines = {"started": told["started"], **told["machine"], **told["versions"], "busy cores": f"{busy_cores():.2f}"}
+    saved = about("python -m tests.bench.reference", 0)
+    lines = {"started": saved["started"], **saved["machine"], **saved["versions"], "busy cores": f"{busy_cores():.2f}"}
     return "".join(f"# {key}: {value}\n" for key, value in lines.items())
 
 

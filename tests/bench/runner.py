@@ -141,7 +141,7 @@ class Clocked(Progress):
 
 def many_cells(folder: Path) -> None:
     """5560 cells, 139 scenes of two disks, 10 engines, 4 steps: played, and their tables made once more; in processes
-    of their own, whose memory can be told."""
+    of their own, whose memory can be measured."""
     for number in range(139):
         one = scenario("slow_collision")
         scene = replace(one.scene, velocity=one.scene.velocity * (1 + number / 100))

@@ -1,4 +1,4 @@
-"""Where a command is told to write, and something else is already, or nothing can be."""
+"""Where a command is asked to write, and something else is already, or nothing can be."""
 
 from __future__ import annotations
 

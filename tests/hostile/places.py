@@ -58,7 +58,7 @@ SWITCHES: dict[str, tuple[dict[str, str], tuple[int, ...]]] = {
     "without docstrings": ({"PYTHONOPTIMIZE": "2"}, (2,)),
     "without assertions": ({"PYTHONOPTIMIZE": "1"}, (0,)),
     "in development mode": ({"PYTHONDEVMODE": "0"}, (0,)),
-    "told more": ({"PYTHONVERBOSE": ""}, (0,)),
+    "verbose": ({"PYTHONVERBOSE": ""}, (0,)),
     "with other hashes": ({"PYTHONHASHSEED": "42"}, (0,)),
     "with a safe path": ({"PYTHONSAFEPATH": "1"}, (0,)),
     "without kernels compiled": ({"NUMBA_DISABLE_JIT": "1"}, (0,)),
@@ -104,14 +104,14 @@ NAMES = [
     Input("a name with an escape code", ("truth", "a\x1b[31mb.toml"), says="a\\x1b[31mb.toml"),
 ]  # fmt: skip
 # Streams, as a shell gives them.
-TOLD = "cannot write to standard output"
+REFUSED = "cannot write to standard output"
 LINES: dict[str, tuple[str, tuple[int, ...], str]] = {
-    "truth: a full disk": ("$crosscheck truth two.toml > /dev/full", (1,), TOLD),
-    "truth --json: a full disk": ("$crosscheck truth two.toml --json > /dev/full", (1,), TOLD),
-    "list: a full disk": ("$crosscheck list > /dev/full", (1,), TOLD),
-    "help: a full disk": ("$crosscheck run --help > /dev/full", (1,), TOLD),
-    "check: a full disk": ("$crosscheck check plain.py > /dev/full", (1,), TOLD),
-    "run: a full disk": (f"$crosscheck {' '.join(RUN)} > /dev/full", (1,), TOLD),
+    "truth: a full disk": ("$crosscheck truth two.toml > /dev/full", (1,), REFUSED),
+    "truth --json: a full disk": ("$crosscheck truth two.toml --json > /dev/full", (1,), REFUSED),
+    "list: a full disk": ("$crosscheck list > /dev/full", (1,), REFUSED),
+    "help: a full disk": ("$crosscheck run --help > /dev/full", (1,), REFUSED),
+    "check: a full disk": ("$crosscheck check plain.py > /dev/full", (1,), REFUSED),
+    "run: a full disk": (f"$crosscheck {' '.join(RUN)} > /dev/full", (1,), REFUSED),
     "truth: no output": ("$crosscheck truth two.toml >&-", (1,), ""),
     "list: no output": ("$crosscheck list >&-", (1,), ""),
     "run: no output": (f"$crosscheck {' '.join(RUN)} >&-", (1,), ""),
@@ -130,7 +130,7 @@ LINES: dict[str, tuple[str, tuple[int, ...], str]] = {
     "check: a folder that is gone": ("mkdir a; cd a; rmdir ../a; $crosscheck check plain.py", (2,), ""),
     "run: files of no more than 100 kB": (f"ulimit -f 100; $crosscheck {' '.join(RUN)}", (1, 2), ""),
     "truth: three files at once": ("ulimit -n 12; $crosscheck truth two.toml", (0, 1, 2), ""),
-    "truth: told to stop": ("timeout -s TERM 0.3 $crosscheck truth two.toml; test $? -eq 124", (0,), ""),
+    "truth: signalled to stop": ("timeout -s TERM 0.3 $crosscheck truth two.toml; test $? -eq 124", (0,), ""),
     "a command by its module": ("cd /; $python -m reports truth slow_collision", (0,), "horizon"),
 }  # fmt: skip
 STREAMS = [

@@ -22,14 +22,14 @@ from typing import Any, NamedTuple
 
 from tests.hostile.talks import NOT_ANY_MORE, free_port, hear
 
-SENTENCE, DONE, FINDINGS, STOPPED = "clear sentence", "done", "done, with findings", "stopped when told"
+SENTENCE, DONE, FINDINGS, STOPPED = "clear sentence", "done", "done, with findings", "stopped when signalled"
 TRACEBACK, HANG, LOST, STRAY = "traceback", "hang", "file lost", "file where none was asked for"
 LEFT, WRONG = "process left behind", "wrong exit code or sentence"
 GOOD, BAD = (SENTENCE, DONE, FINDINGS, STOPPED), (TRACEBACK, HANG, LOST, STRAY, LEFT, WRONG)
 BY_CODE = {0: DONE, 1: FINDINGS, 2: SENTENCE, 130: STOPPED, 143: STOPPED}
 SECONDS = 90.0  # that an input may take on a busy machine; what is bounded by its own --timeout takes a fraction of it
 LINES = 101  # of a refusal: one sentence a fault, as many as the reader of scenes lists, and one that there are more
-GRACE = 3.0  # s in which a process that has been told to end is gone
+GRACE = 3.0  # s in which a process that has been signalled to end is gone
 LOADED = ["reports.cli", "reports.run.arguments", "reports.commands.run", "reports.commands.truth", 
           "reports.commands.diff",
           "reports.commands.replay", "reports.check.command", "reports.speed.command", "reports.stability.command",
@@ -61,7 +61,7 @@ class Input(NamedTuple):
         environment: variables that are set; then, and with `shell`, the interpreter is started anew.
         shell: a line for sh in place of `words`, with `$crosscheck` in it: streams that are closed or full.
         talk: of a command that serves: what is sent to the port, and gives what is heard, in which `says` is looked
-            for, too. Then it must serve on, until it is told to stop.
+            for, too. Then it must serve on, until it is signalled to stop.
     """
 
     name: str
@@ -127,7 +127,7 @@ def word_of(
 
 
 def kept(user: Path, writes: tuple[str, ...]) -> dict[str, str]:
-    """What is in the user's folder, but for what may be written: path -> what tells whether it has changed."""
+    """What is in the user's folder, but for what may be written: path -> what shows whether it has changed."""
     found = {}
     for path in sorted(user.rglob("*")):
         name = str(path.relative_to(user))

@@ -16,7 +16,7 @@ from typing import Any
 from tests.hostile.played import CROSSCHECK
 
 TWO = (Path(__file__).parents[1] / "data" / "scenes" / "two.toml").read_text()
-MADE = "CROSSCHECK_HOSTILE_RUN"  # variable that tells the processes of the pool where it is
+MADE = "CROSSCHECK_HOSTILE_RUN"  # variable that says to the processes of the pool where it is
 RUN = ("run", "two.toml", "--engine", "pymunk", "--dt", "0.02", "--workers", "1")
 CELL = "CELL"  # in the words of an input: the first cell of the copy that was made for it
 Prepare = Callable[[Path], dict[str, str]]

@@ -79,10 +79,10 @@ def test_a_list_gives_the_bits_and_the_collisions_of_all_pairs(scene, count):
     disks, world = scene
     other = copy_of(disks)
     collisions = exercise.advance(disks, world, DT, count)
-    told, unlisted = by_list(other, world, DT, count)
+    reported, unlisted = by_list(other, world, DT, count)
     event(f"by list: {np.sign(count - unlisted)}, by all pairs: {np.sign(unlisted)}, collisions: {len(collisions) > 0}")
     assert same(disks, other)
-    assert told == collisions
+    assert reported == collisions
 
 
 def heap(n=300, fill=3.0):
@@ -102,9 +102,9 @@ def test_a_disk_pushed_off_its_leash_in_mid_step_is_looked_after_at_once():
     assert near.listed
     assert until_astray(other, world, near) == 0
 
-    told, _ = by_list(renewed := heap(), world, DT, 1)
+    reported, _ = by_list(renewed := heap(), world, DT, 1)
     assert same(first, renewed)
-    assert told == collisions
+    assert reported == collisions
 
     exercise.integrate(stale, world, DT)
     kept = look_around(stale, world, DT, 1)._replace(leash=np.inf)
@@ -144,11 +144,11 @@ def test_a_disk_lost_in_space_leaves_no_list_but_the_same_bits(far):
     disks.position[7] = [far, 0.0]
     other = copy_of(disks)
     collisions = exercise.advance(disks, world, DT, 5)
-    told, unlisted = by_list(other, world, DT, 5)
+    reported, unlisted = by_list(other, world, DT, 5)
     assert unlisted == 5
     assert collisions
     assert same(disks, other)
-    assert told == collisions
+    assert reported == collisions
 
 
 def test_disks_all_in_one_place_are_not_listed():

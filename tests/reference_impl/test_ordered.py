@@ -1,4 +1,4 @@
-"""`reference:ordered` against exact answers: right to rounding where collisions can be told apart, bounded
+"""`reference:ordered` against exact answers: right to rounding where collisions can be distinguished, bounded
 elsewhere."""
 
 from __future__ import annotations
@@ -74,13 +74,13 @@ def test_all_the_collisions_of_one_long_step_come_in_their_order(gravity):
     events = EventEngine(scene)
     events.advance(0.6)
     engine = played(scene, 0.6, 1)
-    told = np.array([(i, j, J) for _, i, j, J in engine.collisions()])
-    assert len(told) >= 8
-    assert [sorted(pair) for pair in told[:, :2].tolist()] == [
+    reported = np.array([(i, j, J) for _, i, j, J in engine.collisions()])
+    assert len(reported) >= 8
+    assert [sorted(pair) for pair in reported[:, :2].tolist()] == [
         sorted(pair) for pair in events.collisions[:, 1:3].tolist()
     ]
     # Every collision multiplies what rounding did before it by about a free path over a radius.
-    assert told[:, 2] == pytest.approx(events.collisions[:, 3], rel=1e-11)
+    assert reported[:, 2] == pytest.approx(events.collisions[:, 3], rel=1e-11)
     assert np.abs(engine.read().position - events.look(0.6)[0]).max() < 1e-11
 
 

@@ -145,16 +145,16 @@ def test_an_answer_with_any_bit_turned_is_what_was_written_or_none(tmp_path: Pat
     put_answer(path, Answer(record_of(scenario("slow_collision")), "ok", "", 60.0))
     whole, data = read_answer(path), path.read_bytes()
     assert whole is not None
-    told = 0
+    found_out = 0
     for k in range(8 * len(data)):
         turned = bytearray(data)
         turned[k // 8] ^= 1 << k % 8
         path.write_bytes(turned)
         found = read_answer(path)
-        told += found is None
+        found_out += found is None
         assert found is None or same(found, whole), f"bit {k % 8} of byte {k // 8}"
 
-    assert told > 4 * len(data)  # the rest: dates and attributes, which nobody reads
+    assert found_out > 4 * len(data)  # the rest: dates and attributes, which nobody reads
 
 
 def same(one: Answer, other: Answer) -> bool:

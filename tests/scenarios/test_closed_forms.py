@@ -18,7 +18,7 @@ FLYING = [name for name in ANSWERED if name not in (*THRUST, *RESTING)]
 
 
 def exact(name):
-    """A scenario, its truth, and until when collisions can be told apart (a ball settles after infinitely many)."""
+    """A scenario, its truth, and until when collisions can be distinguished (a ball settles after infinitely many)."""
     run = scenario(name)
     truth = run.truth(run.times)
     return run, truth, 8.0 if name == "bouncing_ball_e09" else truth.t[-1]

@@ -41,7 +41,7 @@ def test_an_answer_ends_where_float64_cannot_tell_it_any_more(force: float, away
         assert "the rounding of float64 is more than 1e-09 of the smallest radius from t = " in record.reason
 
 
-def test_where_nothing_can_be_told_there_is_no_answer():
+def test_where_nothing_can_be_proved_there_is_no_answer():
     """At 10^6 m a rounding is 10^-10 m, and a few of them too much."""
     with pytest.raises(NoTruth, match="the rounding of float64 is more than"):
         record_of(under_thrust(0.0, away=1e6))

@@ -1,4 +1,5 @@
-"""Where contacts come at once: one outcome is the truth, several are all told; and where the oracle has no answer."""
+"""Where contacts come at once: one outcome is the truth, several are all reported; and where the oracle has no
+answer."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def rests(record: TruthRecord) -> list[tuple[float, int, int]]:
 @pytest.mark.parametrize("name", ["bouncing_ball_e09", "rest_on_floor", "slide_on_incline", "column_of_ten"])
 def test_what_has_a_closed_form_is_found_to_the_bound_claimed(name: str, kind):
     """To its end, states and collisions, in digits and in balls; every contact at rest begins at the start or is
-    told."""
+    reported."""
     one = scenario(name)
     record = computed(one, kind)
     expected, found = one.truth(one.times), states(one, record)

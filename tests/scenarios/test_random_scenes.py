@@ -116,7 +116,7 @@ def test_scenes_depend_on_their_seed_and_number_only():
     assert any(one.scene.static.any() for one in many)
 
 
-def test_what_never_ends_is_ended_and_told():
+def test_what_never_ends_is_ended_and_reported():
     """The control of the limit: one of three pieces loops for ever."""
     assert each_within(0.2, endless_at_two, [1, 2, 3]) == [1, None, 3]
 

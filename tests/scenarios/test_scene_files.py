@@ -46,7 +46,7 @@ def test_a_fault_is_one_plain_line(good: str, bad: str, line: str, tmp_path: Pat
     ],
 )
 def test_bytes_that_are_no_text_are_refused(content: bytes, line: str, tmp_path: Path) -> None:
-    """Wrong encodings and huge files are told apart."""
+    """Wrong encodings and huge files are distinguished."""
     assert faults_of(content, tmp_path) == [line]
 
 
@@ -69,7 +69,7 @@ def test_a_file_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
         assert refusal.value.faults == [f"{path}: {line}"]
 
 
-def test_every_fault_is_told_at_once(tmp_path: Path) -> None:
+def test_every_fault_is_reported_at_once(tmp_path: Path) -> None:
     """Faults in one key hide none in another, not even where a check looks at both."""
     text = TWO.replace("radius = 0.25", "radius = -1").replace("= 0.02", "= 0.03").replace("0.9", "2")
     text += "[[wall]]\nstart = [0, 0]\nend = [0, 0]\n" + THRUST.replace("= 0\n", "= 7\n") + "when = 1\n"
@@ -191,7 +191,7 @@ def test_what_is_written_reads_back_bit_for_bit(tmp_path_factory: pytest.TempPat
 
 @given(x=st.floats(-0.6, 0.6), y=st.floats(-0.6, 0.6), tilt=st.floats(-1, 1), wall=st.booleans())
 @example(x=1.5e-6, y=0.0, tilt=1.5e-6, wall=True)  # its centre lies behind the wall by less than rounding can tell
-def test_the_told_shift_cures_the_overlap(
+def test_the_shift_that_is_named_removes_the_overlap(
     tmp_path_factory: pytest.TempPathFactory, x: float, y: float, tilt: float, wall: bool
 ) -> None:
     """The disk moved by the printed shift, digits as printed, is accepted."""
@@ -217,7 +217,7 @@ def test_the_told_shift_cures_the_overlap(
 
 @given(st.lists(st.tuples(st.floats(0, 3), st.floats(0, 9), st.floats(0.1, 2)), min_size=2, max_size=9))
 def test_every_overlap_is_found(tmp_path_factory: pytest.TempPathFactory, disks: list[tuple]) -> None:
-    """The search by left edges tells of the same pairs as a look at every pair."""
+    """The search by left edges finds the same pairs as a look at every pair."""
     path = tmp_path_factory.getbasetemp() / "pairs.toml"
     rows = "".join(f"{{position = [{x}, {y}], radius = {r}, static = true}}," for x, y, r in disks)
     path.write_text(f'name = "p"\nduration = 1\nsample_interval = 1\nrestitution = 1\ndisk = [{rows}]')

@@ -1,8 +1,8 @@
 """Numbers of as many digits as asked for, under one set of verbs: gmpy2's mpfr, the library's decimal, arb's balls.
 
-A kind makes numbers out of float64 (exactly), takes roots and tells signs. What lies below its `tie` counts as zero:
-no precision can tell an exact equality from a small difference, and half the digits are far more than chance needs.
-Balls never guess: where zero lies inside one, they raise `Undecided`.
+A kind makes numbers out of float64 (exactly), takes roots and determines signs. What lies below its `tie` counts as
+zero: no precision can tell an exact equality from a small difference, and half the digits are far more than chance
+needs. Balls never guess: where zero lies inside one, they raise `Undecided`.
 """
 
 from __future__ import annotations

@@ -208,12 +208,12 @@ def test_what_would_take_for_ever_is_refused_though_it_is_no_collision():
 
 
 def test_the_loop_comes_back_to_python_and_goes_on_as_if_it_had_not(monkeypatch):
-    """After so many events as it is told, and with the same collisions as without a stop."""
+    """After so many events as it is asked for, and with the same collisions as without a stop."""
     scene, torus = gas(100, 0.3)
     whole, parts = EventEngine(scene, torus), EventEngine(scene, torus)
-    parts.arena.told[LEFT] = 10
+    parts.arena.counters[LEFT] = 10
     assert event_loop.advance(parts.arena, parts.scenery, 5.0) == GOES_ON
-    assert parts.arena.told[LEFT] == 0
+    assert parts.arena.counters[LEFT] == 0
     whole.advance(5.0)
     monkeypatch.setattr(events, "EVENTS", 7)
     parts.advance(5.0)

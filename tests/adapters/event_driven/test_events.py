@@ -37,13 +37,15 @@ def test_the_closed_forms_are_met_up_to_the_horizon(name):
     chaos = 1e3 if isinstance(run.truth, OracleTruth) else 1.0
     for field, tolerance in (("position", 1e-12), ("velocity", 2e-12), ("angle", 1e-14), ("angular_velocity", 1e-14)):
         np.testing.assert_allclose(getattr(found, field)[:k], getattr(exact, field)[:k], rtol=0, atol=chaos * tolerance)
-    told, listed = found.collisions, exact.collisions
+    reported, listed = found.collisions, exact.collisions
     last = min(found.t[k - 1], 8.0 if name == "bouncing_ball_e09" else np.inf)  # it lists only collisions 1e-4 s apart
     h = int((listed.t <= last).sum())
-    assert h == (told.t <= last).sum()
-    pairs = [sorted(zip(np.round(c.t[:h], 8), c.i[:h], c.j[:h])) for c in (told, listed)]  # 49 balls collision at once
+    assert h == (reported.t <= last).sum()
+    pairs = [
+        sorted(zip(np.round(c.t[:h], 8), c.i[:h], c.j[:h])) for c in (reported, listed)
+    ]  # 49 balls collision at once
     assert pairs[0] == pairs[1]
-    np.testing.assert_allclose(told.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=chaos * 1e-12)
+    np.testing.assert_allclose(reported.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=chaos * 1e-12)
 
 
 @pytest.mark.parametrize("name", ["free_fall", "galperin_3", "ping_pong", "mass_ratios", "line_gas"])
@@ -62,7 +64,7 @@ def test_a_scene_without_an_answer_is_refused_with_its_reason(name, words):
 
 
 @pytest.mark.parametrize("name", ["gas_of_100", "asteroids", "falling_box"])
-def test_the_horizon_of_a_chaotic_scene_is_told(name):
+def test_the_horizon_of_a_chaotic_scene_is_reported(name):
     """It lies within the duration, and no sample beyond it is given; more samples do not change it."""
     run = scenario(name)
     truth = float64_truth(run)
@@ -149,7 +151,7 @@ def test_a_disk_under_a_thrust_strikes_a_resting_one_at_the_root_of_the_gap():
 
 
 def test_the_log_and_the_epochs_change_nothing():
-    """Collisions are told in full over many epochs of the clock, whatever the stops on the way."""
+    """Collisions are reported in full over many epochs of the clock, whatever the stops on the way."""
     scene, torus = gas(16, 0.05)
     at_once, x, _ = state_after(scene, 5.0, torus)
     often = EventEngine(scene, torus)

@@ -26,7 +26,8 @@ def test_a_gas_has_the_pressure_energy_and_momentum_of_the_literature():
 
 @pytest.mark.parametrize("packing", PACKINGS)
 def test_the_committed_figures_are_those_of_the_literature(packing):
-    """Within four standard errors, told by the blocks; Z is off by (Z - 1) / N at first order, by the next one too."""
+    """Within four standard errors, reported by the blocks; Z is off by (Z - 1) / N at first order, by the next one
+    too."""
     row = read()[packing]
     assert row["collisions"] > 9.9e6
     for name in ("Z", "rate"):

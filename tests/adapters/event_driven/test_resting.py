@@ -207,7 +207,7 @@ def test_a_settling_row_does_not_depend_on_order_or_handedness():
 
 
 def test_nothing_comes_to_rest_at_restitution_one():
-    """A ball that bounces for ever is not told to lie down: 2000 bounces, and its energy."""
+    """A ball that bounces for ever is not made to lie down: 2000 bounces, and its energy."""
     engine = EventEngine(disks([[0.0, 1.5]], [[0.0, 0.0]], 1.0))
     engine.advance(1790.0)
     x, v = engine.look(1790.0)

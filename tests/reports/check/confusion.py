@@ -15,7 +15,7 @@ from reports.check.verdict import FileCheck, check_file
 from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 
 TABLE = Path(__file__).parents[3] / "tests" / "data" / "confusion.csv"
-COLUMNS = ("solver", "fault is in", "found", "told first in", "first cause", "first cause is right")
+COLUMNS = ("solver", "fault is in", "found", "reported first in", "first cause", "first cause is right")
 
 
 def judged(paths: Sequence[Path]) -> dict[Path, FileCheck]:
@@ -55,9 +55,9 @@ def main() -> None:
 def row_of(name: str, mutant: Mutant | None, one: FileCheck) -> tuple[str, ...]:
     """A row of the table; a correct solver has no fault that could be found."""
     row = first(one) if mutant else next(iter(one.faults), None)
-    told = (row.task, row.cause) if row else ("", "")
+    reported = (row.task, row.cause) if row else ("", "")
     right = "" if mutant is None else "yes" if said_first(mutant, one) else "no"
-    return (name, mutant.task if mutant else "", "yes" if row else "no", *told, right)
+    return (name, mutant.task if mutant else "", "yes" if row else "no", *reported, right)
 
 
 if __name__ == "__main__":

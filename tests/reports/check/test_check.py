@@ -66,7 +66,7 @@ def test_the_same_file_gets_the_same_rows():
     assert check_solver(path) == check_solver(str(path))
 
 
-def test_two_mistakes_are_both_told(tmp_path: Path):
+def test_two_mistakes_are_both_reported(tmp_path: Path):
     """One in task 1 and one in 2d: two sentences, in this order, without those that only follow."""
     text = (CORRECT[0].parent / "plain.py").read_text()
     text = text.replace(" / sphere.mass * dt", " * dt").replace("sphereB.velocity.x -= J", "sphereB.velocity.x += J")
@@ -98,7 +98,7 @@ def test_free_choices_are_notes():
 
 
 def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):
-    """Numbers that no formula of the table gives are told as numbers."""
+    """Numbers that no formula of the table gives are reported as numbers."""
     text = (CORRECT[0].parent / "plain.py").read_text()
     (tmp_path / "solver.py").write_text(text.replace("J = -(1 + RESTITUTION) * vn", "J = -(1 + RESTITUTION) * vn**3"))
     sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences

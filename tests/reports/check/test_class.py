@@ -30,25 +30,25 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_the_table_of_a_class_fits_a_terminal(folder: Path):
-    """A line a file, and how many are right of those that were checked; a link to nothing is told, too."""
+    """A line a file, and how many are right of those that were checked; a link to nothing is reported, too."""
     (folder / "eve.js").symlink_to("gone.js")
     done = crosscheck("check", folder, cwd=folder)
     refused = check_file(folder / "eve.js").refused
     (folder / "eve.js").unlink()
-    told = done.stdout.replace("\n", " ")
+    reported = done.stdout.replace("\n", " ")
 
     assert "1 of 3 files without a fault; 2 not checked." in done.stdout
     (eve,) = (line for line in done.stdout.splitlines() if line.startswith("eve.js"))
     assert not {"ok", "FAULT"} & set(eve.split())
     assert refused == f"{folder}/eve.js: is a link to gone.js, which is not there"
-    assert "eve.js: is a link to gone.js, which is not there" in told
-    assert "ben/Exercise.js: Task 2c impulse, impulse: it divides by (mA + mB)" in re.sub(" +", " ", told)
+    assert "eve.js: is a link to gone.js, which is not there" in reported
+    assert "ben/Exercise.js: Task 2c impulse, impulse: it divides by (mA + mB)" in re.sub(" +", " ", reported)
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
     assert "Traceback" not in done.stderr
 
 
 def test_a_student_with_a_long_name_and_one_with_an_empty_folder_have_a_row(tmp_path: Path):
-    """The middle of a name gives way; the table keeps its columns; what was not handed in is told."""
+    """The middle of a name gives way; the table keeps its columns; what was not handed in is reported."""
     for name in ("a" * 70, "b", "with nothing", ".git"):
         (tmp_path / name).mkdir()
     shutil.copy(RIGHT, tmp_path / ("a" * 70) / "Exercise.js")

@@ -99,7 +99,7 @@ LOADING = {
 
 @pytest.mark.parametrize("name", LOADING)
 def test_a_file_that_cannot_be_loaded_is_one_row_that_says_why_and_where(results: Results, name: str):
-    """The row "loads" is a fault; its cause has line and column of the user's file where the language tells."""
+    """The row "loads" is a fault; its cause has line and column of the user's file where the language reports them."""
     rows = rows_of(results, name)
 
     assert [row.name for row in rows] == ["loads"]

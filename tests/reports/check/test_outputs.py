@@ -57,15 +57,15 @@ def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(folder: P
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
     """JSON of a folder: four files in order, as the schema says; what is no text is refused with its reason."""
     done = crosscheck("check", folder, "--json", "--junit", folder / "class.xml", cwd=folder)
-    told = json.loads(done.stdout)
+    reported = json.loads(done.stdout)
 
-    jsonschema.validate(told, json.loads(SCHEMA.read_text()))
+    jsonschema.validate(reported, json.loads(SCHEMA.read_text()))
     assert done.returncode == 1
-    assert [(Path(one["file"]).parent.name, one["passed"]) for one in told["files"]] == [
+    assert [(Path(one["file"]).parent.name, one["passed"]) for one in reported["files"]] == [
         ("anna", True), ("ben", False), ("cem", False), ("dora", False)
     ]  # fmt: skip
-    assert "SyntaxError" in told["files"][2]["sentences"][0]
-    assert "is not text" in told["files"][3]["refused"]
+    assert "SyntaxError" in reported["files"][2]["sentences"][0]
+    assert "is not text" in reported["files"][3]["refused"]
     suites = ElementTree.parse(folder / "class.xml").getroot()
     assert [int(s.get("failures", "")) > 0 for s in suites] == [False, True, True, False]
     assert [s.get("errors") for s in suites] == ["0", "0", "0", "1"]

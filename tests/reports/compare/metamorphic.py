@@ -1,4 +1,4 @@
-"""A scenario, its exact answer and what was played of it, all told otherwise: turned, shifted, in other units ...
+"""A scenario, its exact answer and what was played of it, all stated otherwise: turned, shifted, in other units ...
 
 What is changed is what was played, not how: the metrics are under test here, and no engine. Steps, samples and the
 collisions of a stepping engine are put on the grid of the new units, as the engine would have put them.
@@ -65,7 +65,7 @@ class Change:
         return self.length / self.time * self.way(np.asarray(v)) + np.array(self.boost)
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene, told otherwise."""
+        """The scene, stated otherwise."""
         order = self.order(scene.n)
         unit = self.length / self.time
         velocity = np.where(scene.static[:, None], 0.0, self.speed(scene.velocity))
@@ -81,7 +81,7 @@ class Change:
         )  # fmt: skip
 
     def thrust(self, thrust: Thrust, n: int) -> Thrust:
-        """The thrust, told otherwise; one that turns with its disk only flips."""
+        """The thrust, stated otherwise; one that turns with its disk only flips."""
         flipped = thrust.force * [1, self.flip] if thrust.frame == "body" else self.way(thrust.force)
         force = self.mass * self.length / self.time**2 * flipped
         torque = self.mass * self.length**2 / self.time**2 * self.flip * thrust.torque
@@ -89,7 +89,7 @@ class Change:
         return Thrust(disk, self.time * thrust.start, self.time * thrust.stop, force, torque, thrust.frame)
 
     def scenario(self, one: Scenario) -> Scenario:
-        """The scenario, with its exact answer told otherwise."""
+        """The scenario, with its exact answer stated otherwise."""
         thrusts = [self.thrust(thrust, one.scene.n) for thrust in self.thrusts(one.thrusts)]
         new = replace(
             one, scene=self.scene(one.scene), duration=self.time * one.duration,
@@ -136,7 +136,7 @@ class Change:
         return Collisions.of(rows)
 
     def run(self, run: Run, one: Scenario) -> Run:
-        """A run, told otherwise."""
+        """A run, stated otherwise."""
         assert run.trajectory is not None
         times = np.arange(len(run.trajectory)) * (self.time * one.sample_interval)
         new = self.trajectory(run.trajectory, one, times, run.dt)
@@ -163,7 +163,7 @@ def which_half(w: int, x: Array, walls: Array, _truth: bool) -> Sequence[int]:
 
 
 def both(w: int, _x: Array, walls: Array, truth: bool) -> Sequence[int]:
-    """Of two walls in one place an engine tells both, the exact answer the second."""
+    """Of two walls in one place an engine reports both, the exact answer the second."""
     return (w + len(walls),) if truth else (w, w + len(walls))
 
 

@@ -184,7 +184,7 @@ def largest_change(metric: str) -> float:
 
 @pytest.mark.parametrize("metric", HELD)
 def test_the_same_scene_ten_times_as_fast_reads_the_same(metric: str):
-    """Samples, steps and the collisions that are told of them lie on one grid: no rounding of it decides."""
+    """Samples, steps and the collisions that are reported of them lie on one grid: no rounding of it decides."""
     # Rounding of the speeds, 3 m/s, that a few collisions have spread; momenta and energies are relative.
     assert largest_change(metric) < 1e-9
 

@@ -1,4 +1,4 @@
-"""Every metric changes as its unit says if the same is told otherwise: numbers of disks, axes, origin, units, walls.
+"""Every metric changes as its unit says if the same is stated otherwise: numbers of disks, axes, origin, units, walls.
 
 Nothing else may change a number, not by more than rounding, and not by the rounding of a grid on which steps, samples
 and collisions lie together.
@@ -119,7 +119,7 @@ def wrong(name: str, change: Change) -> list[str]:
 def test_every_metric_changes_as_its_unit_says(name: str, change: str):
     """Against the laws, the exact answer and every other engine, at two steps."""
     if (change, name) in LEFT_OUT:
-        pytest.skip("the scene cannot be told so")
+        pytest.skip("the scene cannot be stated so")
     assert not wrong(name, CHANGES[change])
 
 

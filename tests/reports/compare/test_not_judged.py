@@ -104,7 +104,7 @@ def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
 
 
 def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisions():
-    """Each tells of a collision every other step: less than a tenth of the samples is left."""
+    """Each reports a collision every other step: less than a tenth of the samples is left."""
     one = scenario("slide_on_incline")
     found = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)).trajectory
     assert found is not None

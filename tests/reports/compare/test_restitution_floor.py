@@ -64,7 +64,7 @@ def read(name: str, engine: str, substeps: int) -> dict[str, Value | None]:
 
 @pytest.mark.parametrize(("name", "substeps"), [("gas_of_100", 1), ("box_billiard", 1), ("box_billiard", 2)])
 def test_a_contact_that_lasts_is_no_collision(name: str, substeps: int):
-    """Box2D 3.1 as shipped lets a slow disk stick to a wall, and tells of a collision whenever it comes nearer
+    """Box2D 3.1 as shipped lets a slow disk stick to a wall, and reports a collision whenever it comes nearer
     again."""
     found = read(name, "box2d_v3:shipped", substeps)["restitution_error"]
 

@@ -252,10 +252,10 @@ def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.M
 def test_spin_is_part_of_the_energy():
     """m v2 / 2 + I w2 / 2, and momentum m v, of all disks."""
     flight = Flight(field_scenario(), ["reference:exercise"])
-    scene, told = flight.scenario.scene, flight.measures(flight.solid)
+    scene, reported = flight.scenario.scene, flight.measures(flight.solid)
     each = [m * (v @ v) / 2 + i * w * w / 2 for m, v, i, w in zip(
         scene.mass, scene.velocity, scene.inertia, scene.angular_velocity)]  # fmt: skip
 
-    assert told["energy"] == pytest.approx(sum(each), rel=1e-14)
-    assert told["momentum"] == pytest.approx((scene.mass @ scene.velocity).tolist(), rel=1e-13)
-    assert 0 < pi / 4 * 0.3**4 * scene.angular_velocity[1] ** 2 < told["energy"]
+    assert reported["energy"] == pytest.approx(sum(each), rel=1e-14)
+    assert reported["momentum"] == pytest.approx((scene.mass @ scene.velocity).tolist(), rel=1e-13)
+    assert 0 < pi / 4 * 0.3**4 * scene.angular_velocity[1] ** 2 < reported["energy"]

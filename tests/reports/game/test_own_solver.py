@@ -1,4 +1,5 @@
-"""Somebody's own solver in the game: one that cannot fly is told before; one that dies in flight leaves the others."""
+"""Somebody's own solver in the game: one that cannot fly is reported before; one that dies in flight leaves the
+others."""
 
 from __future__ import annotations
 
@@ -57,13 +58,13 @@ def test_a_right_solver_flies_as_the_reference_does(browser: Browser, tmp_path: 
     with page_of(browser, solver(tmp_path), monkeypatch) as page:
         page.keyboard.down("w")
         fly(page, 20)
-        told = page.evaluate("game.now.flyers.map((flyer) => [flyer.left, flyer.ship_apart])")
+        reported = page.evaluate("game.now.flyers.map((flyer) => [flyer.left, flyer.ship_apart])")
         who = page.locator("tr.solid .who").inner_text()
         wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
 
-    assert told[0] == ["", 0.0]
-    assert told[1][0] == ""
-    assert told[1][1] < 1e-9
+    assert reported[0] == ["", 0.0]
+    assert reported[1][0] == ""
+    assert reported[1][1] < 1e-9
     assert who == "Exercise.js:own"
     assert wide <= 0
 
@@ -119,7 +120,7 @@ def test_the_page_says_that_it_waits(browser: Browser, tmp_path: Path, monkeypat
         ("\0\1\2", "is not text"),
     ],
 )
-def test_a_file_that_cannot_fly_is_told_before_anything_is_served(
+def test_a_file_that_cannot_fly_is_reported_before_anything_is_served(
     text: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """One line that names the file, exit 2."""
@@ -134,7 +135,7 @@ def test_a_file_that_cannot_fly_is_told_before_anything_is_served(
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_every_file_that_cannot_fly_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_every_file_that_cannot_fly_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A line each; the good one is not named, and none of them is left among the engines."""
     monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
     shutil.copy(SOLVER, tmp_path / "good.js")
@@ -216,7 +217,9 @@ def test_any_name_of_a_folder_will_do(browser: Browser, tmp_path: Path, monkeypa
         ([word for k in range(17) for word in ("--engine", f"{k}.js")], "--engine: 17 engines; at most 16 fly at once"),
     ],
 )
-def test_what_is_asked_wrongly_is_told(words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_what_is_asked_wrongly_is_reported(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """One line, exit 2, before anything is served: not a page that cannot begin."""
     monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
     solver(tmp_path)

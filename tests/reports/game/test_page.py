@@ -112,7 +112,7 @@ def test_a_scripted_flight_wins(page: Page):
 
 def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(page: Page, tmp_path: Path):
     """pymunk as shipped makes e2 of e: it parts at the first collision, whose pair and instant the exact answer
-    tells."""
+    reports."""
     fly(page, 16)
     together = [flyer["apart"] for flyer in page.evaluate("game.now.flyers")]
     page.locator("#stop").check()
@@ -206,7 +206,7 @@ def test_a_finger_steers_too(page: Page):
     assert page.evaluate("game.now.ship[2]") == pytest.approx(0.25 * 20 * FRAME, abs=1e-14)
 
 
-def test_a_lost_connection_is_told_and_mended(page: Page):
+def test_a_lost_connection_is_reported_and_mended(page: Page):
     """The page says so, and begins anew when the server is there again."""
     fly(page, 3)
     page.evaluate("game.socket.close(); game.field.seen = true")

@@ -162,7 +162,7 @@ def test_a_tab_that_does_not_read_holds_nobody_up(served: Served):
 
 
 def test_ten_tabs_fly_their_own_flights_and_give_them_back(served: Served):
-    """Each counts its own frames; a tab whose connection is cut is closed, too; one too many is told."""
+    """Each counts its own frames; a tab whose connection is cut is closed, too; one too many is reported."""
     assert no_tabs(served)
     with ExitStack() as stack:
         tabs = [stack.enter_context(served.open()) for _ in range(10)]
@@ -203,7 +203,7 @@ def test_a_flight_is_the_same_whatever_another_tab_does_meanwhile(monkeypatch: p
     assert bits(together) == bits(alone)
 
 
-def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_told(served: Served, tmp_path: Path):
+def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_reported(served: Served, tmp_path: Path):
     """Exit 0, no traceback, with a tab open; where the port is taken the next free one is used and named."""
     program = Path(sys.executable).parent / "crosscheck"
     arguments = [program, "play", "--port", str(served.port), "--engine", "reference"]
@@ -232,7 +232,7 @@ def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_told(served: Served, tmp_pa
         (None, ["boxed2d"], "did you mean box2d"),
     ],
 )
-def test_bad_input_is_told_and_nothing_is_served(
+def test_bad_input_is_reported_and_nothing_is_served(
     flight: str | None, engines: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
     """A line a fault, exit 2."""
@@ -264,7 +264,7 @@ def test_a_port_that_nobody_may_have_is_not_called_taken(
     assert "--port 80: the system keeps it for administrators" in capsys.readouterr().err
 
 
-def test_a_missing_browser_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+def test_a_missing_browser_is_reported(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     """By --open on a machine without one; it is served all the same."""
     served_on: list[int] = []
     monkeypatch.setattr("webbrowser.open", lambda _: False)

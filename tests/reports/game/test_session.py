@@ -1,4 +1,4 @@
-"""One open page of the game: what it answers, and what it tells of a scene that is flown again."""
+"""One open page of the game: what it answers, and what it reports of a scene that is flown again."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from scenarios.model import Scenario
      '{"do": "fly", "engines": ["reference:exercise"], "seed": -1}', '{"do": "save"' + " " * 5000 + "}",
      b"\xff\xfe\x00", "[" * 3000],
 )  # fmt: skip
-def test_a_malformed_message_is_told_in_a_sentence(text: str | bytes):
+def test_a_malformed_message_is_reported_in_a_sentence(text: str | bytes):
     """ValueError and nothing else, whatever the text is."""
     with pytest.raises(ValueError, match=r"\w{3,}"):
         read_message(text)
 
 
-def test_saving_before_flying_is_told():
+def test_saving_before_flying_is_reported():
     """There is nothing to save."""
     with pytest.raises(ValueError, match="nothing has been flown"):
         Session(["reference:exercise"]).answer('{"do": "save"}')
@@ -48,15 +48,15 @@ def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
     session = Session(["reference:exercise"], scenario)
     session.flight.advance(scenario.samples)
     run = play(ENGINES["reference:exercise"].make(), "reference:exercise", scenario, session.flight.dt)
-    told = session.now()
+    reported = session.now()
 
     assert run.trajectory is not None
     assert session.flight.solid.state.position.tolist() == run.trajectory.position[-1].tolist()
-    assert (told["left_at"], told["won"], session.field()["earth"]) == (-1, False, None)
+    assert (reported["left_at"], reported["won"], session.field()["earth"]) == (-1, False, None)
 
 
 def test_the_flame_is_against_a_thrust_that_turns_with_the_ship():
-    """In a replayed scene whose thrust is in the ship's own frame; the page draws what it is told."""
+    """In a replayed scene whose thrust is in the ship's own frame; the page draws what it is reported."""
     whole = SCENARIOS["body_frame_thrust"]()
     session = Session(["reference:exercise"], whole)
     [thrust] = whole.thrusts

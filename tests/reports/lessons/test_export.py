@@ -1,4 +1,5 @@
-"""A lesson as a file needs no server, all of them lead to each other, and what cannot be written is told at once."""
+"""A lesson as a file needs no server, all of them lead to each other, and what cannot be written is reported at
+once."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from playwright.sync_api import Browser
 
 from reports.lessons import command, pages
 from reports.lessons.catalogue import LESSONS
-from reports.lessons.pages import offline, told
+from reports.lessons.pages import answer_json, offline
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
 
@@ -21,7 +22,7 @@ def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
     """It asks nothing of anywhere, its sliders work, and what it holds is what the lesson shows live."""
     lesson = LESSONS["order"]
     path = tmp_path / "order.html"
-    path.write_text(offline(lesson, {places: told("order", places) for places in lesson.grid}))
+    path.write_text(offline(lesson, {places: answer_json("order", places) for places in lesson.grid}))
     page, heard = opened(browser, path.as_uri())
     page.on("request", lambda request: heard.append(request.url))
     page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
@@ -38,7 +39,7 @@ def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
     assert before != after
     assert heard == []
     assert len(held) == len(lesson.grid)
-    assert held["1,0"]["charts"] == json.loads(json.dumps(lesson.at((1, 0)).told()["charts"]))
+    assert held["1,0"]["charts"] == json.loads(json.dumps(lesson.at((1, 0)).to_json()["charts"]))
 
 
 def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -83,7 +84,7 @@ def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: 
         (["--export", "/proc/all"], "/proc/all: "),
     ],
 )
-def test_what_cannot_be_written_is_told_before_any_run(
+def test_what_cannot_be_written_is_reported_before_any_run(
     words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """One line, exit 2, nothing is there that was not, and no engine was asked."""
@@ -119,7 +120,7 @@ def test_a_page_that_cannot_be_made_leaves_the_old_one(tmp_path: Path, monkeypat
 
 def test_a_run_that_fails_ends_the_export_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Exit 1 with the lesson, where its sliders were, and what was raised; nothing is left behind."""
-    monkeypatch.setattr(command, "told", fails)
+    monkeypatch.setattr(command, "answer_json", fails)
     done = crosscheck("lesson", "order", "--export", tmp_path / "order.html", cwd=tmp_path)
 
     assert done.returncode == 1

@@ -102,15 +102,15 @@ def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
 
 
 def test_the_numbers_of_a_collision_are_those_of_the_solver():
-    """The impulse that lesson 4 writes out is the one the solver tells, and momentum is kept."""
+    """The impulse that lesson 4 writes out is the one the solver reports, and momentum is kept."""
     scene = two(0.9, 10.0, 1.0).scene
-    before, after, told = collision_of_the_reference(scene, 1 / 64)
+    before, after, reported = collision_of_the_reference(scene, 1 / 64)
     steps = dict(LESSONS["meeting"].at((2, 2, 2, 0)).steps)
     kick = scene.mass[0] * np.hypot(*(after.velocity[0] - before.velocity[0]))
 
-    assert told == pytest.approx(kick, rel=1e-14)
-    assert f"the solver tells {told:.3g} N s" in steps["Impulse"]
-    assert f"= {told:.3g} N s; the solver" in steps["Impulse"]
+    assert reported == pytest.approx(kick, rel=1e-14)
+    assert f"the solver reports {reported:.3g} N s" in steps["Impulse"]
+    assert f"= {reported:.3g} N s; the solver" in steps["Impulse"]
     assert "parting over closing speed: 0.9" in steps["Update"]
 
 
@@ -187,7 +187,7 @@ def test_the_list_of_lessons_fits_and_leads_to_each(browser: Browser, url: str, 
         ("/nothing/shown?at=0", 400, "no such lesson"),
     ],
 )
-def test_what_cannot_be_shown_is_told(url: str, path: str, status: int, said: str):
+def test_what_cannot_be_shown_is_reported(url: str, path: str, status: int, said: str):
     """A status and a sentence, no traceback."""
     with pytest.raises(HTTPError) as refusal:
         urlopen(url + path, timeout=10)

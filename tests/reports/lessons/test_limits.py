@@ -79,7 +79,7 @@ def test_the_run_fails_beyond_the_limit_and_only_there(case: str, engine: str, p
 
 
 def test_refusals_are_shown_beside_the_exact_answer():
-    """Box2D refuses a spin it would cut: there is nothing of it to draw, the reason is told."""
+    """Box2D refuses a spin it would cut: there is nothing of it to draw, the reason is reported."""
     shown = LESSON.at(at("spin", "box2d:matched", 8))
 
     assert [curve.name for curve in shown.charts[0].curves] == [TRUTH]

@@ -160,7 +160,7 @@ class Remembers(Controlled):
 
 
 class Once(Controlled):
-    """Killed by `kill -9` the first time only: where it is told to, it leaves a mark that it has been here."""
+    """Killed by `kill -9` the first time only: where it is asked to, it leaves a mark that it has been here."""
 
     def misbehave(self):
         mark = Path(os.environ["CONTROL_MARK"])

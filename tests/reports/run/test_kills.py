@@ -1,4 +1,4 @@
-"""What is killed or told to stop loses nothing: a worker, the run itself, from outside or by Ctrl-C."""
+"""What is killed or signalled to stop loses nothing: a worker, the run itself, from outside or by Ctrl-C."""
 
 import os
 import signal
@@ -55,7 +55,7 @@ def test_workers_that_are_killed_are_replaced_and_their_cells_played_again(long:
 @pytest.mark.parametrize(
     ("how", "code", "word"), [(signal.SIGINT, 130, "Interrupted."), (signal.SIGTERM, 143, "Terminated.")]
 )
-def test_a_run_that_is_told_to_stop_keeps_what_was_played_and_says_how_to_go_on(
+def test_a_run_that_is_signalled_to_stop_keeps_what_was_played_and_says_how_to_go_on(
     long: Path, tmp_path: Path, how: int, code: int, word: str
 ):
     """Ctrl-C, and what a batch system sends: no worker is left behind, and both commands it names do as they say."""

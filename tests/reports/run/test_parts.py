@@ -84,7 +84,7 @@ def test_a_run_takes_the_place_of_nothing_that_has_begun(parts: dict[str, Path],
 
 @pytest.mark.parametrize("name", ["speed", "stability"])
 def test_a_scene_file_that_has_changed_is_not_gone_on_with(parts: dict[str, Path], tmp_path: Path, name: str):
-    """Its old numbers would be told as those of the new scene."""
+    """Its old numbers would be reported as those of the new scene."""
     journal = journal_of(parts[name], tmp_path)
     before = journal.read_bytes()
     (tmp_path / "my.toml").write_text(SCENE.replace("radius = 0.25", "radius = 0.2"))
@@ -97,7 +97,7 @@ def test_a_scene_file_that_has_changed_is_not_gone_on_with(parts: dict[str, Path
 
 @pytest.mark.parametrize("line", ["5", "[1, 2]", '{"foo": 1}', '{"task": {"kind": "limit"}}', '{"header": 7}'])
 @pytest.mark.parametrize("name", ["speed", "stability"])
-def test_a_line_that_is_none_of_its_own_is_told(parts: dict[str, Path], tmp_path: Path, name: str, line: str):
+def test_a_line_that_is_none_of_its_own_is_reported(parts: dict[str, Path], tmp_path: Path, name: str, line: str):
     """Before anything is played, by its number, with and without --resume."""
     journal = journal_of(parts[name], tmp_path)
     first, *others = journal.read_text().splitlines()
@@ -119,7 +119,7 @@ def test_what_was_torn_beside_the_journal_does_not_keep_the_atlas_from_its_end(p
     assert (tmp_path / "out" / "limits.csv").exists()
 
 
-def test_a_header_without_what_it_should_have_is_told(parts: dict[str, Path], tmp_path: Path):
+def test_a_header_without_what_it_should_have_is_reported(parts: dict[str, Path], tmp_path: Path):
     """By the commands that read a run's folder."""
     journal = journal_of(parts["run"], tmp_path)
     first, *others = journal.read_text().splitlines()

@@ -178,7 +178,7 @@ def test_a_replay_says_that_the_file_is_another(tmp_path: Path):
 
 
 def test_a_run_says_which_modules_beside_the_file_were_played(tmp_path: Path):
-    """In its settings, with a hash over all, so that two runs can be told apart."""
+    """In its settings, with a hash over all, so that two runs can be distinguished."""
     run = played(engine_file(place(tmp_path, "beside", 1)))
 
     assert run.settings["from beside it"][1].startswith("helper.py; sha256 of all ")

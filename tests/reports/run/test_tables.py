@@ -133,7 +133,7 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_
     last = {scene: max(k for k, (which, _) in enumerate(made) if which == scene) for scene, _ in made}
     resumed = [path.name for path, _ in Gathering(archive, cells[:1], 60.0).whole()]
     first = [task for _, tasks in made for task in tasks]
-    assert gathering.asked == list(last)  # of which the person is told who waits for them
+    assert gathering.asked == list(last)  # which the person who waits is shown
     assert not gathering.playing
     then = [task for path, work in first for task in gathering.came(path, work())]
     after = [task for path, work in then for task in gathering.came(path, work())]

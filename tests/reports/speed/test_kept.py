@@ -1,4 +1,4 @@
-"""What a measurement has got is kept as it ends, and a log is told now and then how far it is."""
+"""What a measurement has got is kept as it ends, and a log says now and then how far it is."""
 
 from __future__ import annotations
 

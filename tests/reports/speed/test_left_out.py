@@ -37,7 +37,8 @@ def test_an_accuracy_that_was_not_timed_is_not_called_unreached():
 
 
 def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
-    """Of five scenes one is reached, one never, one failed, one untimed, one not yet: infinite, and all are told."""
+    """Of five scenes one is reached, one never, one failed, one untimed, one not yet: infinite, and all are
+    reported."""
     why = ["", UNREACHABLE, FAILED, NOT_TIMED, "not down to dt 0.1 s"]
     reached = pd.DataFrame({
         "scenario": list("abcde"), "engine": "pymunk", "profile": "matched", "accuracy": "1 %",

@@ -130,9 +130,9 @@ def test_a_failed_scene_is_infinitely_dear_and_an_untimed_one_is_counted():
 
 def test_a_pool_says_which_scene_moves_it_most():
     """Leaving out the only scene between small and large errors moves the middle most."""
-    told = pooled(points([1.0] * 5, [1e-3, 1e-3, 0.1, 10.0, 10.0]))
+    reported = pooled(points([1.0] * 5, [1e-3, 1e-3, 0.1, 10.0, 10.0]))
 
-    assert told.moved.iloc[0] == pytest.approx(moved(told_errors := np.array([1e-3, 1e-3, 0.1, 10, 10])).max())
-    assert told.moved_by.iloc[0] == f"scene_{moved(told_errors).argmax()}"
-    assert f"without {told.moved_by.iloc[0]}" in said_of_pool(told)
+    assert reported.moved.iloc[0] == pytest.approx(moved(reported_errors := np.array([1e-3, 1e-3, 0.1, 10, 10])).max())
+    assert reported.moved_by.iloc[0] == f"scene_{moved(reported_errors).argmax()}"
+    assert f"without {reported.moved_by.iloc[0]}" in said_of_pool(reported)
     assert said_of_pool(pooled(points([1.0], [0.1]))).startswith("One scene")

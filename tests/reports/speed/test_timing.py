@@ -41,8 +41,8 @@ def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
     assert steps * EACH / held.duration <= best <= (1 + SLACK) * steps * EACH / held.duration
 
 
-def test_what_wrapping_in_python_took_is_told_apart():
-    """A quarter of each step goes into wrapping: it is left out of the cost, and told beside it."""
+def test_what_wrapping_in_python_took_is_given_separately():
+    """A quarter of each step goes into wrapping: it is left out of the cost, and reported beside it."""
     engines = {("sleeper:own", 1, 0): partial(Sleeper, EACH, EACH / 4)}
     row = summed_up(table(ladder.times_of("near_miss", 0, engines, 3, 1.0)), ["key"]).iloc[0]
 
@@ -88,7 +88,7 @@ def test_the_estimate_counts_the_rounds_that_are_taken(run: float):
     assert all_rounds(run, effort) == pytest.approx(len(samples) * (run + READY))
 
 
-def test_a_sample_is_filled_with_runs_and_told_per_unit():
+def test_a_sample_is_filled_with_runs_and_reported_per_unit():
     """Runs of 0.1 ms fill 1 ms with ten; the cost is per unit of amount, of which a run has two."""
     sample = interleaved([fixed(1.01e-4)], 1, 1.0, seed=0)[0]
 
@@ -133,7 +133,7 @@ def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
     assert max(ages) <= sizes.FRESH + sizes.WARM_STEPS
 
 
-def test_an_engine_that_would_take_too_long_a_step_stops_and_is_told_of():
+def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():
     """A sleeper of 2 ms a step, the same for every size, is stopped only by a patience below that."""
     engines = {"sleeper:own": partial(Sleeper, 2e-3)}
     samples, stopped = sizes.costs(engines, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)

@@ -194,15 +194,17 @@ def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets
     """A heavy disk drives a light one against a wall: in all, impulses of twice the heavy one's momentum, once each."""
     scenario = SCENARIOS["galperin_314"]()
     dt = scenario.dt(4)
-    told = {}
+    reported = {}
     for steps in (3, 1):
         run = play(Pymunk(profile, collision_persistence=steps), "pymunk:changed", scenario, dt)
         assert run.trajectory is not None
         collisions, velocity = run.trajectory.collisions, run.trajectory.velocity[:, :, 0]
-        told[steps] = collisions.impulse[collisions.j >= 0].sum() / (scenario.scene.mass[1] * np.ptp(velocity[:, 1]))
+        reported[steps] = collisions.impulse[collisions.j >= 0].sum() / (
+            scenario.scene.mass[1] * np.ptp(velocity[:, 1])
+        )
 
-    assert told[1] == pytest.approx(1.0, abs=1e-9)
-    assert told[3] > 10
+    assert reported[1] == pytest.approx(1.0, abs=1e-9)
+    assert reported[3] > 10
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
 
 
 @pytest.mark.parametrize(
-    ("what", "engine", "tells"),
+    ("what", "engine", "expected"),
     [
         ("offset", "box2d:matched", "positions are float32"),
         ("offset", "box2d_v3:matched", "positions are float32"),
@@ -46,11 +46,11 @@ def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
         ("speed", "reference:exercise", "a collision takes effect at the end of the step in which it is found"),
     ],
 )
-def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, tells: str):
+def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, expected: str):
     """Two disks head-on at 1 m/s and 1/200 s: the mechanisms known from the atlas come out by themselves."""
     limit = found(what, engine)
 
-    assert tells in limit.reason
+    assert expected in limit.reason
     assert limit.tested.startswith("works ")
     assert limit.why == limit.reason
 

@@ -43,7 +43,7 @@ SCENE = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[1.0], 
 
 
 def read_speed(_: Scenario, played: Trajectory) -> Reading:
-    """What the run was told to read."""
+    """What the run was asked to read."""
     return Reading(float(played.velocity[0, 0, 0]), 0.5, "it broke")
 
 

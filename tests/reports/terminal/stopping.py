@@ -1,4 +1,4 @@
-"""Starts a command, waits until it is somewhere, tells it to stop, and looks what is left of it."""
+"""Starts a command, waits until it is somewhere, signals it to stop, and looks what is left of it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AT_MOST = 3.0  # s that a command may take to end, on a machine that does nothin
 
 
 class Ended(NamedTuple):
-    """How a command ended that was told to.
+    """How a command ended that was signalled to.
 
     Attributes:
         status: as a shell has it.
@@ -56,7 +56,7 @@ class Command:
         return self.when(self.mark.exists)
 
     def stop(self, how: int, whole_group: bool = False) -> Ended:
-        """Tell it, or as a terminal does all processes of its group, and wait for its end."""
+        """Signal it, or as a terminal does all processes of its group, and wait for its end."""
         started = time.monotonic()
         (os.killpg if whole_group else os.kill)(self.process.pid, how)
         try:

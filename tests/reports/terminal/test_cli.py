@@ -140,9 +140,9 @@ def test_bad_input_is_one_clear_message_and_exit_2(words: list[str], said: str, 
 
 def test_truth_prints_the_exact_answer(tmp_path: Path):
     """For people with the ends of its list of collisions, for programs as JSON with all of them."""
-    told, listed = (crosscheck("truth", "line_gas", *more, cwd=tmp_path).stdout for more in ([], ["--events"]))
+    reported, listed = (crosscheck("truth", "line_gas", *more, cwd=tmp_path).stdout for more in ([], ["--events"]))
     for word in ("closed form", "horizon", "error bound", "258 more: --events"):
-        assert word in told
+        assert word in reported
     assert len(listed.splitlines()) > 272
     answer = json.loads(crosscheck("truth", "asteroids", "--json", cwd=tmp_path).stdout)
     assert answer["method"] in ("certified", "two-precision")
@@ -162,7 +162,7 @@ def test_truth_says_why_there_is_none(tmp_path: Path):
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_who_waits_for_an_exact_answer_is_told_so_on_a_terminal_only(
+def test_who_waits_for_an_exact_answer_sees_so_on_a_terminal_only(
     terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     """A script reads the error stream."""
@@ -184,8 +184,8 @@ def test_a_pipe_for_a_scene_hangs_no_command(words: list[str], tmp_path: Path):
 
 def test_truth_tells_what_comes_to_rest_and_all_outcomes(tmp_path: Path):
     """A rest is a line of the list; a break shot ends in a table of two outcomes, of which none is the truth."""
-    told = crosscheck("truth", str(SCENES / "settles.toml"), cwd=tmp_path).stdout
-    assert "comes to rest" in told
+    reported = crosscheck("truth", str(SCENES / "settles.toml"), cwd=tmp_path).stdout
+    assert "comes to rest" in reported
     broken = crosscheck("truth", str(SCENES / "break.toml"), cwd=tmp_path).stdout
     for words in ("2 outcomes; none is the truth", "0: (-0.125, -0.216506)", "0: (-0.125, 0.216506)", "still known"):
         assert words in broken

@@ -35,7 +35,7 @@ SOLVERS = {path.name: path for path in CORRECT if path.name in ("plain.js", "pla
 
 
 def trapped(folder: Path, names: Iterable[str]) -> Callable[[], str]:
-    """Put a module of each name into `folder`; returns what tells which of them were run."""
+    """Put a module of each name into `folder`; returns what shows which of them were run."""
     mark = folder.parent / f"{folder.name}.ran"
     folder.mkdir()
     for name in names:
@@ -45,12 +45,12 @@ def trapped(folder: Path, names: Iterable[str]) -> Callable[[], str]:
 
 @pytest.fixture
 def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
-    """What tells which modules were run of the current folder, which has all names of Python's and of what we use."""
-    told = trapped(tmp_path / "here", (*sys.stdlib_module_names, *OURS, *LIBRARIES, *BY_THEMSELVES))
+    """What shows which modules were run of the current folder, which has all names of Python's and of what we use."""
+    reported = trapped(tmp_path / "here", (*sys.stdlib_module_names, *OURS, *LIBRARIES, *BY_THEMSELVES))
     for name, path in SOLVERS.items():
         (tmp_path / "here" / f"my_{name}").write_text(path.read_text())
     monkeypatch.chdir(tmp_path / "here")
-    return told
+    return reported
 
 
 def in_a_worker() -> Any:

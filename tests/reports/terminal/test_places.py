@@ -13,7 +13,7 @@ from tests.reports.terminal.command_line import CROSSCHECK
 
 SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
 SOLVER = Path(__file__).parents[3] / "tests" / "solvers" / "correct" / "plain.py"  # numba takes no such names
-TOLD = "cannot write to standard output: "
+REFUSED = "cannot write to standard output: "
 
 
 def shell(line: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[bytes]:
@@ -36,9 +36,9 @@ def test_an_outlet_takes_all_and_remembers_the_first_fault():
 @pytest.mark.parametrize(
     ("line", "code", "said"),
     [
-        ("$C list engines >/dev/full", 1, TOLD + "No space left on device"),
-        ("$C list engines >&-", 1, TOLD + "Bad file descriptor"),
-        ("$C list engines | head -0; exit ${PIPESTATUS[0]}", 1, TOLD + "Broken pipe"),
+        ("$C list engines >/dev/full", 1, REFUSED + "No space left on device"),
+        ("$C list engines >&-", 1, REFUSED + "Bad file descriptor"),
+        ("$C list engines | head -0; exit ${PIPESTATUS[0]}", 1, REFUSED + "Broken pipe"),
         ("$C list engines >/dev/null", 0, ""),
         ("$C list nothing >&-", 2, "list 'nothing' is not known"),
         ("$C list nothing 2>&-", 2, ""),

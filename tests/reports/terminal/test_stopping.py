@@ -104,7 +104,8 @@ def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(place: P
 @pytest.mark.slow
 @pytest.mark.parametrize("how", BOTH)
 def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: int):
-    """Told to stop while it compares: the sentence counts the cells, and --resume gives the bytes of a whole run."""
+    """Signalled to stop while it compares: the sentence counts the cells, and --resume gives the bytes of a whole
+    run."""
     command = Command(*TWO, cwd=place, stalled="reports.compare.comparison:_measure").stalled()
     had = ended_in(place / "out.part")
     ended = command.stop(how)
@@ -121,7 +122,7 @@ def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: 
 @pytest.mark.parametrize("how", BOTH)
 @pytest.mark.parametrize("words", [["run"], ["list"], ["diff", "done", "done"], ["report", "done"], ["check", SOLVERS]])
 @pytest.mark.parametrize("after", [0.3, 1.0, 2.0])
-def test_a_command_ends_whenever_it_is_told(place: Path, words: list, how: int, after: float):
+def test_a_command_ends_whenever_it_is_signalled(place: Path, words: list, how: int, after: float):
     """While it imports, starts workers, writes: after so many s, wherever that is; what has ended by itself is done."""
     command = Command(*words, cwd=place)
     started = os.times().elapsed
@@ -192,7 +193,7 @@ def test_what_takes_too_long_is_said_and_the_other_scene_is_judged(place: Path):
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("number", STATUS)
-def test_a_command_is_told_until_it_has_heard(number: int):
+def test_a_command_is_signalled_until_it_ends(number: int):
     """What is raised in a destructor is lost: a second later it is raised again, and not once it has been heard."""
 
     class Deaf:
@@ -229,7 +230,7 @@ def test_a_second_ctrl_c_does_not_cut_the_sentence_off(tmp_path: Path, capsys: p
     assert "Terminated. All is kept." in capsys.readouterr().err
 
 
-def test_a_finished_run_takes_its_place_whole_whenever_it_is_told(
+def test_a_finished_run_takes_its_place_whole_whenever_it_is_signalled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     """SIGTERM between the two renames: the old run is gone, the new one is there, and it is said that all is done."""
