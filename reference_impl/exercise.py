@@ -122,7 +122,7 @@ def touching_wall(x, radius, i: int, walls, w: int) -> bool:  # type: ignore[no-
 
 @kernel
 def direction(dx: float, dy: float) -> tuple[float, float, float]:
-    """Length and unit vector of (dx, dy); equal centres have no direction, so they are parted along x."""
+    """Length and unit vector of (dx, dy); equal centres have no direction, so they are separated along x."""
     distance = sqrt(dx * dx + dy * dy)
     if distance == 0.0:
         return 0.0, 1.0, 0.0

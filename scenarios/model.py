@@ -277,7 +277,7 @@ class Trajectory:
         angle: (k, n) rad, unwrapped.
         angular_velocity: (k, n) rad/s.
         collisions: the collisions up to t[-1].
-        valid_until: s, the horizon up to which engines are held to a truth: no sample lies beyond it.
+        horizon: s, the horizon up to which engines are held to a truth: no sample lies beyond it.
         reason: why the truth ends there; "" if it does not.
         error_bound: m, how far a truth may be off before it; 0: a closed form, right to a few roundings.
     """
@@ -288,7 +288,7 @@ class Trajectory:
     angle: Array
     angular_velocity: Array
     collisions: Collisions = field(default_factory=lambda: NO_COLLISIONS)
-    valid_until: float = np.inf
+    horizon: float = np.inf
     error_bound: float = 0.0
     reason: str = ""
 

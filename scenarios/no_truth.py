@@ -23,7 +23,7 @@ def truth_at(scenario: Scenario, t: Array) -> Trajectory:
         raise NoTruth(scenario.without_truth)
     truth = scenario.truth(t)
     if len(truth) < len(t):
-        late, until = t[len(truth)], truth.valid_until
+        late, until = t[len(truth)], truth.horizon
         why = f": {truth.reason}" if truth.reason else ""
         raise NoTruth(
             f"t = {late:.9g} s: the truth of {scenario.name} ends at its horizon at {until:.9g} s{why}", until

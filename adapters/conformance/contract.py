@@ -77,7 +77,7 @@ def load_forgets(row: Row) -> Reading:
     return Reading("collisions at the start" if left else first_difference(seen, wanted), "nowhere")
 
 
-def worlds_are_apart(row: Row) -> Reading:
+def worlds_are_separate(row: Row) -> Reading:
     """A second engine of the same kind, a hundred times as large, changes nothing in the first."""
     large = scene_of(position=[[0.0, 0.0]], velocity=[[1.0, 0.0]], radius=[50.0], mass=[1.0])
     with loaded(row, plain()) as alone:
@@ -240,7 +240,7 @@ CONTRACT: dict[str, Probe] = {
     "order_and_shapes": Probe("Does read give float64 arrays in the scene's order?", order_and_shapes, "breaks"),
     "read_copies": Probe("Does read give copies?", read_copies, "breaks"),
     "load_forgets": Probe("Where does a used engine differ from a fresh one after load?", load_forgets, "breaks"),
-    "worlds_are_apart": Probe("Where does a second engine disturb the first?", worlds_are_apart, "breaks"),
+    "worlds_are_separate": Probe("Where does a second engine disturb the first?", worlds_are_separate, "breaks"),
     "counts_are_steps": Probe("Where does step(3) differ from three steps?", counts_are_steps, "breaks"),
     "steps_obey_dt": Probe("How fast is a disk of 1.5 m/s by its path, at two dt? (m/s)", steps_obey_dt, "breaks"),
     "stays_finite": Probe("Is every number finite for 20 steps of a plain scene?", stays_finite, "breaks"),

@@ -80,7 +80,7 @@ def pair_momentum(row: Row) -> Reading:
 
 
 def restitution(row: Row, closing: float) -> Reading:
-    """Parting over closing speed of two equal disks that meet head-on, e = 0.5."""
+    """Separation over approach speed of two equal disks that meet head-on, e = 0.5."""
     with loaded(row, head_on(closing)) as engine:
         before = engine.read().velocity
         engine.step(24)

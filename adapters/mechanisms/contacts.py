@@ -17,7 +17,7 @@ CONTACT = np.dtype([
     ("i", "i8"), ("j", "i8"),
     ("nx", "f8"), ("ny", "f8"),  # the normal
     ("gap", "f8"),  # m between the surfaces when it was found
-    ("target", "f8"),  # m/s: the parting speed it is to have
+    ("target", "f8"),  # m/s: the speed of separation it is to have
     ("impulse", "f8"), ("slide", "f8"),  # N s along the normal and along the tangent (-ny, nx)
     ("strongest", "f8"),  # N s, of the impulses that one solve added
     ("nudged", "f8"),  # N s, of `ablated_reference.nudge`

@@ -79,7 +79,7 @@ def _lesson(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mec
 def _pymunk(reported: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
     from adapters.pymunk import Pymunk
 
-    # Its bounce reverses whatever speed a contact has, also one at which the two part (cpArbiterPreStep).
+    # Its bounce reverses whatever speed a contact has, also one at which the two separate (cpArbiterPreStep).
     impulse = {
         "order": PYMUNK, "iterations": reported["iterations"], "threshold": -np.inf,
         "memory": reported["collision_persistence"],

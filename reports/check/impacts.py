@@ -214,7 +214,7 @@ def fitting(pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[Collision, Ar
 
 def follows_print(answers: dict[str, Answer], e: float) -> bool:
     """Whether pairs that part get the impulse of the printed formula."""
-    for name in PARTING:
+    for name in SEPARATING:
         h, came = (
             collision_of(QUESTIONS[name].balls, answers[name].last),
             changes(QUESTIONS[name].balls, answers[name].last),
@@ -224,4 +224,4 @@ def follows_print(answers: dict[str, Answer], e: float) -> bool:
     return True
 
 
-PARTING = ("part", "part, other numbers")
+SEPARATING = ("separate", "separate, other numbers")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from reports.check.collisions import Collision, changes, collision_of
-from reports.check.impacts import IMPULSES, PARTING, UPDATES, Finding, tangent
+from reports.check.impacts import IMPULSES, SEPARATING, UPDATES, Finding, tangent
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import Row, judged, near, not_asked, shown
@@ -127,16 +127,16 @@ def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> R
     either = "no impulse, or that of the formula"
     seen = [
         (collision_of(QUESTIONS[n].balls, answers[n].last), changes(QUESTIONS[n].balls, answers[n].last))
-        for n in PARTING
+        for n in SEPARATING
     ]
     if all(near(came, 0.0) for _, came in seen):
-        return Row("parting", "2c", asked, "no impulse", either, "note", "only pairs that approach get an impulse")
+        return Row("separating", "2c", asked, "no impulse", either, "note", "only pairs that approach get an impulse")
     law, change = (found.law, found.change) if found else (IMPULSES[""], UPDATES[""].change)
     if all(near(change(h, law(h, e), e), came, 0.1) for h, came in seen):
         note = "pairs that part get an impulse too, as the formula is printed; it turns them back"
-        return Row("parting", "2c", asked, "an impulse, by the same formula", either, "note", note)
+        return Row("separating", "2c", asked, "an impulse, by the same formula", either, "note", note)
     got = f"A is changed by {shown(seen[0][1][0])} m/s"
-    return judged("parting", "2c", asked, got, either, False, found.mistake if found else "")
+    return judged("separating", "2c", asked, got, either, False, found.mistake if found else "")
 
 
 UNALIKE = "A and B are not treated alike: it matters which is called first"

@@ -86,7 +86,7 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[R
                f"{shown(shift.across)} m across it", "0 m across it", along, across_cause(seen)),
         split(balls, shift) if right and along else not_asked("split", "2b", "they do not meet in one point"),
     ]  # fmt: skip
-    return [*rows, *at_rest(answers, explained), parting(answers["part"])]
+    return [*rows, *at_rest(answers, explained), separation(answers["separate"])]
 
 
 def at_rest(answers: dict[str, Answer], explained: bool) -> list[Row]:
@@ -197,10 +197,10 @@ def split(balls: tuple[Ball, ...], shift: Shift) -> Row:
     return Row("split", "2b", asked, how, "any", "note", f"{how}; their centre of mass {aside}")
 
 
-def parting(answer: Answer) -> Row:
+def separation(answer: Answer) -> Row:
     """A pair that overlaps and moves apart: displaced or left; free, as nothing is lost by it."""
-    shift = shift_of(QUESTIONS["part"].balls, answer.last)
+    shift = shift_of(QUESTIONS["separate"].balls, answer.last)
     moved = abs(shift.a) + abs(shift.b) > 1e-9
     said = "displaced as any other" if moved else "left as it is: an early return for pairs that part"
-    return Row("parting pair", "2b", "Is a pair displaced that overlaps and moves apart?", "yes" if moved else "no",
+    return Row("separating pair", "2b", "Is a pair displaced that overlaps and moves apart?", "yes" if moved else "no",
                "yes, or no if it returns early", "note", said)  # fmt: skip

@@ -33,7 +33,7 @@ class Restitution:
         own: the value written into it, or the exercise's if none is found.
         named: whether it is written in, by a name or as a number.
         absurd: whether what came is no number from 0 to 1, and a name such as e or restitution gets it.
-        came: parting over closing speed of two equal spheres that meet head-on at 2 m/s.
+        came: separation over approach speed of two equal spheres that meet head-on at 2 m/s.
         slow, fast: the same at 2 mm/s and at 200 m/s.
     """
 
@@ -86,7 +86,7 @@ class Restitution:
 
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
     """What the file's text says and what its collisions give."""
-    came, slow, fast = (parting(answers[name], name) for name in ("even", "slow", "fast"))
+    came, slow, fast = (separation(answers[name], name) for name in ("even", "slow", "fast"))
     named, found = named_in(text), written(text)
     absurd = not 0 <= came <= 1 and any(near(e, came) for e in named)
     # A file may hold several such numbers, and use one of them.
@@ -105,8 +105,8 @@ def written(text: str) -> list[float]:
     return [e for e in named_in(text) if 0 <= e <= 1] + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
 
 
-def parting(answer: Answer, name: str) -> float:
-    """Parting over closing speed; NaN if the call failed."""
+def separation(answer: Answer, name: str) -> float:
+    """Separation over approach speed; NaN if the call failed."""
     if answer.failed or not answer.balls:
         return float("nan")
     a, b = QUESTIONS[name].balls

@@ -74,8 +74,8 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
     return plain(
         {
             "scenario": scenario.name, "method": record.method, "bits": record.bits, "duration_s": scenario.duration,
-            "valid_until_s": min(record.valid_until, scenario.duration),
-            "followed_until_s": min(record.followed_until, scenario.duration), "reason": record.reason,
+            "horizon_s": min(record.horizon, scenario.duration),
+            "float64_horizon_s": min(record.float64_horizon, scenario.duration), "reason": record.reason,
             "error_bound_m": record.error_bound, "collisions": collisions, "outcomes": outcomes(record),
             "still_known": list(record.remains),
         }
@@ -97,14 +97,14 @@ def outcomes(record: TruthRecord) -> list[dict]:
 def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
     """The record for people."""
     console = Console()
-    ends = f"{number(min(record.valid_until, scenario.duration), 6)} s of {number(scenario.duration, 6)} s"
+    ends = f"{number(min(record.horizon, scenario.duration), 6)} s of {number(scenario.duration, 6)} s"
     lines = {
         "scenario": f"{scenario.name}: {scenario.asks}",
         "method": record.method,
         "precision": precision(record),
         "horizon": ends,
-        "ends because": record.reason or "it is asked for no longer" * (record.valid_until >= scenario.duration),
-        "engines held to it": f"up to {number(min(record.followed_until, record.valid_until, scenario.duration), 6)} s",
+        "ends because": record.reason or "it is asked for no longer" * (record.horizon >= scenario.duration),
+        "horizon of float64": f"up to {number(min(record.float64_horizon, record.horizon, scenario.duration), 6)} s",
         "error bound": f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64",
         "still known": "\n".join(record.remains),
         "collisions": str(int((record.events[:, 3] != 0).sum())),

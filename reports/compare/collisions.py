@@ -219,9 +219,9 @@ def effective_restitution(trajectory: Trajectory, scene: Scene, slowest: float, 
                 below += 1
                 continue
             turned = np.abs(spin[k + 1] - spin[k]) * scene.radius
-            closing, parting = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
+            closing, separating = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
             if closing > max(slowest, 0.0):
-                values.append(parting / closing)
+                values.append(separating / closing)
                 times.append(when)
     return Restitutions(np.array(values), np.array(times), below)
 

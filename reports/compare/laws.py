@@ -140,10 +140,10 @@ def cross(u: Array, v: Array) -> Array:
 
 def deviation(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
     """(k, n) m between the positions in the samples both have; across the nearer edge where the scene wraps."""
-    return lengths(apart(a, b, scene))
+    return lengths(difference(a, b, scene))
 
 
-def apart(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
+def difference(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
     """(k, n, 2) m from b to a, as `deviation`."""
     k = min(len(a), len(b))
     way = a.position[:k] - b.position[:k]

@@ -57,21 +57,21 @@ def energy_created(view: View) -> Value | None:
 
 
 @over_judged
-def energy_apart(view: View) -> Value | None:
+def energy_deviation(view: View) -> Value | None:
     """Root mean square distance of the energy from the truth's range within three steps, over the energy at hand.
 
     Beside an engine: difference of the energies of all disks that are away from their collisions in both (view.py).
     """
-    return Value(_rms(view.energy_apart[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0))
+    return Value(_rms(view.energy_deviation[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0))
 
 
 @over_judged
-def momentum_apart(view: View) -> Value | None:
+def momentum_deviation(view: View) -> Value | None:
     """Root mean square distance of the momentum from the truth's range within three steps, over the sum of m|v|.
 
     Beside an engine: distance of the momenta of all disks that are away from their collisions in both (view.py).
     """
-    return Value(_rms(view.momentum_apart[view.judged.any(axis=1)]) / (scales.momentum(view.scenario) or 1.0))
+    return Value(_rms(view.momentum_deviation[view.judged.any(axis=1)]) / (scales.momentum(view.scenario) or 1.0))
 
 
 @over_judged
@@ -87,7 +87,7 @@ def energy_loss_error(view: View) -> Value | None:
     last, scale = int(np.flatnonzero(view.judged.any(axis=1))[-1]), scales.energy(scenario, view.other) or 1.0
     low, high = view.energy_range
     start = laws.energy(view.played, scenario.scene)[0] - laws.energy(view.other, scenario.scene)[0]
-    excess, width = float(start - view.energy_apart[last]) / scale, (high[last] - low[last]) / scale
+    excess, width = float(start - view.energy_deviation[last]) / scale, (high[last] - low[last]) / scale
     return Value(excess, at=float(view.played.t[last]), note=f"the delay explains {width:.2g}" if width else "")
 
 
@@ -124,28 +124,28 @@ def disks_through_walls(view: View) -> Value | None:
 
 def position_rms(view: View) -> Value | None:
     """Root mean square distance over disks and samples."""
-    return Value(_rms(view.apart))
+    return Value(_rms(view.deviation))
 
 
 def position_rms_radii(view: View) -> Value | None:
     """Root mean square distance over disks and samples, each in radii of its disk."""
-    return Value(_rms(view.apart / view.scenario.scene.radius))
+    return Value(_rms(view.deviation / view.scenario.scene.radius))
 
 
 def position_max(view: View) -> Value | None:
     """Largest distance of any disk in any sample."""
-    return _largest_of_disks(view.apart, view)
+    return _largest_of_disks(view.deviation, view)
 
 
 def position_max_radii(view: View) -> Value | None:
     """Largest distance of any disk in any sample, in radii of that disk; over an edge of the wrap if that is nearer."""
-    return _largest_of_disks(view.apart / view.scenario.scene.radius, view)
+    return _largest_of_disks(view.deviation / view.scenario.scene.radius, view)
 
 
 @over_judged
 def velocity_rms(view: View) -> Value | None:
     """Root mean square over disks and samples of what `velocity_max` is the largest of."""
-    return Value(_rms(view.velocity_apart[view.judged]))
+    return Value(_rms(view.velocity_deviation[view.judged]))
 
 
 @over_judged
@@ -154,22 +154,22 @@ def velocity_max(view: View) -> Value | None:
 
     Beside an engine: from the other's, where the disk has no collision within three steps in either (view.py).
     """
-    return _largest_of_disks(np.where(view.judged, view.velocity_apart, 0.0), view)
+    return _largest_of_disks(np.where(view.judged, view.velocity_deviation, 0.0), view)
 
 
 def angle_rms(view: View) -> Value | None:
     """Root mean square difference of angle over disks and samples."""
-    return Value(_rms(view.angle_apart))
+    return Value(_rms(view.angle_deviation))
 
 
 def angle_max(view: View) -> Value | None:
     """Largest difference of angle of any disk in any sample."""
-    return _largest_of_disks(view.angle_apart, view)
+    return _largest_of_disks(view.angle_deviation, view)
 
 
 def time_to_1pct_s(view: View) -> Value | None:
     """First sample at which some disk is off by more than 1 % of its radius; `inf` if none ever is."""
-    off = view.apart / view.scenario.scene.radius > 0.01
+    off = view.deviation / view.scenario.scene.radius > 0.01
     if not off.any():
         return Value(np.inf, note=f"never within {view.played.t[-1]:g} s")
     k = int(np.argmax(off.any(axis=1)))
@@ -276,10 +276,10 @@ METRICS: dict[str, Metric] = {
     "angle_rms": Metric(angle_rms, "rad", (TRUTH, ENGINE)),
     "time_to_1pct_s": Metric(time_to_1pct_s, "s", (TRUTH, ENGINE), "higher"),
     "momentum_error": Metric(momentum_error, "1", (ITSELF,)),
-    "momentum_apart": Metric(momentum_apart, "1", (TRUTH, ENGINE)),
+    "momentum_deviation": Metric(momentum_deviation, "1", (TRUTH, ENGINE)),
     "angular_momentum_error": Metric(angular_momentum_error, "1", (ITSELF,)),
     "energy_error": Metric(energy_error, "1", (ITSELF, TRUTH)),
-    "energy_apart": Metric(energy_apart, "1", (TRUTH, ENGINE)),
+    "energy_deviation": Metric(energy_deviation, "1", (TRUTH, ENGINE)),
     "energy_created": Metric(energy_created, "1", (ITSELF,)),
     "energy_loss_error": Metric(energy_loss_error, "1", (TRUTH,), "zero"),
     "restitution": Metric(restitution, "1", (ITSELF,), "as stated"),

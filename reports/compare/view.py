@@ -57,7 +57,7 @@ class View:
     rounding: float = FLOAT64
 
     @cached_property
-    def apart(self) -> Array:
+    def deviation(self) -> Array:
         """(k, n) m between the two."""
         assert self.other is not None
         return laws.deviation(self.played, self.other, self.scenario.scene)
@@ -94,7 +94,7 @@ class View:
         return f"{self.judged.sum()} of {samples * (~self.scenario.scene.static).sum()} samples of a disk"
 
     @cached_property
-    def velocity_apart(self) -> Array:
+    def velocity_deviation(self) -> Array:
         """(k, n) m/s between the two, of the truth within the detection delay; nan where it is not judged."""
         assert self.other is not None
         expected = self.other.velocity
@@ -103,7 +103,7 @@ class View:
         return np.where(self.judged, laws.lengths(self.played.velocity - expected), np.nan)
 
     @cached_property
-    def momentum_apart(self) -> Array:
+    def momentum_deviation(self) -> Array:
         """(k,) kg m/s between the momenta of the two, of the truth within the detection delay; nan if not judged.
 
         Beside an engine only those of the disks that are judged are added up.
@@ -123,8 +123,8 @@ class View:
         return energy_range(self.played, self.other, self.jumps, self.dt, self.scenario.scene)
 
     @cached_property
-    def energy_apart(self) -> Array:
-        """(k,) J that the engine has more than the other, as `momentum_apart`."""
+    def energy_deviation(self) -> Array:
+        """(k,) J that the engine has more than the other, as `momentum_deviation`."""
         assert self.other is not None
         if self.jumps is not None:
             energy, (low, high) = laws.energy(self.played, self.scenario.scene), self.energy_range
@@ -138,7 +138,7 @@ class View:
         return np.where(judged.any(axis=1), np.where(judged, apart, 0.0).sum(axis=1), np.nan)
 
     @cached_property
-    def angle_apart(self) -> Array:
+    def angle_deviation(self) -> Array:
         """(k, n) rad between the two."""
         assert self.other is not None
         return np.abs(self.played.angle - self.other.angle)

@@ -59,7 +59,7 @@ def energy(view: View) -> Array | None:
     if view.other is None:
         actual = laws.energy(view.played, scenario.scene)
         return np.abs(actual - actual[0]) / (scales.energy(scenario) or 1.0)
-    return np.abs(view.energy_apart) / (scales.energy(scenario, view.other) or 1.0)
+    return np.abs(view.energy_deviation) / (scales.energy(scenario, view.other) or 1.0)
 
 
 def energy_rise(view: View) -> Array | None:

@@ -119,7 +119,7 @@ class Field {
     return { outline, craters, colour: `rgb(${grey + 10} ${grey} ${grey - 10})`, dark: `rgb(${grey - 34} ${grey - 42} ${grey - 50})` };
   }
 
-  // `flyers`: [{name, at: [[x, y, angle], ...], gone}], the solid one first named by `solid`; `mark`: where one parted.
+  // `flyers`: [{name, at: [[x, y, angle], ...], gone}], the solid one first named by `solid`; `mark`: where one diverged.
   draw(flyers, solid, force, marks) {
     this.last = [flyers, solid, force, marks];
     const pen = this.canvas.getContext("2d");
@@ -187,7 +187,7 @@ class Field {
     });
   }
 
-  // Faint where it is still with the solid one, so that what has parted stands out.
+  // Faint where it is still with the solid one, so that what has diverged stands out.
   drawGhost(pen, flyer, leader) {
     const look = looks[flyer.name];
     pen.strokeStyle = look.dark;  // the sky is dark on any page

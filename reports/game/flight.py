@@ -11,7 +11,7 @@ import numpy as np
 from adapters.engine import Engine
 from adapters.engines import ENGINES
 from adapters.play import RUNAWAY, advance, fault_of, first_collisions, reach, weight_impulse
-from reports.game.parting import Parting, Touches, parting
+from reports.game.divergence import Divergence, Touches, divergence
 from reports.game.pilot import SHIP, Pilot
 from scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
 from scenarios.model import Array, Scenario, State
@@ -50,7 +50,7 @@ class Flyer:
         seen: how many of its collisions since then are in `touches`.
         earlier: how many collisions there were before.
         collisions: how many there were since.
-        parting: where it parted from the solid one.
+        divergence: where it diverged from the solid one.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Flyer:
     seen: int = 0
     earlier: int = 0
     collisions: int = 0
-    parting: Parting | None = None
+    divergence: Divergence | None = None
 
 
 class Flight:
@@ -183,10 +183,10 @@ class Flight:
         """Note who parts from the solid one at the end of this frame, and whether the game is won."""
         solid = self.solid
         for ghost in self.flyers:
-            watched = not (ghost is solid or ghost.left or ghost.parting or solid.set_backs or ghost.set_backs)
+            watched = not (ghost is solid or ghost.left or ghost.divergence or solid.set_backs or ghost.set_backs)
             if watched:
                 velocities = solid.state.velocity, ghost.state.velocity
-                ghost.parting = parting(solid.touches, ghost.touches, *velocities, self.frame)
+                ghost.divergence = divergence(solid.touches, ghost.touches, *velocities, self.frame)
         if self.won and self.won_at < 0:
             self.won_at = self.frame
 
@@ -209,8 +209,8 @@ class Flight:
         return {
             "momentum": (mass @ state.velocity[moving]).tolist(),
             "energy": float(mass @ speed2 + inertia @ state.angular_velocity[moving] ** 2) / 2,
-            "ship_apart": float(apart[SHIP]),
-            "apart": float(apart.max()),
+            "ship_deviation": float(apart[SHIP]),
+            "deviation": float(apart.max()),
             "collisions": flyer.earlier + flyer.collisions,
         }
 

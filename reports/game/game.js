@@ -61,9 +61,9 @@ class Game {
   }
 
   stopWhereTheyPart(frame) {
-    const parted = this.field.engines.filter((name, k) => frame.flyers[k].parted && !this.stopped.has(name));
-    parted.forEach((name) => this.stopped.add(name));
-    if (parted.length && by("stop").checked) this.pause(true);
+    const diverged = this.field.engines.filter((name, k) => frame.flyers[k].diverged && !this.stopped.has(name));
+    diverged.forEach((name) => this.stopped.add(name));
+    if (diverged.length && by("stop").checked) this.pause(true);
   }
 
   nameThoseWhoLeave(frame) {
@@ -103,7 +103,7 @@ class Game {
       name: this.field.engines[k], gone: flyer.left,
       at: this.field.radius.map((_, disk) => this.between(before.flyers[k], flyer, disk, this.paused ? 1 : share)),
     }));
-    const marks = after.flyers.flatMap((flyer, k) => flyer.parted ? [this.mark(flyer.parted, this.field.engines[k])] : []);
+    const marks = after.flyers.flatMap((flyer, k) => flyer.diverged ? [this.mark(flyer.diverged, this.field.engines[k])] : []);
     this.sky.draw(flyers, after.solid, after.force, marks);
     recent(this.drawn, [now, performance.now() - began]);
   }
@@ -144,19 +144,19 @@ class Game {
     const put = (name, text) => { if (cell(name).textContent !== text) cell(name).textContent = text; };
     put("momentum", flyer ? flyer.momentum.map((p) => p.toFixed(2)).join(", ") : "");
     put("energy", flyer ? flyer.energy.toFixed(3) : "");
-    put("ship_apart", flyer && !solid ? short(flyer.ship_apart) : "");
-    put("apart", flyer && !solid ? short(flyer.apart) : "");
+    put("ship_deviation", flyer && !solid ? short(flyer.ship_deviation) : "");
+    put("deviation", flyer && !solid ? short(flyer.deviation) : "");
     put("collisions", flyer ? String(flyer.collisions) : "");
-    put("parted", flyer ? this.story(flyer, row.dataset.engine) : "");
-    cell("parted").classList.toggle("gone", Boolean(flyer?.left));
+    put("diverged", flyer ? this.story(flyer, row.dataset.engine) : "");
+    cell("diverged").classList.toggle("gone", Boolean(flyer?.left));
   }
 
   story(flyer, name) {
     if (flyer.left) return `left: ${flyer.left}`;
-    if (!flyer.parted) return "";
-    const { t, i, j, shared, solid_only: mine } = flyer.parted;
+    if (!flyer.diverged) return "";
+    const { t, i, j, shared, solid_only: mine } = flyer.diverged;
     const solid = this.field.engines[this.now.solid];
-    const whose = shared ? "both collide, and part differently" : `only ${shortName(mine ? solid : name)} collides`;
+    const whose = shared ? "both collide, and diverge" : `only ${shortName(mine ? solid : name)} collides`;
     return `${t.toFixed(2)} s, ${pairOf(i, j)}: ${whose}`;
   }
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from adapters.engines import ENGINES
+from reports.game.divergence import DIVERGED
 from reports.game.flight import FRAME, SUBSTEPS
-from reports.game.parting import APART
 from reports.page.documents import looks_as_json, render
 from reports.page.style import look
 from scenarios.model import Scenario
@@ -18,5 +18,5 @@ def game_page(engines: Sequence[str], file: Scenario | None, mark: str) -> str:
     return render(
         "game/game.html.j2", ["game/field.js", "game/game.js"], ["game/game.css"], connects=True,
         rows=ENGINES, flown=list(engines), steps={k: FRAME / k for k in SUBSTEPS}, file=file, looks=looks, mark=mark,
-        apart=APART, looks_json=looks_as_json(looks),
+        diverged=DIVERGED, looks_json=looks_as_json(looks),
     )  # fmt: skip

@@ -92,17 +92,17 @@ class Session:
         return [*force.tolist(), float(sum(thrust.torque for thrust in on))]
 
     def to_json(self, flyer: Flyer) -> dict[str, Any]:
-        """One engine's disks, its measures, and where it parted or why it left."""
-        parted = None
-        if flyer.parting is not None:
-            collision = flyer.parting.collision
-            parted = collision._asdict() | {
+        """One engine's disks, its measures, and where it diverged or why it left."""
+        diverged = None
+        if flyer.divergence is not None:
+            collision = flyer.divergence.collision
+            diverged = collision._asdict() | {
                 "t": (collision.frame + 1) * self.flight.scenario.sample_interval,
-                "shared": flyer.parting.shared, "solid_only": flyer.parting.solid_only,
+                "shared": flyer.divergence.shared, "solid_only": flyer.divergence.solid_only,
             }  # fmt: skip
         return self.flight.measures(flyer) | {
             "x": rounded(flyer.state.position.ravel()), "angle": rounded(flyer.state.angle),
-            "left": flyer.left, "parted": parted, "set_backs": flyer.set_backs,
+            "left": flyer.left, "diverged": diverged, "set_backs": flyer.set_backs,
         }  # fmt: skip
 
     def close(self) -> None:

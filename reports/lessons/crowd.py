@@ -84,7 +84,7 @@ COST = Lesson(
 def field(seed: int, restitution: float) -> Scenario:
     """The exercise's asteroids for 20 s."""
     scene = asteroid_field(seed, 20, restitution)
-    return with_oracle(Scenario("field", "How long can it be followed?", "", scene, 20.0, 1 / 32))
+    return with_oracle(Scenario("field", "How long is it comparable?", "", scene, 20.0, 1 / 32))
 
 
 def show_horizon(settings: Settings) -> Shown:
@@ -104,7 +104,7 @@ def show_horizon(settings: Settings) -> Shown:
         errors = shown.errors()
         charts.insert(0, Chart("Farthest disk from the exact answer", "time in s", "m", errors, "y"))
         facts += [
-            ("the exact answer is followed until", f"{number(float(shown.truth.t[-1]))} s"),
+            ("the exact answer ends at its horizon", f"{number(float(shown.truth.t[-1]))} s"),
             *growth(shown, errors),
         ]
     return Shown(charts, shown.film, facts)

@@ -75,8 +75,8 @@ def pairs(closing: Array, restitution: float) -> Scene:
     )  # fmt: skip
 
 
-def parting(closing: Array) -> Read:
-    """(k,) parting over closing speed of `pairs`, at the end."""
+def separation(closing: Array) -> Read:
+    """(k,) separation over approach speed of `pairs`, at the end."""
     return lambda each: (each.velocity[-1, 1::2, 0] - each.velocity[-1, 0::2, 0]) / closing
 
 
@@ -90,10 +90,10 @@ def show_threshold(settings: Settings) -> Shown:
     closing = np.array([0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0])
     scenario = asked(pairs(closing, settings["e"]), 0.5)
     runs = runs_of(["box2d:shipped"], AblatedReference(threshold=settings["threshold"]), scenario, 4)
-    curves = over(closing, runs, parting(closing))
+    curves = over(closing, runs, separation(closing))
     facts = [*setting_rows(runs, "restitution threshold in m/s"), distance(curves, "box2d:shipped", "")]
     curves.append(Curve(TRUTH, closing, np.full(len(closing), settings["e"])))
-    chart = Chart("Parting over closing speed", "closing speed in m/s", "e of the collision", curves, "x")
+    chart = Chart("Separation over approach speed", "closing speed in m/s", "e of the collision", curves, "x")
     return Shown([chart], filmed(scenario, runs), facts)
 
 
@@ -107,7 +107,7 @@ def show_mixing(settings: Settings) -> Shown:
         runs = runs_of(names[:1], AblatedReference(mixing=settings["rule"]), scenario, 4)
         for run in runs:
             if run.trajectory is not None:
-                found.setdefault(run.name, []).append(float(parting(closing)(run.trajectory)[0]))
+                found.setdefault(run.name, []).append(float(separation(closing)(run.trajectory)[0]))
         if e == SHOWN:
             film = filmed(scenario, runs)
     curves = [Curve(name, stated, found[name], dots=True) for name in names]

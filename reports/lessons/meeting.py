@@ -55,7 +55,7 @@ def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
     share = (1 / m1) / (1 / m1 + 1 / m2)
     closing = float((before.velocity[0] - before.velocity[1]) @ n)
     impulse = -(1 + e) * closing / (1 / m1 + 1 / m2)
-    parting = float((after.velocity[0] - after.velocity[1]) @ n)
+    separating = float((after.velocity[0] - after.velocity[1]) @ n)
     start, end = scene.mass @ before.velocity, scene.mass @ after.velocity
     return [
         ("Detect", f"|x₁ − x₂| = {number(distance)} m < r₁ + r₂ = {number(reach)} m: they overlap by δ = "
@@ -68,7 +68,7 @@ def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
                     f"the solver reports {number(reported)} N s"),
         ("Update", f"v₁' = v₁ + J n/m₁ = {pair(after.velocity[0])} m/s, "
                    f"v₂' = v₂ − J n/m₂ = {pair(after.velocity[1])} m/s; "
-                   f"parting over closing speed: {number(-parting / closing, 6)}"),
+                   f"separation over approach speed: {number(-separating / closing, 6)}"),
         ("Momentum", f"m₁v₁ + m₂v₂ = {pair(start)} before and {pair(end)} kg m/s after: off by "
                      f"{number(float(np.abs(end - start).max()), 2)}"),
     ]  # fmt: skip

@@ -66,7 +66,7 @@ def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None])
 
 
 def momentum(comparison: Comparison) -> Drawing:
-    """Momentum that should not be there; where walls take some up, momentum apart from the truth's."""
+    """Momentum that should not be there; where walls take some up, the deviation of the momentum from the truth's."""
     if violations.knows_impulses(comparison.scenario):
         caption = (
             "Distance of the momentum from P(0) and what weight and thrusts have added since, over the Σ m|v| at hand. "
@@ -79,12 +79,14 @@ def momentum(comparison: Comparison) -> Drawing:
         return Drawing("Momentum", why, None)
     scale, lines = scales.momentum(comparison.scenario) or 1.0, []
     for run, view in views(comparison, comparison.truth):
-        lines.append(Line(run, view.played.t, view.momentum_apart / scale))
+        lines.append(Line(run, view.played.t, view.momentum_deviation / scale))
     caption = (
         "Walls and static disks take up momentum, so no law is broken here: how far the momentum is from the truth's, "
         f"over the Σ m|v| at hand{DELAY}."
     )
-    return Drawing("Momentum apart from the truth's", caption, over_time(comparison, lines, "apart / Σ m|v| at hand"))
+    return Drawing(
+        "Momentum deviation from the truth", caption, over_time(comparison, lines, "deviation / Σ m|v| at hand")
+    )
 
 
 DELAY = ", where a collision up to three steps late or early costs nothing: that is measured by itself"
@@ -127,7 +129,7 @@ def deviation(comparison: Comparison) -> Drawing:
         if held is None:
             return Drawing("Trajectories", "No engine played this scene.", None)
     lines = [
-        Line(run, view.played.t, (view.apart / scene.radius).max(axis=1))
+        Line(run, view.played.t, (view.deviation / scene.radius).max(axis=1))
         for run, view in views(comparison, held.trajectory if held else truth)
         if run is not held
     ]
@@ -135,8 +137,8 @@ def deviation(comparison: Comparison) -> Drawing:
         caption = "Largest distance of any disk from where it truly is, in radii of that disk. Lower is better."
         return Drawing("Trajectory deviation", caption, over_time(comparison, lines, "off the truth (radii)"))
     caption = f"No truth to be off from: how far the disks are from those of {held.name}; neither is the right one."
-    apart = f"apart from {held.name}"
-    return Drawing(apart.capitalize(), caption, over_time(comparison, lines, f"{apart} (radii)"))
+    deviation = f"deviation from {held.name}"
+    return Drawing(deviation.capitalize(), caption, over_time(comparison, lines, f"{deviation} (radii)"))
 
 
 def convergence(comparison: Comparison) -> Drawing:
@@ -183,9 +185,9 @@ def over_time(comparison: Comparison, lines: list[Line], title: str, log: bool =
         return None
     duration, truth = comparison.scenario.duration, comparison.truth
     marks: dict[str, Any] = {}
-    if truth is not None and truth.valid_until < duration:
+    if truth is not None and truth.horizon < duration:
         ink = {"dash": "dot", "width": 1, "color": style.look(style.TRUTH).light}
-        at = {"x": truth.valid_until, "y": 1, "yref": "paper", "showarrow": False, "xanchor": "left", "yanchor": "top"}
+        at = {"x": truth.horizon, "y": 1, "yref": "paper", "showarrow": False, "xanchor": "left", "yanchor": "top"}
         marks["shapes"] = [{"x0": at["x"], "x1": at["x"], "y0": 0, "y1": 1, "yref": "paper", "line": ink}]
         marks["annotations"] = [at | {"text": "truth ends"}]
     if log:  # the start is given to all: its 0 would take up half of the axis and say nothing

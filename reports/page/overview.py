@@ -189,17 +189,17 @@ def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[s
 
 
 def between_engines(comparison: Comparison, names: Sequence[str]) -> dict[str, list[Cell]]:
-    """name -> how far apart its trajectory is from each other name's, at most, in radii; {} if there is no pair."""
+    """name -> the deviation of its trajectory from each other name's, at most, in radii; {} if there is no pair."""
     table = comparison.table
     near = table.dt_s == comparison.middle_dt
-    apart: dict[frozenset[str], float] = {}
+    deviations: dict[frozenset[str], float] = {}
     for row in table[near & (table.metric == MAPPED) & table.versus.isin(list(names))].to_dict("records"):
-        apart[frozenset((f"{row['engine']}:{row['profile']}", str(row["versus"])))] = float(row["value"])
-    if not apart:
+        deviations[frozenset((f"{row['engine']}:{row['profile']}", str(row["versus"])))] = float(row["value"])
+    if not deviations:
         return {}
 
     def cell(one: str, other: str) -> Cell:
-        value = apart.get(frozenset((one, other)))
+        value = deviations.get(frozenset((one, other)))
         return Cell("–") if value is None else Cell(number(value, 2), "", heat(value))
 
     return {one: [cell(one, other) for other in names[:k]] for k, one in enumerate(names)}

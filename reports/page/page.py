@@ -192,8 +192,8 @@ def truth_of(comparison: Comparison) -> str:
     if truth is None:
         return f"none: {scenario.without_truth or 'the scene comes without an exact answer'}"
     ends = "at every sample"
-    if truth.valid_until < scenario.duration:
-        ends = f"up to its horizon at {style.number(truth.valid_until)} s, and no further"
+    if truth.horizon < scenario.duration:
+        ends = f"up to its horizon at {style.number(truth.horizon)} s, and no further"
         ends += f": {truth.reason}" if truth.reason else ""
     return f"exact {ends}" + (f"; off by at most {style.number(truth.error_bound)} m" if truth.error_bound else "")
 

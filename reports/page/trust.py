@@ -36,9 +36,9 @@ def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
 def exact_answers(comparisons: Sequence[Comparison]) -> str:
     """How the exact answers of these scenes were found, and how far off they may be."""
     models = [answered_by(each.scenario) if each.truth is not None else "" for each in comparisons]
-    closed, followed, none = models.count(CLOSED_FORM), models.count(COLLISION_BY_COLLISION), models.count("")
+    closed, event_driven, none = models.count(CLOSED_FORM), models.count(COLLISION_BY_COLLISION), models.count("")
     parts = [f"{closed} of {len(models)} scenes have a closed form"] if closed else []
-    if followed:
+    if event_driven:
         bound = max(
             c.truth.error_bound
             for c, m in zip(comparisons, models)
@@ -46,8 +46,7 @@ def exact_answers(comparisons: Sequence[Comparison]) -> str:
         )
         how = "proven by interval arithmetic" if has_balls() else "computed at two precisions that agree"
         parts.append(
-            f"{followed} are followed from collision to collision in many digits, {how}, and off by at most "
-            f"{number(bound)} m"
+            f"{event_driven} are computed event by event in many digits, {how}, and off by at most {number(bound)} m"
         )
     if none:
         parts.append(f"{none} have no exact answer and no score: only the laws of physics are held against them")
@@ -57,9 +56,9 @@ def exact_answers(comparisons: Sequence[Comparison]) -> str:
 def how_far_they_hold(comparisons: Sequence[Comparison]) -> str:
     """Up to when engines are held to the exact answers of these scenes."""
     ends = {
-        each.scenario.name: (each.truth.valid_until, each.scenario.duration)
+        each.scenario.name: (each.truth.horizon, each.scenario.duration)
         for each in comparisons
-        if each.truth is not None and each.truth.valid_until < each.scenario.duration
+        if each.truth is not None and each.truth.horizon < each.scenario.duration
     }
     if not ends:
         return "Every exact answer holds to the end of its scene."

@@ -22,7 +22,7 @@ from scenarios.truth.exact import CLOSED_FORM, OracleTruth, TruthRecord
 from scenarios.truth.oracle.work import Clock
 
 OK, NONE = "ok", "none"
-FOLLOWED = 0.5  # of the time for an answer: its horizon takes up to three quarters as long as its events
+FOR_EVENTS = 0.5  # of the time for an answer: its horizon takes up to three quarters as long as its events
 SAID = "answer.json"  # in the file of an answer, beside the arrays of its record
 
 
@@ -101,7 +101,7 @@ def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
     """
     reason = f"the limit of {timeout:g} s was reached (a longer --timeout gives more)"
     try:
-        return record_of(open_scene(scene, seed), Clock(FOLLOWED * timeout, reason))
+        return record_of(open_scene(scene, seed), Clock(FOR_EVENTS * timeout, reason))
     except NoTruth as refusal:
         return str(refusal)
 
@@ -110,7 +110,7 @@ def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
     """The oracle's record, as far as a `clock` lets it, or a record of what a closed form says. Raises `NoTruth`."""
     if isinstance(scenario.truth, OracleTruth):
         record = scenario.truth.record(clock)
-        if record.valid_until < scenario.sample_interval:
+        if record.horizon < scenario.sample_interval:
             raise NoTruth(record.reason)
         return record
     if scenario.truth is None:
@@ -121,7 +121,7 @@ def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
     return TruthRecord(
         legs=np.zeros((0, 12)),
         events=np.stack([collisions.t, collisions.i, collisions.j, collisions.impulse, angles], axis=-1),
-        valid_until=truth.valid_until,
+        horizon=truth.horizon,
         error_bound=truth.error_bound,
         bits=53,
         method=CLOSED_FORM,

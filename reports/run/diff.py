@@ -187,7 +187,7 @@ def changed_numbers(before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]
     """Every number that both tables have and that is not the same, and how many are, by engine.
 
     The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric says what is better;
-    how far two engines are apart is neither, and so is a number that is judged in one of the two only.
+    the deviation of two engines is neither, and so is a number that is judged in one of the two only.
     """
     both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
     both["name"] = both.engine + ":" + both.profile

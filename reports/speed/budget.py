@@ -28,7 +28,7 @@ TIME, INTERPLAY, SUM, ALL, TOTAL, UNEXPLAINED = (
 TOTALS = (SUM, ALL, TOTAL)
 COLUMNS = [
     "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "part", "position_radii",
-    "energy", "share", "off_engine_radii", "off_reference_radii", "off_apart_radii", "closed_apart_radii", "note",
+    "energy", "share", "off_engine_radii", "off_reference_radii", "off_deviation_radii", "closed_deviation_radii", "note",
 ]  # fmt: skip
 LIMIT = 0.5  # radii by which end-of-step detection alone may put a disk off: where all is far off, no part adds up to anything
 
@@ -68,14 +68,14 @@ class Offset(NamedTuple):
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
     """A row a part of what puts engine `name` of `MECHANISMS` off in a scene, at this many steps a sample interval.
 
-    Of `COLUMNS`: until_s, how far the scene was followed, horizon_s, how far its exact answer goes, and duration_s, the
-    scene itself; position_radii and energy, the root mean square of what the
+    Of `COLUMNS`: until_s, how far the scene was evaluated, horizon_s, how far its exact answer goes, and duration_s,
+    the scene itself; position_radii and energy, the root mean square of what the
     part changes, the energy in parts of that at hand; share, by which it makes up the position's total (1 in all;
-    negative: it makes up for others); off_engine_radii, off_reference_radii and off_apart_radii: what switching it off
-    changes in the engine, in the reference with all the rest, and how far these two are apart; closed_apart_radii: how
+    negative: it makes up for others); off_engine_radii, off_reference_radii and off_deviation_radii: what switching it
+    off changes in the engine, in the reference with all the rest, and their deviation; closed_deviation_radii: how
     far the flight's part is from its closed form up to the first collision; note: why there are no numbers.
     """
-    at = followed(scene, seed, substeps)
+    at = window_of(scene, seed, substeps)
     scenario, dt = at.scenario, at.dt
     engine, profile = name.split(":")
     known = {"scenario": scenario.name, "seed": seed, "engine": engine, "profile": profile, "dt_s": dt,
@@ -87,7 +87,7 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
         parts, checks = budget.parts(), budget.ablated_in_both()
     except NotPlayed as failure:
         return [known | {"part": TOTAL, "note": str(failure)}]
-    checks[FLIGHT] = {"closed_apart_radii": at.flight_apart(parts[FLIGHT], row_of(name).alpha)}
+    checks[FLIGHT] = {"closed_deviation_radii": at.flight_deviation(parts[FLIGHT], row_of(name).alpha)}
     shares = {part: {"share": each.share_of(parts[TOTAL])} for part, each in parts.items() if part not in TOTALS}
     return [
         known | {"part": part, "position_radii": each.radii, "energy": each.of_energy, "note": ""}
@@ -96,21 +96,21 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
     ]  # fmt: skip
 
 
-def followed(scene: str, seed: int, substeps: int) -> Followed:
+def window_of(scene: str, seed: int, substeps: int) -> Window:
     """The scene up to where end-of-step detection alone puts a disk farther off than `LIMIT`."""
     scenario, truth = held(scene, seed)
-    whole = Followed(scenario, truth, scenario.dt(substeps))
+    whole = Window(scenario, truth, scenario.dt(substeps))
     late = whole.played(with_mechanisms([])).trajectory
     assert late is not None
     off = (laws.deviation(late, truth, scenario.scene) / scenario.scene.radius).max(axis=1)
     last = max(int(np.append(np.flatnonzero(off > LIMIT), len(off))[0]) - 1, 1)
     shorter = replace(scenario, duration=last * scenario.sample_interval)
     # All collisions are kept: one just after the end is near to the last samples, too.
-    return Followed(shorter, replace(cut(truth, last + 1), collisions=truth.collisions), whole.dt)
+    return Window(shorter, replace(cut(truth, last + 1), collisions=truth.collisions), whole.dt)
 
 
 @dataclass(frozen=True)
-class Followed:
+class Window:
     """A scenario, its truth in all of it, and a dt in s."""
 
     scenario: Scenario
@@ -136,12 +136,12 @@ class Followed:
         late."""
         scene, truth, played = self.scenario.scene, self.truth, run.trajectory
         assert played is not None
-        apart = laws.apart(played, truth, scene)[:, ~scene.static] / scene.radius[~scene.static, None]
+        position = laws.difference(played, truth, scene)[:, ~scene.static] / scene.radius[~scene.static, None]
         energy = laws.energy(played, scene) - laws.energy(truth, scene)
         calm = View(self.scenario, self.dt, played, truth).calm
-        return Offset(apart, energy[calm] / (scales.energy(self.scenario) or 1.0))
+        return Offset(position, energy[calm] / (scales.energy(self.scenario) or 1.0))
 
-    def flight_apart(self, part: Offset, alpha: float) -> float:
+    def flight_deviation(self, part: Offset, alpha: float) -> float:
         """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first collision; see `Row.alpha` of the
         engines."""
         truth, scene = self.truth, self.scenario.scene
@@ -153,7 +153,7 @@ class Followed:
 class Budget:
     """The offset of one engine, and its mechanisms, each of which is played once with the same others."""
 
-    def __init__(self, at: Followed, mechanisms: Sequence[Mechanism], total: Offset) -> None:
+    def __init__(self, at: Window, mechanisms: Sequence[Mechanism], total: Offset) -> None:
         self.at, self.mechanisms, self.total = at, mechanisms, total
         self.known: dict[tuple[str, ...], Offset] = {}
 
@@ -187,7 +187,7 @@ class Budget:
                 in_reference = self.reference(self.mechanisms) - self.reference(others)
                 found[mechanism.name] = {
                     "off_engine_radii": in_engine.radii, "off_reference_radii": in_reference.radii,
-                    "off_apart_radii": (in_engine - in_reference).radii,
+                    "off_deviation_radii": (in_engine - in_reference).radii,
                 }  # fmt: skip
         return found
 

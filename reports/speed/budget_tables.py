@@ -26,7 +26,7 @@ class Cell(NamedTuple):
 class Table(NamedTuple):
     """Rows of cells by `engine:profile`, and the notes of those that could not be explained.
 
-    until, horizon, duration: s, up to where the scene was followed, its exact answer goes, and it lasts.
+    until, horizon, duration: s, up to where the scene was evaluated, its exact answer goes, and it lasts.
     """
 
     scenario: str

@@ -20,14 +20,14 @@ STEP, STEP_DISK, FORCE, WRAP_DISK = 1.0e-6, 0.17e-6, 16e-6, 0.75e-6
 READ, READ_DISK, READY = 20e-6, 1.5e-6, 1.5e-3
 LISTENING = 1.5  # times a step where collisions are heard of, too
 STARTING = 12.0  # s until the workers have imported and compiled
-APART = 0.2  # s, to take the error of one engine in one scene apart
+BUDGET = 0.2  # s, for the error budget of one engine in one scene
 PAGE = 8.0  # s
 
 
 def estimate(plan: Plan, measurements: Sequence[Measurement], reach: Reach) -> str:
     """A sentence on how much there is to do and about how long it takes on an idle machine."""
-    apart = APART * len(plan.budget_scenes) * len(set(plan.engines) & set(MECHANISMS))
-    playing = (apart + sum(seconds_to_play(measurement, reach) for measurement in measurements)) / plan.workers
+    budgets = BUDGET * len(plan.budget_scenes) * len(set(plan.engines) & set(MECHANISMS))
+    playing = (budgets + sum(seconds_to_play(measurement, reach) for measurement in measurements)) / plan.workers
     timed = [measurement for measurement in measurements if measurement.seed == plan.seed]
     timing = sum(seconds_to_time(measurement, reach, plan.effort) for measurement in timed)
     timing += seconds_of_sizes(plan.effort) * plan.whole

@@ -17,7 +17,7 @@ COLUMNS = [
 
 
 class Cut(NamedTuple):
-    """A scene that is not followed as far as its exact answer goes; both in s."""
+    """A scene that is not evaluated as far as its exact answer goes; both in s."""
 
     scenario: str
     until: float
@@ -25,15 +25,15 @@ class Cut(NamedTuple):
 
     @property
     def share(self) -> float:
-        """The part of the exact answer that is followed."""
+        """The part of the exact answer that is evaluated."""
         return self.until / self.horizon
 
 
 class Extent(NamedTuple):
-    """How many scenes, the simulated seconds followed and of their exact answers, and those that are cut."""
+    """How many scenes, the simulated seconds evaluated and of their exact answers, and those that are cut."""
 
     scenes: int
-    followed: float
+    evaluated: float
     horizon: float
     cuts: list[Cut]
 
@@ -55,7 +55,7 @@ class Share(NamedTuple):
 
 def explained(budget: pd.DataFrame) -> pd.DataFrame:
     """A row a scene and engine, of `COLUMNS`: its error, what is left of it unexplained (root mean squares), and how
-    far the scene was followed, its exact answer goes, and the scene goes; note: why the engine has no error.
+    far the scene was evaluated, its exact answer goes, and the scene goes; note: why the engine has no error.
     """
     keys = COLUMNS[: COLUMNS.index("error_radii")]
     wide = budget.pivot(index=keys, columns="part", values="position_radii").reindex(columns=[TOTAL, UNEXPLAINED])
@@ -66,7 +66,7 @@ def explained(budget: pd.DataFrame) -> pd.DataFrame:
 
 
 def extent(table: pd.DataFrame) -> Extent:
-    """Over how much of the scenes errors are taken apart; `table` as `explained` gives it."""
+    """Over how much of the scenes errors have a budget; `table` as `explained` gives it."""
     scenes = table.drop_duplicates("scenario")
     rows = zip(scenes.scenario, scenes.until_s.astype(float), scenes.horizon_s.astype(float))
     cuts = [Cut(*row) for row in rows if row[1] < row[2] * (1 - 1e-9)]
@@ -94,7 +94,7 @@ def sentence(table: pd.DataFrame) -> str:
         + (f"; {known.exact} more are below {LEAST:g} radii" if known.exact else "")
         + (f"; {known.failed} were not played" if known.failed else "")
         + f") {known.within[0]} are explained to 1 %, {known.within[1]} to 0.1 %, "
-        f"over {over.followed:.0f} of {over.horizon:.0f} simulated seconds"
+        f"over {over.evaluated:.0f} of {over.horizon:.0f} simulated seconds"
     )
     if not over.cuts:
         return f"{said}: every scene as far as its exact answer goes"

@@ -39,7 +39,7 @@ def held(scene: str, seed: int) -> Held:
         raise NoTruth(scenario.without_truth or "the scene comes without an exact answer")
     truth = scenario.truth(scenario.times)
     if len(truth) < 2:
-        raise NoTruth(f"its exact answer ends at {truth.valid_until:.3g} s, before the first sample")
+        raise NoTruth(f"its exact answer ends at {truth.horizon:.3g} s, before the first sample")
     return Held(replace(scenario, duration=(len(truth) - 1) * scenario.sample_interval), truth)
 
 

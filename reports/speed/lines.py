@@ -101,8 +101,8 @@ class BudgetRow(Row):
     share: Number = 0.0
     off_engine_radii: Length = 0.0
     off_reference_radii: Length = 0.0
-    off_apart_radii: Length = 0.0
-    closed_apart_radii: Length = 0.0
+    off_deviation_radii: Length = 0.0
+    closed_deviation_radii: Length = 0.0
 
 
 class SampleRow(Row):

@@ -20,7 +20,7 @@ RUNS = 20
 def closed_form(scene: str, seed: int) -> dict[str, Any]:
     """scenario, truth: what the harness takes for the truth, closed_us: µs per simulated second of a closed form.
 
-    One followed in many digits is kept on disk, so what it costs cannot be measured by asking again.
+    One computed in many digits is kept on disk, so what it costs cannot be measured by asking again.
     """
     scenario = held(scene, seed).scenario
     if (model := answered_by(scenario)) != CLOSED_FORM or scenario.truth is None:

@@ -114,7 +114,7 @@ def section_of(results: Results, scene: str) -> Section:
     until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
     scored = f" Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends." if until < whole else ""
     wrapping = (points.wrapping > 0).any()
-    apart = (
+    budgets = (
         " Setting disks onto the opposite edge, which an engine without such an edge leaves to Python, is not in it: "
         "hover."
         if wrapping
@@ -124,7 +124,7 @@ def section_of(results: Results, scene: str) -> Section:
         "speed": Drawing(
             "Error against cost",
             f"A point is one dt; halving it goes right.{scored}{spread} Time: median of the rounds, bars the quartiles."
-            f"{floor}{apart}",
+            f"{floor}{budgets}",
             charts.speed(points),
         ),
         "matched": Drawing(
@@ -161,7 +161,7 @@ def budget_section(results: Results) -> dict[str, Any] | None:
         "absent": [name for name in results.names if name not in parts],
         "overview": budget_tables.overview(budget),
         "scenes": [budget_tables.of_scene(budget, scene) for scene in dict.fromkeys(budget.scenario)],
-        "off": budget_tables.ablated_in_both(budget), "closed": float(budget.closed_apart_radii.max()),
+        "off": budget_tables.ablated_in_both(budget), "closed": float(budget.closed_deviation_radii.max()),
     }  # fmt: skip
 
 

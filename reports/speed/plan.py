@@ -80,7 +80,7 @@ class Plan:
 
     @property
     def budget_scenes(self) -> tuple[str, ...]:
-        """Where errors are taken apart: in the scenes asked for, if any are."""
+        """Where errors have a budget: in the scenes asked for, if any are."""
         return self.effort.budget_scenes if self.whole else tuple(self.scenes)
 
     @property

@@ -10,7 +10,7 @@ from adapters.engine import Unsupported
 from adapters.play import Run, fault_of, gather
 from reports.stability.limits import Case
 from reports.stability.phases import EDGE, drawn, phase
-from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_APART, SPRING_GROWS, STRAYS
+from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_DEVIATION, SPRING_GROWS, STRAYS
 from reports.stability.variants import Variant
 from scenarios.families.placing import lay_out
 from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
@@ -142,11 +142,11 @@ ALONE = (
     ),
     Case(
         "scale_up", FAMILY, "How much larger may a scene be made and stay the same?",
-        "scale", "1", (1.0, 3.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3), scaled, SCALED_APART,
+        "scale", "1", (1.0, 3.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3), scaled, SCALED_DEVIATION,
     ),
     Case(
         "scale_down", FAMILY, "How much smaller may a scene be made and stay the same?",
-        "scale", "1", (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3), scaled, SCALED_APART,
+        "scale", "1", (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3), scaled, SCALED_DEVIATION,
     ),
     Case(
         "far_from_origin", FAMILY, "How far from the origin may a disk at 1 m/s be and still fly on?",

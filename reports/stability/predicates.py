@@ -86,8 +86,8 @@ def _collisions_invented(scenario: Scenario, played: Trajectory) -> Reading:
 
 
 def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
-    closing, parting = (float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1]))
-    e = -parting / closing
+    closing, separating = (float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1]))
+    e = -separating / closing
     off = abs(e - scenario.scene.restitution)
     return Reading(off, float(truth_of(scenario).collisions.t[0]), f"the collision is played with e = {e + 0.0:.3g}")
 
@@ -112,7 +112,7 @@ def _velocity_off(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(float(share[worst]), float(true.collisions.t[0]), f"disk {worst} leaves with another velocity")
 
 
-def _scaled_apart(scenario: Scenario, played: Trajectory) -> Reading:
+def _scaled_deviation(scenario: Scenario, played: Trajectory) -> Reading:
     true = truth_of(scenario)
     off = (np.linalg.norm(played.position - true.position, axis=2) / scenario.scene.radius).max(axis=1)
     return Reading(float(off.max()), first_above(played.t, off, 0.25), "here it leaves the path it has at scale 1")
@@ -191,8 +191,8 @@ STRAYS = Predicate("strays", "of the way", 0.01, "a free disk has not gone its w
 VELOCITY_OFF = Predicate(
     "velocity off", "of the speed", 1e-3, "a disk leaves the collision with another velocity", _velocity_off
 )
-SCALED_APART = Predicate(
-    "apart", "radii", 0.25, "the path, scaled back, is not the one that the scene has at scale 1", _scaled_apart
+SCALED_DEVIATION = Predicate(
+    "deviation", "radii", 0.25, "the path, scaled back, is not the one that the scene has at scale 1", _scaled_deviation
 )
 ANGLE_OFF = Predicate("angle off", "of the angle", 0.02, "a free disk does not turn as fast as it spins", _angle_off)
 BOUNCES_OFF = Predicate(

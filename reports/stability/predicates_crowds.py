@@ -39,7 +39,7 @@ def _ejected(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(float(speed[-1]), first_above(played.t, speed, EJECTED.bound), f"thrown at {speed[-1]:.3g} radii/s")
 
 
-def _not_apart(scenario: Scenario, played: Trajectory) -> Reading:
+def _still_overlap(scenario: Scenario, played: Trajectory) -> Reading:
     left = laws.penetration(played, scenario.scene)
     return Reading(float(left[-1]), float(played.t[-1]), f"an overlap of {left[-1]:.3g} radii is left")
 
@@ -77,6 +77,6 @@ STANDS = Predicate(
     "does not stand", "of the bound", 1.0, "a disk sinks by 0.1 radii, or trembles at 0.02 sqrt(g R)", _stands
 )
 EJECTED = Predicate("thrown apart", "radii/s", 0.1, "two disks at rest are given energy", _ejected)
-NOT_APART = Predicate("still overlap", "radii", 0.02, "an overlap is left after a second", _not_apart)
+STILL_OVERLAP = Predicate("still overlap", "radii", 0.02, "an overlap is left after a second", _still_overlap)
 BURSTS = Predicate("bursts", "of the bound", 1.0, "a disk leaves the box, or flies at 10 radii/s", _bursts)
 NOT_AT_REST = Predicate("not at rest", "sqrt(g R)", 0.05, "what should lie still moves", _not_at_rest)

@@ -208,7 +208,7 @@ REASONS = (
     ),
     Reason("long_wrapped_gas", "box2d*", "impulses are rounded to float32, and what is left over adds up", "IEEE 754",
            mechanism=DIGITS),
-    Reason("*_gas", "box2d:matched", "parting contacts aim at 0 and closing ones at e v in one solve",
+    Reason("*_gas", "box2d:matched", "separating contacts aim at 0 and closing ones at e v in one solve",
            "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp", mechanism=IMPULSE),
     Reason("*_gas", "*", "sequential impulses do not solve a cluster of contacts in a step",
            "Catto, Iterative dynamics with temporal coherence, 2005", mechanism=IMPULSE),

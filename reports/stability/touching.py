@@ -38,14 +38,14 @@ class Touching:
     Attributes:
         asks: what happens, in a sentence.
         position: (n, 2) in radii, all touching; disk 0 comes in along x at speed 1.
-        parted: (n, 2) by how much a disk is moved for each radius of gap.
+        displaced: (n, 2) by how much a disk is moved for each radius of gap.
         laws: name -> velocities (n, 2) in units of the incoming speed; several where the order is free.
         source: of the laws.
     """
 
     asks: str
     position: Array
-    parted: Array
+    displaced: Array
     laws: dict[str, list[Array]]
     source: str
 
@@ -123,7 +123,7 @@ TOUCHING = {
 
 def scene_of(one: Touching, gap: float) -> Scenario:
     """Disk 0 flies in and is there in the middle of its fourth step; seen until the last collision is long over."""
-    position = (one.position + gap * one.parted) * RADIUS
+    position = (one.position + gap * one.displaced) * RADIUS
     position[0, 0] -= SPEED * DT * (LEAD + 0.5)
     n = len(position)
     scene = lay_out(

@@ -94,7 +94,7 @@ def similar(
         collisions = was.collisions
         return replace(
             was, t=was.t / tempo, position=was.position * size + by, velocity=was.velocity * (size * tempo),
-            angular_velocity=was.angular_velocity * tempo, valid_until=was.valid_until / tempo,
+            angular_velocity=was.angular_velocity * tempo, horizon=was.horizon / tempo,
             error_bound=was.error_bound * size,
             collisions=Collisions(frozen(collisions.t / tempo), collisions.i, collisions.j, frozen(collisions.impulse * (size * tempo))),
         )  # fmt: skip

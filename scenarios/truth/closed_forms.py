@@ -25,18 +25,18 @@ def answer(
     motion: Motion,
     collisions: Iterable[Collision] = (),
     turning: Motion | None = None,
-    valid_until: float = np.inf,
+    horizon: float = np.inf,
     error_bound: float = 0.0,
     reason: str = "",
 ) -> Trajectory:
-    """An exact motion as the `Trajectory` of `scene` at the times t (k,) s, cut at `valid_until` s.
+    """An exact motion as the `Trajectory` of `scene` at the times t (k,) s, cut at `horizon` s.
 
     motion: position and velocity (k, n, 2) m, m/s. turning: angle and angular velocity (k, n) rad, rad/s;
     left out where nothing turns a disk: it keeps its spin. collisions: those after the last sample are dropped.
     reason: why it is valid no longer.
     """
     angle, angular_velocity = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
-    kept = t <= valid_until
+    kept = t <= horizon
     return Trajectory(
         t=frozen(t[kept]),
         position=frozen(motion[0][kept]),
@@ -44,7 +44,7 @@ def answer(
         angle=frozen(angle[kept]),
         angular_velocity=frozen(angular_velocity[kept]),
         collisions=Collisions.of([collision for collision in collisions if kept.any() and collision[0] <= t[kept][-1]]),
-        valid_until=valid_until,
+        horizon=horizon,
         error_bound=error_bound,
         reason=reason,
     )

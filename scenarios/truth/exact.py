@@ -28,7 +28,7 @@ HEAVY = 4096  # bits that make a step twice as dear as one of few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, COLLISION_BY_COLLISION, NOTHING = "closed form", "collision by collision, in many digits", "nothing"
 COARSE = 0.45  # of the time that is left for both of two precisions: the finer one takes a little longer
-ACCURACY = 1e-12  # radii of the smallest disk, and s; two precisions that differ by more have parted
+ACCURACY = 1e-12  # radii of the smallest disk, and s; two precisions that differ by more have diverged
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class OracleTruth:
         if np.max(t) > one.duration * (1 + 1e-9):
             raise ValueError(f"t = {np.max(t):g} s: the truth of {one.name} is known up to {one.duration:g} s")
         record = self.record()
-        if record.valid_until < one.sample_interval:
+        if record.horizon < one.sample_interval:
             raise NoTruth(record.reason)
         return record.sampled(one.scene, one.thrusts, t)
 
@@ -97,7 +97,7 @@ def computed(
     """
     scene, thrusts = scenario.scene, scenario.thrusts
     if scene.n > MOST_DISKS:
-        raise NoTruth(f"{scene.n} disks are more than the {MOST_DISKS} that are followed in many digits")
+        raise NoTruth(f"{scene.n} disks are more than the {MOST_DISKS} that are computed in many digits")
     if fault := _out_of_scale(scenario):
         raise NoTruth(fault)
     if any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts):
@@ -191,17 +191,17 @@ def two_precisions(
     while True:
         coarse = trace(scene, forced, until, kind(bits), Work(steps(bits), clock, COARSE))
         fine = trace(scene, forced, until, kind(2 * bits), Work(steps(2 * bits), clock))
-        parted, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
+        diverged, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
         if clock.struck and coarse.end < fine.end:
             fine = replace(fine, end=end, reason=coarse.reason, disks=[], outcomes=[], named=[])
-        if parted < end:
-            reason = f"the digits of {2 * bits} bits are used up at t = {parted:.9g} s"
-            fine = replace(fine, end=parted, reason=reason, disks=[], outcomes=[])
+        if diverged < end:
+            reason = f"the digits of {2 * bits} bits are used up at t = {diverged:.9g} s"
+            fine = replace(fine, end=diverged, reason=reason, disks=[], outcomes=[])
         attempts.append((fine, error, 2 * bits))
-        if parted >= end or 2 * bits >= MOST_BITS or clock.struck:
+        if diverged >= end or 2 * bits >= MOST_BITS or clock.struck:
             break
-        needed = ceil(SPARE * bits * until / max(parted, until * bits / MOST_BITS))
+        needed = ceil(SPARE * bits * until / max(diverged, until * bits / MOST_BITS))
         bits = min(max(2 * bits, needed), MOST_BITS // 2)
     best = max(attempts, key=lambda attempt: min(attempt[0].end, until)) if clock.struck else attempts[-1]
     return record_of(scenario, *best, "two-precision")
@@ -230,19 +230,19 @@ def accuracy_of(scenario: Scenario) -> float:
 
 def difference(coarse: Path, fine: Path, until: float, k: Numbers, accuracy: float) -> tuple[float, float]:
     """When the two part, s, or inf: the first event in which they differ by `accuracy` m; the error until then, m."""
-    parted, errors = np.inf, [(0.0, 0.0)]
+    diverged, errors = np.inf, [(0.0, 0.0)]
     end = min(coarse.end, fine.end, until)
     with k.precise():
         for mine, theirs in zip(coarse.legs, fine.legs):
             for leg in mine[len(theirs) :] + theirs[len(mine) :]:
-                parted = min(parted, float(leg.t)) if float(leg.t) < end - ACCURACY else parted
+                diverged = min(diverged, float(leg.t)) if float(leg.t) < end - ACCURACY else diverged
             for one, other in zip(mine, theirs):
                 t = min(float(one.t), float(other.t))
                 if t < end and (error := _apart(one, other, end - t)) > accuracy:
-                    parted = min(parted, t)
+                    diverged = min(diverged, t)
                     break
                 errors.append((t, error if t < end else 0.0))
-    return parted, max((error for t, error in errors if t < parted), default=0.0)
+    return diverged, max((error for t, error in errors if t < diverged), default=0.0)
 
 
 def _apart(one: Leg, other: Leg, left: float) -> float:

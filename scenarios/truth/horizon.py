@@ -1,7 +1,7 @@
 """How long a float64 solver can follow an exact motion: a rounding of the start, carried along to first order.
 
-Motions from starts a rounding apart part exponentially; after that a distance to the exact answer says nothing about a
-solver. The horizon is when that happens. It comes from the oracle's own path: every number of the start may be off by
+Motions from starts a rounding apart diverge exponentially; after that a distance to the exact answer says nothing about
+a solver. The horizon is when that happens. It comes from the oracle's own path: every number of the start may be off by
 2^-52 of the largest, each on its own, and what becomes of it is the derivative of flight and of every collision
 (Dellago, Posch & Hoover, Phys. Rev. E 53, 1485, 1996; with falling disks and rest the same for parabolas and for
 motion along a wall). The derivative is wanted to a few per cent, so it is float64 along a path in many digits. A near
@@ -19,26 +19,26 @@ from scenarios.truth.oracle.bodies import Hop, Leg
 from scenarios.truth.oracle.path import Event, Path
 
 EPS = float(np.finfo(float).eps)
-ASTRAY = 1e-9
-"""Of a disk's radius: the standard deviation of its position from which on it is not followed any more."""
+DIVERGED = 1e-9
+"""Of a disk's radius: the standard deviation of its position from which on it counts as diverged."""
 BOUNCES = 64  # of those that die out so many are looked at; what comes later lasts less than float64 can tell
 
 
-def horizon(scenario: Scenario, path: Path) -> float:
-    """s, until when starts a rounding apart stay together along `path`, see `ASTRAY`; inf: as far as the path goes.
+def float64_horizon(scenario: Scenario, path: Path) -> float:
+    """s, until when starts a rounding apart stay together along `path`, see `DIVERGED`; inf: as far as the path goes.
 
     Contacts that touch are kept touching: what lies on a wall, or on another disk, has no freedom across it.
     """
     nearby = Nearby(scenario, path)
     end = min(path.end, scenario.duration)
     for event in path.events:
-        if float(event.t) >= min(end, nearby.astray):
+        if float(event.t) >= min(end, nearby.diverged):
             break
         if float(event.impulse):  # else a contact begins
             nearby.collide(event)
     for i in nearby.moving:
-        nearby.carry(i, min(end, nearby.astray))
-    return nearby.astray
+        nearby.carry(i, min(end, nearby.diverged))
+    return nearby.diverged
 
 
 def roundings(scene: Scene) -> tuple[Array, Array]:
@@ -79,7 +79,7 @@ class Nearby:
         dx, dv: (n, d, 2) m, m/s, how far each disk is off then, for a rounding of each of d numbers.
         struck, v: (n,) s and (n, 2) m/s, when each disk collided last, and its velocity after that.
         instant: s, when the latest collision was; `late`: (d,) s, by how much each rounding delays it.
-        astray: s, when the first disk is off by too much; inf: none is so far.
+        diverged: s, when the first disk is off by too much; inf: none is so far.
     """
 
     def __init__(self, scenario: Scenario, path: Path) -> None:
@@ -90,7 +90,7 @@ class Nearby:
         self.struck, self.v = np.full(scene.n, -1.0), np.zeros((scene.n, 2))
         self.instant, self.late = 0.0, np.zeros(self.dx.shape[1])
         self.switches = {edge for thrust in scenario.thrusts for edge in (thrust.start, thrust.stop)}
-        self.astray = np.inf
+        self.diverged = np.inf
 
     def carry(self, i: int, until: float) -> None:
         """Bring disk i to `until` s over all of its legs that begin before."""
@@ -101,21 +101,21 @@ class Nearby:
         self.fly(i, until)
 
     def fly(self, i: int, until: float) -> None:
-        """Bring disk i to `until` s on its leg, and note when it goes astray."""
+        """Bring disk i to `until` s on its leg, and note when it diverges."""
         hop = self.path.legs[i][self.leg[i]].hop
         if hop is not None:
             self.bounce(i, hop)
-        here, drift, since, limit = self.dx[i], self.dv[i], until - self.t[i], ASTRAY * self.scene.radius[i]
+        here, drift, since, limit = self.dx[i], self.dv[i], until - self.t[i], DIVERGED * self.scene.radius[i]
         # |dx + dv s|^2 = limit^2, summed over the roundings: they are independent, so that their variances add.
         room, slope, growth = limit**2 - (here**2).sum(), (here * drift).sum(), (drift**2).sum()
         if not room > 0:  # or nan, after a graze that no float64 can follow
-            self.astray = min(self.astray, self.t[i])
+            self.diverged = min(self.diverged, self.t[i])
         elif growth and (s := room / (slope + np.sqrt(slope**2 + growth * room))) < since:
-            self.astray = min(self.astray, self.t[i] + s)
+            self.diverged = min(self.diverged, self.t[i] + s)
         self.dx[i], self.t[i] = here + drift * since, until
 
     def bounce(self, i: int, hop: Hop) -> None:
-        """Note when disk i goes astray across a wall on which its bounces die out; what is left is along the wall.
+        """Note when disk i diverges across a wall on which its bounces die out; what is left is along the wall.
 
         Bounce k begins at u s_k, s_k = (2 / g) (1 - e^k) / (1 - e), with the speed u e^k (`oracle_record.along`): off
         by dt at the first one and by du, it begins dt + du s_k late and lasts 2 du e^k / g longer.
@@ -126,8 +126,8 @@ class Nearby:
         du = self.dv[i] @ normal - g * dt
         begins = 2 / g * (1 - e**k) / (1 - e)
         off = u * e**k * np.abs(dt + begins * du) + 2 * u / g * e ** (2 * k) * np.abs(du)
-        if (far := (off**2).sum(axis=1) > (ASTRAY * self.scene.radius[i]) ** 2).any():
-            self.astray = min(self.astray, self.t[i] + u * float(begins[int(far.argmax()), 0]))
+        if (far := (off**2).sum(axis=1) > (DIVERGED * self.scene.radius[i]) ** 2).any():
+            self.diverged = min(self.diverged, self.t[i] + u * float(begins[int(far.argmax()), 0]))
         for part in (self.dx, self.dv):
             part[i] -= np.outer(part[i] @ normal, normal)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.truth.closed_forms import Collision, answer, world_thrusts
-from scenarios.truth.horizon import ASTRAY, horizon
+from scenarios.truth.horizon import DIVERGED, float64_horizon
 from scenarios.truth.oracle.path import Event, Path
 
 EPS = float(np.finfo(float).eps)
@@ -29,12 +29,12 @@ class TruthRecord:
             normal nx, ny, speed m/s after the first bounce, fall m/s2; else 0. Disk by disk in order of time.
         events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle |v_n| / |v|; an
             impulse of 0 is no collision: from there on the disk rests on the other.
-        valid_until: s; nothing is said of what comes later.
+        horizon: s; nothing is said of what comes later.
         error_bound: m.
         bits: of the numbers it was computed with.
         method: "closed form", "two-precision" (the same with half as many bits) or "certified" (interval arithmetic).
         reason: why it ends where it does.
-        followed_until: s; until then a float64 engine can be held to it, see `horizon.py`.
+        float64_horizon: s; until then a float64 engine can be held to it, see `horizon.py`.
         outcomes: (o, 4) outcome, disk, vx, vy m/s: where the order of simultaneous collisions matters, all ends it may
             have.
         orders: (p, 3) outcome, disk, other: the collisions, in one order, that lead to each.
@@ -43,18 +43,19 @@ class TruthRecord:
 
     legs: Array = field(repr=False)
     events: Array = field(repr=False)
-    valid_until: float
+    horizon: float
     error_bound: float
     bits: int
     method: str
     reason: str
-    followed_until: float = np.inf
+    float64_horizon: float = np.inf
     outcomes: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 4))))
     orders: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 3))))
     remains: tuple[str, ...] = ()
 
     def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
-        """The motion at the times t (k,) s up to where it is known and can be followed; later times are left out."""
+        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64; later times are left
+        out."""
         t = np.asarray(t, float)
         position, velocity = np.empty((len(t), scene.n, 2)), np.empty((len(t), scene.n, 2))
         for i in range(scene.n):
@@ -67,9 +68,9 @@ class TruthRecord:
             (float(at), int(i), int(j), float(kick)) for at, i, j, kick, _ in self.events if kick or not at
         ]
         angles = turning.angle, turning.angular_velocity
-        until, reason = self.valid_until, self.reason
-        if self.followed_until < until:
-            until, reason = self.followed_until, "from there on the rounding of float64 leads any engine elsewhere"
+        until, reason = self.horizon, self.reason
+        if self.float64_horizon < until:
+            until, reason = self.float64_horizon, "from there on the rounding of float64 leads any engine elsewhere"
         return answer(scene, t, (position, velocity), collisions, angles, until, self.error_bound, reason)
 
 
@@ -113,12 +114,12 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         legs=frozen(legs),
         events=frozen(np.array(sorted(rows, key=lambda row: row[:3])).reshape(-1, 5)),
         # The instant at which the answer is lost already belongs to what is not known.
-        valid_until=max(float(np.nextafter(end, 0)), 0.0) if path.reason else np.inf,
+        horizon=max(float(np.nextafter(end, 0)), 0.0) if path.reason else np.inf,
         error_bound=error + ROUNDINGS * reach(legs, min(end, scenario.duration)),
         bits=bits,
         method=method,
         reason=path.reason,
-        followed_until=horizon(scenario, path),
+        float64_horizon=float64_horizon(scenario, path),
         outcomes=frozen(np.array(outcomes).reshape(-1, 4)),
         orders=frozen(np.array(orders).reshape(-1, 3)),
         remains=tuple(remains(scenario.scene, legs, path.disks, end)) if path.disks else (),
@@ -128,18 +129,18 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
 def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
     """The path up to where legs and samples, which are float64, tell it as exactly as is promised.
 
-    What is promised is `ASTRAY` radii of the smallest disk, as it is by that that engines are held to an answer. Far
+    What is promised is `DIVERGED` radii of the smallest disk, as it is by that that engines are held to an answer. Far
     from the origin, and after a long way, the rounding of float64 is more.
     """
     end = min(path.end, scenario.duration) if path.reason else scenario.duration
     legs = legs_of(path, end)
-    room = (ASTRAY * float(scenario.scene.radius.min()) - error) / ROUNDINGS
+    room = (DIVERGED * float(scenario.scene.radius.min()) - error) / ROUNDINGS
     if reach(legs, end) <= room:
         return path
     held, lost = 0.0, end
     for _ in range(64):  # halvings: to the last place of float64
         held, lost = (middle, lost) if reach(legs, middle := (held + lost) / 2) <= room else (held, middle)
-    reason = f"the rounding of float64 is more than {ASTRAY:g} of the smallest radius from t = {held:.9g} s on"
+    reason = f"the rounding of float64 is more than {DIVERGED:g} of the smallest radius from t = {held:.9g} s on"
     return replace(path, end=held, reason=reason, disks=[], outcomes=[], named=[])
 
 

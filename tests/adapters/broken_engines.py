@@ -310,7 +310,7 @@ CAUGHT_BY: dict[type[Engine], str] = {
     GivesLiveView: "read_copies",
     LoadKeepsCollisions: "load_forgets",
     LoadKeepsForce: "load_forgets",
-    SharesOneWorld: "worlds_are_apart",
+    SharesOneWorld: "worlds_are_separate",
     IgnoresCount: "counts_are_steps",
     IgnoresDt: "steps_obey_dt",
     NanAtStep7: "stays_finite",

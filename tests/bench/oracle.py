@@ -66,15 +66,15 @@ def said(one: Scenario, record: TruthRecord) -> Row:
     return {
         "method": record.method, "bits": record.bits, "collisions": len(record.events) - len(rests), "rests": len(rests),
         "first_rest_s": round(float(rests[0]), 6) if len(rests) else "",
-        "horizon_s": round(min(record.valid_until, one.duration), 6), "ends_because": record.reason,
+        "horizon_s": round(min(record.horizon, one.duration), 6), "ends_because": record.reason,
     }  # fmt: skip
 
 
 def growth(one: Scenario, bits: int = 128) -> float:
     """1/s, of the distance of runs with so many and twice as many bits, from 2^-bits to what they may be off."""
     coarse, fine = (trace(one.scene, [], one.duration, digits(each)) for each in (bits, 2 * bits))
-    parted, _ = difference(coarse, fine, one.duration, digits(2 * bits), accuracy_of(one))
-    return (bits * log(2) + log(accuracy_of(one))) / parted
+    diverged, _ = difference(coarse, fine, one.duration, digits(2 * bits), accuracy_of(one))
+    return (bits * log(2) + log(accuracy_of(one))) / diverged
 
 
 def main() -> None:

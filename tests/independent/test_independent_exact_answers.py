@@ -41,9 +41,9 @@ class Compared:
 def compared(scenario: Scenario, motion: Motion, record: TruthRecord) -> Compared:
     """Both up to the end of either."""
     faults = []
-    if record.valid_until < float(motion.end) - (NEAR if motion.reason == "accumulation" else ACCURACY):
-        faults.append(f"the record ends at {record.valid_until} s, the motion goes on to {float(motion.end)} s")
-    end = min(float(motion.end), record.valid_until)
+    if record.horizon < float(motion.end) - (NEAR if motion.reason == "accumulation" else ACCURACY):
+        faults.append(f"the record ends at {record.horizon} s, the motion goes on to {float(motion.end)} s")
+    end = min(float(motion.end), record.horizon)
     own = [(float(e.t), e.i, e.j, float(e.impulse), float(e.cosine)) for e in motion.events]
     unlisted = {e[:3] for e in own if any(e[1:3] == f[1:3] and e[2] < 0 < abs(e[0] - f[0]) < LEAST for f in own)}
     own = [e for e in own if e[0] < end - SHORT and e[:3] not in unlisted]
@@ -59,7 +59,7 @@ def compared(scenario: Scenario, motion: Motion, record: TruthRecord) -> Compare
             faults.append(f"impulse or angle: {e} is {row} in the record")
     # The record is asked past its horizon, too: that is about engines of float64, not about the record.
     times = np.linspace(0, end, 17)[:-1]
-    sampled = replace(record, followed_until=np.inf).sampled(scenario.scene, scenario.thrusts, times)
+    sampled = replace(record, float64_horizon=np.inf).sampled(scenario.scene, scenario.thrusts, times)
     if len(sampled) < len(times):
         faults.append(f"{len(sampled)} of {len(times)} samples")
     distance = 0.0
@@ -131,7 +131,7 @@ def test_a_record_that_is_wrong_in_one_thing_is_noticed(seed: int):
         replace(record, events=changed(3, 2, 1)),
         replace(record, events=changed(3, 3, 1e-6)),
         replace(record, legs=moved),
-        replace(record, valid_until=float(motion.end) / 2),
+        replace(record, horizon=float(motion.end) / 2),
     ]
 
     assert not compared(scenario, motion, record).faults

@@ -105,7 +105,7 @@ def test_at_the_horizon_starts_a_rounding_apart_are_a_billionth_of_a_radius_apar
     scenes = [gas(seed) for seed in range(GASES)] + [catalogue.scenario(name) for name in SUITE]
     lines, found, wrong = [], [], []
     for seed, one in enumerate(scenes):
-        horizon = computed(one).followed_until
+        horizon = computed(one).float64_horizon
         times, distance = distances(one, min(1.15 * horizon, one.duration), DRAWS, seed)
         found.append((times, distance, horizon))
         lines.append(f"{one.name} {horizon:.3f} ({crossing(times, distance):.3f})")

@@ -98,11 +98,11 @@ def test_a_collision_reverses_the_normal_speed_by_e_and_leaves_the_tangential(so
     """A pair that parts already is left alone."""
     disks, world = pair
     before, after, n, impulse = before_and_after(solver, disks, world)
-    closing, parting = ((v[0] - v[1]) @ n for v in (before, after))
+    closing, separating = ((v[0] - v[1]) @ n for v in (before, after))
     tangent = np.array([-n[1], n[0]])
     bound = tolerance(disks, before)
     if closing > 4 * ROUNDING * np.abs(before).max():  # whose sign rounding cannot turn
-        assert abs(parting + world.restitution * closing) <= bound
+        assert abs(separating + world.restitution * closing) <= bound
         assert impulse > 0
     elif closing < -4 * ROUNDING * np.abs(before).max():
         assert (after == before).all()
@@ -161,7 +161,7 @@ def test_the_formula_as_printed_draws_a_separating_pair_together():
         impulse = exercise.collide(disks, 0, 1, World(restitution=0.9, approaching_only=approaching_only))
         assert disks.velocity[:, 0] == pytest.approx(after, abs=4 * ROUNDING)  # 1.9 is rounded
         assert impulse == (0.0 if approaching_only else pytest.approx(-1.9, rel=4 * ROUNDING))
-        assert disks.position[:, 0] == pytest.approx([-0.05, 0.95], abs=4 * ROUNDING)  # parted in either case
+        assert disks.position[:, 0] == pytest.approx([-0.05, 0.95], abs=4 * ROUNDING)  # separated in either case
 
 
 @steady

@@ -30,8 +30,8 @@ def played(scene, dt, steps, variant=ordered):
 def exact(scene, t):
     """Positions (n, 2) m at t s by the oracle, in many digits."""
     record = computed(Scenario("probe", "Where?", "here", scene, t, t))
-    assert record.valid_until >= t
-    return replace(record, followed_until=np.inf).sampled(scene, (), np.array([0.0, t])).position[-1]
+    assert record.horizon >= t
+    return replace(record, float64_horizon=np.inf).sampled(scene, (), np.array([0.0, t])).position[-1]
 
 
 def off(scene, t, rate, variant=ordered):

@@ -69,7 +69,7 @@ def test_truth_has_one_state_a_sample_up_to_its_horizon(name):
     """All arrays have the shapes of `Trajectory`; no collision lies beyond the last sample."""
     run = scenario(name)
     truth, n = run.truth(run.times), run.scene.n
-    k = int((run.times <= truth.valid_until).sum())
+    k = int((run.times <= truth.horizon).sum())
     assert truth.t.tolist() == run.times[:k].tolist()
     assert truth.position.shape == truth.velocity.shape == (k, n, 2)
     assert truth.angle.shape == truth.angular_velocity.shape == (k, n)

@@ -130,9 +130,9 @@ def test_collisions_lie_at_touching_distance_and_their_impulse_is_the_change_of_
         # Positions and paths of 10 m have a last place of 2e-15; Galperin's weighted axis adds two digits.
         assert abs(gap) < 1e-13
         before, after = (around.velocity[s] + gravity * (collisions.t[k] - times[s]) for s in (step - 1, step))
-        approach, parting = (((v[j] if j >= 0 else 0) - v[i]) @ normal for v in (before, after))
+        approach, separating = (((v[j] if j >= 0 else 0) - v[i]) @ normal for v in (before, after))
         # The same of velocities up to 25 m/s.
-        assert parting == pytest.approx(-scene.restitution * approach, abs=1e-13)
+        assert separating == pytest.approx(-scene.restitution * approach, abs=1e-13)
         for disk, sign in ((i, -1), (j, 1)):
             if disk >= 0:
                 kick = sign * collisions.impulse[k] * normal / scene.mass[disk]
@@ -272,8 +272,8 @@ def test_an_offset_grows_between_static_disks_as_the_horizon_assumes():
     offset = [abs(along[0] * x[0, 1] - along[1] * x[0, 0]) for _, x, _ in simulate(moved, 7.0)][1:]
     # q = 1 + 0.75 / 1.5; after a few bounces only the growing direction is left, while 1e-7 m is still small.
     assert offset[7] / offset[6] == pytest.approx(1.5 + np.sqrt(1.25), rel=1e-3)
-    assert truth.valid_until < run.duration
-    assert truth.t[-1] <= truth.valid_until
+    assert truth.horizon < run.duration
+    assert truth.t[-1] <= truth.horizon
 
 
 def test_a_disk_slides_down_the_incline_in_contact_and_does_not_turn():

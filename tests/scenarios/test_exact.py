@@ -14,7 +14,7 @@ from scenarios.no_truth import NoTruth
 from scenarios.truth import exact as oracle
 from scenarios.truth import record as oracle_record
 from scenarios.truth.exact import computed, with_oracle
-from scenarios.truth.horizon import ASTRAY
+from scenarios.truth.horizon import DIVERGED
 from scenarios.truth.record import TruthRecord
 from tests.reports.compare.metamorphic import Change
 from tests.scenarios.exercise_box import boxed, lasting
@@ -28,7 +28,7 @@ def under_thrust(force: float, away: float = 0.0, duration: float = 2.0) -> Scen
 
 def keeps_its_promise(one: Scenario, record: TruthRecord) -> bool:
     """Whether the error bound is what engines are held to at most; a last place for the sum that it is."""
-    return record.error_bound <= ASTRAY * one.scene.radius.min() * (1 + 1e-12)
+    return record.error_bound <= DIVERGED * one.scene.radius.min() * (1 + 1e-12)
 
 
 @pytest.mark.parametrize(("force", "away"), [(1e6, 0.0), (9e5, 1e3), (1.0, 1e5), (0.0, 1e5), (1e3, 2e5)])
@@ -37,7 +37,7 @@ def test_an_answer_ends_where_float64_cannot_tell_it_any_more(force: float, away
     one = under_thrust(force, away, 20.0)
     record = record_of(one)
     assert keeps_its_promise(one, record)
-    if record.valid_until < one.duration:
+    if record.horizon < one.duration:
         assert "the rounding of float64 is more than 1e-09 of the smallest radius from t = " in record.reason
 
 
@@ -99,29 +99,29 @@ def test_the_horizon_and_the_end_of_an_answer_are_the_same_in_other_units(units:
     new = with_oracle(replace(change.scenario(replace(one, truth=None)), truth=None))
     before, after = computed(one), computed(new)
     # The derivatives of a motion whose start is off by 1e-16, and that is followed until this is 1e-9.
-    assert after.followed_until == pytest.approx(change.time * before.followed_until, rel=1e-6)
-    assert after.valid_until == pytest.approx(change.time * before.valid_until)
+    assert after.float64_horizon == pytest.approx(change.time * before.float64_horizon, rel=1e-6)
+    assert after.horizon == pytest.approx(change.time * before.horizon)
     assert after.reason == before.reason == ""
-    early = before.events[:, 0] < before.followed_until
+    early = before.events[:, 0] < before.float64_horizon
     times, impulses = before.events[early][:, [0, 3]].T
     found = after.events[: early.sum()]
     np.testing.assert_array_equal(found[:, 1:3], before.events[early][:, 1:3])
     np.testing.assert_allclose(found[:, 0], change.time * times, rtol=1e-8)
     np.testing.assert_allclose(found[:, 3], change.mass * change.length / change.time * impulses, rtol=1e-7)
-    assert before.followed_until < 12.0
+    assert before.float64_horizon < 12.0
     assert keeps_its_promise(new, after)
 
 
 def test_a_horizon_by_metres_is_caught(monkeypatch: pytest.MonkeyPatch):
-    """The control: astray by a nanometre, whatever the radius."""
+    """The control: diverged by a nanometre, whatever the radius."""
     change, one = UNITS["lengths x 1000"], with_oracle(lasting(boxed(1), 12.0))
-    monkeypatch.setattr("scenarios.truth.horizon.ASTRAY", 1e-9 / one.scene.radius.max())
+    monkeypatch.setattr("scenarios.truth.horizon.DIVERGED", 1e-9 / one.scene.radius.max())
     before = computed(one)
     monkeypatch.setattr(
-        "scenarios.truth.horizon.ASTRAY", 1e-12 / one.scene.radius.max()
+        "scenarios.truth.horizon.DIVERGED", 1e-12 / one.scene.radius.max()
     )  # of radii a thousand times as large
     after = computed(with_oracle(change.scenario(replace(one, truth=None))))
-    assert after.followed_until < 0.99 * before.followed_until
+    assert after.float64_horizon < 0.99 * before.float64_horizon
 
 
 def test_the_answer_up_to_the_bound_of_work_is_kept_and_says_so(monkeypatch: pytest.MonkeyPatch):
@@ -138,7 +138,7 @@ def test_the_answer_up_to_the_bound_of_work_is_kept_and_says_so(monkeypatch: pyt
     monkeypatch.setattr(oracle, "WORK", 400)
     record = computed(one)
     assert record.reason.startswith("the work allowed for an answer in ")
-    assert 10 < record.valid_until < 100
+    assert 10 < record.horizon < 100
     truth = record.sampled(scene, (), one.times)
-    assert truth.t[-1] == np.floor(record.valid_until)
+    assert truth.t[-1] == np.floor(record.horizon)
     assert keeps_its_promise(one, record)

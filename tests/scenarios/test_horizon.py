@@ -12,9 +12,9 @@ import pytest
 from scenarios.catalogue import scenario
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scenario, Scene, Thrust
-from scenarios.truth import horizon as of_horizon
+from scenarios.truth import float64_horizon as of_horizon
 from scenarios.truth.exact import computed
-from scenarios.truth.horizon import ASTRAY, EPS, Nearby, horizon, roundings
+from scenarios.truth.horizon import DIVERGED, EPS, Nearby, float64_horizon, roundings
 from scenarios.truth.oracle.events import trace
 from scenarios.truth.oracle.numbers import digits
 from scenarios.truth.oracle.path import Path
@@ -54,7 +54,7 @@ def carried(one: Scenario) -> Array:
 
 def ends(one: Scenario) -> Array:
     """(n, 2) m, the positions at the end."""
-    free = replace(record_of(one, path_of(one), 0.0, 300, ""), followed_until=np.inf)
+    free = replace(record_of(one, path_of(one), 0.0, 300, ""), float64_horizon=np.inf)
     assert not free.reason
     return free.sampled(one.scene, one.thrusts, np.array([0.0, one.duration])).position[-1]
 
@@ -133,9 +133,9 @@ def test_the_derivatives_of_these_motions_pass_every_kind_of_change():
 @pytest.mark.parametrize(("name", "seed"), [("asteroids", 0), ("gas_of_100", 0), ("falling_box", 0)])
 def test_at_the_horizon_moved_starts_are_as_far_off_as_it_says(name: str, seed: int):
     """Twelve starts in many digits, each number a unit in the last place up or down: the disk that is off the most is
-    off by `ASTRAY` radii, root mean square. Twelve draws tell that to 20 %, and the largest of many is taken."""
+    off by `DIVERGED` radii, root mean square. Twelve draws tell that to 20 %, and the largest of many is taken."""
     one = scenario(name, seed)
-    until = float(computed(one).followed_until)
+    until = float(computed(one).float64_horizon)
     one = replace(one, duration=until, sample_interval=until)
     here, dx, off = ends(one), roundings(one.scene), []
     for number in range(12):
@@ -144,7 +144,7 @@ def test_at_the_horizon_moved_starts_are_as_far_off_as_it_says(name: str, seed: 
             one.scene, position=one.scene.position + signs @ dx[0], velocity=one.scene.velocity + signs @ dx[1]
         )
         off.append(((ends(replace(one, scene=there)) - here) ** 2).sum(axis=1))
-    assert 0.5 < (np.sqrt(np.mean(off, axis=0)) / (ASTRAY * one.scene.radius)).max() < 2
+    assert 0.5 < (np.sqrt(np.mean(off, axis=0)) / (DIVERGED * one.scene.radius)).max() < 2
 
 
 ROW = lay_out(
@@ -156,24 +156,24 @@ ROW = lay_out(
 
 def test_what_touches_at_the_start_has_the_horizon_of_small_gaps():
     """A row of three: it used to have none, since a start moved by a rounding overlaps."""
-    touching = computed(asked(ROW, 12.0)).followed_until
+    touching = computed(asked(ROW, 12.0)).float64_horizon
     apart = replace(ROW, position=ROW.position + np.outer(np.arange(6) > 1, [1e-9, 0]) * [[0], [0], [1], [2], [0], [0]])
 
     assert 2.0 < touching < 12.0
-    assert computed(asked(apart, 12.0)).followed_until == pytest.approx(touching, rel=0.02)
+    assert computed(asked(apart, 12.0)).float64_horizon == pytest.approx(touching, rel=0.02)
 
 
 def test_motions_that_are_not_chaotic_are_followed_to_their_end():
     """Rows, single balls, what comes to rest."""
     for name in ("bouncing_ball_e09", "rest_on_floor", "column_of_ten", "galperin_31", "cradle_touching", "line_gas"):
         one = scenario(name)
-        assert horizon(one, path_of(one)) == np.inf
+        assert float64_horizon(one, path_of(one)) == np.inf
 
 
 def test_the_horizon_does_not_depend_on_the_units_of_length_and_time():
     """Lengths times 1024, times divided by 8: powers of two, so that nothing is rounded otherwise."""
     one = lasting(boxed(1), 12.0)
-    until = computed(one).followed_until
+    until = computed(one).float64_horizon
     scene = one.scene
     wide = replace(
         scene, position=scene.position * 1024, velocity=scene.velocity * 1024, radius=scene.radius * 1024,
@@ -182,9 +182,9 @@ def test_the_horizon_does_not_depend_on_the_units_of_length_and_time():
     fast = replace(scene, velocity=scene.velocity * 8)
 
     assert until < 12.0
-    assert computed(replace(one, scene=wide)).followed_until == pytest.approx(until, rel=1e-9)
+    assert computed(replace(one, scene=wide)).float64_horizon == pytest.approx(until, rel=1e-9)
     quick = replace(one, scene=fast, duration=1.5, sample_interval=1.5 / 100)
-    assert computed(quick).followed_until == pytest.approx(until / 8, rel=1e-9)
+    assert computed(quick).float64_horizon == pytest.approx(until / 8, rel=1e-9)
 
 
 def test_the_exact_answer_shares_no_code_with_the_event_engine():

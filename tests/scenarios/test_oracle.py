@@ -30,7 +30,7 @@ def asked(scene: Scene, duration: float = 2.0, **fields) -> Scenario:
 
 def states(scene: Scenario, record: TruthRecord):
     """The trajectory of a record at the scenario's samples, beyond the horizon of float64, too."""
-    return replace(record, followed_until=np.inf).sampled(scene.scene, scene.thrusts, scene.times)
+    return replace(record, float64_horizon=np.inf).sampled(scene.scene, scene.thrusts, scene.times)
 
 
 def drawn(seed: int, n: int = 5, restitution: float = 1.0, gravity: float = 0.0, **fields) -> Scene:
@@ -219,7 +219,7 @@ def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):
     one = scenario("falling_box")
     record = computed(one)
 
-    assert 0.1 < record.valid_until < one.duration
+    assert 0.1 < record.horizon < one.duration
     assert "used up" in record.reason
     whole = one.truth(one.times)
     k = len(states(one, record))

@@ -71,10 +71,10 @@ def test_the_truth_ends_where_there_is_no_more_of_it(scene: Scene, until: float,
     one = asked(scene, 4.0)
     record = computed(one)
 
-    assert record.valid_until == pytest.approx(until, rel=1e-15)
+    assert record.horizon == pytest.approx(until, rel=1e-15)
     assert reason in record.reason
     assert f"at t = {until:.4g}"[:10] in record.reason
-    assert states(one, record).t[-1] <= record.valid_until
+    assert states(one, record).t[-1] <= record.horizon
     assert states(one, record).reason == record.reason
 
 
@@ -130,7 +130,7 @@ def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_collisions():
         np.testing.assert_allclose(end[3 - first], (0.375, -mirror * np.sqrt(3) / 8), rtol=0, atol=1e-15)
     for k in (0, 1):
         assert {*map(tuple, record.orders[record.orders[:, 0] == k, 1:].tolist())} <= {(0, 1), (0, 2), (1, 0), (2, 0)}
-    assert states(one, record).t[-1] < record.valid_until  # none of them is scored
+    assert states(one, record).t[-1] < record.horizon  # none of them is scored
 
 
 def test_a_squeeze_of_unequal_masses_has_two_outcomes():
@@ -211,7 +211,7 @@ def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
         (with_oracle(asked(BREAK, 4.0)), "(2 outcomes)"),
         (scenario("disk_between_static_disks"), "the unstable orbit"),
     ):
-        until = one.truth(one.times).valid_until
+        until = one.truth(one.times).horizon
         before, after = np.array([0.0, until * 0.99]), np.array([until * 1.01])
 
         assert len(truth_at(one, before)) == 2

@@ -127,7 +127,7 @@ def test_a_file_reads_as_it_is_written() -> None:
     assert (bumper.name, bumper.source, bumper.substeps) == ("bumper", "bumper.toml", (2, 6))
     assert bumper.asks == "What do the engines make of bumper?"
     assert bumper.truth is not None
-    assert bumper.truth(bumper.times).valid_until == np.inf
+    assert bumper.truth(bumper.times).horizon == np.inf
     assert bumper.scene.mass.tolist() == [np.inf, 1.0]
     assert bumper.scene.inertia.tolist() == [np.inf, 0.0625]
     assert bumper.scene.walls.shape == (5, 2, 2)

@@ -62,7 +62,7 @@ def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def begins_as(short: TruthRecord, whole: TruthRecord) -> bool:
     """Whether all that the shorter record has is in the longer one, to the bit."""
-    until = short.valid_until
+    until = short.horizon
     here, there = (record.legs[record.legs[:, 1] <= until] for record in (short, whole))
     events, others = (record.events[record.events[:, 0] <= until] for record in (short, whole))
     return np.array_equal(here, there) and np.array_equal(events, others, equal_nan=True)
@@ -76,7 +76,7 @@ def test_an_answer_that_time_ends_is_the_beginning_of_the_whole_one(kind: Callab
     short, whole = computed(boxed(), kind, clock), computed(boxed(), kind)
 
     assert clock.struck
-    assert 2.0 < short.valid_until < 0.9 * boxed().duration
+    assert 2.0 < short.horizon < 0.9 * boxed().duration
     assert short.reason.startswith(f"{REASON} at t = ")
     assert whole.reason == ""
     assert len(short.events) > 5
@@ -99,7 +99,7 @@ def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: flo
     """Whichever attempt in how many bits the time ended: it is within the error bounds of the whole answer."""
     one = scenario("line_gas")
     short, whole = computed(one, kind, Clock(seconds, REASON)), computed(one, kind)
-    until = min(short.valid_until, whole.valid_until, one.duration)
+    until = min(short.horizon, whole.horizon, one.duration)
     t = np.linspace(0.0, max(until - 1e-9, 0.0), 200)
     here, there = (record.sampled(one.scene, one.thrusts, t) for record in (short, whole))
     known = min(len(here), len(there))
@@ -114,7 +114,7 @@ def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: flo
 def test_more_time_never_gives_less():
     """Of several attempts the one that got farthest counts, not the one that was under way."""
     one = scenario("line_gas")
-    reached = [min(computed(one, None, Clock(float(s), REASON)).valid_until, one.duration) for s in range(20, 380, 60)]
+    reached = [min(computed(one, None, Clock(float(s), REASON)).horizon, one.duration) for s in range(20, 380, 60)]
 
     assert reached == sorted(reached)
     assert reached[0] < reached[-1]
@@ -145,7 +145,7 @@ def test_what_depends_on_the_machine_is_not_kept(tmp_path: Path, monkeypatch: py
     whole = record_of(one)
     assert whole.reason == ""
     assert truth_cache.look_up(truth_cache.key_of(one, has_balls())) is not None
-    assert record_of(one, Clock(0.0, REASON)).valid_until == whole.valid_until  # it is there already
+    assert record_of(one, Clock(0.0, REASON)).horizon == whole.horizon  # it is there already
 
 
 @pytest.mark.usefixtures("ticking")
@@ -165,6 +165,6 @@ def test_an_endless_scene_is_answered_up_to_the_limit_of_time(tmp_path: Path, mo
     said = json.loads(done.stdout)
 
     assert done.returncode == 0
-    assert 1.0 < said["valid_until_s"] < said["duration_s"]
+    assert 1.0 < said["horizon_s"] < said["duration_s"]
     assert "the limit of 10 s was reached (a longer --timeout gives more) at t = " in said["reason"]
     assert not (tmp_path / "cache").exists()

@@ -74,9 +74,9 @@ class Ahead:
     def _time_to_body(self, contact: Contact, now: Number, limit: float) -> Number | None:
         bodies, i, j = self.bodies, contact.i, contact.j
         pair = (min(i, j), max(i, j))
-        parted = bodies.parted.get(pair) == (bodies.count[pair[0]], bodies.count[pair[1]])
+        separated = bodies.separated.get(pair) == (bodies.count[pair[0]], bodies.count[pair[1]])
         alike = bodies.kind[i] == bodies.kind[j]
-        if parted and alike:
+        if separated and alike:
             return None
         (x, y, u, v), (px, py, pu, pv) = bodies.state_at(i, now), bodies.state_at(j, now)
         dx, dy, du, dv = px - x, py - y, pu - u, pv - v
@@ -84,7 +84,7 @@ class Ahead:
         c, b, a2 = dx * dx + dy * dy - reach * reach, dx * du + dy * dv, du * du + dv * dv
         if alike:
             return meeting(self.k, c, b, a2)
-        if parted and (bodies.legs[i].t is now or bodies.legs[j].t is now):
+        if separated and (bodies.legs[i].t is now or bodies.legs[j].t is now):
             c = self.k.exact(0.0)
         ax, ay = bodies.legs[j].ax - bodies.legs[i].ax, bodies.legs[j].ay - bodies.legs[i].ay
         gap = [c, 2 * b, a2 + dx * ax + dy * ay, du * ax + dv * ay, (ax * ax + ay * ay) / 4]

@@ -70,7 +70,7 @@ class Bodies:
         shape: (b,) whether each leg is a point, a straight line or a parabola.
         asleep: (b,) whose bounces die out untouched, so that nothing need be asked of them.
         held: (b,) the contacts each rests on: gap 0, no speed and no acceleration across it.
-        parted: pairs that touched, and did not approach, when the two had had so many events.
+        separated: pairs that touched, and did not approach, when the two had had so many events.
         leaning: (b,) the same of walls, at the start of the leg.
         matter: masses and restitution.
     """
@@ -101,7 +101,7 @@ class Bodies:
         inverse = [nought if m is None else exact(1.0) / m for m in mass] + [nought] * len(ends)
         self.matter = Matter(k, inverse, exact(scene.restitution), scene.restitution == 0)
         self.walls = [_frame(k, wall) for wall in scene.walls.tolist()]
-        self.parted: dict[tuple[int, int], tuple[int, int]] = {}
+        self.separated: dict[tuple[int, int], tuple[int, int]] = {}
         self.leaning: list[set[Contact]] = [set() for _ in self.legs]
         self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
 
@@ -202,7 +202,7 @@ class Bodies:
         for contact, _, _ in touches:
             if contact.kind == "body":
                 i, j = sorted((contact.i, contact.j))
-                self.parted[i, j] = self.count[i], self.count[j]
+                self.separated[i, j] = self.count[i], self.count[j]
             elif contact.i in collision or not collision:
                 self.leaning[contact.i].add(contact)
 

@@ -19,7 +19,7 @@ EPS = float(np.finfo(float).eps)
 
 
 class EventTruth:
-    """Times (k,) s -> the `Trajectory` of a scenario by the event engine, cut at `valid_until` s.
+    """Times (k,) s -> the `Trajectory` of a scenario by the event engine, cut at `horizon` s.
 
     It is valid up to the last sample at which all runs from starts a unit in the last place away agree with it, and
     to where the motion has no single continuation; `reason` says which, or is "" if it holds for the duration.
@@ -37,25 +37,25 @@ class EventTruth:
     def __call__(self, t: Array) -> Trajectory:
         """The answer at the times t (k,) s, increasing."""
         scene, thrusts = self.scenario.scene, self.scenario.thrusts
-        motion, collisions, _, _ = self.play(scene, np.asarray(t)[np.asarray(t) <= self.valid_until])
+        motion, collisions, _, _ = self.play(scene, np.asarray(t)[np.asarray(t) <= self.horizon])
         reached = np.asarray(t)[: len(motion[0])]
         turned = world_thrusts(scene, thrusts, reached)
         rows = [(float(at), int(i), int(j), float(impulse)) for at, i, j, impulse in collisions]
         turning = (turned.angle, turned.angular_velocity)
-        return answer(scene, reached, motion, rows, turning, self.valid_until, ERROR_BOUND)
+        return answer(scene, reached, motion, rows, turning, self.horizon, ERROR_BOUND)
 
     @property
-    def valid_until(self) -> float:
+    def horizon(self) -> float:
         """s, the horizon."""
-        return self.horizon[0]
+        return self.ended[0]
 
     @property
     def reason(self) -> str:
         """Why the answer ends there, or ""."""
-        return self.horizon[1]
+        return self.ended[1]
 
     @cached_property
-    def horizon(self) -> tuple[float, str]:
+    def ended(self) -> tuple[float, str]:
         """Until when the runs from nearby starts agree, s, and why no longer."""
         scene, times = self.scenario.scene, self.scenario.times
         (position, _), _, end, reason = self.play(scene, times)
@@ -66,8 +66,8 @@ class EventTruth:
             except NoTruth:  # disks that touch may overlap when they are moved by a unit in the last place
                 return 0.0, "the start itself is decided by rounding: disks or walls touch"
             agree = min(agree, len(other))
-            astray = np.abs(other[:agree] - position[:agree]).max(axis=(1, 2)) > ERROR_BOUND / SAFETY
-            agree = int(astray.argmax()) if astray.any() else agree
+            diverged = np.abs(other[:agree] - position[:agree]).max(axis=(1, 2)) > ERROR_BOUND / SAFETY
+            agree = int(diverged.argmax()) if diverged.any() else agree
         if agree == len(times):
             return float(times[-1]), ""
         if agree == len(position):

@@ -150,7 +150,7 @@ def test_collisions_that_accumulate_are_refused_where_the_exact_answer_ends_too(
         engine.advance(3.0)
     assert "accumulate" in record.reason
     # A bounce that rounding hides takes some 1e-7 s.
-    assert refusal.value.at == pytest.approx(record.valid_until, abs=1e-6)
+    assert refusal.value.at == pytest.approx(record.horizon, abs=1e-6)
     assert engine.spent < 10_000
 
 

@@ -53,7 +53,7 @@ def test_where_nothing_is_chaotic_the_horizon_is_the_duration(name):
     """A start one unit in the last place away leads to the same answer."""
     run = scenario(name)
     truth = float64_truth(run)
-    assert (truth.valid_until, truth.reason) == (run.times[-1], "")
+    assert (truth.horizon, truth.reason) == (run.times[-1], "")
 
 
 @pytest.mark.parametrize(("name", "words"), REFUSED.items())
@@ -68,9 +68,9 @@ def test_the_horizon_of_a_chaotic_scene_is_reported(name):
     """It lies within the duration, and no sample beyond it is given; more samples do not change it."""
     run = scenario(name)
     truth = float64_truth(run)
-    assert 0 < truth.valid_until < run.duration
+    assert 0 < truth.horizon < run.duration
     assert "float64 cannot tell" in truth.reason
-    assert truth(run.times).t[-1] <= truth.valid_until
+    assert truth(run.times).t[-1] <= truth.horizon
     assert truth(run.times).error_bound == 1e-9
 
 
@@ -117,7 +117,7 @@ def test_accumulation_is_refused_with_time_and_disk():
     )  # fmt: skip
     end = 3 * np.sqrt(2 * 1.4 / 9.81)
     truth = float64_truth(Scenario("ball", "", "", fall, 3.0, 0.01))
-    assert truth.valid_until == pytest.approx(end, abs=1e-12)
+    assert truth.horizon == pytest.approx(end, abs=1e-12)
     assert re.search(r"the collisions of disk 0 on disk 1 accumulate at 1\.6027", truth.reason)
     assert truth(np.linspace(0, 3, 301)).t[-1] == 1.6
 

@@ -52,7 +52,7 @@ def test_time_runs_back_at_restitution_one():
 def test_coarse_and_fine_cells_find_the_same_collisions(name):
     """From cells of one diameter to three by three."""
     scene = scenario(name).scene
-    until = 0.7 * float64_truth(scenario(name)).valid_until
+    until = 0.7 * float64_truth(scenario(name)).horizon
     lists = [
         [collision[1:] for collision in collisions_of(state_after(scene, until, cell=cell)[0])]
         for cell in (0.0, 0.37, 9.0)

@@ -90,8 +90,8 @@ def test_free_choices_are_notes():
     """`<=`, a one-sided displacement, an impulse on pairs that part, no guard for equal centres."""
     rows = {row.name: row for row in check_solver(next(path for path in CORRECT if path.name == "one_sided.js"))}
 
-    notes = [rows[name].cause for name in ("touch", "split", "parting", "same centre")]
-    assert {rows[name].verdict for name in ("touch", "split", "parting", "same centre")} == {"note"}
+    notes = [rows[name].cause for name in ("touch", "split", "separating", "same centre")]
+    assert {rows[name].verdict for name in ("touch", "split", "separating", "same centre")} == {"note"}
     assert "compares with <=" in notes[0]
     assert "A alone is moved" in notes[1]
     assert "as the formula is printed" in notes[2]

@@ -114,7 +114,7 @@ class Change:
             t=frozen(t), position=frozen(self.place(old.position, t[:, None])[:, order]),
             velocity=frozen(velocity[:, order]), angle=frozen((self.flip * old.angle + self.turn)[:, order]),
             angular_velocity=frozen((self.flip / self.time * old.angular_velocity)[:, order]),
-            collisions=self.collisions(old, one, dt), valid_until=self.time * old.valid_until,
+            collisions=self.collisions(old, one, dt), horizon=self.time * old.horizon,
             error_bound=self.length * old.error_bound, reason=old.reason,
         )  # fmt: skip
 

@@ -16,7 +16,7 @@ from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.truth.exact import with_oracle
 from tests.reports.compare.answers import beside_truth, truth_of
 
-HELD = ("velocity_max", "velocity_rms", "momentum_apart", "energy_apart")
+HELD = ("velocity_max", "velocity_rms", "momentum_deviation", "energy_deviation")
 
 
 def values(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> list[float]:
@@ -57,7 +57,7 @@ def test_gravity_hides_no_error_of_an_integrator():
     gravity = np.linalg.norm(one.scene.gravity)
     collisions = truth.collisions.t
     played = replace(truth, velocity=truth.velocity - one.scene.gravity * dt)
-    apart = beside_truth(one, dt, played, truth).velocity_apart[1:, 0]
+    apart = beside_truth(one, dt, played, truth).velocity_deviation[1:, 0]
     near = np.abs(truth.t[1:, None] - collisions).min(axis=1) < WINDOW * dt
 
     assert near.sum() > 20
@@ -194,4 +194,4 @@ def test_a_threshold_on_the_grid_is_seen(monkeypatch: pytest.MonkeyPatch):
     for module in (delays, view):
         monkeypatch.setattr(module, "WINDOW", 3.0)
 
-    assert largest_change("momentum_apart") > 1e-6
+    assert largest_change("momentum_deviation") > 1e-6

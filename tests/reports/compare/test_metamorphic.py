@@ -77,7 +77,7 @@ LEFT_OUT = {("boosted", name) for name in WALLED} | {
 }
 # Numbers that belong to a frame: energies and the spin of the whole about a point are others in a moving one.
 OF_A_FRAME = (
-    "energy_error", "energy_apart", "energy_created", "energy_loss_error", "angular_momentum_error",
+    "energy_error", "energy_deviation", "energy_created", "energy_loss_error", "angular_momentum_error",
 )  # fmt: skip
 
 ROUNDING = 1e-9
@@ -150,12 +150,12 @@ def three_steps_away(view: View) -> Value:
 
 def by_a_millimetre(view: View) -> Value:
     """How many disks are off by more than 1 mm in some sample."""
-    return Value(float((view.apart > 1e-3).any(axis=0).sum()))
+    return Value(float((view.deviation > 1e-3).any(axis=0).sum()))
 
 
 def of_the_first_disk(view: View) -> Value:
     """How far the first disk is off."""
-    return _largest_of_disks(view.apart[:, :1], view)
+    return _largest_of_disks(view.deviation[:, :1], view)
 
 
 def along_x(view: View) -> Value:

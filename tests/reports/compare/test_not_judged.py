@@ -22,7 +22,14 @@ from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
-CARRIED = ("velocity_max", "velocity_rms", "momentum_apart", "energy_apart", "energy_error", "energy_loss_error")
+CARRIED = (
+    "velocity_max",
+    "velocity_rms",
+    "momentum_deviation",
+    "energy_deviation",
+    "energy_error",
+    "energy_loss_error",
+)
 NAMES = ("reference:exercise", "pymunk:matched")
 
 
@@ -74,7 +81,9 @@ def test_nothing_is_judged_by_the_start_alone():
     assert (rows.note == f"{NOT_JUDGED}: the start alone").all()
 
 
-@pytest.mark.parametrize("metric", ["velocity_max", "velocity_rms", "momentum_apart", "energy_apart", "energy_error"])
+@pytest.mark.parametrize(
+    "metric", ["velocity_max", "velocity_rms", "momentum_deviation", "energy_deviation", "energy_error"]
+)
 def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
     """Within three steps of its end a truth does not say which velocity may come early: of 3 samples 2 are left at dt
     / 4, none at dt."""
@@ -184,7 +193,7 @@ def test_a_velocity_that_overflows_is_judged_and_bad():
     one, truth = truth_of("wall_to_wall")
     huge = replace(truth, velocity=truth.velocity * 1e200)
     with np.errstate(over="ignore", invalid="ignore"):
-        found = METRICS["energy_apart"].of(beside_truth(one, one.dt(1), huge, truth))
+        found = METRICS["energy_deviation"].of(beside_truth(one, one.dt(1), huge, truth))
 
     assert found is not None
     assert not np.isfinite(found.value)

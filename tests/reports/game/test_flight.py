@@ -207,11 +207,11 @@ def test_the_marker_names_the_first_collision():
     truth = read_truth(scenario)
     t, i, j = truth.collisions.t[0], truth.collisions.i[0], truth.collisions.j[0]
 
-    assert ghost.parting is not None
-    assert (ghost.parting.collision.i, ghost.parting.collision.j) in ((i, j), (j, i))
-    assert ghost.parting.collision.frame == int(t / FRAME)
-    assert ghost.parting.shared
-    assert matched.parting is None or matched.parting.collision.frame > ghost.parting.collision.frame
+    assert ghost.divergence is not None
+    assert (ghost.divergence.collision.i, ghost.divergence.collision.j) in ((i, j), (j, i))
+    assert ghost.divergence.collision.frame == int(t / FRAME)
+    assert ghost.divergence.shared
+    assert matched.divergence is None or matched.divergence.collision.frame > ghost.divergence.collision.frame
 
 
 def read_truth(scenario):  # type: ignore[no-untyped-def]

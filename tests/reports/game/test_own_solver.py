@@ -58,7 +58,7 @@ def test_a_right_solver_flies_as_the_reference_does(browser: Browser, tmp_path: 
     with page_of(browser, solver(tmp_path), monkeypatch) as page:
         page.keyboard.down("w")
         fly(page, 20)
-        reported = page.evaluate("game.now.flyers.map((flyer) => [flyer.left, flyer.ship_apart])")
+        reported = page.evaluate("game.now.flyers.map((flyer) => [flyer.left, flyer.ship_deviation])")
         who = page.locator("tr.solid .who").inner_text()
         wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
 
@@ -82,7 +82,7 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
         fly(page, 30)
         took = monotonic() - began
         banner = page.locator("#banner").inner_text()
-        row = page.locator("tr[data-engine$=':own'] [data-cell=parted]").inner_text()
+        row = page.locator("tr[data-engine$=':own'] [data-cell=diverged]").inner_text()
         solid, frame = page.evaluate("[game.field.engines[game.now.solid], game.now.frame]")
 
     assert frame == 30

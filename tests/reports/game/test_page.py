@@ -114,23 +114,23 @@ def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(pag
     """pymunk as shipped makes e2 of e: it parts at the first collision, whose pair and instant the exact answer
     reports."""
     fly(page, 16)
-    together = [flyer["apart"] for flyer in page.evaluate("game.now.flyers")]
+    together = [flyer["deviation"] for flyer in page.evaluate("game.now.flyers")]
     page.locator("#stop").check()
     page.locator("#pause").click()  # fly on, until it stops by itself
     page.wait_for_function("() => game.paused && game.now.frame > 16", timeout=20_000)
     scenario = read_scene_file(saved(page, tmp_path))
     collisions = scenario.truth(scenario.times).collisions  # type: ignore[misc]
-    parted = page.evaluate("game.now.flyers[1].parted")
-    story = page.locator("tr[data-engine='pymunk:shipped'] [data-cell=parted]").inner_text()
+    diverged = page.evaluate("game.now.flyers[1].diverged")
+    story = page.locator("tr[data-engine='pymunk:shipped'] [data-cell=diverged]").inner_text()
     marks = page.evaluate("game.sky.last[3]")
 
     # A step at the edge: stepping engines set what wraps onto it, and lose what it flew on beyond.
     assert max(together) < 0.71 * FRAME / 16
-    assert {parted["i"], parted["j"]} == {collisions.i[0], collisions.j[0]}
-    assert 0 <= parted["t"] - collisions.t[0] <= 2 * FRAME
-    assert f"{parted['i']} × {parted['j']}: both collide, and part differently" in story
+    assert {diverged["i"], diverged["j"]} == {collisions.i[0], collisions.j[0]}
+    assert 0 <= diverged["t"] - collisions.t[0] <= 2 * FRAME
+    assert f"{diverged['i']} × {diverged['j']}: both collide, and diverge" in story
     assert marks[0]["name"] == "pymunk:shipped"
-    assert page.evaluate("game.now.flyers[1].apart") > 1e-3
+    assert page.evaluate("game.now.flyers[1].deviation") > 1e-3
 
 
 def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Path):

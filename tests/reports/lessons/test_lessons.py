@@ -111,7 +111,7 @@ def test_the_numbers_of_a_collision_are_those_of_the_solver():
     assert reported == pytest.approx(kick, rel=1e-14)
     assert f"the solver reports {reported:.3g} N s" in steps["Impulse"]
     assert f"= {reported:.3g} N s; the solver" in steps["Impulse"]
-    assert "parting over closing speed: 0.9" in steps["Update"]
+    assert "separation over approach speed: 0.9" in steps["Update"]
 
 
 def test_conventions_are_measured():

@@ -146,7 +146,7 @@ def test_the_truth_is_not_drawn_beyond_its_horizon(page: Page, comparisons: list
     truth = comparisons[1].truth
     assert truth is not None
     at = "([name, t]) => { engines[name].seek(t); return engines[name].positions('truth'); }"
-    before, after = (page.evaluate(at, [ORBIT, float(truth.valid_until) + s]) for s in (-0.1, 0.1))
+    before, after = (page.evaluate(at, [ORBIT, float(truth.horizon) + s]) for s in (-0.1, 0.1))
 
     assert before is not None
     assert after is None

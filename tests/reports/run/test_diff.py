@@ -109,7 +109,7 @@ def test_one_bit_in_a_cell_that_is_the_same_is_worse(before: Path, after: Path):
 
 @pytest.mark.parametrize(("factor", "verdict"), [(2.0, "worse"), (0.5, "better")])
 def test_where_versions_differ_the_metric_says_what_is_worse(before: Path, after: Path, factor: float, verdict: str):
-    """A larger error is worse, a smaller better; how far two engines are apart is neither; and there is a warning."""
+    """A larger error is worse, a smaller better; the deviation of two engines is neither; and there is a warning."""
 
     def other_version(line: dict) -> None:
         if "cell" in line:

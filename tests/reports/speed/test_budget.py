@@ -23,7 +23,7 @@ from adapters.mechanisms.table import (
 )
 from reports.compare import scales
 from reports.speed import budget, budget_tables
-from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED, Budget, Offset, budget_of, followed
+from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED, Budget, Offset, budget_of, window_of
 from scenarios.model import Array, State
 
 FLOAT64 = 2.0**-53
@@ -53,16 +53,16 @@ def planted(mechanisms: list[Mechanism]) -> Drifting:
     return Drifting(**parameters)
 
 
-def taken_apart(scene: str, known: list[Mechanism], substeps: int = 4) -> tuple[dict[str, Offset], Budget]:
+def budgeted(scene: str, known: list[Mechanism], substeps: int = 4) -> tuple[dict[str, Offset], Budget]:
     """The budget of the planted engine for somebody who knows only of `known`."""
-    at = followed(scene, 0, substeps)
+    at = window_of(scene, 0, substeps)
     made = Budget(at, known, at.offset(at.played(planted(KNOWN))))
     return made.parts(), made
 
 
 def test_a_planted_engine_gets_its_parts_and_its_bug_is_unexplained():
     """What is left over is the bug to rounding, of every disk in every sample."""
-    parts, made = taken_apart("oblique_e09", KNOWN)
+    parts, made = budgeted("oblique_e09", KNOWN)
     moving = made.at.scenario.scene.radius
 
     left = parts[UNEXPLAINED].position
@@ -75,15 +75,15 @@ def test_a_planted_engine_gets_its_parts_and_its_bug_is_unexplained():
 
 def test_a_mechanism_that_nobody_names_is_unexplained_to_its_size():
     """Negative control: without the restitution rule in the list, what is left over is as large as it and the bug."""
-    known, _ = taken_apart("oblique_e09", KNOWN)
-    missed, _ = taken_apart("oblique_e09", [each for each in KNOWN if each.name != RESTITUTION])
+    known, _ = budgeted("oblique_e09", KNOWN)
+    missed, _ = budgeted("oblique_e09", [each for each in KNOWN if each.name != RESTITUTION])
 
     assert missed[UNEXPLAINED].radii > 0.9 * known[RESTITUTION].radii > 10 * known[UNEXPLAINED].radii
 
 
 def test_the_parts_close_as_vectors_and_agree_with_the_whole():
     """engine - truth = parts + interplay + unexplained, sample by sample; the shares add up to 1."""
-    parts, _ = taken_apart("bouncing_ball_e09", KNOWN)
+    parts, _ = budgeted("bouncing_ball_e09", KNOWN)
     causes = [each for part, each in parts.items() if part not in budget.TOTALS]
     total = parts[TOTAL]
 
@@ -97,14 +97,14 @@ def test_the_parts_close_as_vectors_and_agree_with_the_whole():
 def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
     """x by (alpha - 1/2) dt a t, so that energy is off by -(alpha - 1/2) dt m a2 t, of the energy at hand."""
     rows = pd.DataFrame(budget_of("free_fall", 0, "pymunk:matched", 4)).set_index("part")
-    at = followed("free_fall", 0, 4)
+    at = window_of("free_fall", 0, 4)
     g, t = float(np.linalg.norm(at.scenario.scene.gravity)), at.truth.t
     offset = 0.5 * at.dt * g * t / at.scenario.scene.radius[0]
     energy = 0.5 * at.dt * g**2 * t * at.scenario.scene.mass[0] / scales.energy(at.scenario)
 
     assert rows.loc[FLIGHT].position_radii == pytest.approx(np.sqrt(np.mean(offset**2)), rel=1e-9)
     assert rows.loc[FLIGHT].energy == pytest.approx(np.sqrt(np.mean(energy**2)), rel=1e-9)
-    assert rows.loc[FLIGHT].closed_apart_radii <= 1e-12
+    assert rows.loc[FLIGHT].closed_deviation_radii <= 1e-12
     assert rows.loc[TIME].position_radii <= 1e-12
     assert rows.loc[UNEXPLAINED].position_radii <= 1e-12
 
@@ -121,9 +121,9 @@ def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce()
     assert (wide[DIGITS].dropna() > 0).all()
 
 
-def test_a_scene_is_followed_while_late_collisions_alone_are_near_the_truth():
+def test_a_scene_has_a_budget_while_late_collisions_alone_are_near_the_truth():
     """The asteroids are not played to the end of their truth; one collision head-on is."""
-    at, whole = followed("asteroids", 0, 20), followed("head_on_equal_e09", 0, 4)
+    at, whole = window_of("asteroids", 0, 20), window_of("head_on_equal_e09", 0, 4)
 
     assert 0 < at.truth.t[-1] < 9
     assert at.truth.t[-1] == pytest.approx(at.scenario.duration)

@@ -47,7 +47,7 @@ def test_the_kept_orders_are_those_of_the_code(name: str):
 
 @pytest.mark.parametrize("name", list(MECHANISMS))
 def test_the_kept_budget_is_that_of_the_code(name: str):
-    """One scene: the error and how far it was followed; what is left unexplained may be rounding."""
+    """One scene: the error and how far it was evaluated; what is left unexplained may be rounding."""
     scene = "slow_collision"
     rows = pd.DataFrame(budget_of(scene, 0, name, middle(scene)), columns=budget.COLUMNS)
     now, kept = explained.explained(rows).iloc[0], kept_row(figures.EXPLAINED, scene, name)

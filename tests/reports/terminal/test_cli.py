@@ -146,7 +146,7 @@ def test_truth_prints_the_exact_answer(tmp_path: Path):
     assert len(listed.splitlines()) > 272
     answer = json.loads(crosscheck("truth", "asteroids", "--json", cwd=tmp_path).stdout)
     assert answer["method"] in ("certified", "two-precision")
-    assert (answer["valid_until_s"], answer["reason"], len(answer["collisions"])) == (10.0, "", 20)
+    assert (answer["horizon_s"], answer["reason"], len(answer["collisions"])) == (10.0, "", 20)
 
 
 def test_truth_says_why_there_is_none(tmp_path: Path):

@@ -10,7 +10,7 @@ import numpy as np
 from adapters.engine import Collision
 from scenarios.model import Array, Scene, State
 
-APART = 0.01  # m/s: disks that move on differently by less have not parted, they were found a step early or late
+DIVERGED = 0.01  # m/s: disks that move on differently by less have not diverged, they were found a step early or late
 WAIT = 6  # frames without a collision of a disk before its velocities are compared: engines find a collision some steps apart
 
 
@@ -24,7 +24,7 @@ class LastCollision(NamedTuple):
     y: float
 
 
-class Parting(NamedTuple):
+class Divergence(NamedTuple):
     """Where a ghost left the solid ship's engine: the collision, and whose it was."""
 
     collision: LastCollision
@@ -58,10 +58,10 @@ def contact(position: Array, radius: Array, i: int, j: int) -> tuple[float, floa
     return float(x), float(y)
 
 
-def parting(solid: Touches, ghost: Touches, velocity: Array, other: Array, frame: int) -> Parting | None:
+def divergence(solid: Touches, ghost: Touches, velocity: Array, other: Array, frame: int) -> Divergence | None:
     """The collision after which the velocities (n, 2) m/s of solid and ghost differ, if they do by frame `frame`."""
     latest = np.maximum(solid.frame, ghost.frame)
-    apart = np.hypot(*(velocity - other).T) > APART
+    apart = np.hypot(*(velocity - other).T) > DIVERGED
     found = np.flatnonzero(apart & (latest >= 0) & (frame - latest >= WAIT))
     if not len(found):
         return None
@@ -71,4 +71,4 @@ def parting(solid: Touches, ghost: Touches, velocity: Array, other: Array, frame
     solid_later = mine is not None and (theirs is None or mine.frame >= theirs.frame)
     collision = mine if both or solid_later else theirs
     assert collision is not None
-    return Parting(collision, both, not both and solid_later)
+    return Divergence(collision, both, not both and solid_later)
