@@ -57,9 +57,9 @@ class Box2DV3:
 
     `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap. The length unit is half of
     the smallest radius: slop and speculative margin are shares of it, and a larger margin foresees more collisions, but
-    this is the largest that invents none where two disks pass at 1 % of a radius. Contacts are as stiff as the engine
-    lets them be, an eighth of the substeps a second. The values are `MATCHED`, by `crosscheck tune`. The cap on spins
-    cannot be lifted: a scene that reaches it is refused.
+    this is the largest without a spurious collision where two disks pass at 1 % of a radius. Contacts are as stiff as
+    the engine lets them be, an eighth of the substeps a second. The values are `MATCHED`, by `crosscheck tune`. The cap
+    on spins cannot be lifted: a scene that reaches it is refused.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the profile's),
     `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.

@@ -10,9 +10,9 @@ from adapters.engine import FLOAT32, FLOAT64, Engine, Row
 
 def _exercise() -> Engine:
     from adapters.reference import Reference
-    from reference_impl import crowd
+    from reference_impl import verlet_list
 
-    return Reference(crowd)
+    return Reference(verlet_list)
 
 
 def _lesson() -> Engine:
@@ -85,7 +85,7 @@ ENGINES: dict[str, Row] = {
         "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction", 0.625, FLOAT32
     ),
     "event_driven:float64": Row(
-        _event_driven, "from collision to collision without steps: parabolas and contact times, in float64", 0.5, FLOAT64
+        _event_driven, "event by event without steps: parabolas and contact times, in float64", 0.5, FLOAT64
     ),
 }  # fmt: skip
 

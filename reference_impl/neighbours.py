@@ -1,8 +1,8 @@
-"""Which disks are near each other, and which are near a wall, so that a crowd need not ask every pair in every step.
+"""Which disks are near each other, and which are near a wall, so that many disks need not ask every pair in every step.
 
-A list of the near pairs (Verlet, Phys. Rev. 159, 98, 1967), found by cells. It decides what is asked, never what is
+A neighbour list (Verlet, Phys. Rev. 159, 98, 1967), found by cells. It decides what is asked, never what is
 answered: the pairs stand in the order of the double loop over i < j, and one that is left out cannot touch as long as
-both of its disks are on the leash.
+neither of its disks has moved by half the skin.
 """
 
 from math import floor, sqrt
@@ -14,17 +14,17 @@ from reference_impl.compiled import compiled, kernel
 from reference_impl.state import Disks, World
 
 LASTS = 16  # steps of the fastest disk that a list is made for, unless fewer are left
-THIN, THICK = 0.125, 2.0  # the skin in mean radii: at least, so that a crowd at rest may fall; at most
+THIN, THICK = 0.125, 2.0  # the skin in mean radii: at least, so that disks at rest may fall; at most
 FAR = 2.0**31  # cells from the origin, up to where rounding cannot put a disk into the wrong one
 ROOM = 32  # near pairs a disk, beyond which a list is given up
 
 
-class Near(NamedTuple):
-    """What may touch as long as no disk is farther than `leash` from its home."""
+class NeighbourList(NamedTuple):
+    """What may touch as long as no disk is farther than `half_skin` from its home."""
 
     listed: bool  # False: too dense or too far out for a list, so everything may touch
     home: np.ndarray  # (2n,) m: where the disks were when this was found, x and y in turn
-    leash: float  # m
+    half_skin: float  # m
     first: np.ndarray  # (p,) the near pairs, first < second, in the order of the double loop
     second: np.ndarray  # (p,)
     reach2: np.ndarray  # (p,) m2: squared sum of the radii
@@ -33,10 +33,10 @@ class Near(NamedTuple):
 
 
 @compiled
-def look_around(disks: Disks, world: World, dt: float, left: int) -> Near:
+def build_list(disks: Disks, world: World, dt: float, left: int) -> NeighbourList:
     """All pairs that are apart by less than a skin, and the disks within half a skin of a wall; `left` steps to go.
 
-    Both disks of a pair may use up half of the skin. The leash is a little less than that: 2 % of the skin are more
+    Both disks of a pair may use up half of the skin. `half_skin` is a little less than that: 2 % of the skin are more
     than what rounding makes of all the distances.
     """
     x, radius = disks.position, disks.radius
@@ -47,7 +47,7 @@ def look_around(disks: Disks, world: World, dt: float, left: int) -> Near:
     reach2 = (radius[first] + radius[second]) ** 2
     listed = len(cells.disk) > 0 and len(first) <= ROOM * len(x)
     disk, wall = near_walls(x, radius, 0.5 * skin, world.walls)
-    return Near(listed, x.copy().reshape(-1), 0.49 * skin, first, second, reach2, disk, wall)
+    return NeighbourList(listed, x.copy().reshape(-1), 0.49 * skin, first, second, reach2, disk, wall)
 
 
 @kernel
@@ -63,10 +63,10 @@ def skin_for(disks: Disks, dt: float, left: int) -> float:
 
 
 @kernel
-def astray(x, home, i: int, leash: float) -> bool:  # type: ignore[no-untyped-def]
-    """Whether disk i is farther from its home than the leash; x (2n,) m, as `home`: rows of two are no vectors."""
+def beyond_skin(x, home, i: int, half_skin: float) -> bool:  # type: ignore[no-untyped-def]
+    """Whether disk i is farther from its home than half the skin; x (2n,) m, as `home`: rows of two are no vectors."""
     dx, dy = x[2 * i] - home[2 * i], x[2 * i + 1] - home[2 * i + 1]
-    return dx * dx + dy * dy > leash * leash
+    return dx * dx + dy * dy > half_skin * half_skin
 
 
 class Cells(NamedTuple):

@@ -70,7 +70,7 @@ def fly(disks: Disks, world: World, acceleration, dt: float) -> None:  # type: i
 def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[no-untyped-def]
     """Move disk i, and keep what rounding cuts off for the next time (Kahan, Comm. ACM 8, 40, 1965).
 
-    Hundreds of small steps would else round ten times as much as the few flights from collision to collision that they
+    Hundreds of small steps would else round ten times as much as the few flights event by event that they
     are.
     """
     before, way = x[i, axis], way + remainder[i, axis]

@@ -29,7 +29,7 @@ Dts = Annotated[
     list[float] | None, typer.Option("--dt", metavar="S", help="Step in s instead of each ladder; repeatable.")
 ]
 Full = Annotated[bool, typer.Option("--full", help="Two finer steps for every scenario.")]
-Seed = Annotated[int, typer.Option(min=0, help="What random scenes are drawn from.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of random scenes.")]
 Out = Annotated[
     Path, typer.Option(help="Folder for the results; an earlier run there is replaced when this one is done.")
 ]
@@ -229,7 +229,7 @@ def stability(
     engine: Engines = None,
     full: Annotated[bool, typer.Option("--full", help="16 runs a value, every value, closer brackets.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Keep what an interrupted run in --out has ended.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder for the atlas; one that is there is replaced.")] = Path(
+    out: Annotated[Path, typer.Option(help="Folder for the stability report; one that is there is replaced.")] = Path(
         "reports/out/stability"
     ),
     workers: Workers = 0,

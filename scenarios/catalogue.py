@@ -16,14 +16,14 @@ from scenarios.model import Scenario
 SCENARIOS: dict[str, Callable[..., Scenario]] = {
     builder().name: builder for builder in (*LESSON, *PAIRS, *WALLS, *ROWS, *THRUSTS, *EXERCISE, *CROWDS)
 }
-DRAWN = {"falling_box", "asteroids", "gas_of_100"}
-"""Scenarios drawn from a seed; the others are the same for every seed."""
+RANDOM = {"falling_box", "asteroids", "gas_of_100"}
+"""Scenarios that are random (seed n); the others are the same for every seed."""
 
 
 def scenario(name: str, seed: int = 0) -> Scenario:
-    """The scenario of that name, drawn from `seed` if it is drawn at all.
+    """The scenario of that name, random (seed `seed`) if it is random at all.
 
     Raises:
         KeyError: no scenario has that name.
     """
-    return SCENARIOS[name](seed=seed) if name in DRAWN else SCENARIOS[name]()
+    return SCENARIOS[name](seed=seed) if name in RANDOM else SCENARIOS[name]()

@@ -176,7 +176,7 @@ class Scenario:
         thrusts: piecewise-constant thrusts.
         truth: times (k,) s -> the exact `Trajectory` there, up to its horizon, or `NoTruth` (see `truth_at`); or None.
         without_truth: why there is no exact answer, in one sentence, where `truth` is None.
-        seed: what the scene was drawn from, or None.
+        seed: seed of a random scene, or None.
     """
 
     name: str

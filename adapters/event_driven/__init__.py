@@ -1,1 +1,1 @@
-"""The event-driven engine: no steps, from collision to collision, in float64."""
+"""The event-driven engine: no steps, event by event, in float64."""

@@ -1,4 +1,4 @@
-"""The float64 event engine of `scenarios` as an engine: from collision to collision, and asked at the end of each
+"""The float64 event engine of `scenarios` as an engine: event by event, and asked at the end of each
 step."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The float64 event engine: disks, walls, a torus or the exercise's wrap, from collision to collision without time
+"""The float64 event engine: disks, walls, a torus or the exercise's wrap, event by event without time
 steps.
 
 It has no step size and no tolerance: contact times are roots, flights are parabolas. Where the motion has no single

@@ -58,9 +58,9 @@ def _float32() -> Engine:
     import numpy as np
 
     from adapters.reference import Reference
-    from reference_impl import crowd
+    from reference_impl import verlet_list
 
-    return Reference(crowd, precision=np.float32)
+    return Reference(verlet_list, precision=np.float32)
 
 
 def _always_listing() -> Engine:
@@ -71,13 +71,13 @@ def _always_listing() -> Engine:
 
 @cache
 def listing() -> Any:
-    """The reference's solver for crowds with a list of neighbours for the fewest disks, too: the same source."""
+    """The reference's solver with a neighbour list for the fewest disks, too: the same source."""
     from numba import njit
 
-    from reference_impl import crowd
+    from reference_impl import verlet_list
 
-    advance = FunctionType(crowd.advance.py_func.__code__, vars(crowd) | {"CROWD": 0})
-    return SimpleNamespace(__name__="crowd", advance=njit(error_model="numpy")(advance))
+    advance = FunctionType(verlet_list.advance.py_func.__code__, vars(verlet_list) | {"LISTED_FROM": 0})
+    return SimpleNamespace(__name__="verlet_list", advance=njit(error_model="numpy")(advance))
 
 
 def _rows(engine: str, make: Callable[..., Engine], changes: dict[str, dict[str, Any]]) -> list[Option]:

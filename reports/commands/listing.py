@@ -9,7 +9,7 @@ from reports.compare.metrics import METRICS
 from reports.run.arguments import unknown
 from reports.terminal.console import Console
 from reports.terminal.exits import refuse
-from scenarios.catalogue import DRAWN, SCENARIOS, scenario
+from scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from scenarios.truth.exact import answered_by
 
 
@@ -33,4 +33,4 @@ def explain(what: str) -> None:
 
 def _line(name: str) -> str:
     one = scenario(name)
-    return f"{one.asks} ({answered_by(one)}{'; drawn from --seed' if name in DRAWN else ''})"
+    return f"{one.asks} ({answered_by(one)}{'; random, from --seed' if name in RANDOM else ''})"

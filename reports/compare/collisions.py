@@ -1,4 +1,4 @@
-"""Which collisions of the truth an engine found, which it missed, which it invented, and how late it was."""
+"""Which collisions of the truth an engine found, which it missed, which are spurious, and how late it was."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ class Matched:
     Attributes:
         delay: (m,) s, played time less true time of each collision found.
         missed: (time s, i, j) of true collisions not found.
-        invented: (time s, i, j) of played collisions that are not true.
+        spurious: (time s, i, j) of played collisions that are not true.
     """
 
     delay: Array
     missed: list[tuple[float, int, int]]
-    invented: list[tuple[float, int, int]]
+    spurious: list[tuple[float, int, int]]
 
     @property
     def first_wrong(self) -> tuple[float, str] | None:
-        """Time and description of the first missed or invented collision, or None."""
+        """Time and description of the first missed or spurious collision, or None."""
         wrong = [(t, f"missed {who(i, j)}") for t, i, j in self.missed]
-        wrong += [(t, f"invented {who(i, j)}") for t, i, j in self.invented]
+        wrong += [(t, f"spurious {who(i, j)}") for t, i, j in self.spurious]
         return min(wrong) if wrong else None
 
 
@@ -54,7 +54,7 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
     Where a pair has struck more often on one side, those collisions are left over whose absence brings the others
     closest in time; the earlier if two are as close. A match is no match if it is further off than `HALF` the time to
     the nearest other true collision of the pair (or to the start), and than `FAR` dt: then one collision is missed and
-    one invented.
+    one spurious.
 
     Three kinds of collisions are not judged: of a pair at rest against each other from the start (a true collision
     without impulse), as what an engine reports there is weight; true collisions of a pair closer together than
@@ -70,7 +70,7 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
     return Matched(
         delay=mine.t[found] - its.t[partner[found]],
         missed=[(float(its.t[k]), int(its.i[k]), int(its.j[k])) for k in np.flatnonzero(lost)],
-        invented=[(float(mine.t[k]), int(mine.i[k]), int(mine.j[k])) for k in np.flatnonzero(extra)],
+        spurious=[(float(mine.t[k]), int(mine.i[k]), int(mine.j[k])) for k in np.flatnonzero(extra)],
     )
 
 
@@ -101,7 +101,7 @@ def by_pair(collisions: Collisions, resting: np.ndarray, end: float) -> ByPair:
 @njit(cache=True)
 def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no-untyped-def]
     """Pair by pair: (partner of each played collision or -1, true collisions that are missed, played collisions that
-    are invented)."""
+    are spurious)."""
     partner = np.full(len(played), -1)
     lost, extra = np.zeros(len(true), dtype=np.bool_), np.zeros(len(played), dtype=np.bool_)
     for k in range(len(played_limits) - 1):

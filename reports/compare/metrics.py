@@ -190,13 +190,13 @@ def collisions_missed(view: View) -> Value | None:
     return Value(len(view.matched.missed), note=f"of {len(view.collisions[1])}")
 
 
-def collisions_invented(view: View) -> Value | None:
+def collisions_spurious(view: View) -> Value | None:
     """Collisions of the engine that the other does not have at their time."""
-    return Value(len(view.matched.invented))
+    return Value(len(view.matched.spurious))
 
 
 def first_wrong_collision_s(view: View) -> Value | None:
-    """When the first collision is missed or invented, and whose; `inf` if none is."""
+    """When the first collision is missed or spurious, and whose; `inf` if none is."""
     if view.matched.first_wrong is None:
         return Value(np.inf, note="none")
     at, what = view.matched.first_wrong
@@ -288,7 +288,7 @@ METRICS: dict[str, Metric] = {
     "disks_through_walls": Metric(disks_through_walls, "disks", (ITSELF,)),
     "collision_count_error": Metric(collision_count_error, "collisions", (TRUTH, ENGINE), "zero"),
     "collisions_missed": Metric(collisions_missed, "collisions", (TRUTH, ENGINE)),
-    "collisions_invented": Metric(collisions_invented, "collisions", (TRUTH, ENGINE)),
+    "collisions_spurious": Metric(collisions_spurious, "collisions", (TRUTH, ENGINE)),
     "first_wrong_collision_s": Metric(first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"),
     "collision_delay_dt": Metric(collision_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
     "collision_delay_max_dt": Metric(collision_delay_max_dt, "dt", (TRUTH, ENGINE)),

@@ -144,19 +144,19 @@ class View:
         return np.abs(self.played.angle - self.other.angle)
 
     @cached_property
-    def calm(self) -> np.ndarray:
+    def collision_free_samples(self) -> np.ndarray:
         """(k,) False at samples within `WINDOW` dt of a collision of the other; sample 0 always counts.
 
         For the error budget, which takes runs from each other: no metric, as in a crowd nothing but the start is left.
         """
-        calm = np.ones(len(self.played), bool)
+        free = np.ones(len(self.played), bool)
         if self.other is not None and len(collisions := self.other.collisions.t):
             nearest = np.searchsorted(collisions, self.played.t)
             before = self.played.t - collisions[np.maximum(nearest - 1, 0)]
             after = collisions[np.minimum(nearest, len(collisions) - 1)] - self.played.t
-            calm = np.minimum(np.abs(before), np.abs(after)) > WINDOW * self.dt
-            calm[0] = True
-        return calm
+            free = np.minimum(np.abs(before), np.abs(after)) > WINDOW * self.dt
+            free[0] = True
+        return free
 
     @cached_property
     def restitutions(self) -> Restitutions:

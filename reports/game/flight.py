@@ -20,7 +20,7 @@ FRAME = 1 / 64  # s; a power of two, so that every instant of a saved flight is 
 SUBSTEPS = (2, 4, 8, 16, 32)  # steps in a frame; 16 is the nearest to the exercise's 0.001 s
 LONGEST = 600.0  # s, of a flight
 EARTH, EARTH_SIZE = (3.5, 1.5), 0.5
-CALM, SLOW_SPIN = 0.1, 0.1  # squared speed and angular velocity below which the exercise says "You won"
+SLOW, SLOW_SPIN = 0.1, 0.1  # squared speed and angular velocity below which the exercise says "You won"
 
 
 def field_scenario(seed: int = 0, asteroids: int = 20, restitution: float = 0.9, substeps: int = 16) -> Scenario:
@@ -195,7 +195,7 @@ class Flight:
         """The exercise's rule as written: a squared distance below a size, no absolute value of the spin."""
         ship = self.solid.state
         apart, speed = ship.position[SHIP] - np.array(EARTH), ship.velocity[SHIP]
-        near = float(apart @ apart) < EARTH_SIZE and float(speed @ speed) < CALM
+        near = float(apart @ apart) < EARTH_SIZE and float(speed @ speed) < SLOW
         return self.is_game and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
 
     def measures(self, flyer: Flyer) -> dict[str, Any]:

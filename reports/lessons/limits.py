@@ -1,4 +1,5 @@
-"""Lesson 8, where methods fail: cases of the atlas, searched when they are asked for, with the run that fails."""
+"""Lesson 8, where methods fail: cases of the stability report, searched when they are asked for, with the run that
+fails."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ SECONDS = 4.0  # that a replay lasts
 
 
 class Seen(NamedTuple):
-    """A case of the atlas as the lesson shows it: what is drawn over time, of the first disk; and how harsh it gets."""
+    """A case of the stability report as the lesson shows it: what is drawn over time, of the first disk; and how harsh
+    it gets."""
 
     case: str
     what: str

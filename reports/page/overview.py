@@ -66,7 +66,7 @@ SUMMARY: dict[str, Column] = {
     "momentum_error": Column("Momentum", "of Σ m|v|", "largest momentum that came or went unasked"),
     "energy_error": Column("Energy", "of the energy at hand", "largest energy that came or went unasked"),
     "restitution_error": Column("Restitution", "no unit", "largest |e measured − e asked for| of any collision"),
-    "wrong_collisions": Column("Wrong collisions", "collisions in all", "collisions missed and collisions invented, added up"),
+    "wrong_collisions": Column("Wrong collisions", "collisions in all", "missed and spurious collisions, added up"),
     "failed": Column("Not played", "scenarios", "refused, crashed, diverged or timed out"),
 }  # fmt: skip
 
@@ -138,7 +138,7 @@ def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: 
 def pool(metric: str, name: str, found: Sequence[Found]) -> tuple[float, str]:
     """The median, for collisions the sum, of a metric over the scenarios in which it is judged; in how many it is, or
     not."""
-    kinds = ("collisions_missed", "collisions_invented") if metric == "wrong_collisions" else (metric,)
+    kinds = ("collisions_missed", "collisions_spurious") if metric == "wrong_collisions" else (metric,)
     known = [[each[name, kind] for kind in kinds if (name, kind) in each] for each in found]
     totals = [sum(one.value for one in each) for each in known if each and all(one.judged for one in each)]
     left_out = sum(not one.judged for each in known for one in each[:1])

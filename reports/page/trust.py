@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from reports.compare.comparison import Comparison
 from reports.page.style import number
-from scenarios.truth.exact import CLOSED_FORM, COLLISION_BY_COLLISION, answered_by
+from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN, answered_by
 from scenarios.truth.oracle.numbers import has_balls
 
 
@@ -36,13 +36,11 @@ def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
 def exact_answers(comparisons: Sequence[Comparison]) -> str:
     """How the exact answers of these scenes were found, and how far off they may be."""
     models = [answered_by(each.scenario) if each.truth is not None else "" for each in comparisons]
-    closed, event_driven, none = models.count(CLOSED_FORM), models.count(COLLISION_BY_COLLISION), models.count("")
+    closed, event_driven, none = models.count(CLOSED_FORM), models.count(EVENT_DRIVEN), models.count("")
     parts = [f"{closed} of {len(models)} scenes have a closed form"] if closed else []
     if event_driven:
         bound = max(
-            c.truth.error_bound
-            for c, m in zip(comparisons, models)
-            if m == COLLISION_BY_COLLISION and c.truth is not None
+            c.truth.error_bound for c, m in zip(comparisons, models) if m == EVENT_DRIVEN and c.truth is not None
         )
         how = "proven by interval arithmetic" if has_balls() else "computed at two precisions that agree"
         parts.append(

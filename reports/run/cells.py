@@ -24,7 +24,7 @@ class Cell:
 
     Attributes:
         scene: a name of the catalogue, or the path of a scene file (ends in .toml).
-        seed: what a drawn scene is drawn from.
+        seed: seed of a random scene.
         engine: `engine:profile`, or a solver's file as `PATH:own`.
         substeps: steps in a sample interval.
     """

@@ -40,7 +40,7 @@ class Plan:
     Attributes:
         scenes: names of the catalogue or paths of scene files, in reading order.
         engines: `engine:profile`, or a solver's file as `PATH:own`, -> its row, in reading order.
-        seed: what drawn scenes are drawn from.
+        seed: seed of random scenes.
         dts: step sizes in s instead of each scenario's own; empty: its own.
         full: two finer steps for every scenario.
         timings: rounds of timings after all is played.

@@ -1,6 +1,7 @@
 """Where an engine's error comes from: its mechanisms switched on in the reference one at a time, and what is left over.
 
-As vectors, disk by disk and sample by sample, the parts close: engine - truth = parts + interplay + unexplained.
+As vectors, disk by disk and sample by sample, the contributions close: engine - truth = contributions + interplay +
+residual.
 """
 
 from __future__ import annotations
@@ -22,15 +23,15 @@ from reports.run.scenes import open_scene
 from reports.speed.ladder import held
 from scenarios.model import Array, Scenario, Trajectory
 
-TIME, INTERPLAY, SUM, ALL, TOTAL, UNEXPLAINED = (
-    "time of collisions", "interplay", "sum", "all", "engine", "unexplained",
+TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (
+    "time of collisions", "interplay", "sum", "all", "engine", "residual",
 )  # fmt: skip
 TOTALS = (SUM, ALL, TOTAL)
 COLUMNS = [
-    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "part", "position_radii",
+    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "contribution", "position_radii",
     "energy", "share", "off_engine_radii", "off_reference_radii", "off_deviation_radii", "closed_deviation_radii", "note",
 ]  # fmt: skip
-LIMIT = 0.5  # radii by which end-of-step detection alone may put a disk off: where all is far off, no part adds up to anything
+LIMIT = 0.5  # radii by which end-of-step detection alone may put a disk off: where all is far off, no contribution adds up to anything
 
 
 class NotPlayed(Exception):
@@ -66,14 +67,16 @@ class Offset(NamedTuple):
 
 
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
-    """A row a part of what puts engine `name` of `MECHANISMS` off in a scene, at this many steps a sample interval.
+    """A row a contribution of what puts engine `name` of `MECHANISMS` off in a scene, at this many steps a sample
+    interval.
 
     Of `COLUMNS`: until_s, how far the scene was evaluated, horizon_s, how far its exact answer goes, and duration_s,
     the scene itself; position_radii and energy, the root mean square of what the
-    part changes, the energy in parts of that at hand; share, by which it makes up the position's total (1 in all;
+    contribution changes, the energy in contributions of that at hand; share, by which it makes up the position's total
+    (1 in all;
     negative: it makes up for others); off_engine_radii, off_reference_radii and off_deviation_radii: what switching it
     off changes in the engine, in the reference with all the rest, and their deviation; closed_deviation_radii: how
-    far the flight's part is from its closed form up to the first collision; note: why there are no numbers.
+    far the flight's contribution is from its closed form up to the first collision; note: why there are no numbers.
     """
     at = window_of(scene, seed, substeps)
     scenario, dt = at.scenario, at.dt
@@ -84,15 +87,19 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
     try:
         run = at.played(row_of(name).make())
         budget = Budget(at, mechanisms_of(name, run.settings, scenario.scene, dt), at.offset(run))
-        parts, checks = budget.parts(), budget.ablated_in_both()
+        contributions, checks = budget.contributions(), budget.ablated_in_both()
     except NotPlayed as failure:
-        return [known | {"part": TOTAL, "note": str(failure)}]
-    checks[FLIGHT] = {"closed_deviation_radii": at.flight_deviation(parts[FLIGHT], row_of(name).alpha)}
-    shares = {part: {"share": each.share_of(parts[TOTAL])} for part, each in parts.items() if part not in TOTALS}
+        return [known | {"contribution": TOTAL, "note": str(failure)}]
+    checks[FLIGHT] = {"closed_deviation_radii": at.flight_deviation(contributions[FLIGHT], row_of(name).alpha)}
+    shares = {
+        contribution: {"share": each.share_of(contributions[TOTAL])}
+        for contribution, each in contributions.items()
+        if contribution not in TOTALS
+    }
     return [
-        known | {"part": part, "position_radii": each.radii, "energy": each.of_energy, "note": ""}
-        | shares.get(part, {}) | checks.get(part, {})
-        for part, each in parts.items()
+        known | {"contribution": contribution, "position_radii": each.radii, "energy": each.of_energy, "note": ""}
+        | shares.get(contribution, {}) | checks.get(contribution, {})
+        for contribution, each in contributions.items()
     ]  # fmt: skip
 
 
@@ -138,16 +145,16 @@ class Window:
         assert played is not None
         position = laws.difference(played, truth, scene)[:, ~scene.static] / scene.radius[~scene.static, None]
         energy = laws.energy(played, scene) - laws.energy(truth, scene)
-        calm = View(self.scenario, self.dt, played, truth).calm
-        return Offset(position, energy[calm] / (scales.energy(self.scenario) or 1.0))
+        free = View(self.scenario, self.dt, played, truth).collision_free_samples
+        return Offset(position, energy[free] / (scales.energy(self.scenario) or 1.0))
 
-    def flight_deviation(self, part: Offset, alpha: float) -> float:
+    def flight_deviation(self, contribution: Offset, alpha: float) -> float:
         """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first collision; see `Row.alpha` of the
         engines."""
         truth, scene = self.truth, self.scenario.scene
-        calm = truth.t < truth.collisions.t.min(initial=np.inf)
-        gained = (truth.velocity - truth.velocity[0])[calm][:, ~scene.static] / scene.radius[~scene.static, None]
-        return float(np.abs(part.position[calm] - (alpha - 0.5) * self.dt * gained).max(initial=0.0))
+        free = truth.t < truth.collisions.t.min(initial=np.inf)
+        gained = (truth.velocity - truth.velocity[0])[free][:, ~scene.static] / scene.radius[~scene.static, None]
+        return float(np.abs(contribution.position[free] - (alpha - 0.5) * self.dt * gained).max(initial=0.0))
 
 
 class Budget:
@@ -157,28 +164,29 @@ class Budget:
         self.at, self.mechanisms, self.total = at, mechanisms, total
         self.known: dict[tuple[str, ...], Offset] = {}
 
-    def parts(self) -> dict[str, Offset]:
-        """What each mechanism changes, then interplay, what is unexplained, the sum, all at once, and the engine.
+    def contributions(self) -> dict[str, Offset]:
+        """What each mechanism changes, then interplay, the residual, the sum, all together, and the engine.
 
         Each is switched on by itself in the reference with end-of-step detection, or on top of those it acts on; for a
         mechanism that the reference does not have, the engine is compared with itself without it.
         """
-        parts = {TIME: self.reference([])}
+        contributions = {TIME: self.reference([])}
         for mechanism in self.mechanisms:
             if mechanism.parameters:
                 below = [each for each in self.mechanisms if each.name in mechanism.on_top]
-                parts[mechanism.name] = self.reference([*below, mechanism]) - self.reference(below)
+                contributions[mechanism.name] = self.reference([*below, mechanism]) - self.reference(below)
             elif mechanism.without is not None:
-                parts[mechanism.name] = self.total - self.at.offset(self.at.played(mechanism.without()))
-        outside = [parts[mechanism.name] for mechanism in self.mechanisms if not mechanism.parameters]
-        summed, reached = added(parts.values()), added([self.reference(self.mechanisms), *outside])
-        return parts | {
-            INTERPLAY: reached - summed, UNEXPLAINED: self.total - reached, SUM: summed, ALL: reached,
+                contributions[mechanism.name] = self.total - self.at.offset(self.at.played(mechanism.without()))
+        outside = [contributions[mechanism.name] for mechanism in self.mechanisms if not mechanism.parameters]
+        summed, reached = added(contributions.values()), added([self.reference(self.mechanisms), *outside])
+        return contributions | {
+            INTERPLAY: reached - summed, RESIDUAL: self.total - reached, SUM: summed, ALL: reached,
             TOTAL: self.total,
         }  # fmt: skip
 
     def ablated_in_both(self) -> dict[str, dict[str, float]]:
-        """part -> what switching it off changes in the engine, and in the reference with all the rest switched on."""
+        """contribution -> what switching it off changes in the engine, and in the reference with all the rest switched
+        on."""
         found = {}
         for mechanism in self.mechanisms:
             if mechanism.parameters and mechanism.without is not None:

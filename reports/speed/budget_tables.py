@@ -1,4 +1,5 @@
-"""The error budget as tables: in which scenes which part is the largest, and all parts of one scene side by side."""
+"""The error budget as tables: in which scenes which contribution is the largest, and all contributions of one scene
+side by side."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.mechanisms.table import NAMES
-from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED
+from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
 from reports.speed.explained import LEAST, TO
 
 EXPLAINED = TO[0]  # of the engine's error: what is left over below it is said to be none
@@ -39,14 +40,18 @@ class Table(NamedTuple):
 
 
 def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
-    """Root mean squares in radii, a row an engine: engine, what is left unexplained, the parts, sum and all."""
+    """Root mean squares in radii, a row an engine: engine, the residual, the contributions, sum and all."""
     here = budget[budget.scenario == scenario]
-    parts = [part for part in causes(budget) if here[here.part == part].position_radii.max() > LEAST]  # of anybody
-    columns = [TOTAL, UNEXPLAINED, *parts, INTERPLAY, SUM, ALL]
+    contributions = [
+        contribution
+        for contribution in causes(budget)
+        if here[here.contribution == contribution].position_radii.max() > LEAST
+    ]  # of anybody
+    columns = [TOTAL, RESIDUAL, *contributions, INTERPLAY, SUM, ALL]
     rows: dict[str, list[Cell]] = {}
     notes: dict[str, str] = {}
     for (engine, profile), group in here.groupby(WHO, sort=False):
-        found = group.set_index("part").position_radii
+        found = group.set_index("contribution").position_radii
         rows[f"{engine}:{profile}"] = [cell(float(found.get(column, np.nan))) for column in columns]
         notes |= {f"{engine}:{profile}": note for note in group.note if note}
     until, horizon, duration = (float(here[name].iloc[0]) for name in ("until_s", "horizon_s", "duration_s"))
@@ -54,8 +59,8 @@ def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
 
 
 def causes(budget: pd.DataFrame) -> list[str]:
-    """The parts that are causes, of any engine."""
-    return [TIME, *(part for part in NAMES if part in set(budget.part))]
+    """The contributions that are causes, of any engine."""
+    return [TIME, *(contribution for contribution in NAMES if contribution in set(budget.contribution))]
 
 
 def cell(value: float) -> Cell:
@@ -67,20 +72,25 @@ def cell(value: float) -> Cell:
 
 def overview(budget: pd.DataFrame) -> Table:
     """In how many scenes an engine was played, has an error, has it explained but for `EXPLAINED`, and in how many
-    each part is the largest; bars of all scenes, and every engine has its row, also one that failed them all.
+    each contribution is the largest; bars of all scenes, and every engine has its row, also one that failed them all.
     """
     columns = ["played", "errors", "explained", *causes(budget)]
     count = budget.scenario.nunique()
     rows = {}
     for (engine, profile), group in budget.groupby(WHO, sort=False):
         played = group[group.note == ""]
-        scenes = played.pivot(index="scenario", columns="part", values="position_radii")
-        scenes = scenes.reindex(columns=[TOTAL, UNEXPLAINED, *causes(budget)]).fillna(0.0)
+        scenes = played.pivot(index="scenario", columns="contribution", values="position_radii")
+        scenes = scenes.reindex(columns=[TOTAL, RESIDUAL, *causes(budget)]).fillna(0.0)
         off = scenes[scenes[TOTAL] > LEAST]
         known = scenes[causes(budget)]
         largest = known[known.max(axis=1) > LEAST].idxmax(axis=1)
-        explained = int((off[UNEXPLAINED] <= EXPLAINED * off[TOTAL]).sum())
-        counts = [len(scenes), len(off), explained, *(int((largest == part).sum()) for part in known.columns)]
+        explained = int((off[RESIDUAL] <= EXPLAINED * off[TOTAL]).sum())
+        counts = [
+            len(scenes),
+            len(off),
+            explained,
+            *(int((largest == contribution).sum()) for contribution in known.columns),
+        ]
         rows[f"{engine}:{profile}"] = [Cell(number, number / count) for number in counts]
     return Table("", np.nan, np.nan, np.nan, columns, rows, {})
 

@@ -53,8 +53,8 @@ def at_the_edge(
     traces = []
     for engine, profile, group in by_engine(lost):
         others = drawn[(drawn.engine == engine) & (drawn.profile == profile)]
-        per_rung = float((others.cost / 2.0**others.rung).median()) if len(others) else np.nan
-        cost = group.cost.where(group.cost.notna(), per_rung * 2.0**group.rung)
+        per_step_size = float((others.cost / 2.0**others.step_size).median()) if len(others) else np.nan
+        cost = group.cost.where(group.cost.notna(), per_step_size * 2.0**group.step_size)
         corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside: what is outside is not drawn
         x = cost.fillna(corner).clip(upper=corner)
         y = group.error.clip(lower=LOWEST).where(np.isfinite(group.error), top)
@@ -116,7 +116,7 @@ def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
 
 def turned(what: str, row: dict[str, Any], relative: bool) -> str:
     """What hovering over a point of a sweep says."""
-    value = f"{what} {row['change']}<br>" if what else f"dt / {2.0 ** (row['rung'] - 2):g}<br>" if relative else ""
+    value = f"{what} {row['change']}<br>" if what else f"dt / {2.0 ** (row['step_size'] - 2):g}<br>" if relative else ""
     if not relative:
         return value + hover_text(row)
     return f"{value}{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
@@ -244,7 +244,7 @@ def hover_text(row: dict[str, Any]) -> str:
         return f"{at(row)}failed in {row['failed']} of {row['seeds']}{why}"
     error = style.number(row["error"])
     if row["error_high"] != row["error_low"]:
-        error += f" ({style.number(row['error_low'])} to {style.number(row['error_high'])}, {row['seeds']} draws)"
+        error += f" ({style.number(row['error_low'])} to {style.number(row['error_high'])}, {row['seeds']} seeds)"
     lines = [f"{at(row)}error {error} radii".strip()]
     lines.append(f"{spread(row)} µs/s" if np.isfinite(row["cost"]) else "not timed")
     if np.isfinite(row["idle"]):

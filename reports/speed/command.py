@@ -81,7 +81,7 @@ def kept_of(plan: Plan, header: Mapping[str, Any], journal: Journal, resume: boo
         "scenes": plan.scenes, "files": files, "engines": plan.engines, "effort": asdict(plan.effort),
         "whole": plan.whole,
     }  # fmt: skip
-    scenarios = {scene: ladder.open_scene(scene, seed) for scene, seed in plan.draws}
+    scenarios = {scene: ladder.open_scene(scene, seed) for scene, seed in plan.seeded_scenes}
     return Kept(journal, asked | {key: header[key] for key in ("seed", "versions", "machine")}, resume, scenarios)
 
 

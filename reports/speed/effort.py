@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenarios.catalogue import DRAWN, SCENARIOS
+from scenarios.catalogue import RANDOM, SCENARIOS
 from scenarios.model import Scenario
 
-FEWEST_RUNGS, MOST_RUNGS = 3, 9
+FEWEST_STEP_SIZES, MOST_STEP_SIZES = 3, 9
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Effort:
         scenes: what is measured if nothing is asked for; in the quick form one of each kind, so that no one of them
             is the pooled curve: flight, collisions head-on, oblique and below thresholds, walls, static disks,
             sliding, a stack, rows, a force and a torque, and crowds (a test leaves out one after the other).
-        seeds: how many draws of a drawn scene.
+        seeds: how many seeds of a random scene.
         most_steps: of the finest dt of a ladder.
         rounds: of timing, warm-up not counted.
         budget: s of timing for one engine at one dt in one scene, beyond the first rounds.
@@ -44,14 +44,16 @@ class Effort:
     )  # fmt: skip
 
     def seeds_of(self, scene: str, seed: int) -> list[int]:
-        """The seeds a scene is drawn from; one where it is not drawn."""
-        return list(range(seed, seed + self.seeds)) if scene in DRAWN else [seed]
+        """The seeds of a random scene; one of another."""
+        return list(range(seed, seed + self.seeds)) if scene in RANDOM else [seed]
 
     def ladder(self, scenario: Scenario) -> tuple[int, ...]:
         """Steps in a sample interval, doubling from the scenario's own coarsest."""
         first = scenario.substeps[0]
-        rungs = [first * 2**k for k in range(MOST_RUNGS)]
-        return tuple(k for n, k in enumerate(rungs) if n < FEWEST_RUNGS or k * scenario.samples <= self.most_steps)
+        step_sizes = [first * 2**k for k in range(MOST_STEP_SIZES)]
+        return tuple(
+            k for n, k in enumerate(step_sizes) if n < FEWEST_STEP_SIZES or k * scenario.samples <= self.most_steps
+        )
 
 
 QUICK = Effort(

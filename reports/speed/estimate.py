@@ -46,23 +46,23 @@ def step_of(scenario: Scenario) -> float:
 
 
 def seconds_to_play(measurement: Measurement, reach: Reach) -> float:
-    """s, of all rungs, read at every sample."""
+    """s, of all step sizes, read at every sample."""
     scenario, samples = (
         ladder.open_scene(measurement.scene, measurement.seed),
         reach[measurement.scene, measurement.seed],
     )
-    reading = len(measurement.rungs) * samples * (READ + scenario.scene.n * READ_DISK)
-    return sum(measurement.rungs) * samples * LISTENING * step_of(scenario) + reading
+    reading = len(measurement.step_sizes) * samples * (READ + scenario.scene.n * READ_DISK)
+    return sum(measurement.step_sizes) * samples * LISTENING * step_of(scenario) + reading
 
 
 def seconds_to_time(measurement: Measurement, reach: Reach, effort: Effort) -> float:
-    """s, of all rounds of all rungs; the middle one is there twice on a ladder of a scene."""
+    """s, of all rounds of all step sizes; the middle one is there twice on a ladder of a scene."""
     scenario, samples = (
         ladder.open_scene(measurement.scene, measurement.seed),
         reach[measurement.scene, measurement.seed],
     )
-    rungs = [all_rounds(samples * k * step_of(scenario), effort) for k in measurement.rungs]
-    return sum(rungs) + (rungs[len(rungs) // 2] if measurement.kind == SCENE else 0.0)
+    step_sizes = [all_rounds(samples * k * step_of(scenario), effort) for k in measurement.step_sizes]
+    return sum(step_sizes) + (step_sizes[len(step_sizes) // 2] if measurement.kind == SCENE else 0.0)
 
 
 def all_rounds(run: float, effort: Effort) -> float:

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from reports.speed.budget import LIMIT, TOTAL, UNEXPLAINED
+from reports.speed.budget import LIMIT, RESIDUAL, TOTAL
 
 LEAST = 1e-9  # radii: a smaller error is rounding, and nothing to explain
 TO = (0.01, 0.001)  # of an error: what may be left over
 COLUMNS = [
     "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "error_radii",
-    "unexplained_radii", "note",
+    "residual_radii", "note",
 ]  # fmt: skip
 
 
@@ -54,13 +54,13 @@ class Share(NamedTuple):
 
 
 def explained(budget: pd.DataFrame) -> pd.DataFrame:
-    """A row a scene and engine, of `COLUMNS`: its error, what is left of it unexplained (root mean squares), and how
+    """A row a scene and engine, of `COLUMNS`: its error, its residual (root mean squares), and how
     far the scene was evaluated, its exact answer goes, and the scene goes; note: why the engine has no error.
     """
     keys = COLUMNS[: COLUMNS.index("error_radii")]
-    wide = budget.pivot(index=keys, columns="part", values="position_radii").reindex(columns=[TOTAL, UNEXPLAINED])
-    notes = budget[budget.part == TOTAL].set_index(keys).note
-    table = wide.set_axis(["error_radii", "unexplained_radii"], axis=1).join(notes)
+    wide = budget.pivot(index=keys, columns="contribution", values="position_radii").reindex(columns=[TOTAL, RESIDUAL])
+    notes = budget[budget.contribution == TOTAL].set_index(keys).note
+    table = wide.set_axis(["error_radii", "residual_radii"], axis=1).join(notes)
     order = budget[keys].drop_duplicates()
     return order.merge(table.reset_index(), on=keys)[COLUMNS]
 
@@ -77,7 +77,7 @@ def share(table: pd.DataFrame) -> Share:
     """How many errors are explained."""
     played = table[table.note == ""]
     errors = played[played.error_radii > LEAST]
-    left = errors.unexplained_radii / errors.error_radii
+    left = errors.residual_radii / errors.error_radii
     whole = ~errors.scenario.isin([cut.scenario for cut in extent(table).cuts])
     return Share(
         len(errors), tuple(int((left <= bound).sum()) for bound in TO), len(played) - len(errors),

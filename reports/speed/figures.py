@@ -26,11 +26,11 @@ def figures(results: Results) -> pd.DataFrame:
     """Columns `COLUMNS`: pooled points, cost at matched accuracy, cost by number of disks and its exponent, driving."""
     failed = results.pooled.failed
     parts = [
-        results.pooled.assign(figure="pooled error", at=results.pooled.rung, value=results.pooled.error,
+        results.pooled.assign(figure="pooled error", at=results.pooled.step_size, value=results.pooled.error,
                               low=results.pooled.error_low, high=results.pooled.error_high, unit="radii",
                               note=failed.map("failed in {}".format) + results.pooled.of.map(" of {}".format)),
-        results.pooled.assign(figure="pooled cost", at=results.pooled.rung, value=results.pooled.cost, unit="us/s"),
-        results.pooled.assign(figure="pooled cost less idle steps", at=results.pooled.rung, value=results.pooled.bare,
+        results.pooled.assign(figure="pooled cost", at=results.pooled.step_size, value=results.pooled.cost, unit="us/s"),
+        results.pooled.assign(figure="pooled cost less idle steps", at=results.pooled.step_size, value=results.pooled.bare,
                               low=np.nan, high=np.nan, unit="us/s"),
         results.pooled_reached.assign(figure="cost at accuracy", at=results.pooled_reached.accuracy,
                                       value=results.pooled_reached.cost, note=results.pooled_reached.why, unit="us/s"),

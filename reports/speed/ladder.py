@@ -52,11 +52,11 @@ def reach_of(scene: str, seed: int) -> tuple[int, str]:
 
 
 def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int]) -> list[dict[str, Any]]:
-    """A row a rung of `ladder` (coarse to fine) of what engine `name` makes of the scene, up to the horizon.
+    """A row a step size of `ladder` (coarse to fine) of what engine `name` makes of the scene, up to the horizon.
 
     until_s is how far the exact answer, and so the run, goes of the duration_s of the scene; error_radii the largest
-    distance of any disk from where it truly is, change_radii the largest from where the rung before had it; inf and
-    nan where it failed. An engine that closes in on another motion changes less and less while its error stays.
+    distance of any disk from where it truly is, change_radii the largest from where the step size before had it; inf
+    and nan where it failed. An engine that closes in on another motion changes less and less while its error stays.
     """
     scenario, truth = held(scene, seed)
     whole = open_scene(scene, seed).duration

@@ -94,7 +94,7 @@ class BudgetRow(Row):
     until_s: Seconds
     horizon_s: Seconds
     duration_s: Seconds
-    part: Words
+    contribution: Words
     note: Words
     position_radii: Length = 0.0
     energy: Length = 0.0
@@ -128,7 +128,7 @@ class Errors(Line):
 
 
 class Budget(Line):
-    """What the parts of an error are."""
+    """What the contributions of an error are."""
 
     result: Annotated[list[BudgetRow], Field(min_length=1)]
 
@@ -216,14 +216,14 @@ class TaskLine(Line):
             raise ValueError(f"task = {str(task)[:60]}: must begin as one of {', '.join(map(' '.join, RESULTS))}")
         low, high = PARTS[model]
         if not low <= len(task) <= high or (model is Samples and (len(task) == 2) != (begins[1] == "idle")):
-            raise ValueError(f"task = {str(task)[:60]}: must have as many parts as one of its kind")
+            raise ValueError(f"task = {str(task)[:60]}: must have as many contributions as one of its kind")
         try:
             found: Any = model.model_validate({"result": self.result})
         except ValidationError as error:
             raise ValueError(sentence(error.errors(include_url=False)[0])) from None
         if begins[0] == "error":
             here = [(row.seed, row.name, row.substeps) for row in found.result]
-            if here != [(task[3], task[4], rung) for rung in task[6:]]:
+            if here != [(task[3], task[4], step_size) for step_size in task[6:]]:
                 raise ValueError("result: must have a row for each step that the task names, of its seed and engine")
         if begins[0] == "budget" and any(row.name != task[2] for row in found.result):
             raise ValueError("result: must be of the engine that the task names")

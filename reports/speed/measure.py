@@ -66,7 +66,7 @@ def measure(plan: Plan, progress: Progress, kept: Kept | None = None) -> Measure
 def find_reach(plan: Plan, measured: Measured, progress: Progress) -> Reach:
     """(scene, seed) -> how many sample intervals have an exact answer; those that have none are reported."""
     # In workers, which can be stopped whatever they are doing.
-    asked = {draw: partial(ladder.reach_of, *draw) for draw in plan.draws}
+    asked = {draw: partial(ladder.reach_of, *draw) for draw in plan.seeded_scenes}
     results = dict(done(asked, plan.workers, progress, "exact answer"))
     reach = {}
     for (scene, seed), result in results.items():
@@ -86,19 +86,21 @@ def measure_errors(
     played = []
     for measurement in measurements:
         result = results[measurement.task]
-        found = rung_by_rung(measurement, plan.workers) if isinstance(result, Failure) else result
+        found = one_step_size_at_a_time(measurement, plan.workers) if isinstance(result, Failure) else result
         rows += ({"kind": measurement.kind, "change": measurement.change} | row for row in found)
         if measurement.seed == plan.seed:
             well = tuple(row["substeps"] for row in found if row["status"] == "ok")
-            played.append(measurement._replace(rungs=well))
+            played.append(measurement._replace(step_sizes=well))
     measured.errors = pd.DataFrame(rows)
     return played
 
 
-def rung_by_rung(measurement: Measurement, workers: int) -> list[dict]:
-    """A ladder whose worker died or hung once more, each rung by itself, so that the others are kept."""
+def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict]:
+    """A ladder whose worker died or hung once more, each step size by itself, so that the others are kept."""
     rows: list[dict[str, Any]] = []
-    for k, result in run_all({k: measurement._replace(rungs=(k,)).errors for k in measurement.rungs}, workers, HANGS):
+    for k, result in run_all(
+        {k: measurement._replace(step_sizes=(k,)).errors for k in measurement.step_sizes}, workers, HANGS
+    ):
         if isinstance(result, Failure):
             engine, profile = measurement.name.split(":")
             scenario = ladder.open_scene(measurement.scene, measurement.seed)
@@ -169,8 +171,8 @@ def in_turns(measurements: Sequence[Measurement]) -> dict[tuple[tuple[str, str],
     """
     all_of_them = {}
     for measurement in measurements:
-        for k in measurement.rungs:
-            twice = measurement.kind == SCENE and k == measurement.rungs[len(measurement.rungs) // 2]
+        for k in measurement.step_sizes:
+            twice = measurement.kind == SCENE and k == measurement.step_sizes[len(measurement.step_sizes) // 2]
             for copy in (0, 1) if twice else (0,):
                 all_of_them[(measurement.name, measurement.change), k, copy] = measurement.make
     return all_of_them

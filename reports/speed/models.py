@@ -1,4 +1,4 @@
-"""The cheapest model that answers a scenario: a closed form, from collision to collision, or step by step."""
+"""The cheapest model that answers a scenario: a closed form, event by event, or step by step."""
 
 from __future__ import annotations
 

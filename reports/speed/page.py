@@ -16,7 +16,7 @@ from reports.page import style
 from reports.page.charts import Drawing
 from reports.page.page import REPORTS, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
 from reports.speed import budget_tables, charts, explained, tables
-from reports.speed.budget import TOTALS, UNEXPLAINED
+from reports.speed.budget import RESIDUAL, TOTALS
 from reports.speed.order import ELSEWHERE, UNSTEADY
 from reports.speed.pareto import ACCURACIES
 from reports.speed.pooling import said_of_pool
@@ -61,7 +61,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         versus=charts.records(results.versus), own=OWN,
         left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
         option_scenes=results.plan.option_scenes, budget=budget_section(results),
-        totals=(*TOTALS, UNEXPLAINED),
+        totals=(*TOTALS, RESIDUAL),
         css=Markup(css()), looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
     )  # fmt: skip
@@ -80,7 +80,7 @@ def section(
 
 def pooled_section(results: Results) -> Section:
     """All scenarios at once."""
-    count, steps = len(results.scenes), results.pooled.rung.nunique()
+    count, steps = len(results.scenes), results.pooled.step_size.nunique()
     drawings = {
         "speed": Drawing(
             "Error against cost",
@@ -107,7 +107,7 @@ def section_of(results: Results, scene: str) -> Section:
     points = results.points[results.points.scenario == scene]
     reached = results.reached[results.reached.scenario == scene]
     seeds = int(points.seeds.max())
-    spread = f" The error is the median over {seeds} draws, its bar the 95 % bootstrap interval." if seeds > 1 else ""
+    spread = f" The error is the median over {seeds} seeds, its bar the 95 % bootstrap interval." if seeds > 1 else ""
     noise = results.noise_summary(scene)
     low, high = (style.number(noise.get(end, np.nan)) for end in ("low", "high"))
     floor = f" Noise floor: half of the engines read {low} to {high} against themselves." if noise["pairs"] else ""
@@ -155,10 +155,10 @@ def budget_section(results: Results) -> dict[str, Any] | None:
     if budget.empty:
         return None
     table = results.explained
-    parts = set(table.engine + ":" + table.profile)
+    contributions = set(table.engine + ":" + table.profile)
     return {
         "sentence": explained.sentence(table), "cuts": explained.extent(table).cuts,
-        "absent": [name for name in results.names if name not in parts],
+        "absent": [name for name in results.names if name not in contributions],
         "overview": budget_tables.overview(budget),
         "scenes": [budget_tables.of_scene(budget, scene) for scene in dict.fromkeys(budget.scenario)],
         "off": budget_tables.ablated_in_both(budget), "closed": float(budget.closed_deviation_radii.max()),

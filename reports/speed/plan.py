@@ -19,7 +19,7 @@ Reach = Mapping[tuple[str, int], int]  # (scene, seed) -> how many sample interv
 
 
 class Measurement(NamedTuple):
-    """An engine in a scene, drawn from a seed, at some steps of the sample interval (coarse to fine).
+    """An engine in a scene with a seed at some steps of the sample interval (coarse to fine).
 
     kind: which question it is for: the ladders of all scenes, the options, or the sweeps. `change` is a row of
     `OPTIONS`, a value of a sweep, or `PLAIN`.
@@ -31,17 +31,17 @@ class Measurement(NamedTuple):
     name: str
     change: str
     make: Callable[[], Engine]
-    rungs: tuple[int, ...]
+    step_sizes: tuple[int, ...]
 
     @property
     def task(self) -> tuple:
         """What stands for it where results are kept."""
-        return ("error", *self[:5], *self.rungs)
+        return ("error", *self[:5], *self.step_sizes)
 
     @property
     def errors(self) -> Callable[[], list[dict[str, Any]]]:
         """How to find how far off it is."""
-        return partial(ladder.errors_of, self.scene, self.seed, self.name, self.make, self.rungs)
+        return partial(ladder.errors_of, self.scene, self.seed, self.name, self.make, self.step_sizes)
 
 
 @dataclass(frozen=True)
@@ -84,20 +84,20 @@ class Plan:
         return self.effort.budget_scenes if self.whole else tuple(self.scenes)
 
     @property
-    def draws(self) -> list[tuple[str, int]]:
+    def seeded_scenes(self) -> list[tuple[str, int]]:
         """(scene, seed) of all that an exact answer is needed for."""
         scenes = dict.fromkeys((*self.scenes, *self.option_scenes, *self.sweep_scenes))
-        draws = [(scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)]
-        return draws + [(scene, self.seed) for scene in self.budget_scenes if scene not in scenes]
+        seeded = [(scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)]
+        return seeded + [(scene, self.seed) for scene in self.budget_scenes if scene not in scenes]
 
     def measurements(self, reach: Reach) -> Iterator[Measurement]:
         """Everybody, in every draw that has an exact answer."""
         drawn = {draw for draw, samples in reach.items() if samples}
-        for scene, seed in (draw for draw in self.draws if draw in drawn):
+        for scene, seed in (draw for draw in self.seeded_scenes if draw in drawn):
             if scene in self.scenes:
-                rungs = self.effort.ladder(ladder.open_scene(scene, seed))
+                step_sizes = self.effort.ladder(ladder.open_scene(scene, seed))
                 yield from (
-                    Measurement(SCENE, scene, seed, name, PLAIN, row_of(name).make, rungs) for name in self.engines
+                    Measurement(SCENE, scene, seed, name, PLAIN, row_of(name).make, step_sizes) for name in self.engines
                 )
             if scene in self.option_scenes and seed == self.seed:
                 yield from self.changed(scene)
@@ -106,11 +106,11 @@ class Plan:
 
     def changed(self, scene: str) -> Iterator[Measurement]:
         """Every changed engine, after those they are set against, at the dt the report shows."""
-        rungs = (middle(scene),)
+        step_sizes = (middle(scene),)
         for name in dict.fromkeys(option.engine for option in self.options):
-            yield Measurement(OPTION, scene, self.seed, name, PLAIN, row_of(name).make, rungs)
+            yield Measurement(OPTION, scene, self.seed, name, PLAIN, row_of(name).make, step_sizes)
         for one in self.options:
-            yield Measurement(OPTION, scene, self.seed, one.engine, one.change, one.make, rungs)
+            yield Measurement(OPTION, scene, self.seed, one.engine, one.change, one.make, step_sizes)
 
     def turned(self, scene: str, seed: int) -> Iterator[Measurement]:
         """Every sweep at every value at the dt the report shows, and its engine over a ladder of dt beside it."""
@@ -128,5 +128,5 @@ def around(here: int) -> tuple[int, ...]:
 
 def middle(scene: str) -> int:
     """Steps in a sample interval at the dt the report shows."""
-    rungs = ladder.open_scene(scene, 0).substeps
-    return rungs[len(rungs) // 2]
+    step_sizes = ladder.open_scene(scene, 0).substeps
+    return step_sizes[len(step_sizes) // 2]

@@ -43,7 +43,7 @@ def moved(values: Array, floor: float = 0.0) -> Array:
 
 
 def pooled(found: pd.DataFrame) -> pd.DataFrame:
-    """A row an engine and rung that all scenarios have: error and cost, each `middle_half` over the scenarios.
+    """A row an engine and step size that all scenarios have: error and cost, each `middle_half` over the scenarios.
 
     Columns besides: error_low, error_high, low, high (quartiles); bare, of the cost less that of as many idle steps;
     of (how many scenarios), failed (in how many it did), timed (how many carry the cost); moved and cost_moved (by
@@ -51,9 +51,11 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
     A scenario that an engine failed counts as infinitely wrong and infinitely dear; one that it played but was not
     timed in is left out of the cost, and `timed` says so.
     """
-    rungs = found.groupby("scenario").rung.max().min()
+    step_sizes = found.groupby("scenario").step_size.max().min()
     rows = []
-    for (engine, profile, rung), group in found[found.rung <= rungs].groupby([*WHO, "rung"], sort=False):
+    for (engine, profile, step_size), group in found[found.step_size <= step_sizes].groupby(
+        [*WHO, "step_size"], sort=False
+    ):
         scenes, error = group.scenario.to_numpy(str), group.error.to_numpy(float)
         priced = group[group.cost.notna() | (group.failed > 0)]
         cost = priced.cost.fillna(np.inf).to_numpy(float)
@@ -61,7 +63,7 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
         quartiles = np.percentile(error, [25, 75], method="nearest")
         prices = np.percentile(cost, [25, 75], method="nearest") if len(cost) else [np.nan] * 2
         rows.append({
-            "scenario": POOLED, "engine": engine, "profile": profile, "rung": rung, "dt_s": np.nan,
+            "scenario": POOLED, "engine": engine, "profile": profile, "step_size": step_size, "dt_s": np.nan,
             "error": middle_half(error), "error_low": quartiles[0], "error_high": quartiles[1],
             "cost": finite(middle_half(cost)), "low": finite(prices[0]), "high": finite(prices[1]),
             "bare": finite(middle_half(bare)) if not np.isnan(bare).any() else np.nan,

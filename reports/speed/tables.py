@@ -20,20 +20,20 @@ from reports.speed.timing import summed_up
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario, engine and dt: the columns of `summed`, and rung (0: coarsest)."""
+    """A row a scenario, engine and dt: the columns of `summed`, and step_size (0: coarsest)."""
     found = summed(measured, SCENE, seed)
-    return found.assign(rung=doublings(found))
+    return found.assign(step_size=doublings(found))
 
 
 def sweeps(measured: Measured, seed: int) -> pd.DataFrame:
-    """The columns of `summed`, and rung: the sweeps over their values, and their engines over a ladder of dt."""
+    """The columns of `summed`, and step_size: the sweeps over their values, and their engines over a ladder of dt."""
     if not (measured.errors.kind == SWEEP).any():
         return pd.DataFrame()
     found = summed(measured, SWEEP, seed)
     places = {(sweep.name, str(value)): k for sweep in SWEEPS for k, value in enumerate(sweep.values)}
     names = found.engine + ":" + found.profile
     turned = [places.get(who, -1) for who in zip(names, found.change)]
-    return found.assign(rung=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan)
+    return found.assign(step_size=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan)
 
 
 def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
@@ -46,7 +46,7 @@ def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
     for of in ("cost", "error"):
         both[of] /= both[f"{of}_here"]
     parts = [pooled(group).assign(change=str(change)) for (_, change), group in both.groupby(["profile", "change"])]
-    return pd.concat(parts).sort_values("rung", kind="stable") if parts else found.head(0)
+    return pd.concat(parts).sort_values("step_size", kind="stable") if parts else found.head(0)
 
 
 def without_ratio(found: pd.DataFrame) -> list[tuple[str, str]]:

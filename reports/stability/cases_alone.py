@@ -9,7 +9,7 @@ import numpy as np
 from adapters.engine import Unsupported
 from adapters.play import Run, fault_of, gather
 from reports.stability.limits import Case
-from reports.stability.phases import EDGE, drawn, phase
+from reports.stability.phases import EDGE, phase, sampled
 from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_DEVIATION, SPRING_GROWS, STRAYS
 from reports.stability.variants import Variant
 from scenarios.families.placing import lay_out
@@ -30,7 +30,7 @@ def ball(x: float, run: int) -> Scenario:
     where a fall lasts a whole number of steps, some methods are flattered. Their dt over the time of the fall is x, or
     less by up to a step of the fall.
     """
-    height = HEIGHT * (1 + 0.01 * drawn(seed=1)[run])
+    height = HEIGHT * (1 + 0.01 * sampled(seed=1)[run])
     fall = sqrt(2 * height / G)
     dt = fall / (1 / x + phase(run) - EDGE)
     every = max(1, int(1 / (12 * x)))

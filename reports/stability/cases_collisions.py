@@ -1,4 +1,4 @@
-"""Cases of one collision: missed, invented, grazed, slow, between unequal masses."""
+"""Cases of one collision: missed, spurious, grazed, slow, between unequal masses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from reports.stability.limits import Case
 from reports.stability.phases import phase
-from reports.stability.predicates import COLLISIONS_INVENTED, COLLISIONS_MISSED, RESTITUTION_OFF, VELOCITY_OFF
+from reports.stability.predicates import COLLISIONS_MISSED, COLLISIONS_SPURIOUS, RESTITUTION_OFF, VELOCITY_OFF
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.truth.closed_forms import answer, flight, pair
@@ -44,7 +44,7 @@ def flyby(
         collisions = [(float(at), 0, 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)]
         return answer(scene, t, legs.at(t), collisions)
 
-    asks = "Is the collision found?" if offset < 1 else "Is a collision invented?"
+    asks = "Is the collision found?" if offset < 1 else "Is there a spurious collision?"
     return stepped("flyby", asks, scene, dt, truth)
 
 
@@ -138,7 +138,7 @@ COLLISIONS = (
         "near_miss", FAMILY, "How near may a disk pass at v dt / R = 0.2 without being collision?",
         "b / 2R - 1", "1", (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
         near_miss,
-        COLLISIONS_INVENTED, runs=PHASES,
+        COLLISIONS_SPURIOUS, runs=PHASES,
     ),
     Case(
         "slow_collision", FAMILY, "How slow may a collision at e = 1 be and still be elastic?",

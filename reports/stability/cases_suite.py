@@ -7,7 +7,7 @@ from functools import partial
 
 from reports.stability.limits import Case
 from reports.stability.predicates_usable import USABLE
-from scenarios.catalogue import DRAWN, SCENARIOS, scenario
+from scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from scenarios.model import Scenario
 
 FAMILY = "The largest dt of the suite's scenes"
@@ -46,12 +46,12 @@ def dense_ladder(one: Scenario) -> tuple[float, ...]:
 
 
 LONG = 2e4  # steps of a disk
-SEEDS = 4  # runs at a value of a scene that is drawn
+SEEDS = 4  # runs at a value of a random scene
 
 SUITE = tuple(
     Case(
         f"dt_{name}", FAMILY, build().asks, "dt", "s", dense_ladder(build()), partial(at_dt, name), USABLE,
-        runs=SEEDS if name in DRAWN else 1, ratio=1.2, refines=False,
+        runs=SEEDS if name in RANDOM else 1, ratio=1.2, refines=False,
     )
     for name, build in SCENARIOS.items()
 )  # fmt: skip

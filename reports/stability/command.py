@@ -19,11 +19,11 @@ from reports.run.folders import given_back, may_go_on, open_part, place_of, repl
 from reports.run.journal import Journal
 from reports.run.made import Kind, writing
 from reports.run.runner import affordable
-from reports.stability.atlas import Atlas, Plan, Task, carry_out, case_named, done_before, read, table
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
 from reports.stability.maps import MAPS
 from reports.stability.page import write_page
+from reports.stability.results import Plan, StabilityResults, Task, carry_out, case_named, done_before, read, table
 from reports.stability.touching import TOUCHING, AtGap
 from reports.stability.vary import VARIES, cannot_vary
 from reports.terminal.console import Console
@@ -76,19 +76,19 @@ def gone_on_with(journal: Journal, plan: Plan, resume: bool) -> set[Task]:
     return done
 
 
-def write_files(folder: Path) -> Atlas:
+def write_files(folder: Path) -> StabilityResults:
     """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
-    atlas = read(folder)
-    laws = [(one.name, one.engine, *at[:-1]) for one in atlas.laws for at in one.gaps]
-    cells = [(one.name, one.engine, *cell) for one in atlas.maps for cell in one.cells]
+    results = read(folder)
+    laws = [(one.name, one.engine, *at[:-1]) for one in results.laws for at in one.gaps]
+    cells = [(one.name, one.engine, *cell) for one in results.maps for cell in one.cells]
     with writing(folder, FILES):
-        put_text(folder / LIMITS, table(atlas.limits).to_csv(index=False))
+        put_text(folder / LIMITS, table(results.limits).to_csv(index=False))
         columns = ["scene", "engine", *AtGap._fields[:-1]]
         put_text(folder / LAWS, pd.DataFrame(laws, columns=columns).to_csv(index=False))
         columns = ["map", "engine", "x", "y", "reading", "failed", "event"]
         put_text(folder / MAP, pd.DataFrame(cells, columns=columns).to_csv(index=False))
-        write_page(folder / PAGE, folder, atlas)
-    return atlas
+        write_page(folder / PAGE, folder, results)
+    return results
 
 
 def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
@@ -122,10 +122,10 @@ def varied_of(path: str, vary: Sequence[str]) -> tuple[list[str], list[str]]:
     return [f"{path}:{what}" for what, why in whys.items() if not why], faults
 
 
-def finish(atlas: Atlas, out: Path) -> NoReturn:
+def finish(results: StabilityResults, out: Path) -> NoReturn:
     """Print a table and where the page is; exit 1 if a task ended without a result."""
     console = Console(width=max(Console().width, 120))  # a row that is cut off would be no use to anybody
-    limits = atlas.limits
+    limits = results.limits
     rows = Table(title="Where they fail", title_justify="left", box=None, padding=(0, 1, 0, 0))
     shown = list(dict.fromkeys(limit.case for limit in limits))
     engines = [name for name in ENGINES if any(limit.engine == name for limit in limits)]
@@ -147,8 +147,8 @@ def finish(atlas: Atlas, out: Path) -> NoReturn:
     console.print("values were scanned, are in limits.csv (works_at, fails_at, spacing) and on the page.")
     console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
     lost = [f"{one.case} on {one.engine}" for one in limits if one.status != "ok"]
-    lost += [f"{one.name} on {one.engine}" for one in atlas.maps if one.status != "ok"]
-    lost += [f"{one.name} on {one.engine}" for one in atlas.laws if one.status != "ok"]
+    lost += [f"{one.name} on {one.engine}" for one in results.maps if one.status != "ok"]
+    lost += [f"{one.name} on {one.engine}" for one in results.laws if one.status != "ok"]
     if lost:
         say(f"no result: {', '.join(lost)}")
     sys.exit(FAILED if lost else DONE)

@@ -1,4 +1,4 @@
-"""What a case of the atlas asks, how thoroughly, and what a limit is; search.py finds one."""
+"""What a case of the stability report asks, how thoroughly, and what a limit is; search.py finds one."""
 
 from __future__ import annotations
 

@@ -19,10 +19,10 @@ from reports.page.charts import Drawing, Line, figure_of, shortened
 from reports.page.page import REPORTS, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
 from reports.page.replay import pack_layers, ratio_of
 from reports.stability import overview
-from reports.stability.atlas import Atlas, case_named
 from reports.stability.failures import kept_failure, near
 from reports.stability.limits import EXACT, FORMS, Case, Limit, Trial
 from reports.stability.maps import MAPS
+from reports.stability.results import StabilityResults, case_named
 from reports.stability.touching import GAPS, TOUCHING
 from reports.terminal.foreign_text import put_text
 from scenarios.model import Scenario, Trajectory
@@ -65,9 +65,9 @@ class Section:
         return next((replay for replay in self.replays if replay.engine == engine), None)
 
 
-def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
-    """Write the page of an atlas, whose failing runs are in `folder`, to `path`."""
-    limits, maps, laws = atlas.limits, atlas.maps, atlas.laws
+def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
+    """Write the page of a stability report, whose failing runs are in `folder`, to `path`."""
+    limits, maps, laws = results.limits, results.maps, results.laws
     by_case: dict[str, list[Limit]] = {}
     for limit in limits:
         by_case.setdefault(limit.case, []).append(limit)
@@ -84,11 +84,11 @@ def write_page(path: Path, folder: Path, atlas: Atlas) -> None:
     )  # fmt: skip
     environment.filters["number"] = style.number
     html = environment.get_template("stability.html.j2").render(
-        sections=sections, families=families_of(sections), findings=overview.findings(limits), about=atlas.header,
+        sections=sections, families=families_of(sections), findings=overview.findings(limits), about=results.header,
         engines=[name for name in names if "+" not in name], looks=looks,
         maps=overview.map_tables(maps), all_maps=MAPS, laws=laws, touching=TOUCHING, gaps=GAPS,
         words=overview, exact=EXACT,
-        form=FORMS[atlas.header["form"]], css=Markup(css() + sheet),
+        form=FORMS[results.header["form"]], css=Markup(css() + sheet),
         looks_json=Markup(looks_as_json(looks)), scripts=[Markup(script) for script in scripts],
         library=deflated(plotly), policy=content_policy([plotly, *scripts]),
     )  # fmt: skip

@@ -11,7 +11,7 @@ MOST = 1024  # runs, more than any case has
 
 
 @cache
-def drawn(seed: int) -> tuple[float, ...]:
+def sampled(seed: int) -> tuple[float, ...]:
     """`MOST` numbers from 0 to 1, the same for a seed on every machine."""
     return tuple(float(x) for x in np.random.default_rng(seed).random(MOST))
 
@@ -24,7 +24,7 @@ def phase(run: int) -> float:
     """
     if run == 0:
         return EDGE
-    where = radical_inverse((run + 1) // 2) if run % 2 else drawn(seed=0)[run // 2]
+    where = radical_inverse((run + 1) // 2) if run % 2 else sampled(seed=0)[run // 2]
     return EDGE + (1 - 2 * EDGE) * where
 
 

@@ -78,7 +78,7 @@ def _collisions_missed(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(missed, at, "the collision is missed: the disks pass through each other")
 
 
-def _collisions_invented(scenario: Scenario, played: Trajectory) -> Reading:
+def _collisions_spurious(scenario: Scenario, played: Trajectory) -> Reading:
     change = np.linalg.norm(played.velocity - played.velocity[0], axis=2).max(axis=1)
     share = change / np.linalg.norm(scenario.scene.velocity, axis=1).max()
     at = first_above(played.t, share, 1e-3)
@@ -181,8 +181,8 @@ def first_bounce(scenario: Scenario) -> float:
 COLLISIONS_MISSED = Predicate(
     "collisions missed", "collisions", 0.0, "a disk passes through another that it should collision", _collisions_missed
 )
-COLLISIONS_INVENTED = Predicate(
-    "collisions invented", "of the speed", 1e-3, "a disk is deflected that touches nothing", _collisions_invented
+COLLISIONS_SPURIOUS = Predicate(
+    "spurious collisions", "of the speed", 1e-3, "a disk is deflected that touches nothing", _collisions_spurious
 )
 RESTITUTION_OFF = Predicate(
     "restitution off", "1", 0.01, "the collision is not played with the scene's e", _restitution_off

@@ -84,7 +84,7 @@ def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
         return None
     at, what = wrong
     kind, pair = what.split(maxsplit=1)
-    count = len(found.missed) + len(found.invented)
+    count = len(found.missed) + len(found.spurious)
     return Reading(2.0 * max(count, 1), at, f"{kind} collision: {pair}", "collisions", disk=int(pair.split("-")[0]))
 
 

@@ -30,13 +30,13 @@ class Played(NamedTuple):
         error: (s, k) root mean square distance from the exact answer over disks and samples, in radii, at least
             `FLOOR`; inf where a scene was refused or failed, nan where there is no exact answer.
         gained: (s, k) energy over the energy at hand: at e = 1 the largest change, else the largest rise.
-        missed, invented: (s, k) collisions.
+        missed, spurious: (s, k) collisions.
     """
 
     error: Array
     gained: Array
     missed: Array
-    invented: Array
+    spurious: Array
 
 
 class Against(NamedTuple):
@@ -72,7 +72,7 @@ def measured(make: Make, scenes: Sequence[Asked]) -> Played:
 
 
 def of_run(make: Make, scenario: Scenario, truth: Trajectory | None, substeps: int) -> tuple[float, float, int, int]:
-    """Error, energy gained, collisions missed and invented; see `Played`."""
+    """Error, energy gained, missed and spurious collisions; see `Played`."""
     dt, scene = scenario.dt(substeps), scenario.scene
     engine = make()
     try:
@@ -91,7 +91,7 @@ def of_run(make: Make, scenario: Scenario, truth: Trajectory | None, substeps: i
     off = (played.position[: len(truth)] - truth.position)[:, moving] / scene.radius[moving, None]
     found = match(played.collisions, truth.collisions, float(truth.t[-1]), dt)
     error = float(np.sqrt((off**2).sum(axis=2).mean()))
-    return max(error, FLOOR), rise, len(found.missed), len(found.invented)
+    return max(error, FLOOR), rise, len(found.missed), len(found.spurious)
 
 
 def against(now: Played, before: Played, cost: float, scenes: Sequence[Asked]) -> Against:
@@ -106,8 +106,8 @@ def against(now: Played, before: Played, cost: float, scenes: Sequence[Asked]) -
 def at_cost(error: Array, cost: float) -> Array:
     """(s, k) what the errors would be if a step cost as much as before: those at cost times the step size.
 
-    Steps that cost twice as much are half as many. error (s, k) is read between the rungs of the ladder on a line of
-    its logarithm over that of dt; beyond its ends it is of first order, in proportion to dt.
+    Steps that cost twice as much are half as many. error (s, k) is read between the step sizes of the ladder on a line
+    of its logarithm over that of dt; beyond its ends it is of first order, in proportion to dt.
     """
     ladder = -np.log(LADDER)[::-1]  # ln dt + const, increasing
     wanted = ladder + np.log(cost)
@@ -120,7 +120,7 @@ def at_cost(error: Array, cost: float) -> Array:
 def faults_of(now: Played, before: Played, scenes: Sequence[Asked]) -> list[str]:
     """What `now` breaks that `before` kept, family by family.
 
-    A scene refused or failed; collisions missed or invented, more of them than by counting noise (n + sqrt(n): where
+    A scene refused or failed; missed or spurious collisions, more of them than by counting noise (n + sqrt(n): where
     there was none, none may come); an energy that is wrong by more than `MORE_ENERGY` and `SOME_ENERGY`.
     """
     family = np.array([scene.name.rsplit("-", 1)[0] for scene, _ in scenes])
@@ -129,7 +129,7 @@ def faults_of(now: Played, before: Played, scenes: Sequence[Asked]) -> list[str]
         its = family == name
         if (lost := int((np.isinf(now.error[its]) & ~np.isinf(before.error[its])).sum())) > 0:
             faults.append(f"{name}: {lost} runs failed")
-        for what in ("missed", "invented"):
+        for what in ("missed", "spurious"):
             n, had = (int(getattr(played, what)[its].sum()) for played in (now, before))
             if n > had + np.sqrt(had):
                 faults.append(f"{name}: {n} collisions {what}, not {had}")

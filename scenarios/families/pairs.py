@@ -122,7 +122,7 @@ def near_miss() -> Scenario:
     radius = 0.25
     return _pairs(
         "near_miss",
-        "Who invents a collision when a fast disk passes another at 1.005 times the touching distance?",
+        "Which engine reports a spurious collision when a fast disk passes another at 1.005 times the touching distance?",
         position=[[-6, 1.005 * 2 * radius], [0.03, 0]],
         velocity=[[12, 0], [0, 0]],  # 0.2 radii per step of 1/240 s
         mass=[1, 1],

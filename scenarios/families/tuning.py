@@ -93,7 +93,9 @@ def grazing(rng: np.random.Generator, r: float, v: float) -> Scenario:
 def near_miss(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """Pairs that do not collide."""
     offset = 1 + near(rng)
-    return pairs(rng, np.array([r, r]), FASTER * v * r, offset, 0.5, "Is a collision of two that miss invented?")
+    return pairs(
+        rng, np.array([r, r]), FASTER * v * r, offset, 0.5, "Is there a spurious collision of two disks that miss?"
+    )
 
 
 def unlike(rng: np.random.Generator, r: float) -> Array:

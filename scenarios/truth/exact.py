@@ -1,4 +1,4 @@
-"""The exact answer to scenes without a closed form: collision by collision in many digits, and no further than it is
+"""The exact answer to scenes without a closed form: event by event in many digits, and no further than it is
 right."""
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MOST_DISKS = 200
 WORK = 40_000  # steps of the event loop for one attempt, some twenty seconds; few attempts get so far
 HEAVY = 4096  # bits that make a step twice as dear as one of few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
-CLOSED_FORM, COLLISION_BY_COLLISION, NOTHING = "closed form", "collision by collision, in many digits", "nothing"
+CLOSED_FORM, EVENT_DRIVEN, NOTHING = "closed form", "event-driven, in many digits", "nothing"
 COARSE = 0.45  # of the time that is left for both of two precisions: the finer one takes a little longer
 ACCURACY = 1e-12  # radii of the smallest disk, and s; two precisions that differ by more have diverged
 
@@ -76,7 +76,7 @@ def answered_by(scenario: Scenario) -> str:
     """The cheapest model that answers it and is no engine, which the harness takes for its truth: one of the three."""
     if scenario.truth is None:
         return NOTHING
-    return COLLISION_BY_COLLISION if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
+    return EVENT_DRIVEN if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
 
 
 def with_oracle(scenario: Scenario) -> Scenario:

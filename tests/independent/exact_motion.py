@@ -1,4 +1,4 @@
-"""The exact motion of hard disks, written from the definitions alone: collision by collision, in 420 bits.
+"""The exact motion of hard disks, written from the definitions alone: event-driven, in 420 bits.
 
 A disk flies on a parabola until something happens. To know what happens first, every disk is asked of every other
 disk, of both faces and both ends of every wall, and of every edge of the wrapping box when it would get there; the

@@ -1,4 +1,5 @@
-"""Scenes drawn from a seed: disks in a box, in the open, in the wrapping box; with what else a scene may have."""
+"""Scenes that are random (seed n): disks in a box, in the open, in the wrapping box; with what else a scene may
+have."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ def random_scene(seed: int) -> Scenario:
 
 def scenario(name: str, scene: Scene, duration: float, thrusts: list[Thrust]) -> Scenario:
     """The scene as a scenario without an answer."""
-    return Scenario(name, "?", "drawn from a seed", scene, duration, duration / 16, thrusts=thrusts)
+    return Scenario(name, "?", "random (seed n)", scene, duration, duration / 16, thrusts=thrusts)
 
 
 def box(_rng: np.random.Generator) -> tuple[np.ndarray, None]:

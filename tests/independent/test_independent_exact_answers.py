@@ -112,7 +112,7 @@ def test_every_restitution_meets_all_surroundings():
 
 @pytest.mark.parametrize("seed", [4, 21])
 def test_a_record_that_is_wrong_in_one_thing_is_noticed(seed: int):
-    """An event dropped, invented, 2e-12 s late or of another pair; a disk off by 2e-12 m; an end that is too early."""
+    """An event dropped, spurious, 2e-12 s late or of another pair; a disk off by 2e-12 m; an end that is too early."""
     scenario = random_scene(seed)
     motion, record = Motion(scenario, MOST_EVENTS), computed(scenario)
     assert len(record.events) > 5

@@ -1,7 +1,7 @@
 """Numbers of the table from the trajectories alone, each as its line in `crosscheck list metrics` says.
 
 Left out: what is judged in collision-free samples (velocity, energy error and loss, deviation of momentum and energy),
-the collisions that are matched to those of another (missed, invented, delay), and disks through walls. To add one,
+the collisions that are matched to those of another (missed, spurious, delay), and disks through walls. To add one,
 write it from its line and give it a row in `OWN`.
 """
 

@@ -8,8 +8,8 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from reference_impl import crowd, exercise
-from reference_impl.neighbours import LASTS, look_around
+from reference_impl import exercise, verlet_list
+from reference_impl.neighbours import LASTS, build_list
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
 from tests.adapters.event_driven.gases import boxed_gas
 
@@ -21,7 +21,9 @@ DT = 1 / 60
 def scenes(draw):
     """From a thin gas to disks heaped upon each other; at rest or many boxes a step; with static disks, walls, wrap."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
-    n = draw(st.integers(2, 90) | st.integers(crowd.LOOK, 3 * crowd.LOOK))  # from there on it may look again in a step
+    n = draw(
+        st.integers(2, 90) | st.integers(verlet_list.REBUILD, 3 * verlet_list.REBUILD)
+    )  # from there on it may rebuild again in a step
     fill = draw(st.sampled_from([0.05, 0.3, 0.8, 2.0, 8.0, 100.0]))  # area of all disks over that of the box
     radius = rng.uniform(draw(st.sampled_from([0.05, 0.9])), 1.0, n)
     side = np.sqrt(np.pi * (radius**2).sum() / fill)
@@ -54,17 +56,19 @@ def copy_of(disks):
 
 @njit
 def by_list(disks, world, dt, count):
-    """As `crowd.advance`, however few the disks are; the collisions, and in how many steps all pairs had to be
+    """As `verlet_list.advance`, however few the disks are; the collisions, and in how many steps all pairs had to be
     asked."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
-    return collisions, crowd.advance_listed(disks, world, dt, count, collisions)
+    return collisions, verlet_list.advance_listed(disks, world, dt, count, collisions)
 
 
 @njit
-def until_astray(disks, world, near):
+def until_beyond_skin(disks, world, near):
     """In which step of one the list of near pairs ends to hold: 0, or 1 if it lasts."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
-    return crowd.play(disks, world, DT, 1, collisions, crowd.accelerations_of(disks, world, DT), near, 0, 0, 0)[0]
+    return verlet_list.play(
+        disks, world, DT, 1, collisions, verlet_list.accelerations_of(disks, world, DT), near, 0, 0, 0
+    )[0]
 
 
 def same(a, b):
@@ -93,22 +97,22 @@ def heap(n=300, fill=3.0):
     return make_disks(rng.uniform(0, side, (n, 2)), rng.normal(size=(n, 2)), radius, np.ones(n))
 
 
-def test_a_disk_pushed_off_its_leash_in_mid_step_is_looked_after_at_once():
+def test_a_disk_moved_beyond_the_skin_in_mid_step_rebuilds_the_list_at_once():
     """In a heap the list is out of date before the first step ends; kept to its end, it would miss pairs."""
     world, first, other, stale = World(), heap(), heap(), heap()
     collisions = exercise.advance(first, world, DT, 1)
     exercise.integrate(other, world, DT)
-    near = look_around(other, world, DT, 1)
+    near = build_list(other, world, DT, 1)
     assert near.listed
-    assert until_astray(other, world, near) == 0
+    assert until_beyond_skin(other, world, near) == 0
 
     reported, _ = by_list(renewed := heap(), world, DT, 1)
     assert same(first, renewed)
     assert reported == collisions
 
     exercise.integrate(stale, world, DT)
-    kept = look_around(stale, world, DT, 1)._replace(leash=np.inf)
-    assert until_astray(stale, world, kept) == 1
+    kept = build_list(stale, world, DT, 1)._replace(half_skin=np.inf)
+    assert until_beyond_skin(stale, world, kept) == 1
     assert not same(first, stale)
 
 
@@ -118,8 +122,8 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
     scene = boxed_gas(500, packing)
     position = scene.position - scene.position.mean(axis=0)
     disks = make_disks(position, scene.velocity, scene.radius, scene.mass)
-    near = look_around(disks, World(walls=scene.walls), DT, LASTS)
-    skin = near.leash / 0.49
+    near = build_list(disks, World(walls=scene.walls), DT, LASTS)
+    skin = near.half_skin / 0.49
     apart = np.hypot(*(position[:, None] - position).transpose(2, 0, 1)) - 1.0
     wanted = np.argwhere(np.triu(apart < skin, 1))
     assert near.listed
@@ -129,12 +133,12 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
 
 
 def test_a_list_is_made_for_the_steps_that_are_left_but_not_for_more_than_it_pays():
-    """Its leash is as long as the fastest disk needs; longer, a call of few steps would ask many pairs in vain."""
+    """Its skin is as thick as the fastest disk needs; thicker, a call of few steps would ask many pairs in vain."""
     scene, dt = boxed_gas(500, 0.3), DT / 4
     disks, world = make_disks(scene.position, scene.velocity, scene.radius, scene.mass), World()
-    leash = {left: look_around(disks, world, dt, left).leash for left in (2, 4, 8, LASTS, 2 * LASTS)}
-    assert leash[8] == 2 * leash[4] == 4 * leash[2] > 0.0
-    assert leash[LASTS] == leash[2 * LASTS] == 2 * leash[8]
+    half_skin = {left: build_list(disks, world, dt, left).half_skin for left in (2, 4, 8, LASTS, 2 * LASTS)}
+    assert half_skin[8] == 2 * half_skin[4] == 4 * half_skin[2] > 0.0
+    assert half_skin[LASTS] == half_skin[2 * LASTS] == 2 * half_skin[8]
 
 
 @pytest.mark.parametrize("far", [1e12, 1e300, np.inf, np.nan])
@@ -154,15 +158,15 @@ def test_a_disk_lost_in_space_leaves_no_list_but_the_same_bits(far):
 def test_disks_all_in_one_place_are_not_listed():
     """Every pair is near: a list would be as long as the double loop, and hold memory besides."""
     disks = make_disks(np.zeros((300, 2)), np.zeros((300, 2)), np.ones(300), np.ones(300))
-    assert not look_around(disks, World(), DT, 1).listed
+    assert not build_list(disks, World(), DT, 1).listed
 
 
-@pytest.mark.parametrize("n", [crowd.CROWD - 1, crowd.CROWD, 1000])
+@pytest.mark.parametrize("n", [verlet_list.LISTED_FROM - 1, verlet_list.LISTED_FROM, 1000])
 def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_list_begins(n):
     """As the harness plays it: in several calls."""
     scene = boxed_gas(n, 0.3)
     first, other = (make_disks(scene.position, 5 * scene.velocity, scene.radius, scene.mass) for _ in range(2))
     world = World(restitution=1.0, walls=scene.walls)
     for count in (1, 7, 30):
-        assert crowd.advance(other, world, DT, count) == exercise.advance(first, world, DT, count)
+        assert verlet_list.advance(other, world, DT, count) == exercise.advance(first, world, DT, count)
         assert same(first, other)

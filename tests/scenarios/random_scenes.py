@@ -47,7 +47,7 @@ def random_scenario(seed: int, number: int) -> Scenario:
     return Scenario(
         name=f"random_{layout}_{seed}_{number}",
         asks="Does it end, whatever meets, and is it the same for all who answer?",
-        source="drawn",
+        source="random",
         scene=scene,
         duration=duration,
         sample_interval=INTERVAL,

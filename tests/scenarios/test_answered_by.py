@@ -8,14 +8,14 @@ import pytest
 
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.truth import exact as oracle
-from scenarios.truth.exact import CLOSED_FORM, COLLISION_BY_COLLISION, NOTHING, answered_by, computed
+from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN, NOTHING, answered_by, computed
 
 MODELS = {name: answered_by(scenario(name)) for name in SCENARIOS}
 
 
 def never(*_: object) -> None:
     """Stands for the oracle where it must not be asked."""
-    raise AssertionError("followed collision by collision")
+    raise AssertionError("computed by events")
 
 
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model == CLOSED_FORM])
@@ -31,16 +31,16 @@ def test_a_scene_that_names_a_closed_form_is_answered_without_following_a_collis
     assert len(one.truth(one.times)) >= 2
 
 
-def test_a_scene_that_is_followed_collision_by_collision_says_so(monkeypatch: pytest.MonkeyPatch):
+def test_a_scene_that_is_computed_by_events_says_so(monkeypatch: pytest.MonkeyPatch):
     """Negative control: there the oracle is asked, and there are such scenes."""
     monkeypatch.setattr(oracle, "look_up", never)
-    followed = [name for name, model in MODELS.items() if model == COLLISION_BY_COLLISION]
+    by_events = [name for name, model in MODELS.items() if model == EVENT_DRIVEN]
 
-    assert {"asteroids", "gas_of_100", "cradle_touching"} <= set(followed)
-    for name in followed:
+    assert {"asteroids", "gas_of_100", "cradle_touching"} <= set(by_events)
+    for name in by_events:
         one = scenario(name)
         assert one.truth is not None
-        with pytest.raises(AssertionError, match="followed collision by collision"):
+        with pytest.raises(AssertionError, match="computed by events"):
             one.truth(one.times)
 
 

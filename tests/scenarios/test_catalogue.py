@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.catalogue import DRAWN, SCENARIOS, scenario
+from scenarios.catalogue import RANDOM, SCENARIOS, scenario
 
 ANSWERED = [name for name in SCENARIOS if scenario(name).truth]
 # Among the hundreds of collisions of a drawn scene some fall on a step, in every draw.
-MOVING = [name for name in ANSWERED if name not in (*DRAWN, "rest_on_floor", "slide_on_incline", "column_of_ten")]
+MOVING = [name for name in ANSWERED if name not in (*RANDOM, "rest_on_floor", "slide_on_incline", "column_of_ten")]
 
 
 def smallest_gap(scene, position):
@@ -28,7 +28,7 @@ def test_there_are_at_least_24_and_each_is_listed_under_its_own_name():
     """The catalogue is keyed by `Scenario.name`."""
     assert len(SCENARIOS) >= 24
     assert [scenario(name).name for name in SCENARIOS] == list(SCENARIOS)
-    assert set(SCENARIOS) >= DRAWN
+    assert set(SCENARIOS) >= RANDOM
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
@@ -115,9 +115,9 @@ def test_thrusts_begin_and_end_at_samples(name):
         np.testing.assert_allclose(samples, np.round(samples), rtol=1e-15)
 
 
-@pytest.mark.parametrize("name", sorted(DRAWN))
+@pytest.mark.parametrize("name", sorted(RANDOM))
 def test_same_seed_same_scene_and_another_seed_another(name):
-    """A drawn scene is its seed, bit for bit."""
+    """A random scene is its seed, bit for bit."""
     one, same, other = scenario(name, 3), scenario(name, 3), scenario(name, 4)
     for field in ("position", "velocity", "angular_velocity", "radius", "mass", "inertia"):
         assert getattr(one.scene, field).tobytes() == getattr(same.scene, field).tobytes()
@@ -126,8 +126,8 @@ def test_same_seed_same_scene_and_another_seed_another(name):
 
 
 def test_other_scenarios_do_not_depend_on_the_seed():
-    """Only what `DRAWN` lists is drawn."""
-    for name in set(SCENARIOS) - DRAWN:
+    """Only what `RANDOM` lists is drawn."""
+    for name in set(SCENARIOS) - RANDOM:
         one, other = scenario(name, 3), scenario(name, 4)
         assert one.seed is None
         assert one.scene.position.tobytes() == other.scene.position.tobytes()

@@ -12,7 +12,7 @@ import pytest
 from scenarios.catalogue import scenario
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scenario, Scene, Thrust
-from scenarios.truth import float64_horizon as of_horizon
+from scenarios.truth import horizon as of_horizon
 from scenarios.truth.exact import computed
 from scenarios.truth.horizon import DIVERGED, EPS, Nearby, float64_horizon, roundings
 from scenarios.truth.oracle.events import trace

@@ -19,7 +19,7 @@ from scenarios.truth.oracle.numbers import balls, decimals, has_balls, mpfr
 from tests.scenarios.test_catalogue import smallest_gap
 from tests.scenarios.test_closed_forms import FLYING, simulate
 
-DRAWN = ("asteroids", "falling_box", "gas_of_100")
+RANDOM = ("asteroids", "falling_box", "gas_of_100")
 COUNTS = {"asteroids": 20, "falling_box": 980, "gas_of_100": 1974}
 
 
@@ -47,7 +47,7 @@ def drawn(seed: int, n: int = 5, restitution: float = 1.0, gravity: float = 0.0,
 @pytest.fixture(scope="module")
 def records() -> dict[str, TruthRecord]:
     """The records of the drawn scenes, computed here and now."""
-    return {name: computed(scenario(name)) for name in DRAWN}
+    return {name: computed(scenario(name)) for name in RANDOM}
 
 
 @pytest.mark.parametrize("name", [*FLYING, "ship_thrust", "spin_under_torque"])
@@ -80,7 +80,7 @@ def test_it_finds_what_the_closed_form_says(name: str):
     )
 
 
-@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("name", RANDOM)
 def test_the_drawn_scenes_are_answered_to_their_end(name: str, records: dict[str, TruthRecord]):
     """No reason to stop, no overlap at any sample, as many collisions as ever."""
     one, record = scenario(name), records[name]
@@ -123,7 +123,7 @@ def test_all_numbers_give_the_same(records: dict[str, TruthRecord]):
 @pytest.mark.skipif(not has_balls(), reason="python-flint is an extra")
 def test_interval_arithmetic_proves_every_comparison(records: dict[str, TruthRecord]):
     """The drawn scenes are certified; balls that are too wide say so instead of guessing."""
-    assert {name: record.method for name, record in records.items()} == dict.fromkeys(DRAWN, "certified")
+    assert {name: record.method for name, record in records.items()} == dict.fromkeys(RANDOM, "certified")
     one = scenario("gas_of_100")
     with pytest.raises(ArithmeticError):
         trace(one.scene, [], one.duration, balls(64))

@@ -91,7 +91,7 @@ def test_a_collision_on_a_resting_disk_is_the_limit_of_small_gaps(
 
     assert rests(record)[0] == (0.0, 0, -1)
     np.testing.assert_allclose([leg[5] + leg[10] for leg in after], [lower * speed, upper * speed], rtol=0, atol=1e-15)
-    # The same with a gap of 1e-9 m and nothing to accelerate the lower disk downwards: collision by collision, no
+    # The same with a gap of 1e-9 m and nothing to accelerate the lower disk downwards: event by event, no
     # contact lasts.
     gapped = asked(replace(scene, position=[[0, 0.25 + 1e-9], [0, 1.5]], gravity=[0, 0]), 1.0)
     limit = states(gapped, computed(gapped))

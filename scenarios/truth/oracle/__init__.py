@@ -1,1 +1,1 @@
-"""The oracle: collision by collision, in many digits, certified."""
+"""The oracle: event by event, in many digits, certified."""

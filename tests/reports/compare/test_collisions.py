@@ -14,16 +14,16 @@ def collisions(*times: float) -> Collisions:
     return Collisions.of([(t, 0, 1, 1.0) for t in times])
 
 
-def test_a_missing_collision_is_missed_and_an_extra_collision_is_invented():
+def test_a_missing_collision_is_missed_and_an_extra_collision_is_spurious():
     """The collision that is left over is the one whose absence makes the others match."""
     missed = match(collisions(1.01, 3.01), collisions(1, 2, 3), 10, 0.01)
-    invented = match(collisions(1.01, 2.5, 3.01), collisions(1, 3), 10, 0.01)
+    spurious = match(collisions(1.01, 2.5, 3.01), collisions(1, 3), 10, 0.01)
 
     assert missed.missed == [(2.0, 0, 1)]
-    assert missed.invented == []
-    assert invented.invented == [(2.5, 0, 1)]
-    assert invented.missed == []
-    np.testing.assert_allclose(invented.delay, 0.01)
+    assert missed.spurious == []
+    assert spurious.spurious == [(2.5, 0, 1)]
+    assert spurious.missed == []
+    np.testing.assert_allclose(spurious.delay, 0.01)
 
 
 def test_an_engine_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_late():
@@ -35,7 +35,7 @@ def test_an_engine_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_
 
     assert late.first_wrong is None
     np.testing.assert_allclose(late.delay, 0.06 * true)
-    assert (too_late.missed, too_late.invented) == ([(1.0, 0, 1)], [(9.0, 0, 1)])
+    assert (too_late.missed, too_late.spurious) == ([(1.0, 0, 1)], [(9.0, 0, 1)])
 
 
 def test_a_collision_that_the_end_cuts_off_is_not_blamed():

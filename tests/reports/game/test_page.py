@@ -111,7 +111,7 @@ def test_a_scripted_flight_wins(page: Page):
 
 
 def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(page: Page, tmp_path: Path):
-    """pymunk as shipped makes e2 of e: it parts at the first collision, whose pair and instant the exact answer
+    """pymunk as shipped makes e2 of e: it contributions at the first collision, whose pair and instant the exact answer
     reports."""
     fly(page, 16)
     together = [flyer["deviation"] for flyer in page.evaluate("game.now.flyers")]

@@ -1,4 +1,5 @@
-"""Lesson 8: its brackets are those of the atlas, measured when asked for, and its run is the one that fails."""
+"""Lesson 8: its brackets are those of the stability report, measured when asked for, and its run is the one that
+fails."""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ def at(case: str, engine: str, place: int) -> tuple[int, int, int]:
 
 
 @pytest.mark.parametrize("name", ["slow_collision", "spin", "far_from_origin"])
-def test_the_brackets_are_those_of_the_atlas(name: str):
+def test_the_brackets_are_those_of_the_stability_report(name: str):
     """Searched here and now they hold the limits of the full form."""
     rows = {row.engine: row for row in kept() if row.case == name}
     found = {limit.engine: limit for limit in limits_of(name)}
@@ -87,7 +88,7 @@ def test_refusals_are_shown_beside_the_exact_answer():
     assert "b2_maxRotation" in dict(shown.steps)["Why"]
 
 
-def test_every_case_has_its_values_within_the_atlas():
+def test_every_case_has_its_values_within_the_report():
     """From the case's gentlest to its harshest, or to where a replay can still show it."""
     for seen in SEEN.values():
         values, ladder = CASES[seen.case].values, [seen.value(place) for place in HARSHNESS]

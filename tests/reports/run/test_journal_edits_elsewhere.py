@@ -20,11 +20,11 @@ from reports.speed import budget, ladder, lines, models
 from reports.speed.kept import Kept
 from reports.speed.measure import in_turns, scene_rows
 from reports.speed.plan import PLAIN, SCENE, Measurement
-from reports.stability import lines as atlas_lines
-from reports.stability.atlas import Task, found_limit, journalled
+from reports.stability import lines as stability_lines
 from reports.stability.command import write_files
 from reports.stability.limits import Limit
 from reports.stability.maps import MAPS, MapOf
+from reports.stability.results import Task, found_limit, journalled
 from reports.stability.touching import law_of
 from reports.terminal.exits import FolderTaken
 from scenarios.catalogue import scenario
@@ -54,9 +54,9 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def atlas(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The journal of an atlas: a limit, a law, and a map whose readings are all alike."""
-    place = tmp_path_factory.mktemp("atlas")
+def stability(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The journal of an stability: a limit, a law, and a map whose readings are all alike."""
+    place = tmp_path_factory.mktemp("stability")
     (place / "trajectories").mkdir()
     one = MAPS["dt_and_speed"]
     tasks = [Task(kind, name, "pymunk:matched", "quick") for kind, name in
@@ -79,7 +79,7 @@ def resumed(folder: Path) -> None:
 
 
 READ: dict[str, tuple[dict, Callable[[Path], Any]]] = {
-    "measured": (lines.KINDS.models, resumed), "atlas": (atlas_lines.KINDS.models, journalled),
+    "measured": (lines.KINDS.models, resumed), "stability": (stability_lines.KINDS.models, journalled),
 }  # fmt: skip
 
 
@@ -180,14 +180,14 @@ def test_a_line_that_is_there_twice_counts_once(journal: tuple, tmp_path: Path):
         ("measured", 3, ("result", 0, "round"), 7, "must have each round"),
         ("measured", 3, ("result", 0, "engine"), "other", "must have each round"),
         ("measured", 3, ("result", 0, "cost"), 1e300, "result[0].cost = 1e+300: must be less than"),
-        ("atlas", 0, ("header", "form"), "x", "header.form = 'x': must be 'quick' or 'full'"),
-        ("atlas", 0, ("header", "files"), {"../x": "y"}, "header.files.../x = 'y': must match pattern"),
-        ("atlas", 1, ("limit", "trials", 0, "value"), 1e9, "limit.trials[0].value = 1000000000.0: must be from"),
-        ("atlas", 1, ("limit", "intervention"), "x", "limit.intervention = 'x': must be"),
-        ("atlas", 1, ("limit", "case"), "../x.toml:dt", "limit: must be of the task's name and engine"),
-        ("atlas", 2, ("law", "gaps", 0, 5), [[1]], "gaps[0][5]: must hold numbers"),
-        ("atlas", 3, ("map", "cells", 0, 0), 17, "cells: must be those of the map's grid"),
-        ("atlas", 3, ("task", "engine"), "pymunk:x", "map: must be of the task's name and engine"),
+        ("stability", 0, ("header", "form"), "x", "header.form = 'x': must be 'quick' or 'full'"),
+        ("stability", 0, ("header", "files"), {"../x": "y"}, "header.files.../x = 'y': must match pattern"),
+        ("stability", 1, ("limit", "trials", 0, "value"), 1e9, "limit.trials[0].value = 1000000000.0: must be from"),
+        ("stability", 1, ("limit", "intervention"), "x", "limit.intervention = 'x': must be"),
+        ("stability", 1, ("limit", "case"), "../x.toml:dt", "limit: must be of the task's name and engine"),
+        ("stability", 2, ("law", "gaps", 0, 5), [[1]], "gaps[0][5]: must hold numbers"),
+        ("stability", 3, ("map", "cells", 0, 0), 17, "cells: must be those of the map's grid"),
+        ("stability", 3, ("task", "engine"), "pymunk:x", "map: must be of the task's name and engine"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_named(
@@ -217,9 +217,9 @@ def test_a_file_that_never_ends_has_no_digest(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_pages_are_made_of_what_is_taken(atlas: Path, tmp_path: Path):
+def test_pages_are_made_of_what_is_taken(stability: Path, tmp_path: Path):
     """Of the edits that are let pass, a sample is written: an exception would fail this test."""
-    whole = [json.loads(line) for line in (atlas / JOURNAL).read_text().splitlines()]
+    whole = [json.loads(line) for line in (stability / JOURNAL).read_text().splitlines()]
     taken = [
         (number, line, what) for number, line, what in edits(whole)
         if not fault_of(journalled, put(tmp_path, whole, number, line))
@@ -230,13 +230,13 @@ def test_pages_are_made_of_what_is_taken(atlas: Path, tmp_path: Path):
         assert (tmp_path / "stability.html").exists(), what
 
 
-def test_a_text_that_reads_nan_stays_a_text(measured: Path, atlas: Path, tmp_path: Path):
+def test_a_text_that_reads_nan_stays_a_text(measured: Path, stability: Path, tmp_path: Path):
     """It became a number when it was read back, and a traceback where it was taken for text."""
     whole = [json.loads(line) for line in (measured / JOURNAL).read_text().splitlines()]
     whole[1]["result"][0]["reason"] = "nan"
     with Journal(put(tmp_path, whole)) as journal:
         assert Kept(journal, HEADER, True, SCENES)[tuple(whole[1]["task"])][0]["reason"] == "nan"
-    whole = [json.loads(line) for line in (atlas / JOURNAL).read_text().splitlines()]
+    whole = [json.loads(line) for line in (stability / JOURNAL).read_text().splitlines()]
     whole[1]["limit"]["source"] = "nan"
     _, results = journalled(put(tmp_path, whole))
     assert [one.source for one in results.values() if isinstance(one, Limit)] == ["nan"]

@@ -108,7 +108,9 @@ def test_a_line_that_is_none_of_its_own_is_reported(parts: dict[str, Path], tmp_
         assert f"{JOURNAL}: line 2 is no line of" in done.stderr
 
 
-def test_what_was_torn_beside_the_journal_does_not_keep_the_atlas_from_its_end(parts: dict[str, Path], tmp_path: Path):
+def test_what_was_torn_beside_the_journal_does_not_keep_the_stability_run_from_its_end(
+    parts: dict[str, Path], tmp_path: Path
+):
     """A failing run that cannot be read is not shown; its limit is."""
     journal = journal_of(parts["stability"], tmp_path)
     for path in (journal.parent / "trajectories").iterdir():

@@ -23,7 +23,7 @@ from adapters.mechanisms.table import (
 )
 from reports.compare import scales
 from reports.speed import budget, budget_tables
-from reports.speed.budget import ALL, INTERPLAY, SUM, TIME, TOTAL, UNEXPLAINED, Budget, Offset, budget_of, window_of
+from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL, Budget, Offset, budget_of, window_of
 from scenarios.model import Array, State
 
 FLOAT64 = 2.0**-53
@@ -57,46 +57,46 @@ def budgeted(scene: str, known: list[Mechanism], substeps: int = 4) -> tuple[dic
     """The budget of the planted engine for somebody who knows only of `known`."""
     at = window_of(scene, 0, substeps)
     made = Budget(at, known, at.offset(at.played(planted(KNOWN))))
-    return made.parts(), made
+    return made.contributions(), made
 
 
-def test_a_planted_engine_gets_its_parts_and_its_bug_is_unexplained():
+def test_a_planted_engine_gets_its_contributions_and_its_bug_is_the_residual():
     """What is left over is the bug to rounding, of every disk in every sample."""
-    parts, made = budgeted("oblique_e09", KNOWN)
+    contributions, made = budgeted("oblique_e09", KNOWN)
     moving = made.at.scenario.scene.radius
 
-    left = parts[UNEXPLAINED].position
+    left = contributions[RESIDUAL].position
     assert left[..., 1] == pytest.approx(np.broadcast_to(Drifting.bug / moving, left.shape[:2]), abs=1e-12)
     assert np.abs(left[..., 0]).max() <= 1e-12
     for mechanism in (RESTITUTION, POSITION_CORRECTION):
-        assert parts[mechanism].radii > 100 * FLOAT64
-    assert parts[FLIGHT].radii == 0.0  # nothing accelerates here
+        assert contributions[mechanism].radii > 100 * FLOAT64
+    assert contributions[FLIGHT].radii == 0.0  # nothing accelerates here
 
 
-def test_a_mechanism_that_nobody_names_is_unexplained_to_its_size():
+def test_a_mechanism_that_nobody_names_is_the_residual_to_its_size():
     """Negative control: without the restitution rule in the list, what is left over is as large as it and the bug."""
     known, _ = budgeted("oblique_e09", KNOWN)
     missed, _ = budgeted("oblique_e09", [each for each in KNOWN if each.name != RESTITUTION])
 
-    assert missed[UNEXPLAINED].radii > 0.9 * known[RESTITUTION].radii > 10 * known[UNEXPLAINED].radii
+    assert missed[RESIDUAL].radii > 0.9 * known[RESTITUTION].radii > 10 * known[RESIDUAL].radii
 
 
 def test_the_parts_close_as_vectors_and_agree_with_the_whole():
-    """engine - truth = parts + interplay + unexplained, sample by sample; the shares add up to 1."""
-    parts, _ = budgeted("bouncing_ball_e09", KNOWN)
-    causes = [each for part, each in parts.items() if part not in budget.TOTALS]
-    total = parts[TOTAL]
+    """engine - truth = contributions + interplay + residual, sample by sample; the shares add up to 1."""
+    contributions, _ = budgeted("bouncing_ball_e09", KNOWN)
+    causes = [each for part, each in contributions.items() if part not in budget.TOTALS]
+    total = contributions[TOTAL]
 
     assert np.abs(budget.added(causes).position - total.position).max() <= 1e-12
     assert np.abs(budget.added(causes).energy - total.energy).max() <= 1e-12
     assert sum(each.share_of(total) for each in causes) == pytest.approx(1.0, abs=1e-12)
-    assert np.abs((parts[ALL] - parts[SUM] - parts[INTERPLAY]).position).max() <= 1e-12
-    assert parts[INTERPLAY].radii > 0  # in a row of bounces each changes what the next can do
+    assert np.abs((contributions[ALL] - contributions[SUM] - contributions[INTERPLAY]).position).max() <= 1e-12
+    assert contributions[INTERPLAY].radii > 0  # in a row of bounces each changes what the next can do
 
 
 def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
     """x by (alpha - 1/2) dt a t, so that energy is off by -(alpha - 1/2) dt m a2 t, of the energy at hand."""
-    rows = pd.DataFrame(budget_of("free_fall", 0, "pymunk:matched", 4)).set_index("part")
+    rows = pd.DataFrame(budget_of("free_fall", 0, "pymunk:matched", 4)).set_index("contribution")
     at = window_of("free_fall", 0, 4)
     g, t = float(np.linalg.norm(at.scenario.scene.gravity)), at.truth.t
     offset = 0.5 * at.dt * g * t / at.scenario.scene.radius[0]
@@ -106,17 +106,17 @@ def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
     assert rows.loc[FLIGHT].energy == pytest.approx(np.sqrt(np.mean(energy**2)), rel=1e-9)
     assert rows.loc[FLIGHT].closed_deviation_radii <= 1e-12
     assert rows.loc[TIME].position_radii <= 1e-12
-    assert rows.loc[UNEXPLAINED].position_radii <= 1e-12
+    assert rows.loc[RESIDUAL].position_radii <= 1e-12
 
 
 def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce():
     """All eight with known mechanisms; float32 alone leaves less than a thousandth of an engine's error."""
     scenes = ("head_on_equal_e09", "wall_to_wall")
     rows = pd.DataFrame([row for scene in scenes for name in MECHANISMS for row in budget_of(scene, 0, name, 4)])
-    wide = rows.pivot(index=["scenario", "engine", "profile"], columns="part", values="position_radii")
+    wide = rows.pivot(index=["scenario", "engine", "profile"], columns="contribution", values="position_radii")
 
     assert len(wide) == 2 * len(MECHANISMS)
-    assert (wide[UNEXPLAINED] <= 1e-3 * wide[TOTAL]).all()
+    assert (wide[RESIDUAL] <= 1e-3 * wide[TOTAL]).all()
     assert (wide[TOTAL] > 1e-3).all()
     assert (wide[DIGITS].dropna() > 0).all()
 
@@ -140,7 +140,7 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(monkeypatch
     monkeypatch.setitem(ENGINES, "reference:exercise", Row(Refusing, "", 1.0, FLOAT64))
     (row,) = budget_of("free_fall", 0, "reference:exercise", 4)
 
-    assert (row["part"], row["note"]) == (TOTAL, "error: RuntimeError: no <b>such</b> thing")
+    assert (row["contribution"], row["note"]) == (TOTAL, "error: RuntimeError: no <b>such</b> thing")
     table = pd.DataFrame([row], columns=budget.COLUMNS)
     assert budget_tables.of_scene(table, "free_fall").notes == {"reference:exercise": row["note"]}
     assert [cell.value for cell in budget_tables.overview(table).rows["reference:exercise"]] == [0, 0, 0, 0]
@@ -156,7 +156,7 @@ def test_tables_have_the_largest_part_and_bars_by_decades():
 
     assert bars == pytest.approx([1, 1, 0.5, 0, 0, 0, 0])
     assert FLIGHT not in table.columns
-    assert table.columns[:2] == [TOTAL, UNEXPLAINED]
+    assert table.columns[:2] == [TOTAL, RESIDUAL]
     assert dict(zip(overview.columns, overview.rows["pymunk:shipped"]))[RESTITUTION].value == 1
     assert dict(zip(overview.columns, overview.rows["box2d:matched"]))[TIME].value == 1
     assert dict(zip(overview.columns, overview.rows["box2d:matched"]))["explained"].value == 1

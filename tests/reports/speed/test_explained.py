@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from reports.speed import budget, explained
-from reports.speed.budget import TOTAL, UNEXPLAINED, budget_of
+from reports.speed.budget import RESIDUAL, TOTAL, budget_of
 from reports.speed.explained import COLUMNS, Cut, extent, sentence, share
 from reports.speed.ladder import held
 
@@ -68,10 +68,10 @@ def test_the_budget_itself_tells_how_far_it_goes():
 
 
 def test_a_row_has_the_error_and_what_is_left_of_the_budget():
-    """As the parts have them."""
+    """As the contributions have them."""
     rows = pd.DataFrame(budget_of("slow_collision", 0, "box2d:matched", 4), columns=budget.COLUMNS)
-    parts = rows.set_index("part").position_radii
+    contributions = rows.set_index("contribution").position_radii
     row = explained.explained(rows).iloc[0]
 
-    assert (row.error_radii, row.unexplained_radii) == (parts[TOTAL], parts[UNEXPLAINED])
+    assert (row.error_radii, row.residual_radii) == (contributions[TOTAL], contributions[RESIDUAL])
     assert row.note == ""

@@ -33,8 +33,8 @@ def kept_row(path: object, scene: str, name: str) -> pd.Series:
 def test_the_kept_orders_are_those_of_the_code(name: str):
     """One scene on the ladder of the full form: verdict, slope and the error at the finest step, of every engine."""
     scene = "head_on_unequal_e09"
-    rungs = FULL.ladder(ladder.open_scene(scene, 0))
-    rows = ladder.errors_of(scene, 0, name, ENGINES[name].make, rungs)
+    step_sizes = FULL.ladder(ladder.open_scene(scene, 0))
+    rows = ladder.errors_of(scene, 0, name, ENGINES[name].make, step_sizes)
     now = tables.orders(Measured(errors=pd.DataFrame(rows).assign(kind=SCENE)), 0).iloc[0]
     kept = kept_row(figures.ORDERS, scene, name)
 
@@ -47,13 +47,13 @@ def test_the_kept_orders_are_those_of_the_code(name: str):
 
 @pytest.mark.parametrize("name", list(MECHANISMS))
 def test_the_kept_budget_is_that_of_the_code(name: str):
-    """One scene: the error and how far it was evaluated; what is left unexplained may be rounding."""
+    """One scene: the error and how far it was evaluated; the residual may be rounding."""
     scene = "slow_collision"
     rows = pd.DataFrame(budget_of(scene, 0, name, middle(scene)), columns=budget.COLUMNS)
     now, kept = explained.explained(rows).iloc[0], kept_row(figures.EXPLAINED, scene, name)
 
     assert kept.error_radii == pytest.approx(now.error_radii, rel=DIGITS)
-    assert kept.unexplained_radii == pytest.approx(now.unexplained_radii, rel=0.1, abs=1e-5 * now.error_radii)
+    assert kept.residual_radii == pytest.approx(now.residual_radii, rel=0.1, abs=1e-5 * now.error_radii)
     assert (kept.until_s, kept.horizon_s, kept.duration_s) == pytest.approx(
         (now.until_s, now.horizon_s, now.duration_s), rel=DIGITS
     )
@@ -134,10 +134,13 @@ def pooled(worse: str = "") -> pd.DataFrame:
     """Figures of three steps: every error is halved, every cost doubled; one engine is three times as far off."""
     rows = []
     for name in ENGINES:
-        for rung in range(3):
-            error = 0.1 * (3.0 if name == worse else 1.0) / 2**rung
+        for step_size in range(3):
+            error = 0.1 * (3.0 if name == worse else 1.0) / 2**step_size
             lost = "failed in 1 of 2" if name == "event_driven:float64" else "failed in 0 of 2"
-            rows += [row("pooled error", name, str(rung), error, lost), row("pooled cost", name, str(rung), 2.0**rung)]
+            rows += [
+                row("pooled error", name, str(step_size), error, lost),
+                row("pooled cost", name, str(step_size), 2.0**step_size),
+            ]
         rows.append(row("cost at accuracy", name, "1e-6", 1.0, "0 of 2, never in 2" if name in COMPARED else "1 of 2"))
     return pd.DataFrame(rows)
 

@@ -17,11 +17,11 @@ from reports.speed.results import Results
 DT = np.array([0.4, 0.2, 0.1])
 
 
-def point(scenario: str = "one", rung: int = 0, cost: float = 1.0, error: float = 0.1, **more: object) -> dict:
+def point(scenario: str = "one", step_size: int = 0, cost: float = 1.0, error: float = 0.1, **more: object) -> dict:
     """A row of `points` of `pymunk:matched`."""
     return {
-        "scenario": scenario, "engine": "pymunk", "profile": "matched", "change": PLAIN, "rung": rung,
-        "dt_s": 0.4 / 2**rung, "cost": cost, "low": cost, "high": cost, "best": cost, "error": error,
+        "scenario": scenario, "engine": "pymunk", "profile": "matched", "change": PLAIN, "step_size": step_size,
+        "dt_s": 0.4 / 2**step_size, "cost": cost, "low": cost, "high": cost, "best": cost, "error": error,
         "error_low": error, "error_high": error, "seeds": 1, "failed": int(np.isinf(error)),
         "status": "error" if np.isinf(error) else "ok", "reason": "no" if np.isinf(error) else "", "wrapping": 0.0,
         "idle": 0.5,
@@ -58,7 +58,9 @@ def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
 
 def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_edge():
     """The one is accurate, and must not look failed."""
-    table = pd.DataFrame([point(), point(rung=1, cost=np.nan, error=0.05), point(rung=2, cost=np.nan, error=np.inf)])
+    table = pd.DataFrame(
+        [point(), point(step_size=1, cost=np.nan, error=0.05), point(step_size=2, cost=np.nan, error=np.inf)]
+    )
     figure = charts.speed(table)
     edge = next(trace for trace in figure.data if trace.mode == "markers")
 
@@ -68,15 +70,15 @@ def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_
     assert "failed in 1 of 1" in edge.text[1]
 
 
-def sweep(value: str, rung: int, **more: object) -> dict:
-    """A row of a sweep at `value`, at the dt of the row `point(rung=2)`."""
-    return point(rung=rung, profile="matched+iterations", change=value, dt_s=0.1) | more
+def sweep(value: str, step_size: int, **more: object) -> dict:
+    """A row of a sweep at `value`, at the dt of the row `point(step_size=2)`."""
+    return point(step_size=step_size, profile="matched+iterations", change=value, dt_s=0.1) | more
 
 
 def test_a_sweep_that_fails_most_scenes_stays_on_the_pooled_chart():
     """At the edge: a ratio of infinity. It was not drawn at all."""
     rows = [row | {"scenario": scene} for scene in ("one", "two") for row in
-            (point(rung=2), sweep("1", 0), sweep("9", 1, cost=np.nan, error=np.inf, failed=1))]  # fmt: skip
+            (point(step_size=2), sweep("1", 0), sweep("9", 1, cost=np.nan, error=np.inf, failed=1))]  # fmt: skip
     pool = tables.pooled_sweeps(pd.DataFrame(rows))
     edge = next(trace for trace in charts.sweeps(pool, relative=True).data if trace.mode == "markers")
 

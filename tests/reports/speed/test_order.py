@@ -23,13 +23,13 @@ from reports.speed.order import (
 from reports.speed.pareto import FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach, front
 from tests.reports.speed.clockwork import Late
 
-RUNGS = [1, 2, 4, 8, 16]
-DT = 0.01 / np.array(RUNGS)
+STEP_SIZES = [1, 2, 4, 8, 16]
+DT = 0.01 / np.array(STEP_SIZES)
 
 
 def measured(order: int, **how: float):
     """dt, errors and changes of a method of known error, played through a scene without collisions in between."""
-    rows = ladder.errors_of("near_miss", 0, "late:own", partial(Late, order, **how), RUNGS)
+    rows = ladder.errors_of("near_miss", 0, "late:own", partial(Late, order, **how), STEP_SIZES)
     columns = (np.array([row[name] for row in rows]) for name in ("dt_s", "error_radii", "change_radii"))
     dt, errors, changes = columns
     return dt, errors[None], changes[None]
@@ -130,7 +130,7 @@ def test_the_front_is_who_nobody_beats():
 
 
 def test_the_cost_of_an_accuracy_is_that_of_the_cheapest_dt_that_keeps_it():
-    """Errors 0.5, 0.02, 0.2, 0.05, 0.01: a lucky second rung does not count, as a finer one is worse again."""
+    """Errors 0.5, 0.02, 0.2, 0.05, 0.01: a lucky second step size does not count, as a finer one is worse again."""
     cost, error = 1.0 / DT, np.array([0.5, 0.02, 0.2, 0.05, 0.01])
 
     assert cost_to_reach(0.1, DT, cost, error, ORDER)[:2] == (cost[3], DT[3])
@@ -148,7 +148,7 @@ def test_what_is_not_reached_says_why():
 
 
 def test_a_failed_finest_step_does_not_pass_for_an_accuracy():
-    """The rung below the failed one was accurate, but it is not known whether it stays so."""
+    """The step size below the failed one was accurate, but it is not known whether it stays so."""
     error = np.array([0.5, 0.05, 0.05, 0.05, np.inf])
 
     assert cost_to_reach(0.1, DT, 1.0 / DT, error, ORDER).why == NOT_REACHED

@@ -27,7 +27,7 @@ from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
-from scenarios.truth.exact import CLOSED_FORM, COLLISION_BY_COLLISION
+from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN
 from tests.reports.page.browsing import opened, overhang
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
@@ -49,7 +49,7 @@ def measured() -> Measured:
 
 @pytest.fixture(scope="module")
 def results(measured: Measured) -> Results:
-    """The same with one engine that failed one rung of one scene, and one that refused all of it."""
+    """The same with one engine that failed one step size of one scene, and one that refused all of it."""
     errors = measured.errors.copy()
     here = (errors.scenario == SCENES[0]) & (errors.engine == "pymunk") & (errors.kind == "scene")
     refused = here & (errors.profile == "shipped")
@@ -126,7 +126,7 @@ def test_what_cannot_be_reached_is_above_what_costs(results: Results):
     assert UNREACHABLE not in set(results.reached[results.reached.engine == "event_driven"].why)
 
 
-def test_a_random_scene_has_an_interval_over_its_draws(results: Results):
+def test_a_random_scene_has_an_interval_over_its_seeds(results: Results):
     """The median error lies between the ends of its bootstrap interval, which are apart."""
     row = results.points[(results.points.scenario == "asteroids") & (results.points.engine == "reference")].iloc[0]
 
@@ -185,11 +185,11 @@ def test_the_line_of_a_sweep_goes_over_all_its_values_from_cheap_to_expensive(re
 
 
 def test_the_cheapest_model_is_named_for_every_scene(results: Results):
-    """A closed form where the truth is one; the asteroids are answered collision by collision."""
+    """A closed form where the truth is one; the asteroids are answered event by event."""
     models = results.models.set_index("scenario")
 
     assert models.loc[SCENES[0]].truth == CLOSED_FORM
-    assert models.loc["asteroids"].truth == COLLISION_BY_COLLISION
+    assert models.loc["asteroids"].truth == EVENT_DRIVEN
     assert models.loc["asteroids"].engine == "event_driven:float64"
     assert set(models.model) <= {"closed form", "collision to collision, float64"}
 

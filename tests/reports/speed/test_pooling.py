@@ -18,7 +18,7 @@ BEFORE = (
     "free_fall", "head_on_equal_e09", "oblique_e1", "bouncing_ball_e1", "line_gas", "cradle_with_gaps", "ship_thrust",
     "asteroids",
 )  # fmt: skip
-RUNGS = 3  # those that every scene has
+STEP_SIZES = 3  # those that every scene has
 
 
 def test_the_middle_half_of_known_values():
@@ -48,13 +48,13 @@ def test_what_one_value_moves_is_found():
 
 
 def errors_of(scenes: tuple[str, ...], names: tuple[str, ...]) -> dict[tuple[str, int], Array]:
-    """(engine, rung) -> errors in radii, a scene each, of the steps that all scenes have."""
+    """(engine, step_size) -> errors in radii, a scene each, of the steps that all scenes have."""
     found: dict[tuple[str, int], list[float]] = {}
     for scene in scenes:
-        rungs = QUICK.ladder(ladder.open_scene(scene, 0))[:RUNGS]
+        step_sizes = QUICK.ladder(ladder.open_scene(scene, 0))[:STEP_SIZES]
         for name in names:
-            for rung, row in enumerate(ladder.errors_of(scene, 0, name, ENGINES[name].make, rungs)):
-                found.setdefault((name, rung), []).append(row["error_radii"])
+            for step_size, row in enumerate(ladder.errors_of(scene, 0, name, ENGINES[name].make, step_sizes)):
+                found.setdefault((name, step_size), []).append(row["error_radii"])
     return {key: np.array(errors) for key, errors in found.items()}
 
 
@@ -92,9 +92,9 @@ def test_the_scenes_and_the_median_of_before_fail_both():
     errors = errors_of(BEFORE, STEPPING)
     fall = ladder.held("free_fall", 0).scenario
     g, t = float(np.linalg.norm(fall.scene.gravity)), fall.duration
-    for rung in range(RUNGS):
-        medians = np.percentile(errors["reference:exercise", rung], 50, method="nearest")
-        assert medians == pytest.approx(0.5 * fall.dt(2**rung) * g * t / fall.scene.radius[0], rel=1e-9)
+    for step_size in range(STEP_SIZES):
+        medians = np.percentile(errors["reference:exercise", step_size], 50, method="nearest")
+        assert medians == pytest.approx(0.5 * fall.dt(2**step_size) * g * t / fall.scene.radius[0], rel=1e-9)
 
     assert most_moved(errors) > MOST
     assert median_moved(errors) > 10 * MOST
@@ -110,7 +110,7 @@ def points(costs: list[float], errors: list[float]) -> pd.DataFrame:
     """A row a scene of one engine at one step: failed where the error is infinite."""
     names = [f"scene_{k}" for k in range(len(costs))]
     return pd.DataFrame({
-        "scenario": names, "engine": "some", "profile": "own", "rung": 0, "cost": costs, "error": errors, "idle": 1.0,
+        "scenario": names, "engine": "some", "profile": "own", "step_size": 0, "cost": costs, "error": errors, "idle": 1.0,
         "failed": np.isinf(errors).astype(int),
     })  # fmt: skip
 

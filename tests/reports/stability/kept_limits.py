@@ -1,7 +1,7 @@
 """The limits of the pinned versions in the full form, which the quick one must find again.
 
 `crosscheck stability --full --out OUT && python -m tests.reports.stability.kept_limits OUT` makes the table anew. An
-atlas of some cases, or engines, replaces their rows and keeps the others.
+stability report of some cases, or engines, replaces their rows and keeps the others.
 """
 
 from __future__ import annotations
@@ -116,10 +116,13 @@ def in_words(row: Kept) -> str:
 
 
 def keep(folder: Path) -> None:
-    """Put the limits of a folder's atlas in its full form into the file, in the order of cases and engines."""
+    """Put the limits of a folder's stability report in its full form into the file, in the order of cases and
+    engines."""
     found = rows_of(folder / "limits.csv")
     if not found or {row["form"] for row in found} != {"full"}:
-        raise SystemExit(f"{folder}: holds no full atlas; make one: crosscheck stability --full --out {folder}")
+        raise SystemExit(
+            f"{folder}: holds no full stability report; make one: crosscheck stability --full --out {folder}"
+        )
     rows = {(row["case"], engine_of(row)): row for row in [*rows_of(FILE), *found]}
     with FILE.open("w", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")

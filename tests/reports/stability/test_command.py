@@ -14,10 +14,10 @@ from playwright.sync_api import Browser, Page
 
 from reports import cli
 from reports.run.journal import JOURNAL
-from reports.stability.atlas import COLUMNS, Plan, Task, done_before, tasks_of
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
 from reports.stability.maps import MAPS
+from reports.stability.results import COLUMNS, Plan, Task, done_before, tasks_of
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
 
@@ -28,9 +28,9 @@ ASKED = ("slow_collision", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_sp
 
 
 @pytest.fixture(scope="module")
-def atlas(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An atlas of two cases, a scene file and a map, on two engines."""
-    out = tmp_path_factory.mktemp("atlas") / "out"
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A stability report of two cases, a scene file and a map, on two engines."""
+    out = tmp_path_factory.mktemp("results") / "out"
     engines = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
     done = crosscheck("stability", *ASKED, "--vary", "speed", *engines, "--out", out, cwd=ROOT / "tests" / "data")
     assert done.returncode == 0, done.stderr
@@ -38,43 +38,43 @@ def atlas(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_the_table_of_limits_is_a_file(atlas: Path):
+def test_the_table_of_limits_is_a_file(results: Path):
     """A row a case and engine, columns as documented, and the threshold of Box2D in it."""
-    table = pd.read_csv(atlas / "limits.csv")
+    table = pd.read_csv(results / "limits.csv")
 
     assert list(table.columns) == list(COLUMNS)
     assert set(table.case) == {"slow_collision", "tunnelling_thin_wall", "scenes/two.toml:speed"}
     row = table[(table.case == "slow_collision") & (table.engine == "box2d")].iloc[0]
     assert row.fails_at < 1.0 < row.works_at
     assert (row.unit, row.predicate, row.seeds) == ("m/s", "restitution off", CASES["slow_collision"].runs)
-    assert set(pd.read_csv(atlas / "maps.csv")["map"]) == {"dt_and_speed"}
+    assert set(pd.read_csv(results / "maps.csv")["map"]) == {"dt_and_speed"}
 
 
-def test_the_first_failing_run_is_kept(atlas: Path):
+def test_the_first_failing_run_is_kept(results: Path):
     """A file for each limit, none where nothing failed."""
-    found = {path.name for path in (atlas / "trajectories").iterdir()}
+    found = {path.name for path in (results / "trajectories").iterdir()}
 
     assert "slow_collision.box2d-shipped.npz" in found
     assert "slow_collision.pymunk-matched.npz" not in found
 
 
-def test_the_same_journal_gives_the_same_table(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_same_journal_gives_the_same_table(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Table and page are made from what the journal holds, and from the scene file that it names."""
     monkeypatch.chdir(ROOT / "tests" / "data")
     again = tmp_path / "again"
-    shutil.copytree(atlas, again)
+    shutil.copytree(results, again)
     write_files(again)
 
-    assert (again / "limits.csv").read_bytes() == (atlas / "limits.csv").read_bytes()
+    assert (again / "limits.csv").read_bytes() == (results / "limits.csv").read_bytes()
 
 
-def test_what_has_ended_is_not_played_again(atlas: Path, monkeypatch: pytest.MonkeyPatch):
+def test_what_has_ended_is_not_played_again(results: Path, monkeypatch: pytest.MonkeyPatch):
     """Of an interrupted run of the same versions all is kept; of another version nothing."""
     monkeypatch.chdir(ROOT / "tests" / "data")  # where its scene file is
     plan = Plan(
         ["slow_collision", "grazing"], ["dt_and_speed"], [], ["box2d:shipped", "pymunk:matched"], "quick", 1, ""
     )
-    had, done = done_before(atlas, plan)
+    had, done = done_before(results, plan)
 
     kept = {(task.name, task.engine) for task in done}
     assert ("slow_collision", "box2d:shipped") in kept
@@ -82,19 +82,19 @@ def test_what_has_ended_is_not_played_again(atlas: Path, monkeypatch: pytest.Mon
     assert all(task.name != "grazing" for task in done)
     assert set(done) < set(tasks_of(plan))
     assert Task("limit", "slow_collision", "box2d:shipped", "full") not in done
-    journal = (atlas / "journal.jsonl").read_text().splitlines()
+    journal = (results / "journal.jsonl").read_text().splitlines()
     header = json.loads(journal[0])
     header["header"]["versions"]["pymunk"] = "6"
-    other = atlas.parent / "other"
+    other = results.parent / "other"
     other.mkdir()
     (other / "journal.jsonl").write_text("\n".join([json.dumps(header), *journal[1:]]) + "\n")
     assert done_before(other, plan) == (had, set())
 
 
-def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_else(atlas: Path, tmp_path: Path):
+def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_else(results: Path, tmp_path: Path):
     """Without --resume, or with it for other cases, it is refused, and the journal stays as it was."""
     part = tmp_path / "out.part"
-    shutil.copytree(atlas, part)
+    shutil.copytree(results, part)
     before = (part / JOURNAL).read_bytes()
     engines = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
     again = crosscheck("stability", "slow_collision", *engines, "--out", "out", cwd=tmp_path)
@@ -132,9 +132,9 @@ def test_bad_input_is_one_clear_sentence(words: list[str], says: str):
 
 
 @pytest.fixture(params=[1280, 400])
-def page(request: pytest.FixtureRequest, browser: Browser, atlas: Path):
+def page(request: pytest.FixtureRequest, browser: Browser, results: Path):
     """The page in a browser without a network, and what its console said."""
-    uri, size = (atlas / "stability.html").as_uri(), {"width": request.param, "height": 900}
+    uri, size = (results / "stability.html").as_uri(), {"width": request.param, "height": 900}
     page, faults = opened(browser, uri, viewport=size, offline=True)
     yield page
     page.context.close()
@@ -161,10 +161,10 @@ def test_a_failure_is_one_click_away_and_opens_just_before_it(page: Page):
     assert truth < 0 < played  # it is on the wrong side of the wall
 
 
-def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, atlas: Path):
+def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, results: Path):
     """No sideways scrolling, at most 8 MB, a cell for every value of a map."""
     width, inner = page.evaluate("() => [document.documentElement.scrollWidth, innerWidth]")
-    html = (atlas / "stability.html").read_text()
+    html = (results / "stability.html").read_text()
 
     assert width <= inner
     assert len(html) < 8e6
@@ -173,12 +173,12 @@ def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, atlas: Path):
     assert page.locator(".grid tbody td").count() == 2 * len(one.x) * len(one.y)
 
 
-def test_the_atlas_and_the_report_point_at_each_other_where_they_are_made(atlas: Path):
+def test_the_stability_page_and_the_report_point_at_each_other_where_they_are_made(results: Path):
     """From folder to folder of the defaults; both ways."""
     report, limits = Path("reports/out/latest/report.html"), Path("reports/out/stability/stability.html")
     parameter = inspect.signature(cli.stability).parameters["out"].default
     assert (cli.DEFAULT_OUT, parameter) == (report.parent, limits.parent)
-    assert 'href="../latest/report.html"' in (atlas / "stability.html").read_text()
+    assert 'href="../latest/report.html"' in (results / "stability.html").read_text()
     assert 'href="../stability/stability.html"' in (ROOT / "reports" / "page.html.j2").read_text()
 
 

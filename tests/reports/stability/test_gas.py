@@ -1,4 +1,5 @@
-"""The thermometer of the atlas: it reads the literature's numbers off an exact gas, and notices one that is wrong."""
+"""The thermometer of the stability report: it reads the literature's numbers off an exact gas, and notices one that is
+wrong."""
 
 from __future__ import annotations
 

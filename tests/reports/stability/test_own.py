@@ -47,7 +47,7 @@ def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
     ],
 )
 def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, expected: str):
-    """Two disks head-on at 1 m/s and 1/200 s: the mechanisms known from the atlas come out by themselves."""
+    """Two disks head-on at 1 m/s and 1/200 s: the mechanisms known from the stability report come out by themselves."""
     limit = found(what, engine)
 
     assert expected in limit.reason
@@ -161,7 +161,8 @@ def test_a_disk_that_is_struck_twice_between_two_samples_is_not_called_stuck(x: 
 
 @pytest.mark.parametrize("name", ["tunnelling_mine.toml", "dt_mine.toml", "overlap_mine.toml"])
 def test_the_name_of_a_scene_file_does_not_pick_its_reason(name: str):
-    """The table's patterns are for the atlas' own cases; what every exact method refuses holds everywhere."""
+    """The table's patterns are for the stability report' own cases; what every exact method refuses holds
+    everywhere."""
     failing = Trial(2.0, 1, 1, 2.0, 0, broken="refused")
     limit = Limit(f"{name}:speed", "box2d:matched", "quick", "limit", 1.0, 2.0, (failing,))
 

@@ -20,7 +20,6 @@ from reports.page.replay import pack_layers
 from reports.run.journal import plain
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
-from reports.stability.atlas import Task, failed, limit_from, row_of
 from reports.stability.cases import CASES
 from reports.stability.cases_collisions import at_speed
 from reports.stability.cases_gas import gas
@@ -28,6 +27,7 @@ from reports.stability.explain import explained
 from reports.stability.failures import AFTER, BEFORE, keep_failure, kept_failure, near, part_of
 from reports.stability.limits import FULL, QUICK, Case, Limit, Trial
 from reports.stability.predicates import Predicate, Reading, judge
+from reports.stability.results import Task, failed, limit_from, row_of
 from reports.stability.search import Search
 from reports.stability.variants import Variant, play_as
 from scenarios.families.placing import lay_out

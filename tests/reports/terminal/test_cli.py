@@ -240,7 +240,7 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
     ],
 )
 def test_a_folder_of_another_command_is_left_alone(words: list[str], file: str, said: str, tmp_path: Path):
-    """A run does not replace an atlas, nor an atlas a run."""
+    """A run does not replace a stability report, nor a stability report a run."""
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / file).touch()
     done = crosscheck(*words, "--out", "out", cwd=tmp_path)

@@ -81,11 +81,11 @@ def test_near_misses_miss_and_grazing_pairs_collide():
         assert len(truth.collisions) == graze.scene.n / 2
 
 
-def played(error: float, order: float = 1.0, gained: float = 0.0, missed: int = 0, invented: int = 0) -> Played:
+def played(error: float, order: float = 1.0, gained: float = 0.0, missed: int = 0, spurious: int = 0) -> Played:
     """Three scenes of one family, with an error of an order in dt."""
-    rungs = np.tile(error / np.array(LADDER, float) ** order, (3, 1))
-    full = np.ones_like(rungs)
-    return Played(rungs, gained * full, missed * full, invented * full)
+    step_sizes = np.tile(error / np.array(LADDER, float) ** order, (3, 1))
+    full = np.ones_like(step_sizes)
+    return Played(step_sizes, gained * full, missed * full, spurious * full)
 
 
 THREE = posed(("flight_alone",), (0, 1, 2))
@@ -93,7 +93,7 @@ THREE = posed(("flight_alone",), (0, 1, 2))
 
 @pytest.mark.parametrize("cost", [0.5, 0.8, 1.0, 1.3, 3.0, 10.0])
 def test_equal_cost_is_a_step_as_much_longer_as_it_costs(cost: float):
-    """An error of first order grows by the cost; beyond the rungs, too."""
+    """An error of first order grows by the cost; beyond the step_sizes, too."""
     first = played(0.1)
 
     assert at_cost(first.error, cost) == pytest.approx(cost * first.error)
@@ -112,7 +112,7 @@ def test_an_error_of_no_order_gains_nothing_from_cheaper_steps_within_the_ladder
 @pytest.mark.parametrize(
     ("worse", "said"),
     [
-        ({"invented": 1}, "9 collisions invented, not 0"),
+        ({"spurious": 1}, "9 spurious collisions, not 0"),
         ({"missed": 1}, "9 collisions missed, not 0"),
         ({"gained": 0.02}, "energy wrong by 0.02, not 0"),
     ],
@@ -133,13 +133,13 @@ def test_a_run_that_fails_breaks_and_one_that_failed_before_does_not():
     assert faults_of(failed, failed, THREE) == []
 
 
-def test_a_length_unit_of_two_radii_invents_collisions_in_near_misses_and_a_small_one_none():
+def test_a_length_unit_of_two_radii_makes_spurious_collisions_in_near_misses_and_a_small_one_none():
     """Why Box2D 3.1 may not have the length unit of the smallest error: its margin is 2 % of it."""
     scenes = posed(("near_miss",), (0, 1))
     small, large = (measured(partial(changed_box2d_v3, length_unit=unit), scenes) for unit in (0.5, 2.0))
 
-    assert small.invented.sum() == 0
-    assert large.invented.sum() > 0
+    assert small.spurious.sum() == 0
+    assert large.spurious.sum() > 0
     assert any("near_miss" in fault for fault in faults_of(large, small, scenes))
 
 

@@ -1,4 +1,4 @@
-"""The exercise's solver for many disks: the same steps, bit for bit, but only what is near each other is asked.
+"""The exercise's solver with a neighbour list, for many disks: the same steps, bit for bit.
 
 `exercise` is the solver; read that. This leaves out what cannot touch, by the list of `neighbours`, and divides by the
 masses once a call.
@@ -12,12 +12,14 @@ import numpy as np
 from reference_impl import exercise
 from reference_impl.compiled import compiled, kernel
 from reference_impl.exercise import collide, collide_wall, collide_walls, touching_wall, wrap
-from reference_impl.neighbours import Near, astray, look_around
+from reference_impl.neighbours import NeighbourList, beyond_skin, build_list
 from reference_impl.state import Disks, World
 
-CROWD = 64  # disks, from which on the list is cheaper than all pairs, even if a call is one step; if long, from 16 on
-EARLY = 0.8  # of the leash: the rest is for what the collisions of a step move
-LOOK = 256  # disks a look at all neighbours in mid-step: more looks would cost more than asking all pairs
+LISTED_FROM = (
+    64  # disks, from which on the list is cheaper than all pairs, even if a call is one step; if long, from 16 on
+)
+EARLY = 0.8  # of half the skin: the rest is for what the collisions of a step move
+REBUILD = 256  # disks a look at all neighbours in mid-step: more rebuilds would cost more than asking all pairs
 NONE = -1  # in place of a number
 BLOCK = 256  # disks that fly at a time: few enough for the nearest cache
 
@@ -25,7 +27,7 @@ BLOCK = 256  # disks that fly at a time: few enough for the nearest cache
 @compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """As `exercise.advance`, to the bit."""
-    if len(disks.radius) < CROWD:
+    if len(disks.radius) < LISTED_FROM:
         return exercise.advance(disks, world, dt, count)
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     advance_listed(disks, world, dt, count, collisions)
@@ -36,20 +38,20 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> int:
     """Advance by near pairs, however few the disks are; returns in how many steps all pairs had to be asked."""
     acceleration, n, unlisted = accelerations_of(disks, world, dt), len(disks.radius), 0
-    k, i, j, looks = 0, 0, 0, 0  # in step k nothing has been asked from the pair (i, j) on
+    k, i, j, rebuilds = 0, 0, 0, 0  # in step k nothing has been asked from the pair (i, j) on
     here = disks.position.reshape(-1)  # in place of homes while there is no list: nobody is far from where it is
     if count > 0:
         fly(disks, dt, acceleration, here, inf)
     while k < count:
-        near, began = look_around(disks, world, dt, count - k), k
+        near, began = build_list(disks, world, dt, count - k), k
         if near.listed:
             k, i, j = play(disks, world, dt, count, collisions, acceleration, near, k, i, j)
-        looks = looks + 1 if k == began else 0
-        if k < count and (not near.listed or looks > n // LOOK):
+        rebuilds = rebuilds + 1 if k == began else 0
+        if k < count and (not near.listed or rebuilds > n // REBUILD):
             collide_rest(disks, world, k, collisions, i, j)
             collide_walls(disks, world, k, collisions)
             wrap(disks.position, world)
-            k, i, j, looks, unlisted = k + 1, 0, 0, 0, unlisted + 1
+            k, i, j, rebuilds, unlisted = k + 1, 0, 0, 0, unlisted + 1
             if k < count:
                 fly(disks, dt, acceleration, here, inf)
     turn(disks, dt, count, acceleration)
@@ -90,12 +92,13 @@ def play(
     count: int,
     collisions: list,
     acceleration: Accelerations,
-    near: Near,
+    near: NeighbourList,
     k: int,
     i: int,
     j: int,
 ) -> tuple[int, int, int]:
-    """Go on from the pair (i, j) of step k up to `count` or until a disk goes astray; returns where that is."""
+    """Go on from the pair (i, j) of step k up to `count` or until a disk has moved by half the skin; returns where that
+    is."""
     pairs, p = len(near.first), first_from(near, i, j)
     while True:
         k, p = next_touch(disks, world, dt, count, acceleration, near, k, p)
@@ -106,7 +109,7 @@ def play(
             impulse = collide(disks, a, b, world)
             if impulse != 0.0:
                 collisions.append((k, a, b, impulse))
-            if off_leash(disks, near, a, b):
+            if pair_beyond_skin(disks, near, a, b):
                 return k, a, b + 1
             p += 1
         else:
@@ -120,11 +123,12 @@ def play(
 
 @kernel
 def next_touch(
-    disks: Disks, world: World, dt: float, count: int, acceleration: Accelerations, near: Near, k: int, p: int
+    disks: Disks, world: World, dt: float, count: int, acceleration: Accelerations, near: NeighbourList, k: int, p: int
 ) -> tuple[int, int]:
     """(step, number) of the next near pair that touches, from number p of step k on; walls are numbered after pairs.
 
-    Flies from step to step; (step, `NONE`) at the start of one where a disk is nearly off the leash, or of `count`.
+    Flies from step to step; (step, `NONE`) at the start of one where a disk is nearly beyond half the skin, or of
+    `count`.
     """
     pairs, walls = len(near.first), len(near.disk)
     while True:
@@ -135,26 +139,27 @@ def next_touch(
             return k, p
         wrap(disks.position, world)
         k, p = k + 1, 0
-        if k == count or fly(disks, dt, acceleration, near.home, EARLY * near.leash) > 0:
+        if k == count or fly(disks, dt, acceleration, near.home, EARLY * near.half_skin) > 0:
             return k, NONE
 
 
 @kernel
-def fly(disks: Disks, dt: float, acceleration: Accelerations, home, leash: float) -> int:  # type: ignore[no-untyped-def]
-    """As `exercise.integrate`, but for the angles; returns how many disks are then farther from home than the leash.
+def fly(disks: Disks, dt: float, acceleration: Accelerations, home, half_skin: float) -> int:  # type: ignore[no-untyped-def]
+    """As `exercise.integrate`, but for the angles; returns how many disks are then farther from home than half the
+    skin.
 
     One thing at a time and no way out of a loop, so that it is done in vectors; and in blocks, so that the next loop
     finds in the nearest cache what the one before has left there.
     """
-    x, v, strays = disks.position.reshape(-1), disks.velocity.reshape(-1), 0
+    x, v, beyond = disks.position.reshape(-1), disks.velocity.reshape(-1), 0
     for run in range(len(acceleration.moving)):
         begin, end = np.int64(acceleration.moving[run, 0]), np.int64(acceleration.moving[run, 1])
         for c in range(2 * begin, 2 * end):
             v[c] += acceleration.kick[c]
             x[c] += v[c] * dt
         for i in range(begin, end):
-            strays += astray(x, home, i, leash)
-    return strays
+            beyond += beyond_skin(x, home, i, half_skin)
+    return beyond
 
 
 @kernel
@@ -171,7 +176,7 @@ def turn(disks: Disks, dt: float, count: int, acceleration: Accelerations) -> No
 
 
 @kernel
-def next_touching(disks: Disks, near: Near, p: int) -> int:
+def next_touching(disks: Disks, near: NeighbourList, p: int) -> int:
     """The number of the next near pair that is `touching`, from p on; their count or p if there is none."""
     x, first, second, reach2 = disks.position.reshape(-1), near.first, near.second, near.reach2
     while p < len(first):
@@ -184,7 +189,7 @@ def next_touching(disks: Disks, near: Near, p: int) -> int:
 
 
 @kernel
-def next_touching_wall(disks: Disks, world: World, near: Near, p: int) -> int:
+def next_touching_wall(disks: Disks, world: World, near: NeighbourList, p: int) -> int:
     """The number of the next disk that is `touching_wall` with one near it, from p on; of the end if there is none."""
     x, radius, pairs = disks.position, disks.radius, len(near.first)
     while p < pairs + len(near.disk):
@@ -195,7 +200,7 @@ def next_touching_wall(disks: Disks, world: World, near: Near, p: int) -> int:
 
 
 @kernel
-def first_from(near: Near, i: int, j: int) -> int:
+def first_from(near: NeighbourList, i: int, j: int) -> int:
     """The number of the first near pair from (i, j) on."""
     p = 0
     while p < len(near.first) and (near.first[p] < i or (near.first[p] == i and near.second[p] < j)):
@@ -204,19 +209,19 @@ def first_from(near: Near, i: int, j: int) -> int:
 
 
 @kernel
-def pair(near: Near, p: int):  # type: ignore[no-untyped-def]
+def pair(near: NeighbourList, p: int):  # type: ignore[no-untyped-def]
     """The two disks of a number."""
     return np.int64(near.first[p]), np.int64(near.second[p])
 
 
 @kernel
-def by_wall(near: Near, p: int):  # type: ignore[no-untyped-def]
+def by_wall(near: NeighbourList, p: int):  # type: ignore[no-untyped-def]
     """Disk and wall of a number."""
     return np.int64(near.disk[p - len(near.first)]), np.int64(near.wall[p - len(near.first)])
 
 
 @kernel
-def past(near: Near, i: int, p: int) -> int:
+def past(near: NeighbourList, i: int, p: int) -> int:
     """The number after those of disk i and its walls."""
     while p - len(near.first) < len(near.disk) and near.disk[p - len(near.first)] == i:
         p += 1
@@ -224,10 +229,10 @@ def past(near: Near, i: int, p: int) -> int:
 
 
 @kernel
-def off_leash(disks: Disks, near: Near, a: int, b: int) -> bool:
+def pair_beyond_skin(disks: Disks, near: NeighbourList, a: int, b: int) -> bool:
     """Whether one of two disks is."""
     x = disks.position.reshape(-1)
-    return astray(x, near.home, a, near.leash) or astray(x, near.home, b, near.leash)
+    return beyond_skin(x, near.home, a, near.half_skin) or beyond_skin(x, near.home, b, near.half_skin)
 
 
 @compiled

@@ -1,4 +1,5 @@
-"""The atlas: every case on every engine through the runner, journalled as each ends, with its table of limits."""
+"""The stability report: every case on every engine through the runner, journalled as each ends, with its table of
+limits."""
 
 from __future__ import annotations
 
@@ -142,7 +143,7 @@ def failed(task: Task, failure: Failure) -> Limit | MapOf | LawOf:
     return Limit(task.name, task.engine, task.form, NEVER_WORKS, nan, nan, (trial,), status=failure.status)
 
 
-class Atlas(NamedTuple):
+class StabilityResults(NamedTuple):
     """All that was found: the limits with their reasons, the maps, the laws of touching disks, and the header."""
 
     limits: list[Limit]
@@ -151,8 +152,8 @@ class Atlas(NamedTuple):
     header: dict[str, Any]
 
 
-def read(folder: Path) -> Atlas:
-    """The atlas in a folder, in reading order; raises `ValueError` if its journal cannot be used."""
+def read(folder: Path) -> StabilityResults:
+    """The stability report in a folder, in reading order; raises `ValueError` if its journal cannot be used."""
     headers, results = journalled(folder)
     limits = [one for one in results.values() if isinstance(one, Limit)]
     maps = [one for one in results.values() if isinstance(one, MapOf)]
@@ -162,7 +163,7 @@ def read(folder: Path) -> Atlas:
     limits.sort(key=lambda limit: (order.get(limit.case, len(order)), limit.case, engines.index(limit.engine)))
     maps.sort(key=lambda one: (list(MAPS).index(one.name), engines.index(one.engine)))
     laws.sort(key=lambda one: (list(TOUCHING).index(one.name), engines.index(one.engine)))
-    return Atlas(explained(limits), maps, laws, headers[-1])
+    return StabilityResults(explained(limits), maps, laws, headers[-1])
 
 
 def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | MapOf | LawOf]]:
@@ -214,7 +215,7 @@ def done_before(folder: Path, plan: Plan) -> tuple[int, set[Task]]:
     """How many tasks ended well in an interrupted run, and those of the plan, if versions and scene files are the same.
 
     Raises:
-        ValueError: the journal is none of an atlas.
+        ValueError: the journal is none of a stability report.
     """
     headers, results = journalled(folder)
     well = {task for task, result in results.items() if result.status == "ok"}
