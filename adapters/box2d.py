@@ -10,7 +10,7 @@ from typing import Any
 import Box2D
 import numpy as np
 
-from adapters.engine import KEPT, PASSED, Collision
+from adapters.engine import KEPT, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from scenarios.model import Array, Scene, State
 
@@ -189,9 +189,9 @@ class Box2DEngine:
             must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
         return State(position, velocity, angle, angular_velocity)
 
-    def collisions(self) -> list[Collision]:
+    def collisions(self) -> list[ContactImpulse]:
         """From `PostSolve`, impulses back in N s."""
-        return [Collision(step, i, j, impulse / self.speed) for step, i, j, impulse in self.listener.log]
+        return [ContactImpulse(step, i, j, impulse / self.speed) for step, i, j, impulse in self.listener.log]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """Resolved values are read back from the world, a fixture and the engine's constants."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
-from adapters.engine import NOT_READABLE, PASSED, Collision
+from adapters.engine import NOT_READABLE, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from scenarios.model import Array, Scene, State
 
@@ -91,7 +91,7 @@ class Box2DV3:
             walls=scene.walls, gravity=scene.gravity,
         )  # fmt: skip
         self.scene, self.dt, self.steps = scene, dt, 0
-        self.log: list[Collision] = []
+        self.log: list[ContactImpulse] = []
         self.unit = float(self.chosen["length_unit"] * scene.radius.min()) if self.matched else 1.0
         pyb2d3.set_length_units_per_meter(self.unit)
         # The binding has no way to ask for the unit, but the default of this limit is 400 of it.
@@ -177,7 +177,7 @@ class Box2DV3:
     def _listen(self) -> None:
         for collision in self.world.get_contact_events().hit_events():
             i, j = collision.shape_a.body.user_data, collision.shape_b.body.user_data
-            self.log.append(Collision(self.steps, self._index(i), self._index(j), np.nan))
+            self.log.append(ContactImpulse(self.steps, self._index(i), self._index(j), np.nan))
 
     def _index(self, user_data: int) -> int:
         return user_data if user_data < self.scene.n else self.scene.n - 1 - user_data
@@ -209,7 +209,7 @@ class Box2DV3:
         self.spin, self.seen = spin, self.steps
         return self.angle.copy()
 
-    def collisions(self) -> list[Collision]:
+    def collisions(self) -> list[ContactImpulse]:
         """From the collision events, which tell the approach speed but no impulse."""
         return self.log
 

@@ -28,7 +28,7 @@ class NotStarted(Exception):
     outside = True
 
 
-class Collision(NamedTuple):
+class ContactImpulse(NamedTuple):
     """One contact with an impulse during step `step` (from 0): i and j in either order, wall w as -1 - w; N s.
 
     A contact that lasts gives a collision in every step; `play` keeps where each one begins.
@@ -65,7 +65,7 @@ class Engine(Protocol):
     def read(self) -> State:
         """The present state, as float64 copies."""
 
-    def collisions(self) -> list[Collision]:
+    def collisions(self) -> list[ContactImpulse]:
         """Every impulse of a contact since `load`, in order of steps."""
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
@@ -79,7 +79,7 @@ class Engine(Protocol):
 
 
 @dataclass(frozen=True)
-class Row:
+class EngineRow:
     """How to make an engine and what is known of it.
 
     Attributes:

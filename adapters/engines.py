@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from adapters.engine import FLOAT32, FLOAT64, Engine, Row
+from adapters.engine import FLOAT32, FLOAT64, Engine, EngineRow
 
 
 def _exercise() -> Engine:
@@ -53,38 +53,38 @@ def _event_driven() -> Engine:
     return EventDriven()
 
 
-ENGINES: dict[str, Row] = {
-    "reference:exercise": Row(
+ENGINES: dict[str, EngineRow] = {
+    "reference:exercise": EngineRow(
         _exercise, "hand-written solver of exercise 11: symplectic Euler, project, impulse", 1.0, FLOAT64
     ),
-    "reference:lesson": Row(
+    "reference:lesson": EngineRow(
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
     ),
-    "reference:ordered": Row(
+    "reference:ordered": EngineRow(
         _ordered, "hand-written: exact flight, collisions in the order in which they happen within a step", 0.5, FLOAT64
     ),
-    "pymunk:shipped": Row(
+    "pymunk:shipped": EngineRow(
         partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64
     ),
-    "pymunk:matched": Row(
+    "pymunk:matched": EngineRow(
         partial(_pymunk, "matched"), "pymunk, matched: elasticity sqrt(e), small slop", 0.0, FLOAT64
     ),
-    "box2d:shipped": Row(
+    "box2d:shipped": EngineRow(
         partial(_box2d, "shipped"), "box2d-py 2.3.8 as it comes: friction, sleep, threshold 1 m/s", 1.0, FLOAT32
     ),
-    "box2d:matched": Row(
+    "box2d:matched": EngineRow(
         partial(_box2d, "matched"),
         "box2d-py, matched: units that lift its thresholds; CCD; no friction, sleep", 1.0, FLOAT32
     ),
-    "box2d_v3:shipped": Row(
+    "box2d_v3:shipped": EngineRow(
         partial(_box2d_v3, "shipped"),
         "Box2D 3.1 (pyb2d3) as it comes: friction, sleep, threshold 1 m/s", 0.625, FLOAT32
     ),
-    "box2d_v3:matched": Row(
+    "box2d_v3:matched": EngineRow(
         partial(_box2d_v3, "matched"),
         "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction", 0.625, FLOAT32
     ),
-    "event_driven:float64": Row(
+    "event_driven:float64": EngineRow(
         _event_driven, "event by event without steps: parabolas and contact times, in float64", 0.5, FLOAT64
     ),
 }  # fmt: skip
@@ -92,10 +92,10 @@ ENGINES: dict[str, Row] = {
 OWN = ":own"  # the profile of a solver's file, whose path is its engine
 
 
-_read: dict[str, Row] = {}  # the rows of solvers' files, as they were when the command began
+_read: dict[str, EngineRow] = {}  # the rows of solvers' files, as they were when the command began
 
 
-def row_of(name: str) -> Row:
+def row_of(name: str) -> EngineRow:
     """The row of an engine: of `ENGINES`, or of a solver's file as `PATH:own`, which is read once.
 
     Raises:
@@ -107,7 +107,7 @@ def row_of(name: str) -> Row:
     return _read.get(name) or read_row(name)
 
 
-def read_row(name: str) -> Row:
+def read_row(name: str) -> EngineRow:
     """The row of a solver's file, `PATH:own`, as it is now; `row_of` gives it from now on. Raises `NotASolver`."""
     from adapters.own_solver.engine import engine_file
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Collision, Engine, NotStarted, Unsupported
+from adapters.engine import ContactImpulse, Engine, NotStarted, Unsupported
 from scenarios.model import Array, Collisions, Scenario, Scene, State, Thrust, Trajectory, frozen
 
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
@@ -66,7 +66,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callab
     if substeps < 1 or abs(substeps * dt - scenario.sample_interval) > 1e-9 * scenario.sample_interval:
         raise ValueError(f"dt {dt:g} s does not divide the sample interval {scenario.sample_interval:g} s")
     states: list[State] = []
-    collisions: list[Collision] = []
+    collisions: list[ContactImpulse] = []
     settings: dict[str, tuple[Any, Any]] = {}
     versions: dict[str, str] = {}
     seconds, farthest = 0.0, RUNAWAY * reach(scenario)
@@ -100,7 +100,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callab
     return Run(engine_name, profile, scenario.name, dt, status, reason, trajectory, seconds, settings, versions)
 
 
-def collisions_of(engine: Engine) -> list[Collision]:
+def collisions_of(engine: Engine) -> list[ContactImpulse]:
     """The collisions of an engine that may have failed; none if it cannot tell any more."""
     try:
         return engine.collisions()
@@ -186,7 +186,7 @@ def weight_impulse(scene: Scene, dt: float) -> float:
     return float(2 * moving * np.linalg.norm(scene.gravity) * dt)
 
 
-def first_collisions(collisions: Sequence[Collision], dt: float, weight: float = 0.0) -> Collisions:
+def first_collisions(collisions: Sequence[ContactImpulse], dt: float, weight: float = 0.0) -> Collisions:
     """One collision where the impulses of a pair begin; its time is the end of the step.
 
     An impulse in the step after another of the same pair continues it if it is no larger than `weight` N s, or if

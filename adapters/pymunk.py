@@ -9,7 +9,7 @@ import numpy as np
 import pymunk
 from pymunk import batch
 
-from adapters.engine import Collision
+from adapters.engine import ContactImpulse
 from scenarios.model import Array, Scene, State
 
 FIELDS = (
@@ -54,7 +54,7 @@ class Pymunk:
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new space; static disks and walls are shapes on its static body."""
         self.scene, self.dt, self.steps = scene, dt, 0
-        self.log: list[Collision] = []
+        self.log: list[ContactImpulse] = []
         self.space = pymunk.Space()
         self.space.gravity = tuple(scene.gravity)
         self.asked = self._asked()
@@ -112,7 +112,7 @@ class Pymunk:
         impulse = arbiter.total_impulse.length
         if impulse > 0.0:
             a, b = arbiter.shapes
-            self.log.append(Collision(self.steps, self.index[a], self.index[b], impulse))
+            self.log.append(ContactImpulse(self.steps, self.index[a], self.index[b], impulse))
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to the body's force and torque; pymunk clears both after a step."""
@@ -150,7 +150,7 @@ class Pymunk:
         rows[self.moving] = self._rows()
         return State(rows[:, :2], rows[:, 3:5], rows[:, 2], rows[:, 5])
 
-    def collisions(self) -> list[Collision]:
+    def collisions(self) -> list[ContactImpulse]:
         """From `post_solve`."""
         return self.log
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Collision
+from adapters.engine import ContactImpulse
 from reference_impl import exercise
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, Disks, World, make_disks
 from scenarios.model import Array, Scene, State
@@ -41,7 +41,7 @@ class Reference:
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
         self.dt, self.steps = dt, 0
-        self.log: list[Collision] = []
+        self.log: list[ContactImpulse] = []
         disks = make_disks(
             scene.position, scene.velocity, scene.radius, scene.mass,
             scene.inertia, scene.angle, scene.angular_velocity,
@@ -75,7 +75,7 @@ class Reference:
         done = self.steps
         collisions = self.variant.advance(self.disks, self.world, self.dt, count)
         if self.listening:
-            self.log += [Collision(done + k, i, j, impulse) for k, i, j, impulse in collisions]
+            self.log += [ContactImpulse(done + k, i, j, impulse) for k, i, j, impulse in collisions]
         self.steps += count
 
     def read(self) -> State:
@@ -84,7 +84,7 @@ class Reference:
         kept = disks.position, disks.velocity, disks.angle, disks.angular_velocity
         return State(*(array.astype(np.float64) for array in kept))
 
-    def collisions(self) -> list[Collision]:
+    def collisions(self) -> list[ContactImpulse]:
         """As the solver returned them."""
         return self.log
 

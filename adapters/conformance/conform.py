@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from adapters.conformance.contract import CONTRACT
 from adapters.conformance.physics import PHYSICS
-from adapters.conformance.probe import Probe, Reading
-from adapters.engine import Row, Unsupported
+from adapters.conformance.probe import Probe, ProbeReading
+from adapters.engine import EngineRow, Unsupported
 
 PROBES: dict[str, Probe] = CONTRACT | PHYSICS
 
@@ -39,7 +39,7 @@ class Finding:
     note: str = ""
 
 
-def conform(name: str, row: Row) -> list[Finding]:
+def conform(name: str, row: EngineRow) -> list[Finding]:
     """One finding a probe, in the order of `PROBES`; only the finding "make" if the engine cannot be made.
 
     Whatever an engine raises becomes a finding: a refusal (`Unsupported`) departs, all else breaks.
@@ -58,16 +58,16 @@ def no_answer(name: str, what: str, why: str) -> Finding:
     return Finding(engine, profile, "make", "Does the engine answer?", "no", "yes", 0.0, "breaks", f"{what}: {why}")
 
 
-def ask(engine: str, profile: str, name: str, row: Row) -> Finding:
+def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
     """The finding of one probe."""
     probe = PROBES[name]
     try:
         reading = probe.read(row)
         verdict = "keeps" if reading.kept else probe.failure
     except Unsupported as refusal:
-        reading, verdict = Reading("refused", "an answer", note=str(refusal)), "departs"
+        reading, verdict = ProbeReading("refused", "an answer", note=str(refusal)), "departs"
     except Exception as error:  # an engine may raise anything; the finding says what
-        reading, verdict = Reading("raised", "an answer", note=f"{type(error).__name__}: {error}"), "breaks"
+        reading, verdict = ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}"), "breaks"
     return Finding(
         engine, profile, name, probe.asked, reading.got, reading.expected, reading.bound, verdict, reading.note
     )

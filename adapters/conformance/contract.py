@@ -7,7 +7,7 @@ import numpy as np
 from adapters.conformance.probe import (
     DT,
     Probe,
-    Reading,
+    ProbeReading,
     first_difference,
     head_on,
     history,
@@ -18,14 +18,14 @@ from adapters.conformance.probe import (
     reported,
     scene_of,
 )
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.play import fault_of
 
 NONE = np.zeros(2)
 ROUNDINGS = 8  # a scale, an inverse mass, a product, a sum: no path from a force to a velocity rounds more often
 
 
-def order_and_shapes(row: Row) -> Reading:
+def order_and_shapes(row: EngineRow) -> ProbeReading:
     """Three disks of which the middle one is static; float32 keeps 2^-24 of a number, twice where units are scaled."""
     scene = scene_of(
         position=[[1.0, 2.0], [-3.0, 0.5], [0.1, -4.0]], velocity=[[0.3, -0.7], [0.0, 0.0], [1.1, 0.2]],
@@ -40,10 +40,10 @@ def order_and_shapes(row: Row) -> Reading:
             faults.append(f"{name} is {array.dtype} {array.shape}")
         elif (off := np.abs(array - wanted)).max() > 4 * row.rounding * largest(wanted):
             faults.append(f"{name} of disk {int(np.argwhere(off == off.max())[0][0])} is off by {off.max():.3g}")
-    return Reading("; ".join(faults) or "as the scene", "as the scene")
+    return ProbeReading("; ".join(faults) or "as the scene", "as the scene")
 
 
-def read_copies(row: Row) -> Reading:
+def read_copies(row: EngineRow) -> ProbeReading:
     """A state that was read is neither changed by a step nor a way to change the engine."""
     faults = set()
     with loaded(row, plain()) as engine:
@@ -59,10 +59,10 @@ def read_copies(row: Row) -> Reading:
                 array.fill(99.0)
             if not np.array_equal(getattr(engine.read(), name), kept):
                 faults.add(f"{name} changed by writing")
-    return Reading("; ".join(sorted(faults)) or "copies", "copies")
+    return ProbeReading("; ".join(sorted(faults)) or "copies", "copies")
 
 
-def load_forgets(row: Row) -> Reading:
+def load_forgets(row: EngineRow) -> ProbeReading:
     """An engine that has played, been struck, and still holds a force does after `load` what a fresh one does."""
     with loaded(row, head_on(2.0)) as used:
         for _ in range(12):
@@ -74,10 +74,10 @@ def load_forgets(row: Row) -> Reading:
         seen = history(used)
     with loaded(row, plain(), DT / 2) as fresh:
         wanted = history(fresh)
-    return Reading("collisions at the start" if left else first_difference(seen, wanted), "nowhere")
+    return ProbeReading("collisions at the start" if left else first_difference(seen, wanted), "nowhere")
 
 
-def worlds_are_separate(row: Row) -> Reading:
+def worlds_are_separate(row: EngineRow) -> ProbeReading:
     """A second engine of the same kind, a hundred times as large, changes nothing in the first."""
     large = scene_of(position=[[0.0, 0.0]], velocity=[[1.0, 0.0]], radius=[50.0], mass=[1.0])
     with loaded(row, plain()) as alone:
@@ -85,10 +85,10 @@ def worlds_are_separate(row: Row) -> Reading:
     with loaded(row, plain()) as one, loaded(row, large) as other:
         other.step(5)
         seen = history(one)
-    return Reading(first_difference(seen, wanted), "nowhere")
+    return ProbeReading(first_difference(seen, wanted), "nowhere")
 
 
-def counts_are_steps(row: Row) -> Reading:
+def counts_are_steps(row: EngineRow) -> ProbeReading:
     """step(3) is step() three times, to the bit."""
     with loaded(row, plain()) as one_by_one:
         for _ in range(60):
@@ -98,10 +98,10 @@ def counts_are_steps(row: Row) -> Reading:
         for _ in range(20):
             at_once.step(3)
         seen = history(at_once)
-    return Reading(first_difference(seen, wanted), "nowhere")
+    return ProbeReading(first_difference(seen, wanted), "nowhere")
 
 
-def steps_obey_dt(row: Row) -> Reading:
+def steps_obey_dt(row: EngineRow) -> ProbeReading:
     """v dt a step, for two dt; a position rounds once a step."""
     worst, steps, speed = 0.0, 64, 1.5
     for dt in (DT, 0.01):
@@ -109,20 +109,20 @@ def steps_obey_dt(row: Row) -> Reading:
             start = engine.read().position
             engine.step(steps)
             worst = max(worst, abs((engine.read().position - start)[0, 0] / (steps * dt) - speed))
-    return Reading(speed + worst, speed, row.rounding * steps * speed)
+    return ProbeReading(speed + worst, speed, row.rounding * steps * speed)
 
 
-def stays_finite(row: Row) -> Reading:
+def stays_finite(row: EngineRow) -> ProbeReading:
     """20 steps of a scene with a collision, a bounce, gravity and spin."""
     with loaded(row, plain()) as engine:
         for k in range(20):
             engine.step()
             if fault := fault_of(engine.read(), np.inf):
-                return Reading(f"{fault} after step {k + 1}", "finite")
-    return Reading("finite", "finite")
+                return ProbeReading(f"{fault} after step {k + 1}", "finite")
+    return ProbeReading("finite", "finite")
 
 
-def force_lasts_one_step(row: Row) -> Reading:
+def force_lasts_one_step(row: EngineRow) -> ProbeReading:
     """One force, then one step, then three: the speed after the first is the speed after all."""
     force = np.array([20.0, 10.0])
     with loaded(row, one_disk()) as engine:
@@ -145,44 +145,44 @@ def force_lasts_one_step(row: Row) -> Reading:
         )
     ]
     # Nothing acts on the disk afterwards, so its velocity is not even rounded again.
-    return Reading(max(ratios, key=lambda ratio: abs(ratio - 1)), 1.0, 4 * row.rounding)
+    return ProbeReading(max(ratios, key=lambda ratio: abs(ratio - 1)), 1.0, 4 * row.rounding)
 
 
-def mass_by_force(row: Row) -> Reading:
+def mass_by_force(row: EngineRow) -> ProbeReading:
     """F dt / dv of a disk of 7.3 kg; by a density of 1 it would have 0.785 kg."""
     with loaded(row, one_disk()) as engine:
         engine.apply_force(0, np.array([30.0, 0.0]), 0.0)
         engine.step()
         dv = float(engine.read().velocity[0, 0])
-    return Reading(30.0 * DT / dv if dv else np.inf, 7.3, ROUNDINGS * row.rounding * 7.3)
+    return ProbeReading(30.0 * DT / dv if dv else np.inf, 7.3, ROUNDINGS * row.rounding * 7.3)
 
 
-def inertia_by_torque(row: Row) -> Reading:
+def inertia_by_torque(row: EngineRow) -> ProbeReading:
     """torque dt / dw of a disk of 0.9 kg m2; a solid disk of its mass would have 0.9125."""
     with loaded(row, one_disk()) as engine:
         engine.apply_force(0, NONE, 2.0)
         engine.step()
         dw = float(engine.read().angular_velocity[0])
-    return Reading(2.0 * DT / dw if dw else np.inf, 0.9, ROUNDINGS * row.rounding * 0.9)
+    return ProbeReading(2.0 * DT / dw if dw else np.inf, 0.9, ROUNDINGS * row.rounding * 0.9)
 
 
-def same_instant(row: Row) -> Reading:
+def same_instant(row: EngineRow) -> ProbeReading:
     """After 1 s of free fall the speed is g t; half a step off it would be g dt / 2 = 0.02 m/s less or more."""
     steps, gravity = 256, 9.81
     with loaded(row, one_disk(gravity=gravity)) as engine:
         engine.step(steps)
         speed = -float(engine.read().velocity[0, 1])
-    return Reading(speed, gravity * steps * DT, row.rounding * steps * gravity)
+    return ProbeReading(speed, gravity * steps * DT, row.rounding * steps * gravity)
 
 
-def collisions_are_reported(row: Row) -> Reading:
+def collisions_are_reported(row: EngineRow) -> ProbeReading:
     """One collision of disks 1 and 2 of three gives one collision, of these two."""
     with loaded(row, head_on(2.0)) as engine:
         engine.step(12)
-        return Reading(reported(engine), "disk 1 and disk 2")
+        return ProbeReading(reported(engine), "disk 1 and disk 2")
 
 
-def walls_are_reported(row: Row) -> Reading:
+def walls_are_reported(row: EngineRow) -> ProbeReading:
     """One collision on the second of two walls gives one collision, with this wall."""
     scene = scene_of(
         position=[[0.0, 9.0], [0.0, 0.0]], velocity=[[0.0, 0.0], [2.0, 0.0]], radius=[0.5, 0.5], mass=[1.0, 1.0],
@@ -190,10 +190,10 @@ def walls_are_reported(row: Row) -> Reading:
     )  # fmt: skip
     with loaded(row, scene) as engine:
         engine.step(12)
-        return Reading(reported(engine), "disk 1 and wall 1")
+        return ProbeReading(reported(engine), "disk 1 and wall 1")
 
 
-def collisions_name_their_step(row: Row) -> Reading:
+def collisions_name_their_step(row: EngineRow) -> ProbeReading:
     """The step of a collision, from 0, is the one in which the velocities change."""
     with loaded(row, head_on(2.0)) as engine:
         before = engine.read().velocity[1, 0]
@@ -202,10 +202,10 @@ def collisions_name_their_step(row: Row) -> Reading:
             engine.step()
             changed += 1
         steps = [collision.step for collision in engine.collisions()]
-    return Reading(steps[0] if steps else np.nan, changed - 1)
+    return ProbeReading(steps[0] if steps else np.nan, changed - 1)
 
 
-def impulse_is_reported(row: Row) -> Reading:
+def impulse_is_reported(row: EngineRow) -> ProbeReading:
     """The impulses reported add up to the momentum that changed hands; an engine may also report none (NaN)."""
     with loaded(row, head_on(2.0)) as engine:
         before = engine.read().velocity[2, 0]
@@ -213,11 +213,11 @@ def impulse_is_reported(row: Row) -> Reading:
         moved = engine.read().velocity[2, 0] - before
         impulses = [collision.impulse for collision in engine.collisions()]
     if np.isnan(impulses).any():
-        return Reading("not reported", "not reported", note="the engine's events carry no impulse")
-    return Reading(float(sum(impulses)), float(moved), ROUNDINGS * row.rounding * abs(moved))
+        return ProbeReading("not reported", "not reported", note="the engine's events carry no impulse")
+    return ProbeReading(float(sum(impulses)), float(moved), ROUNDINGS * row.rounding * abs(moved))
 
 
-def static_stays(row: Row) -> Reading:
+def static_stays(row: EngineRow) -> ProbeReading:
     """A static disk that is struck and under a force keeps its state to the bit."""
     scene = scene_of(
         position=[[-1.02, 0.1], [0.0, 0.0]], velocity=[[2.0, 0.0], [0.0, 0.0]], radius=[0.5, 0.5], mass=[1.0, np.inf],
@@ -230,7 +230,7 @@ def static_stays(row: Row) -> Reading:
             engine.step()
         after, collisions = engine.read(), reported(engine)
     moved = [name for name, array in vars(after).items() if (array[1] != getattr(before, name)[1]).any()]
-    return Reading(
+    return ProbeReading(
         "; ".join(f"{name} changed" for name in moved) or f"stays, reported {collisions}",
         "stays, reported disk 0 and disk 1",
     )

@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from adapters.conformance.probe import DT, Probe, Reading, head_on, largest, loaded, one_disk, scene_of
-from adapters.engine import Row
+from adapters.conformance.probe import DT, Probe, ProbeReading, head_on, largest, loaded, one_disk, scene_of
+from adapters.engine import EngineRow
 
 SPEEDS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)  # m/s, on both sides of Box2D's threshold of 1
 ROUNDINGS = (
@@ -15,7 +15,7 @@ ROUNDINGS = (
 )
 
 
-def free_flight(row: Row) -> Reading:
+def free_flight(row: EngineRow) -> ProbeReading:
     """The offset of a thrown disk from x0 + v0 t + a t2 / 2 after 1 s, in m; x' = x + v dt + alpha a dt2 gives
     (alpha - 1/2) a dt t. Every step rounds a position and a velocity, whose error flies on."""
     steps, gravity, speed = 256, 9.81, 4.1
@@ -25,44 +25,44 @@ def free_flight(row: Row) -> Reading:
         engine.step(steps)
         moved = float(engine.read().position[0, 1]) - start
     bound = row.rounding * steps * (1.0 + gravity * t * t)
-    return Reading(moved - (speed * t - gravity * t * t / 2), -(row.alpha - 0.5) * gravity * DT * t, bound)
+    return ProbeReading(moved - (speed * t - gravity * t * t / 2), -(row.alpha - 0.5) * gravity * DT * t, bound)
 
 
-def slow_flight(row: Row) -> Reading:
+def slow_flight(row: EngineRow) -> ProbeReading:
     """Speed in m/s of a free disk after 2 s: nothing acts on it, so it is not even rounded."""
     speed = 2.0**-8
     with loaded(row, one_disk(velocity=(speed, 0.0))) as engine:
         engine.step(512)
-        return Reading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
+        return ProbeReading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
 
 
-def fast_flight(row: Row) -> Reading:
+def fast_flight(row: EngineRow) -> ProbeReading:
     """Speed in m/s of a free disk after 4 steps of 1/64 s, 16 radii each."""
     speed = 512.0
     with loaded(row, one_disk(velocity=(speed, 0.0)), 1 / 64) as engine:
         engine.step(4)
-        return Reading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
+        return ProbeReading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
 
 
-def fast_spin(row: Row) -> Reading:
+def fast_spin(row: EngineRow) -> ProbeReading:
     """Spin in rad/s of a free disk after 4 steps of 1/64 s, three quarters of a turn each."""
     spin = 300.0
     with loaded(row, one_disk(spin=spin), 1 / 64) as engine:
         engine.step(4)
-        return Reading(float(engine.read().angular_velocity[0]), spin, 2 * row.rounding * spin)
+        return ProbeReading(float(engine.read().angular_velocity[0]), spin, 2 * row.rounding * spin)
 
 
-def spins_freely(row: Row) -> Reading:
+def spins_freely(row: EngineRow) -> ProbeReading:
     """Angle in rad after 1 s at 20 rad/s; an angle rounds once a step."""
     steps, spin = 256, 20.0
     with loaded(row, one_disk(spin=spin)) as engine:
         for _ in range(8):
             engine.step(steps // 8)
             angle = float(engine.read().angle[0])  # read often: an engine may keep only cos and sin
-    return Reading(angle, spin * steps * DT, row.rounding * steps * spin)
+    return ProbeReading(angle, spin * steps * DT, row.rounding * steps * spin)
 
 
-def pair_momentum(row: Row) -> Reading:
+def pair_momentum(row: EngineRow) -> ProbeReading:
     """Change of momentum over sum m |v|, in an oblique collision of 1 kg and 7 kg; both velocities round once or
     twice."""
     scene = scene_of(
@@ -74,21 +74,21 @@ def pair_momentum(row: Row) -> Reading:
         engine.step(24)
         after = engine.read().velocity
     if np.abs(after - before).max() < 0.1:
-        return Reading("no collision", 0.0)
+        return ProbeReading("no collision", 0.0)
     change = largest(scene.mass @ (after - before)) / float(scene.mass @ np.hypot(*before.T))
-    return Reading(change, 0.0, ROUNDINGS * row.rounding)
+    return ProbeReading(change, 0.0, ROUNDINGS * row.rounding)
 
 
-def restitution(row: Row, closing: float) -> Reading:
+def restitution(row: EngineRow, closing: float) -> ProbeReading:
     """Separation over approach speed of two equal disks that meet head-on, e = 0.5."""
     with loaded(row, head_on(closing)) as engine:
         before = engine.read().velocity
         engine.step(24)
         after = engine.read().velocity
-    return Reading(float((after[2] - after[1])[0] / (before[1] - before[2])[0]), 0.5, ROUNDINGS * row.rounding)
+    return ProbeReading(float((after[2] - after[1])[0] / (before[1] - before[2])[0]), 0.5, ROUNDINGS * row.rounding)
 
 
-def wall_restitution(row: Row) -> Reading:
+def wall_restitution(row: EngineRow) -> ProbeReading:
     """Speed after over speed before a collision of 2 m/s on a wall, e = 0.5."""
     scene = scene_of(
         position=[[0.0, 0.0]], velocity=[[2.0, 0.0]], radius=[0.5], mass=[7.3],
@@ -96,17 +96,17 @@ def wall_restitution(row: Row) -> Reading:
     )  # fmt: skip
     with loaded(row, scene) as engine:
         engine.step(24)
-        return Reading(-float(engine.read().velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.rounding)
+        return ProbeReading(-float(engine.read().velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.rounding)
 
 
-def friction(row: Row) -> Reading:
+def friction(row: EngineRow) -> ProbeReading:
     """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin fast: the effective
     coefficient of friction while they slide. Frictionless, the sideways part is 0 and is not even rounded."""
     with loaded(row, head_on(2.0, spin=40.0)) as engine:
         before = engine.read().velocity[1]
         engine.step(24)
         taken = engine.read().velocity[1] - before
-    return Reading(float(abs(taken[1] / taken[0])) if taken[0] else np.nan, 0.0, row.rounding)
+    return ProbeReading(float(abs(taken[1] / taken[0])) if taken[0] else np.nan, 0.0, row.rounding)
 
 
 PHYSICS: dict[str, Probe] = {

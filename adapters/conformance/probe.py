@@ -10,14 +10,14 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.engine import Engine, Row
+from adapters.engine import Engine, EngineRow
 from adapters.play import first_collisions
 from scenarios.model import Array, Scene, frozen
 
 DT = 1 / 256  # s; a power of two, so that a whole number of steps is a time without rounding
 
 
-class Reading(NamedTuple):
+class ProbeReading(NamedTuple):
     """What a probe read: a number that must lie within `bound` of `expected`, or words that must equal it."""
 
     got: float | str
@@ -45,12 +45,12 @@ class Probe:
     """
 
     asked: str
-    read: Callable[[Row], Reading]
+    read: Callable[[EngineRow], ProbeReading]
     failure: Literal["breaks", "departs"]
 
 
 @contextmanager
-def loaded(row: Row, scene: Scene, dt: float = DT) -> Iterator[Engine]:
+def loaded(row: EngineRow, scene: Scene, dt: float = DT) -> Iterator[Engine]:
     """A fresh engine with `scene` in it, closed at the end whatever happens."""
     engine = row.make()
     try:

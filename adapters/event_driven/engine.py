@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Collision, Unsupported
+from adapters.engine import ContactImpulse, Unsupported
 from adapters.event_driven.events import EventEngine
 from scenarios.model import Array, Scene, State
 from scenarios.no_truth import NoTruth
@@ -82,12 +82,12 @@ class EventDriven:
         """Every disk flown from its own last event to now."""
         return State(*self.engine.look(self.steps * self.dt), *self.turn())
 
-    def collisions(self) -> list[Collision]:
+    def collisions(self) -> list[ContactImpulse]:
         """Every collision in the step at whose end it had happened."""
         found = []
         for t, i, j, impulse in self.engine.collisions.tolist():
             step = int(t / self.dt)
-            found.append(Collision(step - (step * self.dt >= t and step > 0), int(i), int(j), impulse))
+            found.append(ContactImpulse(step - (step * self.dt >= t and step > 0), int(i), int(j), impulse))
         return found
 
     def settings(self) -> dict[str, tuple[Any, Any]]:

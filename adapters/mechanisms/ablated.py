@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Collision
+from adapters.engine import ContactImpulse
 from adapters.mechanisms import ablated_reference
 from adapters.mechanisms.ablated_reference import STAGES, Parameters
 from adapters.mechanisms.contacts import no_contacts
@@ -71,7 +71,9 @@ class AblatedReference(Reference):
         h = self.precision(self.dt / self.moves)
         collisions = ablated_reference.advance(self.disks, self.world, self.on, self.kept, h, count * self.substeps)
         if self.listening:
-            self.log += [Collision(self.steps + k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions]
+            self.log += [
+                ContactImpulse(self.steps + k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions
+            ]
         self.steps += count
 
     def settings(self) -> dict[str, tuple[Any, Any]]:

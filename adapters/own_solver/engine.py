@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import FLOAT64, Collision, Row, Unsupported
+from adapters.engine import FLOAT64, ContactImpulse, EngineRow, Unsupported
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
 from scenarios.model import Array, Scene, State
@@ -92,10 +92,10 @@ class Student:
         angle, spin = (4, 5) if self.whole else (6, 7)
         return State(*(np.ascontiguousarray(rows[:, part]) for part in (slice(0, 2), slice(2, 4), angle, spin)))
 
-    def collisions(self) -> list[Collision]:
+    def collisions(self) -> list[ContactImpulse]:
         """What `advance` reported, or every call of the collision function that changed a velocity."""
         rows = self.process.do("whole_collisions" if self.whole else "collisions")
-        return [Collision(int(step), int(i), int(j), impulse) for step, i, j, impulse in rows]
+        return [ContactImpulse(int(step), int(i), int(j), impulse) for step, i, j, impulse in rows]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """What the file decides."""
@@ -142,7 +142,7 @@ def read_restitution(process: SolverProcess) -> float:
     return float(b[2] - a[2]) / 2.0
 
 
-def engine_file(path: Path, patience: float = STEP_LIMIT) -> Row:
+def engine_file(path: Path, patience: float = STEP_LIMIT) -> EngineRow:
     """The row of `ENGINES` that a solver's file, as it is now, stands for; raises `NotASolver` if the path is none."""
     solver = read_solver(path)
-    return Row(partial(Student, solver, patience), f"your own solver, {path}", 1.0, FLOAT64, source=solver.source)
+    return EngineRow(partial(Student, solver, patience), f"your own solver, {path}", 1.0, FLOAT64, source=solver.source)

@@ -11,7 +11,7 @@ from reports.check.questions import Ball, direction
 from scenarios.model import Array
 
 
-class Collision(NamedTuple):
+class PairCollision(NamedTuple):
     """A pair before the call, m, m/s, kg: u = vA - vB, n from B to A, distance d, sum of sizes s; shifts of A and B."""
 
     va: Array
@@ -40,15 +40,15 @@ class Collision(NamedTuple):
         return 1 / (1 / self.ma + 1 / self.mb)
 
 
-def collision_of(balls: tuple[Ball, ...], after: list[Ball]) -> Collision:
+def collision_of(balls: tuple[Ball, ...], after: list[Ball]) -> PairCollision:
     """A pair and how it was displaced."""
     a, b = balls
     n, d = direction(a, b)
     shifts = (np.subtract(y.x, x.x) for x, y in zip(balls, after))
-    return Collision(np.array(a.v), np.array(b.v), n, d, a.r + b.r, a.m, b.m, *shifts)
+    return PairCollision(np.array(a.v), np.array(b.v), n, d, a.r + b.r, a.m, b.m, *shifts)
 
 
-Impulse = Callable[[Collision, float], Array]
+Impulse = Callable[[PairCollision, float], Array]
 """What A gets from B by a law, N s, from a pair and the restitution."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from reports.check.questions import QUESTIONS, Answer, Ball, named
 from reports.check.restitution import code_of
-from reports.check.rows import Row, judged, near, shown
+from reports.check.rows import CheckRow, judged, near, shown
 
 Rule = Callable[[float, float, float, float], bool | None]
 
@@ -86,7 +86,7 @@ def acts(question: tuple[Ball, ...], after: list[Ball]) -> bool:
     return any(not (near(b.x, a.x) and near(b.v, a.v)) for a, b in zip(question, after))
 
 
-def detection_rows(answers: dict[str, Answer], text: str) -> list[Row]:
+def detection_rows(answers: dict[str, Answer], text: str) -> list[CheckRow]:
     """The rows of (a); `text` of the file."""
     return [
         reach(answers, (XOR if "^" in code_of(text) else {}) | RULES),
@@ -95,7 +95,7 @@ def detection_rows(answers: dict[str, Answer], text: str) -> list[Row]:
     ]
 
 
-def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> Row:
+def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
     """Which of many pairs react, and the first of the rules that gives this pattern."""
     seen = []
     for question, answer in named(answers, "reach/"):
@@ -137,15 +137,15 @@ def mixed_up(answers: dict[str, Answer]) -> bool:
     return True
 
 
-def touch(answer: Answer) -> Row:
+def touch(answer: Answer) -> CheckRow:
     """Exactly touching: free."""
     reacts = acts(QUESTIONS["touch"].balls, answer.last)
     asked = "Do spheres collide whose distance is exactly the sum of the sizes?"
     note = f"compares with {'<=' if reacts else '<'}, which is free"
-    return Row("touch", "2a", asked, "yes" if reacts else "no", "either", "note", note)
+    return CheckRow("touch", "2a", asked, "yes" if reacts else "no", "either", "note", note)
 
 
-def same_centre(answer: Answer) -> Row:
+def same_centre(answer: Answer) -> CheckRow:
     """Two spheres at one place have no normal; nothing may become NaN for that."""
     asked = "Are all numbers finite where two centres are at the same place?"
     values = [] if answer.failed else [x for b in answer.last for x in (*b.x, *b.v, b.alpha, b.w)]
@@ -153,4 +153,4 @@ def same_centre(answer: Answer) -> Row:
         return judged("same centre", "2a", asked, "yes", "yes", True)
     cause = "divides by a distance of zero; the exercise does not say what to do, but the page loses both spheres"
     got = f"fails: {answer.failed}" if answer.failed else "no, NaN or infinite"
-    return Row("same centre", "2a", asked, got, "yes, by a guard", "note", cause)
+    return CheckRow("same centre", "2a", asked, got, "yes, by a guard", "note", cause)

@@ -7,18 +7,18 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 from reports.check.questions import QUESTIONS, Answer, Ball
-from reports.check.rows import Row, judged, near
+from reports.check.rows import CheckRow, judged, near
 
 FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
 MAY_FAIL = ("same centre",)  # is judged by a row of its own
 
 
-def implemented(task: str, there: bool, answers: dict[str, Answer], text: str) -> tuple[list[Row], bool]:
+def implemented(task: str, there: bool, answers: dict[str, Answer], text: str) -> tuple[list[CheckRow], bool]:
     """The rows on the function of a task and its arguments, and whether it can be judged further."""
     function = FUNCTIONS[task]
     asked = f"Does {function} do something with the spheres it is given?"
 
-    def fault(got: str, cause: str) -> tuple[list[Row], bool]:
+    def fault(got: str, cause: str) -> tuple[list[CheckRow], bool]:
         return [judged("implemented", task, asked, got, "it changes them", False, cause)], False
 
     if not there:
@@ -56,7 +56,7 @@ def nothing(function: str, answers: Iterable[Answer]) -> str:
     return f"not implemented: {function} does nothing"
 
 
-def arguments(task: str, function: str, answers: Iterable[Answer]) -> Row:
+def arguments(task: str, function: str, answers: Iterable[Answer]) -> CheckRow:
     """Whether only the given spheres are changed, and only fields that they have."""
     answers = list(answers)
     strange = sorted({name for answer in answers for name in answer.strange})

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.check.collisions import Collision, Impulse, changes, collision_of
+from reports.check.collisions import Impulse, PairCollision, changes, collision_of
 from reports.check.parts import Change, components, scalar_products
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
 from reports.check.restitution import Restitution
@@ -21,12 +21,12 @@ from reports.check.rows import near
 from scenarios.model import Array
 
 
-def scaled(factor: Callable[[Collision, float], float]) -> Impulse:
+def scaled(factor: Callable[[PairCollision, float], float]) -> Impulse:
     """The right impulse times a factor."""
     return lambda h, e: -(1 + e) * h.vn * h.mu * h.n * factor(h, e)
 
 
-def along(normal: Callable[[Collision], Array]) -> Impulse:
+def along(normal: Callable[[PairCollision], Array]) -> Impulse:
     """The right impulse but for its normal."""
     return lambda h, e: -(1 + e) * (h.u @ normal(h)) * h.mu * normal(h)
 
@@ -36,7 +36,7 @@ def unit(vector: Array) -> Array:
     return vector / np.hypot(*vector)
 
 
-def tangent(h: Collision) -> Array:
+def tangent(h: PairCollision) -> Array:
     """n turned by a quarter."""
     return np.array([-h.n[1], h.n[0]])
 
@@ -199,7 +199,7 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
     return None
 
 
-def fitting(pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[Collision, Array]], e: float) -> Finding | None:
+def fitting(pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[PairCollision, Array]], e: float) -> Finding | None:
     """The first impulse and update of `pairs` that give every collision."""
     with np.errstate(all="ignore"):
         for impulse, update in pairs:

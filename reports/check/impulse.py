@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from reports.check.collisions import Collision, changes, collision_of
+from reports.check.collisions import PairCollision, changes, collision_of
 from reports.check.impacts import IMPULSES, SEPARATING, UPDATES, Finding, tangent
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
 from reports.check.restitution import Restitution
-from reports.check.rows import Row, judged, near, not_asked, shown
+from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
 
 
-def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Finding | None) -> list[Row]:
+def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Finding | None) -> list[CheckRow]:
     """The rows of (c) and (d)."""
     if not finite(answers, "v"):
         return [*no_number(answers, restitution.own), bystanders(answers)]
@@ -56,7 +56,7 @@ def impulse_rows(answers: dict[str, Answer], restitution: Restitution, found: Fi
     return sorted(rows, key=lambda row: (row.task, row.task == "2d" and row.name in ("energy", "restitution")))
 
 
-def no_number(answers: dict[str, Answer], e: float) -> list[Row]:
+def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
     """The one row on velocities that are no numbers: nothing else can be read from them."""
     if not finite(answers, "x"):
         return impulse_not_asked("the positions become no numbers before it")
@@ -109,19 +109,19 @@ def wrong_collisions(answers: dict[str, Answer], e: float) -> list[str]:
     return wrong
 
 
-def acting(collision: Collision, found: Finding | None, right: Array) -> Array:
+def acting(collision: PairCollision, found: Finding | None, right: Array) -> Array:
     """The impulse the file computes, right or wrong, so that (d) is judged by itself."""
     return found.law(collision, found.e) if found else right
 
 
-def energy(collision: Collision, came: Array) -> float:
+def energy(collision: PairCollision, came: Array) -> float:
     """J, what a collision adds to the kinetic energy."""
     before = collision.ma * collision.va @ collision.va + collision.mb * collision.vb @ collision.vb
     va, vb = collision.va + came[0], collision.vb + came[1]
     return float(collision.ma * va @ va + collision.mb * vb @ vb - before) / 2
 
 
-def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> Row:
+def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> CheckRow:
     """On pairs that part: nothing, or the printed formula; both are free."""
     asked = "What happens to a pair that overlaps and moves apart?"
     either = "no impulse, or that of the formula"
@@ -130,11 +130,13 @@ def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> R
         for n in SEPARATING
     ]
     if all(near(came, 0.0) for _, came in seen):
-        return Row("separating", "2c", asked, "no impulse", either, "note", "only pairs that approach get an impulse")
+        return CheckRow(
+            "separating", "2c", asked, "no impulse", either, "note", "only pairs that approach get an impulse"
+        )
     law, change = (found.law, found.change) if found else (IMPULSES[""], UPDATES[""].change)
     if all(near(change(h, law(h, e), e), came, 0.1) for h, came in seen):
         note = "pairs that part get an impulse too, as the formula is printed; it turns them back"
-        return Row("separating", "2c", asked, "an impulse, by the same formula", either, "note", note)
+        return CheckRow("separating", "2c", asked, "an impulse, by the same formula", either, "note", note)
     got = f"A is changed by {shown(seen[0][1][0])} m/s"
     return judged("separating", "2c", asked, got, either, False, found.mistake if found else "")
 
@@ -142,7 +144,7 @@ def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> R
 UNALIKE = "A and B are not treated alike: it matters which is called first"
 
 
-def symmetry(answers: dict[str, Answer], mistake: str) -> Row:
+def symmetry(answers: dict[str, Answer], mistake: str) -> CheckRow:
     """Who is called A must not matter to the velocities."""
     names = list(COLLISIONS)
     came = [np.array([b.v for b in answers[n].last]) for n in names]
@@ -153,7 +155,7 @@ def symmetry(answers: dict[str, Answer], mistake: str) -> Row:
                   mistake or UNALIKE)  # fmt: skip
 
 
-def bystanders(answers: dict[str, Answer]) -> Row:
+def bystanders(answers: dict[str, Answer]) -> CheckRow:
     """Forces, angles, spins, masses and sizes are not changed by a collision without friction."""
     words = {
         "F": "force",
@@ -175,6 +177,6 @@ def bystanders(answers: dict[str, Answer]) -> Row:
                   f"it writes {what}")  # fmt: skip
 
 
-def impulse_not_asked(why: str) -> list[Row]:
+def impulse_not_asked(why: str) -> list[CheckRow]:
     """The rows of (c) and (d) where there is no collision to look at."""
     return [not_asked("impulse", "2c", why), not_asked("velocity of A", "2d", why)]

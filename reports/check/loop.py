@@ -7,7 +7,7 @@ import numpy as np
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
 from reports.check.questions import Answer, Ball, Question, ask
-from reports.check.rows import FOLLOWS, Row, judged, near, not_asked, shown
+from reports.check.rows import FOLLOWS, CheckRow, judged, near, not_asked, shown
 
 DT = 1e-3  # s, the exercise's
 EDGES = {"right": (5.2, 0.1), "left": (-5.2, -0.1), "top": (0.1, 3.2), "bottom": (-0.1, -3.2)}  # m, a place beyond each
@@ -15,7 +15,7 @@ ONTO = {"right": (-5.0, 0.1), "left": (5.0, -0.1), "top": (0.1, -3.0), "bottom":
 A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)  # a pair that collisions
 
 
-def loop_rows(process: SolverProcess, faulty: bool, begun: object) -> list[Row]:
+def loop_rows(process: SolverProcess, faulty: bool, begun: object) -> list[CheckRow]:
     """The rows of the step; where the file has none, a row that says so.
 
     `faulty`: the functions it calls are; `begun`: what came of its first initScene.
@@ -85,7 +85,7 @@ def parked(n: int) -> tuple[Ball, ...]:
     return tuple(Ball((float(x[k % columns]), y[k // columns]), m=1.0, r=min(0.05, 2.0 / columns)) for k in range(n))
 
 
-def integrated(question: Question, came: Answer, alone: Answer) -> Row:
+def integrated(question: Question, came: Answer, alone: Answer) -> CheckRow:
     """Every sphere moves as one alone does by the file's own integrate."""
     asked = "Does a step integrate every sphere once?"
     start, end = question.balls[0], alone.last[0]
@@ -104,7 +104,7 @@ def integrated(question: Question, came: Answer, alone: Answer) -> Row:
     return judged("all spheres", "loop", asked, got, f"{shown(end.v)} m/s", False, cause)
 
 
-def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> Row:
+def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
     """Every pair that is put together reacts, and nobody else."""
     silent, others = [], []
     for name, question in asked.items():
@@ -130,7 +130,7 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> Row:
                   not silent and not others, cause)  # fmt: skip
 
 
-def wrapping(question: Question, came: Answer, alone: Answer) -> Row:
+def wrapping(question: Question, came: Answer, alone: Answer) -> CheckRow:
     """A step sets who is beyond an edge where projectObjects does; all are at rest, so that only this moves them."""
     wrong = [k for k, (a, b) in enumerate(zip(came.last, alone.last)) if not near(a.x, b.x)]
     got = f"{name_of(wrong[0])} is at {shown(came.last[wrong[0]].x)} m" if wrong else "yes"
@@ -145,7 +145,7 @@ def name_of(*spheres: int) -> str:
     return " and ".join("the ufo" if k == 0 else f"asteroid {k - 1}" for k in spheres)
 
 
-def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool) -> list[Row]:
+def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool) -> list[CheckRow]:
     """An asteroid beyond an edge comes in at the opposite one; a ufo that leaves is set back to its start."""
     pairs = list(zip(question.balls, came.last))[1:]
     got, expected, cause = next(filter(None, map(wrong_at_edge, ONTO.items(), pairs)), ("yes", "yes", ""))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from reports.check.rows import Row
+from reports.check.rows import CheckRow
 from reports.check.verdict import FileCheck
 
 SCHEMA = Path(__file__).parent / "check.schema.json"
@@ -23,7 +23,7 @@ def as_json(checks: Sequence[FileCheck]) -> dict[str, Any]:
     ]}  # fmt: skip
 
 
-def row_as_json(row: Row) -> dict[str, str]:
+def row_as_json(row: CheckRow) -> dict[str, str]:
     """A row, its fields in reading order."""
     return {
         "name": row.name, "task": row.task, "asked": row.asked, "got": row.got, "expected": row.expected,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from reports.check.questions import QUESTIONS, Answer, Ball
-from reports.check.rows import Law, Row, follows, judged, near, shown
+from reports.check.rows import CheckRow, Law, follows, judged, near, shown
 from scenarios.model import Array
 
 FORCED = ("force", "force, other numbers", "coast")
@@ -84,7 +84,7 @@ MOVED: dict[str, Law] = {
 }
 
 
-def motion_rows(answers: dict[str, Answer]) -> list[Row]:
+def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
     """The rows of task 1; the function has been called without failing."""
     seen = [(QUESTIONS[name].balls[0], QUESTIONS[name].calls[0][2], answers[name].last[0]) for name in FORCED]
     linear = [(np.array(b.v), np.array(b.F), b.m, b.MoI, dt) for b, dt, _ in seen]
@@ -112,7 +112,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[Row]:
 
 def law_row(
     name: str, asked: str, unit: str, laws: dict[str, Law], given: list[tuple], came: list, words: dict[str, str]
-) -> Row:
+) -> CheckRow:
     """A row whose cause is the law of the table that gives what came."""
     found = follows(laws, given, came)
     with np.errstate(all="ignore"):
@@ -151,7 +151,7 @@ def damped(given: list[tuple], came: list) -> str | None:
     return None
 
 
-def coasting(before: Ball, after: Ball, mistake: str) -> Row:
+def coasting(before: Ball, after: Ball, mistake: str) -> CheckRow:
     """Without a force velocity and spin stay; `mistake`: what is known to be wrong with them."""
     return judged(
         "coasting", "1", "Does a sphere keep its velocity and spin where nothing acts on it?",
@@ -162,7 +162,7 @@ def coasting(before: Ball, after: Ball, mistake: str) -> Row:
     )  # fmt: skip
 
 
-def lasting(answer: Answer) -> Row:
+def lasting(answer: Answer) -> CheckRow:
     """Force and torque stay until the keys change them."""
     before, after = QUESTIONS["force twice"].balls[0], answer.last[0]
     right = near(after.F, before.F) and near(after.torque, before.torque)
@@ -175,7 +175,7 @@ def lasting(answer: Answer) -> Row:
     )  # fmt: skip
 
 
-def untouched(seen: list[tuple[Ball, float, Ball]]) -> Row:
+def untouched(seen: list[tuple[Ball, float, Ball]]) -> CheckRow:
     """Mass, inertia and size are no business of an integration."""
     changed = [
         name for name in ("m", "MoI", "r") for before, _, after in seen

@@ -8,11 +8,11 @@ from itertools import product
 
 import numpy as np
 
-from reports.check.collisions import Collision, Impulse
+from reports.check.collisions import Impulse, PairCollision
 from reports.check.rows import near
 from scenarios.model import Array
 
-Change = Callable[[Collision, Array, float], tuple[Array, Array]]
+Change = Callable[[PairCollision, Array, float], tuple[Array, Array]]
 # (velocity, of the other axis, of the other sphere, n, n of the other axis) -> one product of (vA - vB).n
 PRODUCTS: dict[str, Callable[[float, float, float, float, float], float]] = {
     "is left out": lambda v, across, other, n, m: 0.0,
@@ -40,7 +40,7 @@ def scalar_products() -> dict[str, Impulse]:
 def with_slip(places: set[tuple[int, int]], one: Callable[..., float]) -> Impulse:
     """The right impulse but for the products at `places`, which are made by `one`."""
 
-    def impulse(h: Collision, e: float) -> Array:
+    def impulse(h: PairCollision, e: float) -> Array:
         v, total = (h.va, h.vb), 0.0
         for who, k in product((0, 1), (0, 1)):
             given = (v[who][k], v[who][1 - k], v[1 - who][k], h.n[k], h.n[1 - k])
@@ -70,7 +70,7 @@ COMPONENTS: dict[str, Callable[..., float]] = {
 }
 
 
-def components(seen: Sequence[tuple[Collision, Array]], right: Impulse, e: float) -> tuple[str, Change] | None:
+def components(seen: Sequence[tuple[PairCollision, Array]], right: Impulse, e: float) -> tuple[str, Change] | None:
     """What is done to each part of both velocities, with the right impulse; None if one of them follows no law."""
     found = {}
     for who, axis in product((0, 1), (0, 1)):
@@ -83,7 +83,7 @@ def components(seen: Sequence[tuple[Collision, Array]], right: Impulse, e: float
     if None in found.values():
         return None
 
-    def change(h: Collision, P: Array, e: float) -> tuple[Array, Array]:
+    def change(h: PairCollision, P: Array, e: float) -> tuple[Array, Array]:
         a, b = (np.array([component(found[who, k], h, P, who, k, e) for k in (0, 1)]) for who in (0, 1))
         return a, b
 
@@ -91,7 +91,7 @@ def components(seen: Sequence[tuple[Collision, Array]], right: Impulse, e: float
     return "; ".join(slips), change
 
 
-def component(name: str | None, h: Collision, P: Array, who: int, axis: int, e: float) -> float:
+def component(name: str | None, h: PairCollision, P: Array, who: int, axis: int, e: float) -> float:
     """What a law of `COMPONENTS` adds, m/s."""
     sign, masses, v = 1 - 2 * who, (h.ma, h.mb), (h.va, h.vb)[who]
     own, other = masses[who], masses[1 - who]

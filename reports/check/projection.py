@@ -9,7 +9,7 @@ import numpy as np
 
 from reports.check.impacts import BACKWARDS, Finding
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, Ball, direction, finite
-from reports.check.rows import Row, judged, near, not_asked, shown
+from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
 
 
@@ -69,7 +69,7 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
     return Shift(float(da @ n), float(-(db @ n)), across, a.r + b.r - distance, distance, a.r + b.r)
 
 
-def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[Row]:
+def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[CheckRow]:
     """The rows of (b); `found`: what the velocities say."""
     seen = [(q.balls, shift_of(q.balls, answers[name].last), answers[name].last) for name, q in COLLISIONS.items()]
     balls, shift, after = seen[0]
@@ -89,7 +89,7 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[R
     return [*rows, *at_rest(answers, explained), separation(answers["separate"])]
 
 
-def at_rest(answers: dict[str, Answer], explained: bool) -> list[Row]:
+def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
     """What a pair at relative rest says of the displacement; nothing if the impulse explains it or is no number."""
     still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
     kept = all(near(x.v, y.v) for x, y in zip(still, after))
@@ -182,7 +182,7 @@ def was_set(which: str, seen: list[tuple[Ball, Ball, Ball]]) -> bool:
     return near(crosses, 0.0, 0.01)
 
 
-def split(balls: tuple[Ball, ...], shift: Shift) -> Row:
+def split(balls: tuple[Ball, ...], shift: Shift) -> CheckRow:
     """Who is moved how far: free; said with what it does to the centre of mass."""
     a, b = balls
     share = shift.a / shift.overlap
@@ -194,13 +194,13 @@ def split(balls: tuple[Ball, ...], shift: Shift) -> Row:
     centre = (a.m * shift.a - b.m * shift.b) / (a.m + b.m)
     aside = "stays" if abs(centre) < 1e-9 else f"is moved by {shown(abs(centre))} m"
     asked = f"How is the overlap shared, for masses of {shown(a.m)} and {shown(b.m)} kg?"
-    return Row("split", "2b", asked, how, "any", "note", f"{how}; their centre of mass {aside}")
+    return CheckRow("split", "2b", asked, how, "any", "note", f"{how}; their centre of mass {aside}")
 
 
-def separation(answer: Answer) -> Row:
+def separation(answer: Answer) -> CheckRow:
     """A pair that overlaps and moves apart: displaced or left; free, as nothing is lost by it."""
     shift = shift_of(QUESTIONS["separate"].balls, answer.last)
     moved = abs(shift.a) + abs(shift.b) > 1e-9
     said = "displaced as any other" if moved else "left as it is: an early return for pairs that part"
-    return Row("separating pair", "2b", "Is a pair displaced that overlaps and moves apart?", "yes" if moved else "no",
+    return CheckRow("separating pair", "2b", "Is a pair displaced that overlaps and moves apart?", "yes" if moved else "no",
                "yes, or no if it returns early", "note", said)  # fmt: skip

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from reports.check.rows import Row
+    from reports.check.rows import CheckRow
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -47,7 +47,7 @@ class Fault(Exception):
 class RowItem(pytest.Item):
     """A row as a test."""
 
-    def __init__(self, *, row: Row, **given: object) -> None:
+    def __init__(self, *, row: CheckRow, **given: object) -> None:
         super().__init__(**given)  # type: ignore[arg-type]
         self.row = row
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.check.questions import QUESTIONS, Answer
-from reports.check.rows import Row, judged, near, shown
+from reports.check.rows import CheckRow, judged, near, shown
 
 EXERCISE = 0.9
 COMMENTS = re.compile(r"/\*.*?\*/|//[^\n]*|#[^\n]*", re.DOTALL)
@@ -60,22 +60,22 @@ class Restitution:
         """What is wrong with the number that is written in, "" if nothing is."""
         return f"e = {shown(self.came)} is written into the file; it must be from 0 to 1" if self.absurd else ""
 
-    def row(self, mistake: str) -> Row:
+    def row(self, mistake: str) -> CheckRow:
         """0.9 is right, another number is a note if the file says so, and a fault if it says something else.
 
         `mistake`: what is known to be wrong with the collisions, if anything.
         """
         asked = "What part of its closing speed has a pair when it parts?"
         if near(self.came, EXERCISE):
-            return Row("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
+            return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
         if near(self.came, self.own) or len(self.candidates) > 1:
             note = f"e = {shown(self.came)} is written into the file; the exercise has 0.9. It is judged by its own"
-            return Row("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "note", note)
+            return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "note", note)
         cause = mistake if np.isfinite(self.came) else "the velocities become no numbers"
         cause = cause or f"e = {shown(self.own)} is written into the file, but it is not what comes out"
         return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
 
-    def speeds(self, mistake: str) -> Row:
+    def speeds(self, mistake: str) -> CheckRow:
         """The same at any speed; `mistake` as above."""
         return judged(
             "any speed", "2c", "Is it the same for pairs that close at 2 mm/s and at 200 m/s?",

@@ -36,7 +36,7 @@ READ = {
 
 
 @dataclass(frozen=True)
-class Row:
+class CheckRow:
     """One thing that was checked.
 
     Attributes:
@@ -63,14 +63,14 @@ class Row:
         return READ[self.task]
 
 
-def judged(name: str, task: str, asked: str, got: str, expected: str, right: bool, cause: str = "") -> Row:
+def judged(name: str, task: str, asked: str, got: str, expected: str, right: bool, cause: str = "") -> CheckRow:
     """A row that is right or a fault with its cause."""
-    return Row(name, task, asked, got, expected, "right" if right else "fault", "" if right else cause or UNKNOWN)
+    return CheckRow(name, task, asked, got, expected, "right" if right else "fault", "" if right else cause or UNKNOWN)
 
 
-def not_asked(name: str, task: str, why: str) -> Row:
+def not_asked(name: str, task: str, why: str) -> CheckRow:
     """A row for what could not be asked."""
-    return Row(name, task, "", "", "", "not asked", why)
+    return CheckRow(name, task, "", "", "", "not asked", why)
 
 
 def near(got: object, expected: object, scale: float = 1.0) -> bool:
@@ -100,7 +100,7 @@ def shown(value: object) -> str:
     return ("NaN" if np.isnan(x) else "infinite") if not np.isfinite(x) else f"{0.0 if abs(x) < 1e-12 else x:.4g}"
 
 
-def worst(rows: Iterable[Row]) -> Verdict:
+def worst(rows: Iterable[CheckRow]) -> Verdict:
     """The verdict of a group of rows: its worst."""
     found = {row.verdict for row in rows}
     order: tuple[Verdict, ...] = ("fault", "not asked", "right", "note")

@@ -11,7 +11,7 @@ import numpy as np
 from adapters.own_solver.engine import spheres_of
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
-from reports.check.rows import FOLLOWS, TOLERANCE, Row, judged, near, not_asked, shown
+from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
 from scenarios.truth.closed_forms import world_thrusts
@@ -24,7 +24,7 @@ LIMIT = 2.0  # s that a sample interval may take
 SCENE_LIMIT = 10.0  # s by the clock that all of a scene may take: it needs a tenth of a second
 
 
-class Played(NamedTuple):
+class SceneAnswer(NamedTuple):
     """A scene by a solver: position and velocity (k, n, 2) m, m/s, and its contacts (c, 19).
 
     A contact is: step, i, j, then x, y, vx, vy of i and of j before the call, and of both after it.
@@ -42,7 +42,7 @@ def step_of(process: SolverProcess) -> float:
     return DT if process.surface == "exercise" else 5 * DT
 
 
-def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> Played:
+def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> SceneAnswer:
     """Play it by the file's own functions; its forces last as long as it does. Raises `SolverFailed`."""
     scene, count = scenario.scene, round(scenario.sample_interval / dt)
     forces = np.zeros((scene.n, 3))
@@ -58,10 +58,12 @@ def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> Played:
     if failed:
         raise failed
     rows = np.array(answers[1::2], float)
-    return Played(rows[..., 0:2], rows[..., 2:4], rows[..., 6], rows[..., 7], np.array(contacts, float).reshape(-1, 19))
+    return SceneAnswer(
+        rows[..., 0:2], rows[..., 2:4], rows[..., 6], rows[..., 7], np.array(contacts, float).reshape(-1, 19)
+    )
 
 
-def scene_rows(process: SolverProcess, rows: Sequence[Row], e: float | None) -> list[Row]:
+def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None) -> list[CheckRow]:
     """The rows on whole scenes with restitution `e`, and the one on the first wrong collision in any of them."""
     if any(row.name == "implemented" for row in rows):
         return [not_asked("scenes", "scenes", "a function of the file cannot be used")]
@@ -83,7 +85,7 @@ def scene_rows(process: SolverProcess, rows: Sequence[Row], e: float | None) -> 
                            wrong or "yes", "yes", not wrong, FOLLOWS if blamed else "")]  # fmt: skip
 
 
-def scene_row(scenario: Scenario, record: TruthRecord | None, played: Played, dt: float, cause: str) -> Row:
+def scene_row(scenario: Scenario, record: TruthRecord | None, played: SceneAnswer, dt: float, cause: str) -> CheckRow:
     """The largest distance from the exact positions, beside what the step size explains."""
     truth = truth_of(scenario, record)
     k = len(truth)

@@ -17,7 +17,7 @@ from hypothesis.errors import Flaky, NoSuchExample
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
 from reports.check.rows import TOLERANCE, near, shown
-from reports.check.scenes import Played, first_wrong, play_scene, scene_of, truth_of
+from reports.check.scenes import SceneAnswer, first_wrong, play_scene, scene_of, truth_of
 from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import computed
@@ -136,7 +136,7 @@ def fault_of(process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, i
     return first_wrong(scenario, played.contacts, DT) or flight_fault(scenario, played)
 
 
-def flight_fault(scenario: Scenario, played: Played) -> str:
+def flight_fault(scenario: Scenario, played: SceneAnswer) -> str:
     """Whether a sphere that meets nobody flies as symplectic Euler does: x0 + v0 t + a t (t + dt) / 2 after t."""
     scene, t = scenario.scene, scenario.duration
     met = {int(i) for row in played.contacts for i in row[1:3]}

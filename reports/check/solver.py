@@ -19,11 +19,11 @@ from reports.check.motion import motion_rows
 from reports.check.projection import moved_together, projection_rows
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, ask
 from reports.check.restitution import Restitution, code_of, restitution_of
-from reports.check.rows import Row, judged, not_asked
+from reports.check.rows import CheckRow, judged, not_asked
 from reports.check.scenes import scene_rows
 
 
-def check_solver(path: Path | str) -> list[Row]:
+def check_solver(path: Path | str) -> list[CheckRow]:
     """What was asked of a solver's file and what came of it, task by task.
 
     Raises:
@@ -32,7 +32,7 @@ def check_solver(path: Path | str) -> list[Row]:
     return examine(read_solver(Path(path)))[0]
 
 
-def examine(solver: SolverText) -> tuple[list[Row], float | None]:
+def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
     """The rows of a file, and the restitution that its scenes are judged by."""
     try:
         process = SolverProcess(solver)
@@ -51,7 +51,7 @@ def examine(solver: SolverText) -> tuple[list[Row], float | None]:
 LOADS = "Can the file be loaded, and does it leave the language as it is?"
 
 
-def rows_of(process: SolverProcess, text: str) -> tuple[list[Row], float | None]:
+def rows_of(process: SolverProcess, text: str) -> tuple[list[CheckRow], float | None]:
     """The rows of a file that is loaded, and its restitution; raises `SolverFailed` if its process is lost."""
     # Makes the globals that must not change; judged with the step.
     begun = process.request([("begin", None, 2.0)])[0] if process.functions["begin"] else None
@@ -70,7 +70,7 @@ def rows_of(process: SolverProcess, text: str) -> tuple[list[Row], float | None]
     return hinted(rows, text) if process.kind == "javascript" else rows, e
 
 
-def hinted(rows: list[Row], text: str) -> list[Row]:
+def hinted(rows: list[CheckRow], text: str) -> list[CheckRow]:
     """The rows, the first fault with a word on a condition that sets a variable, if the file has one.
 
     Python takes no such condition.
@@ -94,7 +94,7 @@ def stuck(answers: dict[str, Answer]) -> bool:
     return any(answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values())
 
 
-def loads(process: SolverProcess) -> Row:
+def loads(process: SolverProcess) -> CheckRow:
     """Loaded, and which built-ins it has replaced for everybody."""
     replaced = process.functions["replaced"]
     what = ", ".join(replaced)
@@ -102,14 +102,14 @@ def loads(process: SolverProcess) -> Row:
                   f"the file replaces {what}, which the rest of the page uses, too")  # fmt: skip
 
 
-def task_1(process: SolverProcess, answers: dict[str, Answer], text: str) -> list[Row]:
+def task_1(process: SolverProcess, answers: dict[str, Answer], text: str) -> list[CheckRow]:
     """The rows of integrate."""
     mine = {name: answer for name, answer in answers.items() if name in MOTION}
     rows, usable = implemented("1", process.functions["integrate"], mine, text)
     return rows + (motion_rows(mine) if usable else [not_asked("velocity", "1", "integrate cannot be judged further")])
 
 
-def task_2(process: SolverProcess, answers: dict[str, Answer], text: str) -> tuple[list[Row], Restitution | None]:
+def task_2(process: SolverProcess, answers: dict[str, Answer], text: str) -> tuple[list[CheckRow], Restitution | None]:
     """The rows of the collision function, and its restitution where it has one."""
     mine = {name: answer for name, answer in answers.items() if name not in MOTION}
     rows, usable = implemented("2a", process.functions["collide"], mine, text)

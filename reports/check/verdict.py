@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.own_solver.file import NotASolver, SolverText, read_solver
-from reports.check.rows import FOLLOWS, TASKS, Row, Verdict, worst
+from reports.check.rows import FOLLOWS, TASKS, CheckRow, Verdict, worst
 from reports.check.solver import examine
 
 MOST = 3  # sentences
@@ -22,13 +22,13 @@ class FileCheck:
     """
 
     path: Path
-    rows: Sequence[Row]
+    rows: Sequence[CheckRow]
     refused: str = ""
     restitution: float | None = None
     solver: SolverText | None = None
 
     @property
-    def faults(self) -> list[Row]:
+    def faults(self) -> list[CheckRow]:
         """The rows that found a fault, in order of the tasks."""
         return [row for row in self.rows if row.verdict == "fault"]
 
@@ -37,7 +37,7 @@ class FileCheck:
         """Whether no fault was found."""
         return not self.refused and not self.faults
 
-    def of(self, task: str) -> list[Row]:
+    def of(self, task: str) -> list[CheckRow]:
         """The rows of a task."""
         return [row for row in self.rows if row.task == task]
 
@@ -61,7 +61,7 @@ class FileCheck:
         return [sentence(row) for row in rows[:MOST]]
 
 
-def sentence(row: Row) -> str:
+def sentence(row: CheckRow) -> str:
     """Where, what is likely wrong, and the numbers that say so."""
     numbers = "" if row.name in ("implemented", "loads", "answers") else f" Came: {row.got}. Expected: {row.expected}."
     return f"Task {TASKS[row.task]}, {row.name}: {row.cause}.{numbers}" if row.task[0] in "12" else (

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES, OWN, read_row, row_of
 from reports.run.archive import STATE, Archive, from_trail, load_trajectory, stored_trajectory
 from reports.run.arguments import go_where_files_are
@@ -30,7 +30,7 @@ from scenarios.model import Scenario, Trajectory
 REMEMBERED = ", the last good state (what the engine remembers beside it begins anew)"
 
 
-def replay(name: str, out: Path, timeout: float, engines: Mapping[str, Row] = ENGINES) -> NoReturn:
+def replay(name: str, out: Path, timeout: float, engines: Mapping[str, EngineRow] = ENGINES) -> NoReturn:
     """Play the cell of the run in `out` whose key begins with `name`; exits 0, 1 (it failed again) or 2."""
     try:
         archive = Archive.read(found(Path(os.path.abspath(out))))
@@ -108,7 +108,9 @@ def continued(scenario: Scenario, substeps: int, before: Trajectory | None, k: i
     )
 
 
-def again(record: dict[str, Any], row: Row, scenario: Scenario, timeout: float) -> tuple[str, str, Trajectory | None]:
+def again(
+    record: dict[str, Any], row: EngineRow, scenario: Scenario, timeout: float
+) -> tuple[str, str, Trajectory | None]:
     """Status, reason and trajectory, from a process of its own that prints where the user sees it."""
     cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", 1)
     worker = Worker(memory=0, show=True)

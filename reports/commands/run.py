@@ -18,7 +18,7 @@ from reports.run.arguments import checked_engines, checked_scenes, go_where_file
 from reports.run.folders import RUN, given_back, open_again, open_new, part_of, place_of, reopened, replace_folder
 from reports.run.journal import JOURNAL, Journal
 from reports.run.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
-from reports.run.suite import Means, OtherVersions, Plan, carry_out
+from reports.run.suite import Means, OtherVersions, RunPlan, carry_out
 from reports.terminal.exits import FAILED, broken_off, refuse, say
 from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
@@ -38,7 +38,7 @@ def run_plan(
     """Play, compare, report into `out`; exits 0, 1 (an engine or a scene could not be compared), 2, 130 or 143."""
     with opening(out):
         out, folder = place_of(out), os.getcwd()
-    plan = Plan(
+    plan = RunPlan(
         scenes=checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
         engines={name: row_of(name) for name in checked_engines(engines)},
         seed=seed,
@@ -87,7 +87,7 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
     carry_on(plan, means, journal, out)
 
 
-def plan_of(folder: Path, part: Path) -> Plan:
+def plan_of(folder: Path, part: Path) -> RunPlan:
     """What was asked for, as the journal has it, wherever one is now; of a scene file that is gone the copy is played.
 
     `part`: where `folder` will be when that is carried out. Exits 2 where a scene file, or a solver's, is at fault.
@@ -101,7 +101,7 @@ def plan_of(folder: Path, part: Path) -> Plan:
         scene: part / path.relative_to(folder) if path.is_relative_to(folder) else path for scene, path in files.items()
     }
     names = ("seed", "dts", "full", "timings", "command", "folder")
-    return Plan(scenes=scenes, engines=engines, files=moved, **{name: header[name] for name in names})
+    return RunPlan(scenes=scenes, engines=engines, files=moved, **{name: header[name] for name in names})
 
 
 def file_of(scene: str, folder: Path, header: Mapping[str, Any]) -> Path:
@@ -111,7 +111,7 @@ def file_of(scene: str, folder: Path, header: Mapping[str, Any]) -> Path:
     return copy if not path.exists() and copy.exists() else path
 
 
-def carry_on(plan: Plan, means: Means, journal: Journal, out: Path) -> NoReturn:
+def carry_on(plan: RunPlan, means: Means, journal: Journal, out: Path) -> NoReturn:
     """Carry out the plan, report, and put it all in its place; what was played is kept, whatever happens."""
     part = journal.path.parent
     try:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES, OWN
 from adapters.own_solver.engine import engine_file
 from adapters.own_solver.file import KINDS
@@ -36,7 +36,7 @@ def game_of(flight: Path | None, engines: Sequence[str]) -> Game:
     return Game(chosen, file)
 
 
-def own_rows(names: Sequence[str]) -> dict[str, Row]:
+def own_rows(names: Sequence[str]) -> dict[str, EngineRow]:
     """The rows of solvers' files, `PATH:own`, each tried on a lone ship; exits 2 with a line for each that fails."""
     rows, faults = {}, []
     for name in names:
@@ -49,7 +49,7 @@ def own_rows(names: Sequence[str]) -> dict[str, Row]:
     return rows
 
 
-def grounded(row: Row) -> str:
+def grounded(row: EngineRow) -> str:
     """Why an engine cannot take a lone ship through a step; "" if it can."""
     engine = row.make()
     try:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engine import Collision
+from adapters.engine import ContactImpulse
 from scenarios.model import Array, Scene, State
 
 DIVERGED = 0.01  # m/s: disks that move on differently by less have not diverged, they were found a step early or late
@@ -40,7 +40,7 @@ class Touches:
         self.frame = np.full(scene.n, -WAIT)
         self.last: dict[int, LastCollision] = {}
 
-    def note(self, collisions: Iterable[Collision], frame: int, state: State) -> None:
+    def note(self, collisions: Iterable[ContactImpulse], frame: int, state: State) -> None:
         """`collisions` happened in frame `frame`, which ended in `state`."""
         for collision in collisions:
             i, j = (collision.i, collision.j) if collision.i >= 0 else (collision.j, collision.i)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from adapters.conformance.conform import PROBES, Finding, conform
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from reports.page.style import number
 
 ASKED = (
@@ -24,7 +24,7 @@ class Convention:
     got: dict[str, tuple[str, str]]  # engine:profile -> reading, verdict
 
 
-def table(engines: Mapping[str, Row]) -> list[Convention]:
+def table(engines: Mapping[str, EngineRow]) -> list[Convention]:
     """The physics probes put to every engine now, in the order of `ASKED`; a few seconds."""
     findings = {name: {each.probe: each for each in conform(name, row)} for name, row in engines.items()}
     rows = []

@@ -9,7 +9,7 @@ import numpy as np
 from adapters.engines import ENGINES
 from adapters.play import play
 from adapters.reference import every_pair
-from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider
+from reports.lessons.lesson import Curve, Lesson, LessonChart, Settings, Shown, Simulation, Slider
 from reports.page.style import TRUTH, number
 from scenarios.families.exercise import asteroid_field
 from scenarios.families.placing import box, lay_out, scatter
@@ -55,9 +55,9 @@ def show_cost(settings: Settings) -> Shown:
         x, y = np.log(sizes[-3:]), np.log(np.asarray(curve.y)[-3:])
         facts.append((f"{curve.name}: cost grows as number to the power", number(float(np.polyfit(x, y, 1)[0]), 2)))
     largest = scenes[-1] if last > MOST_DISKS else with_oracle(scenes[-1])
-    film = Played.by(largest, ("reference:exercise", "event_driven:float64"), SUBSTEPS).film
+    film = Simulation.by(largest, ("reference:exercise", "event_driven:float64"), SUBSTEPS).film
     pace = {"pace": largest.duration / SECONDS}
-    return Shown([Chart("Cost of a step", "disks", "µs a step", curves, "xy")], film, facts, opening=pace)
+    return Shown([LessonChart("Cost of a step", "disks", "µs a step", curves, "xy")], film, facts, opening=pace)
 
 
 COST = Lesson(
@@ -90,7 +90,7 @@ def field(seed: int, restitution: float) -> Scenario:
 def show_horizon(settings: Settings) -> Shown:
     """The distance from the exact answer as long as there is one, and the energy, which stays comparable."""
     scenario = field(settings["seed"], settings["e"])
-    shown = Played.by(scenario, HORIZON_NAMES, settings["k"])
+    shown = Simulation.by(scenario, HORIZON_NAMES, settings["k"])
     scene = scenario.scene
 
     def energy(each: Trajectory) -> np.ndarray:
@@ -98,11 +98,11 @@ def show_horizon(settings: Settings) -> Shown:
             (scene.mass * (scene.velocity**2).sum(axis=1)).sum() / 2
         )
 
-    charts = [Chart("Energy of motion, of what it was", "time in s", "", shown.curves(energy))]
+    charts = [LessonChart("Energy of motion, of what it was", "time in s", "", shown.curves(energy))]
     facts = [("collisions of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
     if shown.truth is not None:
         errors = shown.errors()
-        charts.insert(0, Chart("Farthest disk from the exact answer", "time in s", "m", errors, "y"))
+        charts.insert(0, LessonChart("Farthest disk from the exact answer", "time in s", "m", errors, "y"))
         facts += [
             ("the exact answer ends at its horizon", f"{number(float(shown.truth.t[-1]))} s"),
             *growth(shown, errors),
@@ -110,7 +110,7 @@ def show_horizon(settings: Settings) -> Shown:
     return Shown(charts, shown.film, facts)
 
 
-def growth(shown: Played, errors: list[Curve]) -> list[tuple[str, str]]:
+def growth(shown: Simulation, errors: list[Curve]) -> list[tuple[str, str]]:
     """By what factor a collision makes a distance grow, fitted to the engine whose errors begin at rounding."""
     assert shown.truth is not None
     found = next((curve for curve in errors if curve.name == "event_driven:float64"), None)

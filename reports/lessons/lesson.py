@@ -62,7 +62,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Chart:
+class LessonChart:
     """Curves over one pair of axes.
 
     Attributes:
@@ -101,7 +101,7 @@ class Shown:
         said: slider -> what it means here, where that depends on the others.
     """
 
-    charts: Sequence[Chart]
+    charts: Sequence[LessonChart]
     film: Comparison | None = None
     facts: Sequence[tuple[str, str]] = ()
     steps: Sequence[tuple[str, str]] = ()
@@ -169,7 +169,7 @@ class Lesson:
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class Simulation:
     """A scenario played by some engines in one step size, and its truth where it has one."""
 
     scenario: Scenario
@@ -177,10 +177,10 @@ class Played:
     truth: Trajectory | None
 
     @staticmethod
-    def by(scenario: Scenario, names: Sequence[str], substeps: int) -> Played:
+    def by(scenario: Scenario, names: Sequence[str], substeps: int) -> Simulation:
         """Play it; the ladder of the scenario that is kept has this step only."""
         scenario, truth = answered(replace(scenario, substeps=(substeps,)))
-        return Played(scenario, [play_once(name, scenario, substeps) for name in names], truth)
+        return Simulation(scenario, [play_once(name, scenario, substeps) for name in names], truth)
 
     @cached_property
     def film(self) -> Comparison:

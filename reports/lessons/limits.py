@@ -13,7 +13,7 @@ import pandas as pd
 from adapters.engines import ENGINES
 from adapters.play import Run
 from reports.compare.comparison import Comparison
-from reports.lessons.lesson import Chart, Curve, Lesson, Settings, Shown, Slider
+from reports.lessons.lesson import Curve, Lesson, LessonChart, Settings, Shown, Slider
 from reports.page.style import TRUTH, number
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
@@ -91,7 +91,7 @@ def show_limits(settings: Settings) -> Shown:
     curves = [Curve(name, each.t, seen.read(each)) for name, each in drawn if each is not None]
     found = next(limit for limit in limits if limit.engine == engine)
     return Shown(
-        [Chart(seen.what, "time in s", seen.unit, curves), readings(case, limits, engine, value)],
+        [LessonChart(seen.what, "time in s", seen.unit, curves), readings(case, limits, engine, value)],
         Comparison(scenario, truth, [run], pd.DataFrame()),
         [(limit.engine, in_words(limit, case)) for limit in limits if limit.engine in ENGINES],
         in_numbers(case, trial, found),
@@ -105,7 +105,7 @@ def event_of(trial: Trial) -> dict[str, Any]:
     return {} if trial.works or not isfinite(trial.at) else {"event": {"t": trial.at, "disk": trial.disk}}
 
 
-def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> Chart:
+def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> LessonChart:
     """What is read at every value tried, harsher to the right, the engine before all others.
 
     Where a run can only fail or not, the share of runs that fail.
@@ -123,7 +123,7 @@ def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> 
     guides = [("x", value, "here"), *([("y", bound, "fails above")] if bound else [])]
     axis = case.parameter if case.unit == "1" else f"{case.parameter} in {case.unit}"
     what = (case.predicate.name.capitalize(), unit, "xy") if bound else ("Runs that fail", "share", "x")
-    return Chart(what[0], axis, what[1], curves, what[2], guides, case.values[0] > case.values[-1])
+    return LessonChart(what[0], axis, what[1], curves, what[2], guides, case.values[0] > case.values[-1])
 
 
 def with_unit(text: str, case: Case) -> str:

@@ -12,7 +12,7 @@ from adapters.mechanisms.ablated import BOX2D, EXERCISE, MIXING, POSITION_FIRST,
 from adapters.mechanisms.options import changed_box2d
 from adapters.play import Run, play
 from reports.compare.comparison import answered
-from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
+from reports.lessons.lesson import Curve, Lesson, LessonChart, Settings, Shown, Simulation, Slider, play_once
 from reports.page.style import TRUTH, number
 from scenarios.families.lesson import free_fall
 from scenarios.families.placing import lay_out
@@ -60,7 +60,7 @@ def filmed(scenario: Scenario, runs: Sequence[Run]) -> Any:
     """For the engine of the page, which shows the runs at the step of the scenario, and the exact answer if any."""
     seen = replace(scenario, substeps=(round(scenario.sample_interval / runs[0].dt),))
     seen, truth = answered(seen if seen.truth else with_oracle(seen))
-    return Played(seen, runs, truth).film
+    return Simulation(seen, runs, truth).film
 
 
 def pairs(closing: Array, restitution: float) -> Scene:
@@ -93,7 +93,7 @@ def show_threshold(settings: Settings) -> Shown:
     curves = over(closing, runs, separation(closing))
     facts = [*setting_rows(runs, "restitution threshold in m/s"), distance(curves, "box2d:shipped", "")]
     curves.append(Curve(TRUTH, closing, np.full(len(closing), settings["e"])))
-    chart = Chart("Separation over approach speed", "closing speed in m/s", "e of the collision", curves, "x")
+    chart = LessonChart("Separation over approach speed", "closing speed in m/s", "e of the collision", curves, "x")
     return Shown([chart], filmed(scenario, runs), facts)
 
 
@@ -114,7 +114,7 @@ def show_mixing(settings: Settings) -> Shown:
     facts = [("replayed: e on each of the two disks", number(SHOWN)), distance(curves, "pymunk:shipped", "")]
     curves.append(Curve(TRUTH, stated, stated))
     return Shown(
-        [Chart("Restitution of a pair", "e on each of the two disks", "e of the collision", curves)], film, facts
+        [LessonChart("Restitution of a pair", "e on each of the two disks", "e of the collision", curves)], film, facts
     )
 
 
@@ -127,7 +127,7 @@ def falling(names: Sequence[str], on: AblatedReference, substeps: int) -> Shown:
     curves = over_time(runs, lambda each: 1e3 * (each.position - exact)[:, 0, 1])
     facts = [*setting_rows(runs[:1], "substeps"), *(distance(curves, name, "mm") for name in names)]
     curves.append(Curve(TRUTH, scenario.times, np.zeros(scenario.samples + 1)))
-    return Shown([Chart("Above the parabola", "time in s", "mm", curves)], filmed(scenario, runs), facts)
+    return Shown([LessonChart("Above the parabola", "time in s", "mm", curves)], filmed(scenario, runs), facts)
 
 
 def show_order(settings: Settings) -> Shown:
@@ -150,7 +150,7 @@ def show_gravity(settings: Settings) -> Shown:
     facts = [distance(curves, name, "m") for name in names]
     assert scenario.truth is not None
     curves.append(Curve(TRUTH, scenario.times, scenario.truth(scenario.times).position[:, 0, 1]))
-    return Shown([Chart("Height of the centre", "time in s", "m", curves)], filmed(scenario, runs), facts)
+    return Shown([LessonChart("Height of the centre", "time in s", "m", curves)], filmed(scenario, runs), facts)
 
 
 def show_position_correction(settings: Settings) -> Shown:
@@ -163,7 +163,9 @@ def show_position_correction(settings: Settings) -> Shown:
     engine.close()
     curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
     facts = [*setting_rows(runs, "linear slop in m"), distance(curves, NO_CCD, "mm")]
-    return Shown([Chart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")], filmed(scenario, runs), facts)
+    return Shown(
+        [LessonChart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")], filmed(scenario, runs), facts
+    )
 
 
 def show_digits(settings: Settings) -> Shown:
@@ -175,7 +177,7 @@ def show_digits(settings: Settings) -> Shown:
     curves = over_time(runs, lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16))
     facts = [*setting_rows(runs, "float32 rounding of the start in m"), distance(curves, "box2d:shipped", "m")]
     curves.append(Curve(TRUTH, scenario.times, np.full(scenario.samples + 1, 1e-16)))
-    chart = Chart("Distance from x + v t", "time in s", "m, 0 drawn as 10⁻¹⁶", curves, "y")
+    chart = LessonChart("Distance from x + v t", "time in s", "m, 0 drawn as 10⁻¹⁶", curves, "y")
     return Shown([chart], filmed(scenario, runs), facts)
 
 
@@ -191,7 +193,7 @@ def show_cap(settings: Settings) -> Shown:
     curves = over(given, runs, lambda each: each.velocity[-1, :, 0])
     facts = [*setting_rows(runs, "speed cap in m/s"), distance(curves, "box2d:shipped", "m/s")]
     curves.append(Curve(TRUTH, given, given))
-    chart = Chart("Speed of a free disk", "speed it was given in m/s", "m/s", curves, "xy")
+    chart = LessonChart("Speed of a free disk", "speed it was given in m/s", "m/s", curves, "xy")
     return Shown([chart], filmed(scenario, runs), facts, opening={"pace": 0.1 / SECONDS})
 
 
@@ -211,7 +213,7 @@ def show_row(settings: Settings) -> Shown:
     film = filmed(scenario, runs)
     if film.truth is not None:
         curves.append(Curve(TRUTH, np.arange(n + 1.0), film.truth.velocity[-1, :, 0]))
-    return Shown([Chart("Velocity after the collision", "disk", "m/s", curves)], film, facts)
+    return Shown([LessonChart("Velocity after the collision", "disk", "m/s", curves)], film, facts)
 
 
 def page(

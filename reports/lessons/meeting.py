@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.engines import ENGINES
-from reports.lessons.lesson import Chart, Lesson, Played, Settings, Shown, Slider
+from reports.lessons.lesson import Lesson, LessonChart, Settings, Shown, Simulation, Slider
 from reports.page.style import TRUTH, number
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, State
@@ -82,14 +82,14 @@ def pair(vector: Array) -> str:
 def show_meeting(settings: Settings) -> Shown:
     """The collision, drawn and in numbers."""
     scenario = two(settings["e"], settings["ratio"], settings["offset"])
-    shown = Played.by(scenario, NAMES, settings["k"])
+    shown = Simulation.by(scenario, NAMES, settings["k"])
     charts = [
-        Chart(
+        LessonChart(
             "Velocity of the first disk along x", "time in s", "m/s", shown.curves(lambda each: each.velocity[:, 0, 0])
         ),
     ]
     if shown.truth is not None:
-        charts.append(Chart("Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"))
+        charts.append(LessonChart("Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"))
     return Shown(charts, shown.film, steps=in_numbers(scenario.scene, shown.scenario.dt(settings["k"])))
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from adapters.engines import ENGINES
-from reports.lessons.lesson import Chart, Curve, Lesson, Played, Settings, Shown, Slider, play_once
+from reports.lessons.lesson import Curve, Lesson, LessonChart, Settings, Shown, Simulation, Slider, play_once
 from reports.page.style import TRUTH, number
 from scenarios.families.exercise import ship_thrust
 from scenarios.families.lesson import falling_box, ping_pong
@@ -29,17 +29,17 @@ def show_particle(settings: Settings) -> Shown:
     """Height over time, and the error against the step."""
     names = ("reference:lesson", "reference:exercise")
     scenario = bouncing(settings["gravity"])
-    shown = Played.by(scenario, names, settings["k"])
+    shown = Simulation.by(scenario, names, settings["k"])
     steps = np.array([scenario.dt(k) for k in LADDER])
     errors = []
     for name in names:
-        runs = [Played(scenario, [play_once(name, scenario, k)], shown.truth) for k in LADDER]
+        runs = [Simulation(scenario, [play_once(name, scenario, k)], shown.truth) for k in LADDER]
         errors.append(Curve(name, steps, [run.errors()[0].y.max() for run in runs], dots=True))  # type: ignore[union-attr]
     now = [(f"{curve.name}, largest error", f"{number(curve.y.max())} m") for curve in shown.errors()]  # type: ignore[union-attr]
     return Shown(
         [
-            Chart("Height", "time in s", "y in m", shown.curves(lambda each: each.position[:, 0, 1])),
-            Chart("Largest error in 20 s, against the step", "step in s", "m", errors, log="xy"),
+            LessonChart("Height", "time in s", "y in m", shown.curves(lambda each: each.position[:, 0, 1])),
+            LessonChart("Largest error in 20 s, against the step", "step in s", "m", errors, log="xy"),
         ],
         shown.film,
         [("step", f"{number(shown.scenario.dt(settings['k']))} s"), *now],
@@ -89,7 +89,7 @@ def show_thrust(settings: Settings) -> Shown:
     """Who is ahead of the parabola and who is behind, and the formula for it."""
     acceleration = settings["a"]
     scenario = thrust_ship(acceleration)
-    shown = Played.by(scenario, THRUST_NAMES, settings["k"])
+    shown = Simulation.by(scenario, THRUST_NAMES, settings["k"])
     assert shown.truth is not None
     exact, dt = shown.truth, shown.scenario.dt(settings["k"])
 
@@ -105,8 +105,8 @@ def show_thrust(settings: Settings) -> Shown:
         facts.append((f"{run.name}, α = {number(row.alpha)}", f"{number(got)} mm, (α − ½) a dt T = {number(law)} mm"))
     return Shown(
         [
-            Chart("Ahead of the exact answer", "time in s", "mm", shown.curves(ahead)),
-            Chart("Velocity", "time in s", "m/s", shown.curves(lambda each: each.velocity[:, 0, 0])),
+            LessonChart("Ahead of the exact answer", "time in s", "mm", shown.curves(ahead)),
+            LessonChart("Velocity", "time in s", "m/s", shown.curves(lambda each: each.velocity[:, 0, 0])),
         ],
         shown.film,
         facts,
@@ -147,7 +147,7 @@ BOX_NAMES = ("reference:lesson", "reference:exercise", "pymunk:matched", "event_
 def show_box(settings: Settings) -> Shown:
     """Energy over time, and how far from the exact answer as long as there is one."""
     scenario = small_box(settings["e"], settings["n"])
-    shown = Played.by(scenario, BOX_NAMES, settings["k"])
+    shown = Simulation.by(scenario, BOX_NAMES, settings["k"])
     scene = scenario.scene
 
     def energy(each: Trajectory) -> np.ndarray:
@@ -155,9 +155,9 @@ def show_box(settings: Settings) -> Shown:
         return moving + (scene.mass * each.position[:, :, 1]).sum(axis=1) * 9.81
 
     facts = [("collisions of " + run.name, str(len(run.trajectory.collisions))) for run in shown.runs if run.trajectory]
-    charts = [Chart("Energy of motion and height", "time in s", "J", shown.curves(energy))]
+    charts = [LessonChart("Energy of motion and height", "time in s", "J", shown.curves(energy))]
     if shown.truth is not None:
-        charts.append(Chart("Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"))
+        charts.append(LessonChart("Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"))
         facts.append(("the exact answer ends at", f"{number(float(shown.truth.t[-1]))} s"))
     return Shown(charts, shown.film, facts)
 

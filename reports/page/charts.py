@@ -32,7 +32,7 @@ class Drawing(NamedTuple):
     figure: go.Figure | None
 
 
-class Line(NamedTuple):
+class ChartLine(NamedTuple):
     """One run's numbers: x (k,), y (k,); y may hold nan."""
 
     run: Run
@@ -60,9 +60,9 @@ def views(comparison: Comparison, other: Trajectory | None) -> list[tuple[Run, V
     return played
 
 
-def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None]) -> list[Line]:
+def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None]) -> list[ChartLine]:
     """A line a run of what `series` gives for it, over time."""
-    return [Line(run, view.played.t, y) for run, view in played if (y := series(view)) is not None]
+    return [ChartLine(run, view.played.t, y) for run, view in played if (y := series(view)) is not None]
 
 
 def momentum(comparison: Comparison) -> Drawing:
@@ -79,7 +79,7 @@ def momentum(comparison: Comparison) -> Drawing:
         return Drawing("Momentum", why, None)
     scale, lines = scales.momentum(comparison.scenario) or 1.0, []
     for run, view in views(comparison, comparison.truth):
-        lines.append(Line(run, view.played.t, view.momentum_deviation / scale))
+        lines.append(ChartLine(run, view.played.t, view.momentum_deviation / scale))
     caption = (
         "Walls and static disks take up momentum, so no law is broken here: how far the momentum is from the truth's, "
         f"over the Σ m|v| at hand{DELAY}."
@@ -111,7 +111,7 @@ def energy_course(comparison: Comparison) -> Drawing:
     lines = []
     for run, view in views(comparison, None):
         scale = scales.energy(comparison.scenario) or 1.0
-        lines.append(Line(run, view.played.t, laws.energy(view.played, scene) / scale))
+        lines.append(ChartLine(run, view.played.t, laws.energy(view.played, scene) / scale))
     caption = (
         "No exact answer says how much energy the collisions should take, so this is no error: the energy over that "
         "at hand. Without thrusts it must never rise."
@@ -129,7 +129,7 @@ def deviation(comparison: Comparison) -> Drawing:
         if held is None:
             return Drawing("Trajectories", "No engine played this scene.", None)
     lines = [
-        Line(run, view.played.t, (view.deviation / scene.radius).max(axis=1))
+        ChartLine(run, view.played.t, (view.deviation / scene.radius).max(axis=1))
         for run, view in views(comparison, held.trajectory if held else truth)
         if run is not held
     ]
@@ -152,7 +152,7 @@ def convergence(comparison: Comparison) -> Drawing:
     for (engine, profile), group in rows.groupby(["engine", "profile"], sort=False):
         ladder = group.sort_values("dt_s")
         run = Run(str(engine), str(profile), comparison.scenario.name, 0.0)
-        lines.append(Line(run, ladder.dt_s.to_numpy(float), ladder.value.to_numpy(float)))
+        lines.append(ChartLine(run, ladder.dt_s.to_numpy(float), ladder.value.to_numpy(float)))
     if not lines:
         return Drawing(title, "No run has a position error to show.", None)
     steps = sorted({float(x) for line in lines for x in line.x})
@@ -167,7 +167,7 @@ def convergence(comparison: Comparison) -> Drawing:
     return Drawing(title, caption, figure)
 
 
-def first_order(lines: Iterable[Line], steps: list[float]) -> list[dict[str, Any]]:
+def first_order(lines: Iterable[ChartLine], steps: list[float]) -> list[dict[str, Any]]:
     """A guide with slope 1 through the middle of what is shown; none where there is nothing to guide."""
     shown = np.concatenate([line.y for line in lines])
     shown = shown[np.isfinite(shown) & (shown > ZERO)]
@@ -179,7 +179,7 @@ def first_order(lines: Iterable[Line], steps: list[float]) -> list[dict[str, Any
     return [{"type": "scatter", "x": steps, "y": shortened(y)} | look]
 
 
-def over_time(comparison: Comparison, lines: list[Line], title: str, log: bool = True) -> go.Figure | None:
+def over_time(comparison: Comparison, lines: list[ChartLine], title: str, log: bool = True) -> go.Figure | None:
     """A figure of lines over time, with a mark where the truth ends; None if there is no line."""
     if not lines:
         return None
@@ -191,13 +191,13 @@ def over_time(comparison: Comparison, lines: list[Line], title: str, log: bool =
         marks["shapes"] = [{"x0": at["x"], "x1": at["x"], "y0": 0, "y1": 1, "yref": "paper", "line": ink}]
         marks["annotations"] = [at | {"text": "truth ends"}]
     if log:  # the start is given to all: its 0 would take up half of the axis and say nothing
-        lines = [Line(run, x[1:], y[1:]) for run, x, y in lines]
+        lines = [ChartLine(run, x[1:], y[1:]) for run, x, y in lines]
     figure = figure_of([thinned(line) for line in lines], {"title": TIME, "range": [0, duration]}, title, log=log)
     return figure.update_layout(marks)
 
 
 def figure_of(
-    lines: list[Line],
+    lines: list[ChartLine],
     x_axis: dict[str, Any],
     title: str,
     log: bool = True,
@@ -237,7 +237,7 @@ def decades(values: Array) -> dict[str, object]:
     return {"type": "log", "range": [low - 0.35, high + 0.25], "tickvals": [10.0**k for k in ticks], "ticktext": text}
 
 
-def thinned(line: Line) -> Line:
+def thinned(line: ChartLine) -> ChartLine:
     """At most `POINTS` points of a line: the smallest and the largest of each stretch stay, so no peak is hidden."""
     k = len(line.y)
     if k <= POINTS:
@@ -248,7 +248,7 @@ def thinned(line: Line) -> Line:
         if len(known):
             keep |= {int(known[np.argmin(line.y[known])]), int(known[np.argmax(line.y[known])])}
     order = sorted(keep)
-    return Line(line.run, line.x[order], line.y[order])
+    return ChartLine(line.run, line.x[order], line.y[order])
 
 
 def shortened(values: Iterable[float], digits: int = 4) -> list[float | None]:

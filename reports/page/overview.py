@@ -18,7 +18,7 @@ OUTCOMES = {
 MAPPED = "position_max_radii"
 
 
-class Cell(NamedTuple):
+class OverviewCell(NamedTuple):
     """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none), failed, the best."""
 
     text: str
@@ -111,27 +111,29 @@ def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
     }
 
 
-def summary(comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]) -> dict[str, list[Cell]]:
+def summary(
+    comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]
+) -> dict[str, list[OverviewCell]]:
     """`engine:profile` -> a cell for each of `SUMMARY`: medians over the scenarios, sums where the unit says so.
 
     Who is `untrusted` broke the protocol of the harness and is not scored; who failed somewhere is never the best.
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
-    rows: dict[str, list[Cell]] = {name: [] for name in names}
+    rows: dict[str, list[OverviewCell]] = {name: [] for name in names}
     for name in untrusted & set(names):
-        rows[name] = [Cell("breaks", "breaks the protocol: not scored", failed=True)] * (len(SUMMARY) - 1)
+        rows[name] = [OverviewCell("breaks", "breaks the protocol: not scored", failed=True)] * (len(SUMMARY) - 1)
     for metric in SUMMARY:
         if metric == "failed":
             for name in names:
                 count = sum(name in each for each in failed)
-                rows[name].append(Cell(f"{count} of {len(comparisons)}", failed=count > 0))
+                rows[name].append(OverviewCell(f"{count} of {len(comparisons)}", failed=count > 0))
             continue
         pooled = {name: pool(metric, name, found) for name in names if name not in untrusted}
         whole = {name: value for name, (value, _) in pooled.items() if not any(name in each for each in failed)}
         best = min((value for value in whole.values() if not np.isnan(value)), default=np.nan)
         for name, (value, remark) in pooled.items():
-            rows[name].append(Cell(number(value), remark, best=whole.get(name) == best))
+            rows[name].append(OverviewCell(number(value), remark, best=whole.get(name) == best))
     return rows
 
 
@@ -148,7 +150,7 @@ def pool(metric: str, name: str, found: Sequence[Found]) -> tuple[float, str]:
     return float(np.sum(totals) if metric == "wrong_collisions" else np.median(totals)), remark
 
 
-def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[str, list[Cell]]:
+def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[str, list[OverviewCell]]:
     """scenario -> a cell for each name: the largest position error in radii, or why there is none."""
     rows = {}
     for comparison in comparisons:
@@ -157,19 +159,21 @@ def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[st
         cells = []
         for name in names:
             if name in failed:
-                cells.append(Cell(*failed[name], failed=True))
+                cells.append(OverviewCell(*failed[name], failed=True))
             elif (name, MAPPED) in found:
                 value, remark, judged = found[name, MAPPED]
-                cells.append(Cell(number(value, 2), remark, heat(value)) if judged else Cell(NOT_JUDGED, remark))
+                cells.append(
+                    OverviewCell(number(value, 2), remark, heat(value)) if judged else OverviewCell(NOT_JUDGED, remark)
+                )
             elif name in played:
-                cells.append(Cell("no truth", comparison.scenario.without_truth))
+                cells.append(OverviewCell("no truth", comparison.scenario.without_truth))
             else:
-                cells.append(Cell("–", "not asked to play"))
+                cells.append(OverviewCell("–", "not asked to play"))
         rows[comparison.scenario.name] = cells
     return rows
 
 
-def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[str, str, str, list[Cell]]]:
+def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[str, str, str, list[OverviewCell]]]:
     """(metric, unit, which way is better, a cell for each name) of every metric that this scenario has."""
     found, failed = values(comparison), outcome_at_middle_dt(comparison)
     rows = []
@@ -179,16 +183,18 @@ def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[s
         cells = []
         for name in names:
             if (name, key) in found:
-                cells.append(Cell(found[name, key].text, found[name, key].remark))
+                cells.append(OverviewCell(found[name, key].text, found[name, key].remark))
             else:
-                cells.append(Cell(failed[name][0], failed[name][1], failed=True) if name in failed else Cell("–"))
+                cells.append(
+                    OverviewCell(failed[name][0], failed[name][1], failed=True) if name in failed else OverviewCell("–")
+                )
         unit = "" if metric.unit == "1" else metric.unit
         better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[metric.better]
         rows.append((key, unit, better, cells))
     return rows
 
 
-def between_engines(comparison: Comparison, names: Sequence[str]) -> dict[str, list[Cell]]:
+def between_engines(comparison: Comparison, names: Sequence[str]) -> dict[str, list[OverviewCell]]:
     """name -> the deviation of its trajectory from each other name's, at most, in radii; {} if there is no pair."""
     table = comparison.table
     near = table.dt_s == comparison.middle_dt
@@ -198,9 +204,9 @@ def between_engines(comparison: Comparison, names: Sequence[str]) -> dict[str, l
     if not deviations:
         return {}
 
-    def cell(one: str, other: str) -> Cell:
+    def cell(one: str, other: str) -> OverviewCell:
         value = deviations.get(frozenset((one, other)))
-        return Cell("–") if value is None else Cell(number(value, 2), "", heat(value))
+        return OverviewCell("–") if value is None else OverviewCell(number(value, 2), "", heat(value))
 
     return {one: [cell(one, other) for other in names[:k]] for k, one in enumerate(names)}
 

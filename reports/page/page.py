@@ -44,7 +44,7 @@ OWN = "Scenes of your own"
 
 
 @dataclass(frozen=True)
-class Section:
+class ScenarioSection:
     """One scenario as the page shows it."""
 
     comparison: Comparison
@@ -57,9 +57,9 @@ class Section:
     layers: list[tuple[str, Run | None]]
     frames: int
     ratio: float
-    table: list[tuple[str, str, str, list[overview.Cell]]]
+    table: list[tuple[str, str, str, list[overview.OverviewCell]]]
     settings: dict[str, list[tuple[str, str, str]]]
-    pairs: dict[str, list[overview.Cell]]
+    pairs: dict[str, list[overview.OverviewCell]]
 
 
 def write_page(
@@ -106,14 +106,14 @@ def write_page(
     put_text(path, html)
 
 
-def section_of(comparison: Comparison, names: Sequence[str], common: overview.Settings) -> Section:
+def section_of(comparison: Comparison, names: Sequence[str], common: overview.Settings) -> ScenarioSection:
     """All that the page shows of one scenario; of its settings those that are not `common`."""
     own = {key: pair for key, pair in overview.settings(comparison).items() if key not in common}
     drawings = {key: chart.draw(comparison) for key, chart in CHARTS.items()}
     builder = SCENARIOS.get(comparison.scenario.name)
     layers = played(comparison)
     module = getattr(getattr(builder, "func", builder), "__module__", "")
-    return Section(
+    return ScenarioSection(
         comparison=comparison,
         family=FAMILIES.get(module, OWN),
         dt=comparison.middle_dt,
@@ -145,9 +145,9 @@ def deflated(text: str) -> str:
     return base64.b64encode(zlib.compress(encoded(text), 9)).decode()
 
 
-def by_family(sections: Sequence[Section]) -> dict[str, list[Section]]:
+def by_family(sections: Sequence[ScenarioSection]) -> dict[str, list[ScenarioSection]]:
     """The sections under their headings, both in the order of appearance."""
-    families: dict[str, list[Section]] = {}
+    families: dict[str, list[ScenarioSection]] = {}
     for section in sections:
         families.setdefault(section.family, []).append(section)
     return families

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from adapters.conformance.conform import Finding, conform
 from adapters.conformance.probe import DT, plain
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.play import Run, play, unwatched
 from reports.run.archive import packed, parts_of
 from reports.run.cells import Cell, source_hash, versions
@@ -23,7 +23,7 @@ from scenarios.model import Scenario, State
 LOADING = 300.0  # s to import, compile and load an engine: up to 30 idle, all of them the first time
 
 
-class Played(NamedTuple):
+class CellResult(NamedTuple):
     """What a worker sends back of a cell: the run, its trajectory packed into a file, and by what it was played."""
 
     run: Run
@@ -32,7 +32,7 @@ class Played(NamedTuple):
     played_by: str
 
 
-def play_cell(cell: Cell, row: Row, scenario: Scenario, watch: Callable[[State], None] = unwatched) -> Run:
+def play_cell(cell: Cell, row: EngineRow, scenario: Scenario, watch: Callable[[State], None] = unwatched) -> Run:
     """Play a cell here and now; the engine is closed again, whatever happens."""
     try:
         engine = row.make()
@@ -59,21 +59,21 @@ class Begun:
         self.then(state)
 
 
-def play_here(cell: Cell, row: Row, scenario: Scenario) -> Played:
+def play_here(cell: Cell, row: EngineRow, scenario: Scenario) -> CellResult:
     """In the worker: play, leave every good state behind, and send back the run with its trajectory packed."""
     allow(LOADING)
     run = play_cell(cell, row, scenario, Begun(lambda state: leave(parts_of(state))))
     file, samples = (packed(run.trajectory), len(run.trajectory)) if run.trajectory else (b"", 0)
-    return Played(replace(run, trajectory=None), samples, file, engine())
+    return CellResult(replace(run, trajectory=None), samples, file, engine())
 
 
-def time_here(cell: Cell, row: Row, scenario: Scenario) -> float:
+def time_here(cell: Cell, row: EngineRow, scenario: Scenario) -> float:
     """In the worker: s inside the engine's `step`."""
     allow(LOADING)
     return play_cell(cell, row, scenario, Begun()).seconds
 
 
-def conform_here(name: str, row: Row) -> list[Finding]:
+def conform_here(name: str, row: EngineRow) -> list[Finding]:
     """In the worker: what the probes find; before their clock starts the engine is loaded once, and so compiled."""
     allow(LOADING)
     with suppress(Exception):  # which the probes will meet again, and say

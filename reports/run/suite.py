@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.conformance.conform import no_answer
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.play import Run
 from reports.run.archive import Archive, digest, from_trail, packed, stored_scene, trajectory_file
 from reports.run.cells import Cell, content_key, scene_hash
@@ -22,7 +22,7 @@ from reports.run.journal import Journal, plain
 from reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.run.machine import about
 from reports.run.made import writing
-from reports.run.playing import Played, conform_here, engine, play_here, time_here
+from reports.run.playing import CellResult, conform_here, engine, play_here, time_here
 from reports.run.runner import TIMEOUT, run_all
 from reports.run.scenes import open_scene, with_steps
 from reports.run.shares import Gathering
@@ -34,7 +34,7 @@ from scenarios.model import Scenario
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunPlan:
     """What is asked for: all that decides which numbers come out.
 
     Attributes:
@@ -50,7 +50,7 @@ class Plan:
     """
 
     scenes: Sequence[str]
-    engines: Mapping[str, Row]
+    engines: Mapping[str, EngineRow]
     seed: int
     dts: Sequence[float]
     full: bool
@@ -64,7 +64,7 @@ class Plan:
         return with_steps(open_scene(str(self.files.get(scene, scene)), self.seed), self.dts, self.full)
 
     def header(self) -> dict[str, Any]:
-        """What the journal begins with, and `Plan` is made from again when a run is resumed."""
+        """What the journal begins with, and `RunPlan` is made from again when a run is resumed."""
         asked = {name: list(getattr(self, name)) for name in ("scenes", "engines", "dts")}
         same = {name: getattr(self, name) for name in ("full", "timings", "folder")}
         return about(self.command, self.seed) | asked | same
@@ -91,7 +91,7 @@ class OtherVersions(Exception):
     """Workers on another machine do not play by the same source and versions."""
 
 
-def carry_out(plan: Plan, means: Means, journal: Journal, progress: Progress) -> None:
+def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress) -> None:
     """Put the probes to every engine and play every cell that the journal does not have; all goes into its folder."""
     folder = journal.path.parent
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
@@ -134,7 +134,7 @@ def waiting_for(scenes: Sequence[str]) -> str:
     return f"the exact answer to {Path(scenes[0]).stem}{more}"
 
 
-def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
+def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
     """Make the folders, copy the scene files, write the header to the journal and to machine.json."""
     folder = journal.path.parent
     for name in ("trajectories", "scenes", "compared"):
@@ -154,7 +154,7 @@ def begin(plan: Plan, journal: Journal, scenarios: Mapping[str, Scenario], tasks
     journal.append({"header": header})
 
 
-def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
+def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
     """What is to be done, by what it is: an engine's name (its probes), a `KnownAnswer`, or a `Cell`."""
     tasks: dict[Any, Callable[[], Any]] = {name: partial(conform_here, name, row) for name, row in plan.engines.items()}
     if KNOWN_SCENE in plan.scenes:
@@ -167,7 +167,7 @@ def tasks_of(plan: Plan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callabl
     return tasks
 
 
-def had(archive: Archive, plan: Plan, means: Means, scenarios: Mapping[str, Scenario]) -> set[Any]:
+def had(archive: Archive, plan: RunPlan, means: Means, scenarios: Mapping[str, Scenario]) -> set[Any]:
     """The tasks of which the journal has the result, by the same scene, settings and versions.
 
     What was stopped for time is had only if it would be stopped now; not what has lost its trajectory; and what failed
@@ -194,12 +194,12 @@ def name_of(task: KnownAnswer | str) -> str:
     return task if isinstance(task, str) else repr(task)
 
 
-def answer_key(plan: Plan, task: KnownAnswer | str) -> str:
+def answer_key(plan: RunPlan, task: KnownAnswer | str) -> str:
     """The `content_key` of the probes of an engine, or of a known answer."""
     return content_key(name_of(task), plan.engines[task].source if isinstance(task, str) else "")
 
 
-def keep_answer(journal: Journal, plan: Plan, task: KnownAnswer | str, result: Any) -> tuple[str, str, str]:
+def keep_answer(journal: Journal, plan: RunPlan, task: KnownAnswer | str, result: Any) -> tuple[str, str, str]:
     """Write what a known answer, or the probes of an engine, gave; returns what to say of it, its status, and why."""
     failure = result if isinstance(result, Failure) else None
     status, reason = (failure.status, failure.reason) if failure else ("ok", "")
@@ -217,7 +217,7 @@ def keep_answer(journal: Journal, plan: Plan, task: KnownAnswer | str, result: A
 
 
 def keep_cell(
-    journal: Journal, scenario: Scenario, means: Means, cell: Cell, key: str, result: Played | Failure
+    journal: Journal, scenario: Scenario, means: Means, cell: Cell, key: str, result: CellResult | Failure
 ) -> dict[str, Any]:
     """Write the trajectory of the cell of that `key`, then its line, which is returned."""
     played = failed(cell, scenario, result) if isinstance(result, Failure) else result
@@ -252,7 +252,7 @@ def keep_cell(
     return record
 
 
-def failed(cell: Cell, scenario: Scenario, failure: Failure) -> Played:
+def failed(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
     """What is left of a cell whose worker died or was stopped: the states up to then."""
     trajectory = from_trail(failure.trail, scenario)
     samples = len(trajectory) if trajectory else 0
@@ -260,12 +260,12 @@ def failed(cell: Cell, scenario: Scenario, failure: Failure) -> Played:
         f"; last good state: step {(samples - 1) * cell.substeps}, {scenario.times[samples - 1]:g} s" if samples else ""
     )
     run = Run(*cell.names, scenario.name, scenario.dt(cell.substeps), failure.status, failure.reason + last)
-    return Played(run, samples, packed(trajectory) if trajectory else b"", engine())
+    return CellResult(run, samples, packed(trajectory) if trajectory else b"", engine())
 
 
 def take_timings(
     archive: Archive,
-    plan: Plan,
+    plan: RunPlan,
     means: Means,
     journal: Journal,
     scenarios: Mapping[str, Scenario],

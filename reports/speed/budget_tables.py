@@ -17,14 +17,14 @@ FULL, DECADES = 1.0, 6  # radii of a full bar; how many decades below it a bar i
 WHO = ["engine", "profile"]
 
 
-class Cell(NamedTuple):
+class BudgetCell(NamedTuple):
     """A number, and the length of its bar from 0 to 1; nan, and no bar, where an engine has no such mechanism."""
 
     value: float
     bar: float
 
 
-class Table(NamedTuple):
+class BudgetTable(NamedTuple):
     """Rows of cells by `engine:profile`, and the notes of those that could not be explained.
 
     until, horizon, duration: s, up to where the scene was evaluated, its exact answer goes, and it lasts.
@@ -35,11 +35,11 @@ class Table(NamedTuple):
     horizon: float
     duration: float
     columns: list[str]
-    rows: dict[str, list[Cell]]
+    rows: dict[str, list[BudgetCell]]
     notes: dict[str, str]
 
 
-def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
+def of_scene(budget: pd.DataFrame, scenario: str) -> BudgetTable:
     """Root mean squares in radii, a row an engine: engine, the residual, the contributions, sum and all."""
     here = budget[budget.scenario == scenario]
     contributions = [
@@ -48,14 +48,14 @@ def of_scene(budget: pd.DataFrame, scenario: str) -> Table:
         if here[here.contribution == contribution].position_radii.max() > LEAST
     ]  # of anybody
     columns = [TOTAL, RESIDUAL, *contributions, INTERPLAY, SUM, ALL]
-    rows: dict[str, list[Cell]] = {}
+    rows: dict[str, list[BudgetCell]] = {}
     notes: dict[str, str] = {}
     for (engine, profile), group in here.groupby(WHO, sort=False):
         found = group.set_index("contribution").position_radii
         rows[f"{engine}:{profile}"] = [cell(float(found.get(column, np.nan))) for column in columns]
         notes |= {f"{engine}:{profile}": note for note in group.note if note}
     until, horizon, duration = (float(here[name].iloc[0]) for name in ("until_s", "horizon_s", "duration_s"))
-    return Table(scenario, until, horizon, duration, columns, rows, notes)
+    return BudgetTable(scenario, until, horizon, duration, columns, rows, notes)
 
 
 def causes(budget: pd.DataFrame) -> list[str]:
@@ -63,14 +63,14 @@ def causes(budget: pd.DataFrame) -> list[str]:
     return [TIME, *(contribution for contribution in NAMES if contribution in set(budget.contribution))]
 
 
-def cell(value: float) -> Cell:
+def cell(value: float) -> BudgetCell:
     """With a bar on a logarithmic scale."""
     if not value > 0:
-        return Cell(value, 0.0)
-    return Cell(value, float(np.clip(1 + np.log10(value / FULL) / DECADES, 0.0, 1.0)))
+        return BudgetCell(value, 0.0)
+    return BudgetCell(value, float(np.clip(1 + np.log10(value / FULL) / DECADES, 0.0, 1.0)))
 
 
-def overview(budget: pd.DataFrame) -> Table:
+def overview(budget: pd.DataFrame) -> BudgetTable:
     """In how many scenes an engine was played, has an error, has it explained but for `EXPLAINED`, and in how many
     each contribution is the largest; bars of all scenes, and every engine has its row, also one that failed them all.
     """
@@ -91,8 +91,8 @@ def overview(budget: pd.DataFrame) -> Table:
             explained,
             *(int((largest == contribution).sum()) for contribution in known.columns),
         ]
-        rows[f"{engine}:{profile}"] = [Cell(number, number / count) for number in counts]
-    return Table("", np.nan, np.nan, np.nan, columns, rows, {})
+        rows[f"{engine}:{profile}"] = [BudgetCell(number, number / count) for number in counts]
+    return BudgetTable("", np.nan, np.nan, np.nan, columns, rows, {})
 
 
 def ablated_in_both(budget: pd.DataFrame) -> list[dict[str, Any]]:

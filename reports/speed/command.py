@@ -27,7 +27,7 @@ from reports.speed.kept import Kept
 from reports.speed.measure import measure
 from reports.speed.page import write_page
 from reports.speed.pareto import ACCURACIES
-from reports.speed.plan import Plan
+from reports.speed.plan import SpeedPlan
 from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal.console import Console
@@ -46,7 +46,7 @@ def run_speed(
     effort = FULL if full else QUICK
     named = checked_scenes(scenes, [], False, seed)  # none named: all that the effort has, sizes and options besides
     effort = replace(effort, scenes=tuple(named)) if named else effort
-    plan = Plan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
+    plan = SpeedPlan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
     header = about(command, seed)
     with opening(out):
         out = place_of(out)
@@ -73,7 +73,7 @@ def nothing_measured(part: Path, results: Results) -> NoReturn:
     sys.exit(FAILED)
 
 
-def kept_of(plan: Plan, header: Mapping[str, Any], journal: Journal, resume: bool) -> Kept:
+def kept_of(plan: SpeedPlan, header: Mapping[str, Any], journal: Journal, resume: bool) -> Kept:
     """What is kept of an interrupted measurement of this plan, by the same versions on the same machine."""
     files = {scene: digest_of(scene) for scene in plan.scenes if scene.endswith(".toml")}
     files |= {name: row_of(name).source for name in plan.engines if name.endswith(OWN)}
@@ -85,7 +85,7 @@ def kept_of(plan: Plan, header: Mapping[str, Any], journal: Journal, resume: boo
     return Kept(journal, asked | {key: header[key] for key in ("seed", "versions", "machine")}, resume, scenarios)
 
 
-def carry_out(plan: Plan, header: dict[str, Any], kept: Kept, resume: bool) -> tuple[Results, dict[str, Any]]:
+def carry_out(plan: SpeedPlan, header: dict[str, Any], kept: Kept, resume: bool) -> tuple[Results, dict[str, Any]]:
     """All that was measured, and the header that tables and page carry."""
     with Progress() as progress:
         if resume:

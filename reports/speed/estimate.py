@@ -9,7 +9,7 @@ from adapters.engines import ENGINES
 from adapters.mechanisms.table import MECHANISMS
 from reports.speed import ladder
 from reports.speed.effort import Effort
-from reports.speed.plan import SCENE, Measurement, Plan, Reach
+from reports.speed.plan import SCENE, Measurement, Reach, SpeedPlan
 from reports.speed.timing import FEWEST_ROUNDS, LEAST, WARM_UP
 from scenarios.model import Scenario
 
@@ -24,7 +24,7 @@ BUDGET = 0.2  # s, for the error budget of one engine in one scene
 PAGE = 8.0  # s
 
 
-def estimate(plan: Plan, measurements: Sequence[Measurement], reach: Reach) -> str:
+def estimate(plan: SpeedPlan, measurements: Sequence[Measurement], reach: Reach) -> str:
     """A sentence on how much there is to do and about how long it takes on an idle machine."""
     budgets = BUDGET * len(plan.budget_scenes) * len(set(plan.engines) & set(MECHANISMS))
     playing = (budgets + sum(seconds_to_play(measurement, reach) for measurement in measurements)) / plan.workers

@@ -18,7 +18,7 @@ from reports.run.worker_process import Failure
 from reports.speed import budget, ladder, models, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept
-from reports.speed.plan import PLAIN, SCENE, Measurement, Plan, Reach, middle
+from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
 from reports.speed.timing import Sample
 from reports.terminal.progress import Progress
 
@@ -50,7 +50,7 @@ class Measured:
     busy: float = float("nan")
 
 
-def measure(plan: Plan, progress: Progress, kept: Kept | None = None) -> Measured:
+def measure(plan: SpeedPlan, progress: Progress, kept: Kept | None = None) -> Measured:
     """Both passes of all that is planned; what is `kept` of an interrupted measurement is not done again."""
     measured = Measured()
     reach = find_reach(plan, measured, progress)
@@ -63,7 +63,7 @@ def measure(plan: Plan, progress: Progress, kept: Kept | None = None) -> Measure
     return measured
 
 
-def find_reach(plan: Plan, measured: Measured, progress: Progress) -> Reach:
+def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach:
     """(scene, seed) -> how many sample intervals have an exact answer; those that have none are reported."""
     # In workers, which can be stopped whatever they are doing.
     asked = {draw: partial(ladder.reach_of, *draw) for draw in plan.seeded_scenes}
@@ -77,7 +77,7 @@ def find_reach(plan: Plan, measured: Measured, progress: Progress) -> Reach:
 
 
 def measure_errors(
-    plan: Plan, measurements: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
+    plan: SpeedPlan, measurements: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
 ) -> list[Measurement]:
     """How far off all engines are; returns those of the first seed, at the steps that they played to their end."""
     tasks = {measurement.task: measurement.errors for measurement in measurements}
@@ -114,7 +114,7 @@ def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict
     return sorted(rows, key=lambda row: row["substeps"])
 
 
-def measure_budget(plan: Plan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None) -> None:
+def measure_budget(plan: SpeedPlan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None) -> None:
     """What the errors are made of, of the engines whose mechanisms are known, at the middle dt."""
     tasks = {
         ("budget", scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
@@ -129,7 +129,7 @@ def measure_budget(plan: Plan, reach: Reach, measured: Measured, progress: Progr
 
 
 def measure_times(
-    plan: Plan, played: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
+    plan: SpeedPlan, played: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
 ) -> None:
     """What everything costs that was played to its end: one process, one thing at a time."""
     measured.busy = busy_cores()
@@ -149,7 +149,7 @@ def measure_times(
     measured.samples, measured.truths = pd.DataFrame(rows), pd.DataFrame(truths)
 
 
-def timings(plan: Plan, played: Sequence[Measurement]) -> dict[tuple, Callable[[], Any]]:
+def timings(plan: SpeedPlan, played: Sequence[Measurement]) -> dict[tuple, Callable[[], Any]]:
     """The tasks of the second pass: all measurements of a kind in a scene in one, as they are compared."""
     often: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
     makes = {name: row_of(name).make for name in plan.engines}
@@ -190,7 +190,7 @@ def scene_rows(
     return rows
 
 
-def size_rows(makes: Mapping[str, Callable], plan: Plan, often: Mapping[str, Any]) -> dict[str, list]:
+def size_rows(makes: Mapping[str, Callable], plan: SpeedPlan, often: Mapping[str, Any]) -> dict[str, list]:
     """samples: rows of `Measured.samples` for every number of disks; stopped: (name, disks, why)."""
     found, stopped = sizes.costs(makes, plan.effort.sizes, patience=plan.effort.patience, seed=plan.seed, **often)
     rows = [sample_row(SIZE, sample.key[0], sample, n=sample.key[1]) for sample in found]

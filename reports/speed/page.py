@@ -27,7 +27,7 @@ from reports.terminal.foreign_text import put_text
 FLAGGED = (ELSEWHERE, UNSTEADY)
 
 
-class Section(NamedTuple):
+class SpeedSection(NamedTuple):
     """A group of charts under one legend, and a table of what they say."""
 
     key: str
@@ -70,15 +70,15 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
 
 def section(
     key: str, title: str, text: str, drawings: dict[str, Drawing], orders: pd.DataFrame | None = None
-) -> Section:
-    """A `Section`, its figures packed."""
+) -> SpeedSection:
+    """A `SpeedSection`, its figures packed."""
     traces = [trace.name for each in drawings.values() if each.figure is not None for trace in each.figure.data]
     names = [name for name in dict.fromkeys(traces) if ":" in name]
     rows = [] if orders is None else charts.records(orders)
-    return Section(key, title, text, drawings, packed_charts(drawings), rows, names)
+    return SpeedSection(key, title, text, drawings, packed_charts(drawings), rows, names)
 
 
-def pooled_section(results: Results) -> Section:
+def pooled_section(results: Results) -> SpeedSection:
     """All scenarios at once."""
     count, steps = len(results.scenes), results.pooled.step_size.nunique()
     drawings = {
@@ -102,7 +102,7 @@ def pooled_section(results: Results) -> Section:
     return section("pooled", "All scenes pooled", "", drawings)
 
 
-def section_of(results: Results, scene: str) -> Section:
+def section_of(results: Results, scene: str) -> SpeedSection:
     """One scenario."""
     points = results.points[results.points.scenario == scene]
     reached = results.reached[results.reached.scenario == scene]
@@ -137,7 +137,7 @@ def section_of(results: Results, scene: str) -> Section:
     return section(scene, scene, results.asks[scene], drawings, results.order_table(scene))
 
 
-def sizes_section(results: Results) -> Section | None:
+def sizes_section(results: Results) -> SpeedSection | None:
     """Cost against the number of disks."""
     if results.sizes.empty:
         return None
@@ -165,7 +165,7 @@ def budget_section(results: Results) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def options_section(results: Results) -> Section | None:
+def options_section(results: Results) -> SpeedSection | None:
     """What each unneeded option costs and breaks."""
     table = results.options
     if table.empty:
@@ -184,7 +184,7 @@ def options_section(results: Results) -> Section | None:
     return section("options", "No more than a scene needs", "", drawings)
 
 
-def sweep_sections(results: Results) -> list[Section]:
+def sweep_sections(results: Results) -> list[SpeedSection]:
     """What more iterations and substeps buy, and what smaller steps buy for the same time."""
     if results.sweeps.empty:
         return []

@@ -45,7 +45,7 @@ class Measurement(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Plan:
+class SpeedPlan:
     """What is asked for: scenes and engines by name, how much, from which seed, with how many workers.
 
     whole: not only these scenes, but the changed engines and the numbers of disks, too.

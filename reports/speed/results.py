@@ -12,7 +12,7 @@ import pandas as pd
 from reports.speed import explained, models, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.pareto import ACCURACIES, FAILED, NOT_TIMED, UNREACHABLE
-from reports.speed.plan import Plan
+from reports.speed.plan import SpeedPlan
 from reports.speed.pooling import POOLED, pooled
 from reports.terminal.foreign_text import put_text
 
@@ -23,7 +23,7 @@ QUIET = 0.05  # how far from 1 an engine against itself may read
 class Results:
     """What was measured, and the tables made from it on demand."""
 
-    plan: Plan
+    plan: SpeedPlan
     measured: Measured
 
     @property

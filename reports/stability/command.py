@@ -23,7 +23,16 @@ from reports.stability.cases import CASES
 from reports.stability.limits import Limit
 from reports.stability.maps import MAPS
 from reports.stability.page import write_page
-from reports.stability.results import Plan, StabilityResults, Task, carry_out, case_named, done_before, read, table
+from reports.stability.results import (
+    StabilityPlan,
+    StabilityResults,
+    Task,
+    carry_out,
+    case_named,
+    done_before,
+    read,
+    table,
+)
 from reports.stability.touching import TOUCHING, AtGap
 from reports.stability.vary import VARIES, cannot_vary
 from reports.terminal.console import Console
@@ -51,7 +60,7 @@ def find_limits(
     if files := [name.removesuffix(OWN) for name in chosen if name not in ENGINES]:
         how = "a file is not driven to its limits: crosscheck check judges it, crosscheck run plays it"
         refuse([f"--engine {file}: {how}" for file in files])
-    plan = Plan(cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command)
+    plan = StabilityPlan(cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command)
     with opening(out):
         out = place_of(out)
         journal = open_part(out, STABILITY)
@@ -67,7 +76,7 @@ def find_limits(
     finish(found, out)
 
 
-def gone_on_with(journal: Journal, plan: Plan, resume: bool) -> set[Task]:
+def gone_on_with(journal: Journal, plan: StabilityPlan, resume: bool) -> set[Task]:
     """The tasks of the plan that ended well in an interrupted run; raises as `may_go_on`, lest others are lost."""
     had, done = done_before(journal.path.parent, plan)
     may_go_on(journal.path.parent, had, bool(done), resume)

@@ -13,7 +13,7 @@ from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import AT_ONCE, PAIRS, AtGap
 
 
-class Cell(NamedTuple):
+class LimitCell(NamedTuple):
     """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none), failed."""
 
     text: str
@@ -35,23 +35,23 @@ class MapTable(NamedTuple):
     """An engine's map: a row a y, from large to small, a cell an x."""
 
     engine: str
-    rows: list[tuple[float, list[Cell]]]
+    rows: list[tuple[float, list[LimitCell]]]
 
 
-def cell_of(case: Case, limit: Limit | None) -> Cell:
+def cell_of(case: Case, limit: Limit | None) -> LimitCell:
     """A limit in the overview: the deeper its colour, the earlier on the way from gentle to harsh it fails."""
     if limit is None:
-        return Cell("")
+        return LimitCell("")
     remark = f"{limit.verdict}. {why(limit)}"
     if limit.verdict == NEVER_FAILS:
-        return Cell(limit.word, f"does not fail up to {number(limit.works_at)}", 0)
+        return LimitCell(limit.word, f"does not fail up to {number(limit.works_at)}", 0)
     if limit.word:
-        return Cell(limit.word, remark, -1, True)
+        return LimitCell(limit.word, remark, -1, True)
     values = list(case.values)
     harsher = 1 if values[-1] > values[0] else -1
     passed = sum(harsher * value < harsher * limit.fails_at for value in values) / len(values)
     text = limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")
-    return Cell(text, remark, max(1, min(9, round(9 * (1 - passed)))))
+    return LimitCell(text, remark, max(1, min(9, round(9 * (1 - passed)))))
 
 
 def why(limit: Limit) -> str:
@@ -125,22 +125,22 @@ def map_tables(maps: Sequence[MapOf]) -> dict[str, list[MapTable]]:
     return tables
 
 
-def map_cell(value: float, failed: bool, broken: str, bound: float) -> Cell:
+def map_cell(value: float, failed: bool, broken: str, bound: float) -> LimitCell:
     """A reading as a share of its bound: pale far below, the deep half of the ramp where it fails."""
     if isnan(value):
-        return Cell("r" if broken.startswith("refused") else "!", broken, -1, True)
+        return LimitCell("r" if broken.startswith("refused") else "!", broken, -1, True)
     steps = (0.01, 0.1, 0.3, 1.0, 2.0, 5.0, 20.0, 100.0, 1e3)
     share = value / bound
-    return Cell(
+    return LimitCell(
         "×" if failed else "", f"{number(value)}{'; ' + broken if broken else ''}", sum(share > s for s in steps)
     )
 
 
-def law_cell(at: AtGap) -> Cell:
+def law_cell(at: AtGap) -> LimitCell:
     """The law that an engine follows at a gap; coloured where it follows none."""
     if not at.velocity:
-        return Cell(at.law, "", -1, True)
+        return LimitCell(at.law, "", -1, True)
     motion = "; ".join(f"({number(x, 2)}, {number(y, 2)})" for x, y in at.velocity)
     remark = f"{number(at.off, 2)} off, energy {number(at.energy)}; leave with {motion}"
     short = {PAIRS: "pairs", AT_ONCE: "at once"}.get(at.law, f"energy {at.energy:.2f}")
-    return Cell(short, remark, {PAIRS: 0, AT_ONCE: 2}.get(at.law, 6))
+    return LimitCell(short, remark, {PAIRS: 0, AT_ONCE: 2}.get(at.law, 6))

@@ -15,7 +15,7 @@ from plotly.offline import get_plotlyjs
 
 from adapters.play import Run
 from reports.page import style
-from reports.page.charts import Drawing, Line, figure_of, shortened
+from reports.page.charts import ChartLine, Drawing, figure_of, shortened
 from reports.page.page import REPORTS, SCRIPTS, content_policy, css, deflated, looks_as_json, packed_charts
 from reports.page.replay import pack_layers, ratio_of
 from reports.stability import overview
@@ -41,7 +41,7 @@ class Replay:
 
 
 @dataclass(frozen=True)
-class Section:
+class CaseSection:
     """One case as the page shows it."""
 
     case: Case
@@ -56,7 +56,7 @@ class Section:
         """Its name as a fragment of a URL."""
         return "".join(c if c.isalnum() or c in "_-" else "-" for c in self.case.name)
 
-    def cell(self, engine: str) -> overview.Cell:
+    def cell(self, engine: str) -> overview.LimitCell:
         """Its limit in the overview; empty where it was not asked."""
         return overview.cell_of(self.case, next((limit for limit in self.limits if limit.engine == engine), None))
 
@@ -95,19 +95,19 @@ def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
     put_text(path, html)
 
 
-def families_of(sections: Sequence[Section]) -> dict[str, list[Section]]:
+def families_of(sections: Sequence[CaseSection]) -> dict[str, list[CaseSection]]:
     """The sections under their headings, both in the order of appearance."""
-    found: dict[str, list[Section]] = {}
+    found: dict[str, list[CaseSection]] = {}
     for section in sections:
         found.setdefault(section.case.family, []).append(section)
     return found
 
 
-def section_of(case: Case, limits: list[Limit], folder: Path) -> Section:
+def section_of(case: Case, limits: list[Limit], folder: Path) -> CaseSection:
     """All that the page shows of one case."""
     replays = [replay for limit in limits if (replay := replay_of(case, limit, folder)) is not None]
     drawing = readings(case, limits)
-    return Section(case, limits, replays, overview.reasons(limits), drawing, packed_charts({"readings": drawing}))
+    return CaseSection(case, limits, replays, overview.reasons(limits), drawing, packed_charts({"readings": drawing}))
 
 
 def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
@@ -161,7 +161,7 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
         trials = [trial for trial in limit.trials if np.isfinite(trial.worst) and np.isfinite(trial.value)]
         if len(trials) > 1:
             x, y = (np.array([getattr(trial, name) for trial in trials], float) for name in ("value", "worst"))
-            lines.append(Line(named(limit), x, np.abs(y)))
+            lines.append(ChartLine(named(limit), x, np.abs(y)))
     if not lines or not any((line.y > 0).any() for line in lines):
         return Drawing(title, "No engine reads more than 0 anywhere.", None)
     ends = [min(case.values), max(case.values)]
@@ -178,7 +178,7 @@ def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
     for limit in limits:
         trials = [trial for trial in limit.trials if not trial.left]
         x, y = (np.array(pair, float) for pair in zip(*((t.value, t.failed / t.runs) for t in trials)))
-        lines.append(Line(named(limit), x, y))
+        lines.append(ChartLine(named(limit), x, y))
     caption = (
         f"How many of the runs at each {case.parameter} failed; harsher to the right. Values that were left at their "
         "first failing run, as the quick form does, are not drawn."

@@ -52,7 +52,7 @@ SLOWEST_FIRST = (
 
 
 @dataclass(frozen=True)
-class Plan:
+class StabilityPlan:
     """What is asked for: names of `CASES` or FILE.toml:vary, of `MAPS`, `TOUCHING` and `ENGINES`, a key of `FORMS`."""
 
     cases: Sequence[str]
@@ -97,7 +97,7 @@ def found_limit(task: Task, folder: Path) -> Limit:
     return replace(limit, seconds=process_time() - started)
 
 
-def carry_out(plan: Plan, journal: Journal, done: Collection[Task], progress: Progress) -> None:
+def carry_out(plan: StabilityPlan, journal: Journal, done: Collection[Task], progress: Progress) -> None:
     """Do every task that is not `done`; all goes into the journal's folder."""
     folder = journal.path.parent
     (folder / "trajectories").mkdir(exist_ok=True)
@@ -118,7 +118,7 @@ def carry_out(plan: Plan, journal: Journal, done: Collection[Task], progress: Pr
     journal.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
 
 
-def tasks_of(plan: Plan) -> list[Task]:
+def tasks_of(plan: StabilityPlan) -> list[Task]:
     """All tasks, the slowest first, so that none is left over at the end."""
     tasks = [Task("map", name, engine, plan.form) for name in plan.maps for engine in MAPS[name].engines(plan.engines)]
     tasks += [Task("law", name, engine, plan.form) for name in plan.touching for engine in plan.engines]
@@ -211,7 +211,7 @@ def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
     return {name: float(record[name]) for name in names}
 
 
-def done_before(folder: Path, plan: Plan) -> tuple[int, set[Task]]:
+def done_before(folder: Path, plan: StabilityPlan) -> tuple[int, set[Task]]:
     """How many tasks ended well in an interrupted run, and those of the plan, if versions and scene files are the same.
 
     Raises:

@@ -23,7 +23,7 @@ Make = Callable[[], Engine]
 Asked = tuple[Scenario, Trajectory | None]
 
 
-class Played(NamedTuple):
+class TrialScores(NamedTuple):
     """What settings made of the tuning scenes; s scenes, k step sizes from coarse to fine.
 
     Attributes:
@@ -65,14 +65,14 @@ def posed(families: tuple[str, ...], seeds: tuple[int, ...]) -> tuple[Asked, ...
     return tuple((scene, scene.truth(scene.times) if scene.truth else None) for scene in scenes)
 
 
-def measured(make: Make, scenes: Sequence[Asked]) -> Played:
+def measured(make: Make, scenes: Sequence[Asked]) -> TrialScores:
     """Play every scene at every step size."""
     rows = [[of_run(make, scene, truth, k) for k in LADDER] for scene, truth in scenes]
-    return Played(*np.moveaxis(np.array(rows, float), -1, 0))
+    return TrialScores(*np.moveaxis(np.array(rows, float), -1, 0))
 
 
 def of_run(make: Make, scenario: Scenario, truth: Trajectory | None, substeps: int) -> tuple[float, float, int, int]:
-    """Error, energy gained, missed and spurious collisions; see `Played`."""
+    """Error, energy gained, missed and spurious collisions; see `TrialScores`."""
     dt, scene = scenario.dt(substeps), scenario.scene
     engine = make()
     try:
@@ -94,7 +94,7 @@ def of_run(make: Make, scenario: Scenario, truth: Trajectory | None, substeps: i
     return max(error, FLOOR), rise, len(found.missed), len(found.spurious)
 
 
-def against(now: Played, before: Played, cost: float, scenes: Sequence[Asked]) -> Against:
+def against(now: TrialScores, before: TrialScores, cost: float, scenes: Sequence[Asked]) -> Against:
     """Set `now` against `before`, if its steps cost `cost` times as much."""
     both = np.isfinite(now.error) & np.isfinite(before.error)
     had = np.log(before.error[both])
@@ -117,7 +117,7 @@ def at_cost(error: Array, cost: float) -> Array:
     return np.exp(np.array(logs)[:, ::-1])
 
 
-def faults_of(now: Played, before: Played, scenes: Sequence[Asked]) -> list[str]:
+def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) -> list[str]:
     """What `now` breaks that `before` kept, family by family.
 
     A scene refused or failed; missed or spurious collisions, more of them than by counting noise (n + sqrt(n): where

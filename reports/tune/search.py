@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from adapters.conformance.conform import conform
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES
 from reports.tune.grid import MAKES, NOT_SEARCHED, PAIRS, matched_of, settings_of
-from reports.tune.score import Against, Make, Played, against, cost_of, measured, posed
+from reports.tune.score import Against, Make, TrialScores, against, cost_of, measured, posed
 from scenarios.families.tuning import FAMILIES
 
 SEEDS, OTHER_SEEDS = (0, 1), (2, 3)  # what is chosen on, and what has to bear it out
@@ -58,7 +58,7 @@ class Search:
     families: tuple[str, ...] = tuple(each.__name__ for each in FAMILIES)
     seeds: tuple[tuple[int, ...], tuple[int, ...]] = (SEEDS, OTHER_SEEDS)
     say: Callable[[str], None] = print
-    known: dict[tuple[Any, ...], tuple[Played, Played]] = field(default_factory=dict)
+    known: dict[tuple[Any, ...], tuple[TrialScores, TrialScores]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.chosen = matched_of(self.engine)
@@ -71,10 +71,10 @@ class Search:
 
     def keeps(self, settings: dict[str, Any]) -> set[str]:
         """The probes of the conformance suite that it keeps."""
-        row: Row = replace(ENGINES[f"{self.engine}:matched"], make=self.make(settings))
+        row: EngineRow = replace(ENGINES[f"{self.engine}:matched"], make=self.make(settings))
         return {finding.probe for finding in conform(f"{self.engine}:matched", row) if finding.verdict == "keeps"}
 
-    def played(self, settings: dict[str, Any]) -> tuple[Played, Played]:
+    def played(self, settings: dict[str, Any]) -> tuple[TrialScores, TrialScores]:
         """What the settings make of both halves; measured once."""
         key = tuple(settings.values())
         if key not in self.known:

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from adapters.engine import Collision, Engine, Row, Unsupported
+from adapters.engine import ContactImpulse, Engine, EngineRow, Unsupported
 from adapters.engines import ENGINES
 from adapters.reference import Reference
 from reference_impl import exercise, ordered
@@ -189,7 +189,7 @@ class NumbersWallsFromTheEnd(Sound):
 
     def collisions(self):
         return [
-            Collision(h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse)
+            ContactImpulse(h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse)
             for h in self.log
         ]
 
@@ -333,6 +333,6 @@ CAUGHT_BY: dict[type[Engine], str] = {
 }
 
 
-def row_of(make: Callable[[], Engine]) -> Row:
+def row_of(make: Callable[[], Engine]) -> EngineRow:
     """A row like the reference's, with another engine."""
     return replace(ENGINES["reference:exercise"], make=make)

@@ -21,7 +21,7 @@ from reports.run.cells import Cell, scene_hash
 from reports.run.journal import Journal
 from reports.run.playing import play_here
 from reports.run.runner import run_all
-from reports.run.suite import Means, Plan, begin, carry_out, keep_cell
+from reports.run.suite import Means, RunPlan, begin, carry_out, keep_cell
 from reports.run.tables import make_tables
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
@@ -46,7 +46,7 @@ def played(scenarios: Mapping[str, Scenario], cells: list[Cell], workers: int, f
     """What it costs to play the cells into the folder."""
     questions = {scene: replace(one, truth=None) for scene, one in scenarios.items()}
     tasks = {cell: partial(play_here, cell, ENGINES[cell.engine], questions[cell.scene]) for cell in cells}
-    plan = Plan(list(scenarios), {cell.engine: ENGINES[cell.engine] for cell in cells}, 0, [], False, 0, "bench")
+    plan = RunPlan(list(scenarios), {cell.engine: ENGINES[cell.engine] for cell in cells}, 0, [], False, 0, "bench")
     inside, started, before = 0.0, perf_counter(), sum(processor())
     with Journal(folder) as journal:
         begin(plan, journal, scenarios, len(tasks))
@@ -157,7 +157,7 @@ def play_many(folder: Path) -> None:
     scenes = sorted(str(path) for path in folder.glob("*.toml"))
     out = folder / "out"
     out.mkdir()
-    plan = Plan(scenes, ENGINES, seed=0, dts=[], full=False, timings=0, command="bench")
+    plan = RunPlan(scenes, ENGINES, seed=0, dts=[], full=False, timings=0, command="bench")
     started = perf_counter()
     with Journal(out) as journal, Clocked() as progress:
         carry_out(plan, Means(workers=2), journal, progress)

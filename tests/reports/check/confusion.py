@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from reports.check.rows import Row
+from reports.check.rows import CheckRow
 from reports.check.verdict import FileCheck, check_file
 from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 
@@ -24,7 +24,7 @@ def judged(paths: Sequence[Path]) -> dict[Path, FileCheck]:
         return dict(zip(paths, pool.map(check_file, paths)))
 
 
-def first(one: FileCheck) -> Row | None:
+def first(one: FileCheck) -> CheckRow | None:
     """What is said first: a fault, or where there is none the note that a guard is missing."""
     return next(iter(one.faults), None) or next(
         (row for row in one.rows if row.verdict == "note" and row.name == "same centre"), None

@@ -9,13 +9,13 @@ from time import monotonic
 import pytest
 
 from adapters.own_solver.file import NotASolver
-from reports.check.rows import Row
+from reports.check.rows import CheckRow
 from reports.check.solver import check_solver
 from reports.check.verdict import FileCheck
 
 pytestmark = pytest.mark.slow  # waits for what hangs, twice for each function
 
-Results = dict[str, list[Row] | NotASolver]
+Results = dict[str, list[CheckRow] | NotASolver]
 SECONDS = 16.0  # for one file on a busy machine: two calls that are stopped late, a process that starts
 JS = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.js").read_text()
 PY = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.py").read_text()
@@ -28,7 +28,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     texts: dict[str, str | bytes] = {name: text for name, (text, _) in (LOADING | CALLS | REFUSED).items()}
     texts |= HARMLESS | {f"replaces {k}.js": JS + code for k, code in enumerate(REPLACED.values())}
 
-    def check(name: str) -> list[Row] | NotASolver:
+    def check(name: str) -> list[CheckRow] | NotASolver:
         (folder / name).write_bytes(text if isinstance(text := texts[name], bytes) else text.encode())
         began = monotonic()
         try:
@@ -42,14 +42,14 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
         return dict(zip(texts, pool.map(check, texts)))
 
 
-def rows_of(results: Results, name: str) -> list[Row]:
+def rows_of(results: Results, name: str) -> list[CheckRow]:
     """The rows of a file that was not refused."""
     rows = results[name]
     assert isinstance(rows, list)
     return rows
 
 
-def first(rows: list[Row]) -> str:
+def first(rows: list[CheckRow]) -> str:
     """The sentence that comes first, on one line."""
     (sentence, *_) = FileCheck(Path("file"), rows).sentences
     assert "\n" not in sentence

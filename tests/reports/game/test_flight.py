@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES
 from adapters.play import play
 from reports.game.flight import EARTH, FRAME, Flight, field_scenario
@@ -224,7 +224,7 @@ def read_truth(scenario):  # type: ignore[no-untyped-def]
 class Failing:
     """An engine that raises in its third frame."""
 
-    def __init__(self, row: Row) -> None:
+    def __init__(self, row: EngineRow) -> None:
         self.inner, self.frames = row.make(), 0
 
     def __getattr__(self, name: str):  # type: ignore[no-untyped-def]
@@ -240,7 +240,7 @@ class Failing:
 def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.MonkeyPatch):
     """With its reason; where it was the solid one, the next takes over."""
     row = ENGINES["pymunk:matched"]
-    monkeypatch.setitem(ENGINES, "pymunk:matched", Row(lambda: Failing(row), "fails", 0.0, 0.0))  # type: ignore[arg-type,return-value]
+    monkeypatch.setitem(ENGINES, "pymunk:matched", EngineRow(lambda: Failing(row), "fails", 0.0, 0.0))  # type: ignore[arg-type,return-value]
     flight = Flight(field_scenario(), ["pymunk:matched", "reference:exercise"])
     flight.advance(10)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from scenarios.model import State
 
 FATAL = 100  # the step
@@ -169,9 +169,9 @@ class Once(Controlled):
             os.kill(os.getpid(), signal.SIGKILL)
 
 
-def row(make: type[Controlled], leaves_state: bool = False) -> Row:
+def row(make: type[Controlled], leaves_state: bool = False) -> EngineRow:
     """As a row of `ENGINES`."""
-    return Row(make, "a control", alpha=0.5, rounding=2.0**-53, leaves_state=leaves_state)
+    return EngineRow(make, "a control", alpha=0.5, rounding=2.0**-53, leaves_state=leaves_state)
 
 
 CONTROLS = {

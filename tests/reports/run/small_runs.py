@@ -8,14 +8,14 @@ from reports.run.cells import Cell, scene_hash
 from reports.run.folders import RUN, open_new, part_of, replace_folder
 from reports.run.known_answers import KNOWN_ANSWERS
 from reports.run.playing import play_here
-from reports.run.suite import Means, Plan, begin, keep_answer, keep_cell, tasks_of
+from reports.run.suite import Means, RunPlan, begin, keep_answer, keep_cell, tasks_of
 
 PLAYED = ("pymunk:shipped", "pymunk:matched")
 
 
 def make(folder: Path, scene_file: Path) -> Path:
     """Its folder, complete but for its tables: every kind of line is in its journal."""
-    plan = Plan(
+    plan = RunPlan(
         ["slow_collision", str(scene_file)],
         {name: ENGINES[name] for name in PLAYED},
         0,

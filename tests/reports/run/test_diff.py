@@ -18,11 +18,11 @@ from reports.run import suite
 from reports.run.archive import digest
 from reports.run.diff import Timing, difference, timing
 from reports.run.journal import JOURNAL, Journal, lines_of
-from reports.run.suite import Means, Plan, carry_out
+from reports.run.suite import Means, RunPlan, carry_out
 from reports.run.tables import seal_of
 from reports.terminal.progress import Progress
 
-PLAN = Plan(
+PLAN = RunPlan(
     ["slow_collision", "near_miss"], {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")},
     seed=0, dts=[], full=False, timings=1, command="test",
 )  # fmt: skip

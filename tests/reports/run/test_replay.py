@@ -12,7 +12,7 @@ from reports.run.archive import Archive
 from reports.run.cells import Cell
 from reports.run.journal import Journal
 from reports.run.playing import play_cell
-from reports.run.suite import Means, Plan, carry_out
+from reports.run.suite import Means, RunPlan, carry_out
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from tests.reports.run.control_engines import CONTROLS, FATAL, Controlled, row
@@ -26,7 +26,7 @@ ENGINES = {name: CONTROLS[name] for name in ("aborts:control", "turnstonan:contr
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of one good engine and two bad ones, at one step."""
     folder = tmp_path_factory.mktemp("run")
-    plan = Plan(["slow_collision"], ENGINES, seed=0, dts=[1 / 60], full=False, timings=0, command="test")
+    plan = RunPlan(["slow_collision"], ENGINES, seed=0, dts=[1 / 60], full=False, timings=0, command="test")
     with Journal(folder) as journal, Progress() as progress:
         carry_out(plan, Means(workers=2), journal, progress)
     return folder

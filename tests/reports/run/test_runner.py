@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES
 from reports.run import playing
 from reports.run.archive import from_trail, load_trajectory, packed
 from reports.run.cells import Cell
-from reports.run.playing import Played, play_cell, play_here
+from reports.run.playing import CellResult, play_cell, play_here
 from reports.run.runner import NoScheduler, cluster, run_all
 from reports.run.worker_process import Failure
 from scenarios.catalogue import scenario
@@ -34,14 +34,14 @@ SCENE = "slow_collision"  # 240 samples of 1/60 s; at one step a sample the 100t
 GOOD = {f"good{i}:control": row(Controlled) for i in range(24)}
 
 
-def cells(rows: dict[str, Row]) -> dict[str, partial]:
+def cells(rows: dict[str, EngineRow]) -> dict[str, partial]:
     """A task a row: `SCENE` at its coarsest step."""
     question = replace(scenario(SCENE), truth=None)
     return {name: partial(play_here, Cell(SCENE, 0, name, 1), row, question) for name, row in rows.items()}
 
 
 @pytest.fixture(scope="module")
-def ended() -> dict[str, Played | Failure]:
+def ended() -> dict[str, CellResult | Failure]:
     """How 24 good cells ended and nine bad ones among them, on two workers."""
     mixed = {**dict(list(GOOD.items())[:12]), **CONTROLS, **dict(list(GOOD.items())[12:])}
     tasks = cells(mixed)
@@ -111,7 +111,7 @@ def test_the_clock_of_a_cell_starts_when_its_engine_is_loaded():
     assert "stopped after 3 s in load" in never.reason
 
 
-def impatient(*words: Any) -> Played:
+def impatient(*words: Any) -> CellResult:
     """In the worker: play, with little time to load."""
     playing.LOADING = 3.0
     return play_here(*words)

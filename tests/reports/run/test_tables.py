@@ -30,7 +30,7 @@ from reports.run.shares import (
     name_of,
     share_of,
 )  # fmt: skip
-from reports.run.suite import Means, Plan, carry_out
+from reports.run.suite import Means, RunPlan, carry_out
 from reports.run.tables import comparisons_of, make_tables
 from reports.run.worker_process import Failure
 from reports.terminal.progress import Progress
@@ -43,7 +43,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of two engines in a scene with thrusts and one without an answer."""
     folder = tmp_path_factory.mktemp("tables")
     engines = {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")}
-    plan = Plan(["slow_collision", "cradle_touching"], engines, seed=0, dts=[], full=False, timings=0, command="test")
+    plan = RunPlan(
+        ["slow_collision", "cradle_touching"], engines, seed=0, dts=[], full=False, timings=0, command="test"
+    )
     with Journal(folder) as journal, Progress() as progress:
         carry_out(plan, Means(workers=1), journal, progress)
     return folder

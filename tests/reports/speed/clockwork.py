@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Collision
+from adapters.engine import ContactImpulse
 from scenarios.model import Array, Scene, State
 
 
@@ -38,7 +38,7 @@ class Sleeper:
         """Must not be called while time is taken."""
         raise AssertionError("read while timed")
 
-    def collisions(self) -> list[Collision]:
+    def collisions(self) -> list[ContactImpulse]:
         """None."""
         return []
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engine import Row
+from adapters.engine import EngineRow
 from adapters.engines import ENGINES
 from adapters.mechanisms.ablated import AblatedReference
 from adapters.mechanisms.table import (
@@ -137,7 +137,7 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(monkeypatch
         def read(self) -> State:
             raise RuntimeError("no <b>such</b> thing")
 
-    monkeypatch.setitem(ENGINES, "reference:exercise", Row(Refusing, "", 1.0, FLOAT64))
+    monkeypatch.setitem(ENGINES, "reference:exercise", EngineRow(Refusing, "", 1.0, FLOAT64))
     (row,) = budget_of("free_fall", 0, "reference:exercise", 4)
 
     assert (row["contribution"], row["note"]) == (TOTAL, "error: RuntimeError: no <b>such</b> thing")

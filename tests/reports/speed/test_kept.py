@@ -16,7 +16,7 @@ from reports.speed.command import kept_of
 from reports.speed.effort import QUICK
 from reports.speed.kept import Kept
 from reports.speed.measure import done
-from reports.speed.plan import Plan
+from reports.speed.plan import SpeedPlan
 from reports.terminal import progress as terminal
 from reports.terminal.exits import FolderTaken
 from reports.terminal.progress import Progress
@@ -62,7 +62,7 @@ def test_what_was_measured_of_a_solver_that_was_saved_since_is_of_something_else
     """Its rows would stand beside those of another text under one name."""
     solver = tmp_path / "solver.js"
     solver.write_text("function integrate(sphere, dt) {}")
-    plan = Plan(("slow_collision",), [f"{solver}:own"], QUICK, 0, 1, whole=False)
+    plan = SpeedPlan(("slow_collision",), [f"{solver}:own"], QUICK, 0, 1, whole=False)
     header: dict[str, Any] = {key: HEADER[key] for key in ("seed", "versions", "machine")}
     read_row(f"{solver}:own")
     with Journal(tmp_path) as journal:

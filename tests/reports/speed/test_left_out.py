@@ -11,7 +11,7 @@ from reports.speed.effort import QUICK
 from reports.speed.measure import SIZE, Measured
 from reports.speed.order import ORDER
 from reports.speed.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
-from reports.speed.plan import PLAIN, Plan
+from reports.speed.plan import PLAIN, SpeedPlan
 from reports.speed.results import Results
 
 DT = np.array([0.4, 0.2, 0.1])
@@ -44,14 +44,14 @@ def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
         "scenario": list("abcde"), "engine": "pymunk", "profile": "matched", "accuracy": "1 %",
         "cost": [5.0] + [np.nan] * 4, "dt_s": np.nan, "why": why, "lost": [w in (UNREACHABLE, FAILED) for w in why],
     })  # fmt: skip
-    results = Results(Plan((), (), QUICK, 0, 1), Measured())
+    results = Results(SpeedPlan((), (), QUICK, 0, 1), Measured())
     results.reached = reached
     row = results.pooled_reached.iloc[0]
 
     assert np.isnan(row.cost)
     assert row.why == "1 of 5, never in 1, failed in 1, untimed in 1"
     assert not row.lost  # two of five
-    results = Results(Plan((), (), QUICK, 0, 1), Measured())
+    results = Results(SpeedPlan((), (), QUICK, 0, 1), Measured())
     results.reached = reached[1:4]
     assert results.pooled_reached.iloc[0].lost  # two of three
 

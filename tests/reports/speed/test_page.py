@@ -22,7 +22,7 @@ from reports.speed.explained import extent
 from reports.speed.measure import Measured, measure
 from reports.speed.page import write_page
 from reports.speed.pareto import FAILED, UNREACHABLE
-from reports.speed.plan import Plan
+from reports.speed.plan import SpeedPlan
 from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal.progress import Progress
@@ -44,7 +44,7 @@ SAID = {"load": 0.0, "seconds": 1.0}
 def measured() -> Measured:
     """A little of everything, played and timed for real, in worker processes."""
     with Progress() as progress:
-        return measure(Plan(SCENES, PLAYED, LITTLE, 0, 2), progress)
+        return measure(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), progress)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def results(measured: Measured) -> Results:
     samples = measured.samples
     timed = (samples.scenario == SCENES[0]) & (samples.engine == "pymunk") & (samples.profile == "shipped")
     changed = replace(measured, errors=errors, samples=samples[~(timed & (samples.kind == "scene"))])
-    return Results(Plan(SCENES, PLAYED, LITTLE, 0, 2), changed)
+    return Results(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), changed)
 
 
 def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):

@@ -17,7 +17,7 @@ from reports.run.journal import JOURNAL
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
 from reports.stability.maps import MAPS
-from reports.stability.results import COLUMNS, Plan, Task, done_before, tasks_of
+from reports.stability.results import COLUMNS, StabilityPlan, Task, done_before, tasks_of
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
 
@@ -71,7 +71,7 @@ def test_the_same_journal_gives_the_same_table(results: Path, tmp_path: Path, mo
 def test_what_has_ended_is_not_played_again(results: Path, monkeypatch: pytest.MonkeyPatch):
     """Of an interrupted run of the same versions all is kept; of another version nothing."""
     monkeypatch.chdir(ROOT / "tests" / "data")  # where its scene file is
-    plan = Plan(
+    plan = StabilityPlan(
         ["slow_collision", "grazing"], ["dt_and_speed"], [], ["box2d:shipped", "pymunk:matched"], "quick", 1, ""
     )
     had, done = done_before(results, plan)

@@ -11,7 +11,7 @@ from adapters.matched import chosen, searched
 from adapters.mechanisms.options import changed_box2d_v3, changed_pymunk
 from adapters.pymunk import MATCHED as PYMUNK
 from reports.tune.grid import GRID, MAKES, NOT_SEARCHED, PAIRS, matched_of, settings_of
-from reports.tune.score import FLOOR, Played, against, at_cost, faults_of, measured, posed
+from reports.tune.score import FLOOR, TrialScores, against, at_cost, faults_of, measured, posed
 from reports.tune.search import BETTER, CHOSEN, COLUMNS, NO_SEARCH, Search, shown
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.families.tuning import FAMILIES, LADDER, LEAST_GAP, one_of, tuning
@@ -81,11 +81,11 @@ def test_near_misses_miss_and_grazing_pairs_collide():
         assert len(truth.collisions) == graze.scene.n / 2
 
 
-def played(error: float, order: float = 1.0, gained: float = 0.0, missed: int = 0, spurious: int = 0) -> Played:
+def played(error: float, order: float = 1.0, gained: float = 0.0, missed: int = 0, spurious: int = 0) -> TrialScores:
     """Three scenes of one family, with an error of an order in dt."""
     step_sizes = np.tile(error / np.array(LADDER, float) ** order, (3, 1))
     full = np.ones_like(step_sizes)
-    return Played(step_sizes, gained * full, missed * full, spurious * full)
+    return TrialScores(step_sizes, gained * full, missed * full, spurious * full)
 
 
 THREE = posed(("flight_alone",), (0, 1, 2))
