@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 from scenarios.model import Array, Scene, State
 
-# What stands in place of what an engine resolved a setting to, where its binding does not tell.
+# What stands in place of what an engine resolved a setting to, where its binding does not report it.
 NOT_READABLE = "not readable"
 PASSED = "passed with every step"  # the engine keeps no such setting
 KEPT = "kept by the adapter"  # the engine knows no such setting

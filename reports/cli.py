@@ -23,35 +23,34 @@ DEFAULT_OUT = Path("reports/out/latest")
 
 Scenes = Annotated[list[str] | None, typer.Argument(metavar="[SCENARIO|FILE.toml]...", help="Default: all scenarios.")]
 Engines = Annotated[
-    list[str] | None, typer.Option("--engine", metavar="NAME[:PROFILE]|FILE", help="Only these; repeatable.")
+    list[str] | None, typer.Option("--engine", metavar="NAME[:PROFILE]|FILE", help="Play only this engine; repeatable.")
 ]
 Dts = Annotated[
-    list[float] | None, typer.Option("--dt", metavar="S", help="Step in s instead of each ladder; repeatable.")
+    list[float] | None,
+    typer.Option("--dt", metavar="S", help="Use this step size instead of the scenario's own; repeatable."),
 ]
-Full = Annotated[bool, typer.Option("--full", help="Two finer steps for every scenario.")]
+Full = Annotated[bool, typer.Option("--full", help="Add two finer step sizes to every scenario.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of random scenes.")]
 Out = Annotated[
     Path, typer.Option(help="Folder for the results; an earlier run there is replaced when this one is done.")
 ]
-Workers = Annotated[int, typer.Option(min=0, help="Processes that play at once; 0: one a core.")]
+Workers = Annotated[int, typer.Option(min=0, help="Number of processes; 0: one per core.")]
 Timeout = Annotated[
     float,
-    typer.Option(
-        min=0.1, max=1e6, metavar="S", help="That a cell, or an exact answer, may take; then it is stopped, in C too."
-    ),
+    typer.Option(min=0.1, max=1e6, metavar="S", help="Time limit of a cell and of an exact answer."),
 ]
 Memory = Annotated[
-    int, typer.Option(min=0, max=10**9, metavar="MB", help="That a process may take; 0: its share of this machine's.")
+    int, typer.Option(min=0, max=10**9, metavar="MB", help="Memory limit of a process; 0: its share of this machine's.")
 ]
 Scheduler = Annotated[str, typer.Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")]
 Timings = Annotated[
     int,
-    typer.Option(min=0, max=10_000, metavar="N", help="Rounds of timings after all is played, one at a time."),
+    typer.Option(min=0, max=10_000, metavar="N", help="Rounds of timings after the run, one process at a time."),
 ]
 Resume = Annotated[
-    Path | None, typer.Option(metavar="OUT", help="Play what is missing or changed in a run, as it was asked for.")
+    Path | None, typer.Option(metavar="OUT", help="Complete an earlier run: play what is missing or has changed.")
 ]
-Port = Annotated[int, typer.Option(min=1, max=65535, help="Where to serve, on this machine only.")]
+Port = Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")]
 Opens = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
 
 
@@ -105,11 +104,11 @@ def report(out: Annotated[Path, typer.Argument(help="The folder of a run, finish
 
 @app.command()
 def replay(
-    cell: Annotated[str, typer.Argument(help="As in the column cell of runs.csv, or how it begins.")],
+    cell: Annotated[str, typer.Argument(help="Cell of runs.csv, or its first characters.")],
     out: Annotated[Path, typer.Option(help="The folder of the run.")] = DEFAULT_OUT,
     timeout: Timeout = 60.0,
 ) -> None:
-    """Play one cell again, step by step: one that failed from its last good state, any other from the start."""
+    """Play one cell again, step by step: a failed one from its last good state, others from the start."""
     from reports.commands import replay as replay_command
 
     replay_command.replay(cell, out, timeout)
@@ -130,11 +129,11 @@ def diff(
 def truth(
     scene: Annotated[str, typer.Argument(metavar="SCENARIO|FILE.toml")],
     events: Annotated[bool, typer.Option("--events", help="All collisions, not only the first and last ten.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="For programs: all of it as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     seed: Seed = 0,
     timeout: Timeout = 60.0,
 ) -> None:
-    """Print the exact answer to a scene: its collisions, how far it reaches, how precise it is and what ends it."""
+    """Print the exact answer to a scene: its collisions, its horizon, and its error bound."""
     from reports.commands.truth import show_truth
 
     show_truth(scene, seed, events, as_json, timeout)
@@ -146,17 +145,17 @@ def check(
         Path,
         typer.Argument(metavar="FILE|DIR", parser=place, help="An Exercise.js, a solver.py, or a folder of them."),
     ],
-    as_json: Annotated[bool, typer.Option("--json", help="For programs: all rows as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print all rows as JSON.")] = False,
     junit: Annotated[
         Path | None, typer.Option(metavar="PATH", parser=place, help="Write the rows as JUnit XML, too.")
     ] = None,
     page: Annotated[
-        Path | None, typer.Option(metavar="PATH", parser=place, help="Where the page goes.  [default: check.html]")
+        Path | None, typer.Option(metavar="PATH", parser=place, help="File of the page.  [default: check.html]")
     ] = None,
 ) -> None:
     """Check a hand-written solver of the exercise, and say what is wrong with it. The file is run as you.
 
-    In Python it may import what is installed, and modules beside it that are called otherwise.
+    A Python file may import installed packages, and modules in its own folder whose names differ from theirs.
     """
     from reports.check.command import check as check_and_say
 
@@ -180,7 +179,7 @@ def play(
 
 @app.command()
 def lesson(
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Begin with this one.")] = "",
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Lesson to begin with.")] = "",
     port: Port = 8000,
     opens: Opens = False,
     export: Annotated[
@@ -206,11 +205,11 @@ def speed(
     scenes: Scenes = None,
     engine: Engines = None,
     full: Annotated[bool, typer.Option("--full", help="All scenarios, finer steps, more rounds, more disks.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Keep what an interrupted run in --out has ended.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted run in --out.")] = False,
     seed: Seed = 0,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("reports/out/speed"),
 ) -> None:
-    """Set error against time for every engine: leave the machine alone meanwhile."""
+    """Measure error against time for every engine. Do not use the machine meanwhile."""
     from reports.speed.command import run_speed
 
     run_speed(scenes or [], engine or [], full, resume, seed, out, "crosscheck " + shlex.join(sys.argv[1:]))
@@ -227,14 +226,14 @@ def stability(
         typer.Option(help="Of FILE.toml, repeatable: dt, speed, mass_ratio, restitution, scale, offset. Default: all."),
     ] = None,
     engine: Engines = None,
-    full: Annotated[bool, typer.Option("--full", help="16 runs a value, every value, closer brackets.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Keep what an interrupted run in --out has ended.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="16 runs per value, all values, narrower brackets.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted run in --out.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for the stability report; one that is there is replaced.")] = Path(
         "reports/out/stability"
     ),
     workers: Workers = 0,
 ) -> None:
-    """Find where every engine fails: limits, with the first failing run of each to look at."""
+    """Find the limit of every engine, and keep the first failing run."""
     from reports.stability.command import find_limits
 
     command = "crosscheck " + shlex.join(sys.argv[1:])
@@ -256,7 +255,7 @@ def tune(
 
 @app.command(name="list")
 def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
-    """Explain every engine, scenario and metric in a line."""
+    """List engines, scenarios and metrics, with one line each."""
     from reports.commands.listing import explain
 
     explain(what)

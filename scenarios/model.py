@@ -243,7 +243,7 @@ class Collisions:
         t: (h,) s; for a stepping engine the end of the step that resolved the collision.
         i: (h,) index of the first disk.
         j: (h,) index of the other disk, i < j; or -1 - w for wall w.
-        impulse: (h,) N s along the normal; NaN where an engine does not tell.
+        impulse: (h,) N s along the normal; NaN where an engine does not report it.
     """
 
     t: Array

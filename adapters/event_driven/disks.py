@@ -41,7 +41,7 @@ DISK = np.dtype(
         ("pair_time", "f8"), ("own_time", "f8"),  # when it meets another disk, or something by itself
         ("partner", "u4"), ("partner_count", "i4"),  # that disk, and its count when this was found
         ("own_code", "i4"),  # what it meets by itself, as above
-        ("last", "i4"),  # what it collision last: a disk, or -1 - wall
+        ("last", "i4"),  # what it struck last: a disk, or -1 - wall
         ("before", "u4"),  # the disk before it in its chain
         ("mark_collisions", "i4"), ("mark_time", "f8"),  # collisions since, to notice when they accumulate
         ("ax", "f8"), ("ay", "f8"),  # acceleration; lying on a wall, only that along it
@@ -88,9 +88,7 @@ class Rules(NamedTuple):
     mixed: bool  # not everything alike
     wrapped: bool
     lasting: bool  # bounces die out too slowly for `crowd`, or never
-    crowd: (
-        float  # units in the last place of the time: who collisions 64 times within so many has no single continuation
-    )
+    crowd: float  # units in the last place of the time: a disk that collides 64 times within so many has no single continuation
 
 
 class Walls(NamedTuple):

@@ -99,7 +99,7 @@ def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) ->
 
 @inlined
 def change(a: Any) -> None:
-    """Make void what others know of a disk, and forget what it collision last."""
+    """Make void what others know of a disk, and forget what it struck last."""
     a.count += 1
     a.last = NOBODY
 

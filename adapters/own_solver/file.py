@@ -98,7 +98,7 @@ def read_beside(path: Path, text: str) -> dict[str, str]:
     for file, module in modules_beside(itself.parent, text, lambda one: text if one == itself else read_module(one)):
         beside[file] = module
         if sum(map(len, beside.values())) > LARGEST:
-            raise NotASolver(f"{path}: imports more than 1 MB from beside it; a solver has a few kilobytes")
+            raise NotASolver(f"{path}: imports more than 1 MB from its folder; a solver has a few kilobytes")
     return beside
 
 

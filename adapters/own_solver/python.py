@@ -105,7 +105,7 @@ class PythonSolver:
         if "for ^" in what:
             what += "; a power is written **"
         elif isinstance(error, EOFError):
-            what += "; nobody is there to answer input()"
+            what += "; input() is not available"
         if isinstance(error, SyntaxError) and error.filename == self.name:
             return SolverFailed("error", what, error.lineno or 0, error.offset or 0)
         mine = [f for f in traceback.TracebackException.from_exception(error).stack if f.filename == self.name]

@@ -37,7 +37,7 @@ def instead(function: str, text: str) -> str:
     """What the file has that may have been meant; "" if nothing is like it."""
     names = re.findall(r"\b(?:function\s*\*?|def|const|let|var)\s+(\w+)", text)
     if function in names:
-        return ", but one inside something else, where nobody finds it"
+        return ", but one inside another function or class, where it cannot be called"
     near_ones = get_close_matches(function.lower(), [name.lower() for name in names], 1, 0.8)
     meant = next((name for name in names if name.lower() in near_ones), "")
     return f", but {meant}" if meant else ""

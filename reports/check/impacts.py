@@ -140,7 +140,7 @@ UPDATES: dict[str, Update] = {
     "y gets the x part of the normal": Update(lambda h, P, e: (P[0] / h.ma * ONES, -P[0] / h.mb * ONES)),
     "x gets the y part of the normal": Update(lambda h, P, e: (P[1] / h.ma * ONES, -P[1] / h.mb * ONES)),
     "the velocities are exchanged": Update(lambda h, P, e: (-h.u, h.u)),
-    "each is thrown back by itself, as from a wall": Update(
+    "each bounces off the other as off a wall": Update(
         lambda h, P, e: (-(1 + e) * (h.va @ h.n) * h.n, -(1 + e) * (h.vb @ h.n) * h.n)
     ),
     "each velocity is turned round and multiplied by e": Update(lambda h, P, e: (-(1 + e) * h.va, -(1 + e) * h.vb)),

@@ -12,7 +12,7 @@ from reports.check.rows import FOLLOWS, CheckRow, judged, near, not_asked, shown
 DT = 1e-3  # s, the exercise's
 EDGES = {"right": (5.2, 0.1), "left": (-5.2, -0.1), "top": (0.1, 3.2), "bottom": (-0.1, -3.2)}  # m, a place beyond each
 ONTO = {"right": (-5.0, 0.1), "left": (5.0, -0.1), "top": (0.1, -3.0), "bottom": (-0.1, 3.0)}
-A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)  # a pair that collisions
+A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)  # a pair that collides
 
 
 def loop_rows(process: SolverProcess, faulty: bool, begun: object) -> list[CheckRow]:
@@ -119,7 +119,7 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
     got = (
         f"no collision of {', '.join(silent)}"
         if silent
-        else f"somebody else is struck: {others[0]}"
+        else f"another sphere is struck: {others[0]}"
         if others
         else "yes"
     )

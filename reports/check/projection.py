@@ -54,7 +54,7 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
 
 
 def moved_together(answers: dict[str, Answer]) -> bool:
-    """Whether pairs that collision are displaced the wrong way."""
+    """Whether pairs that collide are displaced the wrong way."""
     shifts = [shift_of(question.balls, answers[name].last) for name, question in COLLISIONS.items()]
     return all(s.a + s.b < 0 and near(s.across, 0.0, 0.1) for s in shifts)
 

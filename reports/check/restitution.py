@@ -72,7 +72,7 @@ class Restitution:
             note = f"e = {shown(self.came)} is written into the file; the exercise has 0.9. It is judged by its own"
             return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "note", note)
         cause = mistake if np.isfinite(self.came) else "the velocities become no numbers"
-        cause = cause or f"e = {shown(self.own)} is written into the file, but it is not what comes out"
+        cause = cause or f"e = {shown(self.own)} is written into the file, but its collisions have another"
         return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
 
     def speeds(self, mistake: str) -> CheckRow:

@@ -33,7 +33,7 @@ Sphere = tuple[int, int, int, int, int, int]
 """x, y in half metres, vx, vy in m/s, radius in quarters of a metre, mass in kg."""
 Drawn = tuple[list[Sphere], tuple[int, int, int]]
 """The spheres, and the thrust of one that is alone: force x, y in N, torque in tenths of a N m."""
-# Tried before any is drawn: on a busy machine the time may be up before a pair that collisions is.
+# Tried before any is drawn: on a busy machine the time may be up before a pair that collides is.
 FIRST: list[Drawn] = [
     ([(0, 0, 1, 1, 1, 2)], (1, 2, 1)),
     ([(-1, 0, 1, 0, 1, 1), (1, 0, 0, 0, 1, 2)], (0, 0, 0)),

@@ -27,7 +27,7 @@ from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import legible
 from scenarios.model import Scenario, Trajectory
 
-REMEMBERED = ", the last good state (what the engine remembers beside it begins anew)"
+REMEMBERED = ", the last good state (the engine's internal state begins anew)"
 
 
 def replay(name: str, out: Path, timeout: float, engines: Mapping[str, EngineRow] = ENGINES) -> NoReturn:

@@ -89,7 +89,7 @@ def momentum(comparison: Comparison) -> Drawing:
     )
 
 
-DELAY = ", where a collision up to three steps late or early costs nothing: that is measured by itself"
+DELAY = ", where a collision up to three steps late or early costs nothing; its delay is a metric of its own"
 
 
 def energy(comparison: Comparison) -> Drawing:

@@ -40,10 +40,10 @@ def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
 def closest(off: pd.DataFrame) -> str:
     """Who comes closest to the exact answers."""
     if off.empty:
-        return "No scene here has an exact answer, so nobody is scored: only laws and differences are shown."
+        return "No scene here has an exact answer, so no engine is scored. The page shows violations of the laws of physics and differences between engines."
     medians = off.median().sort_values()
     if np.isinf(medians.iloc[0]):
-        return "No engine was played to its end in half of the scenes with an exact answer, so nobody is ranked."
+        return "No engine was played to its end in half of the scenes with an exact answer, so engines are not ranked."
     best, *others = (f"{name} ({value:.2g})" for name, value in medians.items())
     wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())  # within 1 % counts as equal
     ranking = f", then {', '.join(others[:2])}" + (f", last {others[-1]}" if len(others) > 2 else "") if others else ""

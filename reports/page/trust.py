@@ -22,7 +22,7 @@ def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
         "Checked from outside": (
             "A simulation of all pairs in 420 bits, plain scripts for each engine, and metrics computed again from the "
             "trajectories share no code with what they check: uv run pytest -m independent repeats them, and "
-            "tests/independent/README.md lists what nobody has checked."
+            "tests/independent/README.md lists what has not been checked."
         ),
         "Our own engines": (
             "reference and event_driven are this project's, and it also judges them. So the exact answers import none "
@@ -47,7 +47,9 @@ def exact_answers(comparisons: Sequence[Comparison]) -> str:
             f"{event_driven} are computed event by event in many digits, {how}, and off by at most {number(bound)} m"
         )
     if none:
-        parts.append(f"{none} have no exact answer and no score: only the laws of physics are held against them")
+        parts.append(
+            f"{none} have no exact answer and no score: engines are checked there against the laws of physics only"
+        )
     return "; ".join(parts) + "."
 
 
@@ -62,6 +64,6 @@ def how_far_they_hold(comparisons: Sequence[Comparison]) -> str:
         return "Every exact answer holds to the end of its scene."
     listed = ", ".join(f"{name} to {number(until)} s of {number(whole)} s" for name, (until, whole) in ends.items())
     return (
-        f"{listed}: no score speaks of what comes later. There a rounding of the start has grown to a billionth of a "
+        f"{listed}: later samples have no score. There a rounding of the start has grown to a billionth of a "
         "radius, or the motion has no single answer; the scene says which. All others hold to their end."
     )

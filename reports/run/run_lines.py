@@ -154,5 +154,5 @@ KINDS = Kinds(
         "timing": TimingLine, "footer": FooterLine,
     },
     "delete that line, and run --resume plays what it was of",
-    "without it nobody knows what was asked for: play it again into another --out",
+    "without it the request is not known: play it again into another --out",
 )  # fmt: skip

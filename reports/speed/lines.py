@@ -235,7 +235,7 @@ class TaskLine(Line):
 KINDS = Kinds(
     {"header": HeaderLine, "task": TaskLine},
     "delete that line, and --resume measures again what it was of",
-    "without it nobody knows what was asked for: delete the folder, or name another --out",
+    "without it the request is not known: delete the folder, or name another --out",
 )
 
 

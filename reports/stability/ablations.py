@@ -47,8 +47,8 @@ TOGETHER = "the contacts of a step get their impulses together, in the engine's 
 OWN_ORDER = "adapters/mechanisms/ablated.py, from the engine's own step"
 AT_ONCE = "an overlap is undone at once, so that disks move that have struck nothing yet"
 SENTENCES = (
-    (END_OF_STEP, "*", ACTS_AT_END, "contacts are looked for once a step"),
-    (FLIGHT, "*", "under a force a step of flight goes another way than v dt + a dt² / 2", "alpha of ENGINES"),
+    (END_OF_STEP, "*", ACTS_AT_END, "contacts are detected once per step"),
+    (FLIGHT, "*", "under a force a step moves a disk by other than v dt + a dt² / 2", "alpha of ENGINES"),
     (RESTITUTION, "pymunk:*", PRODUCT, OF_PYMUNK),
     (RESTITUTION, "box2d:*", THRESHOLD, THRESHOLDS["box2d"]),
     (RESTITUTION, "box2d_v3:*", THRESHOLD, THRESHOLDS["box2d_v3"]),

@@ -87,7 +87,7 @@ def mixture(x: float, run: int) -> Scenario:
 
 
 def thermometer(x: float, run: int) -> Scenario:
-    """x = packing of 100 disks, 4000 steps; seen more often than they collision."""
+    """x = packing of 100 disks, 4000 steps; seen more often than they collide."""
     return gas(x, run, rows=10, columns=10, steps=4000, every=20)
 
 

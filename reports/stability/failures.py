@@ -89,7 +89,7 @@ def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
 
 
 def part_of(whole: Trajectory, shown: NDArray[np.int64], scenario: Scenario) -> Trajectory:
-    """A trajectory at the samples `shown` that it has, and what it collisions meanwhile, if that is few enough to
+    """A trajectory at the samples `shown` that it has, and what it strikes meanwhile, if that is few enough to
     show."""
     first, last = shown[0], shown[-1]
     t, x, v, angle, spin = (frozen(getattr(whole, name)[first : last + 1]) for name in ("t", *STATE))

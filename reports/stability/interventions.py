@@ -99,7 +99,7 @@ INTERVENTIONS = {
         "32 times as small, at the same speeds", smaller,
     ),
     "in_order": Intervention("reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"),
-    "finer": Intervention("*", "[!d]*", f"{ACTS_AT_END}, and the step is too coarse for that", "in steps of an eighth", finer),
+    "finer": Intervention("*", "[!d]*", f"{ACTS_AT_END}, and the step is too large for that", "in steps of an eighth", finer),
     **{
         f"{box}_swept": Intervention(f"{box}:matched", "*", "disks are not swept against each other",
                              f"as {box}:matched+bullets", engine=f"{box}:matched+bullets")

@@ -192,7 +192,7 @@ class TaskLine(Line):
 KINDS = Kinds(
     {"header": HeaderLine, "task": TaskLine, "footer": FooterLine},
     "delete that line, and --resume plays again what it was of",
-    "without it nobody knows what was asked for: delete the folder, or name another --out",
+    "without it the request is not known: delete the folder, or name another --out",
 )
 
 

@@ -101,7 +101,7 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     found.append(
         f"The reasons of {len(tested)} of the {len(failing)} limits were tested: the limit follows from the reason, "
         "or an engine that differs in that one thing gets farther, or the failing run works without it, or the "
-        "reference with late collisions and the fewest mechanisms of the engine that suffice works and fails at the same values. "
+        "reference with end-of-step detection and the fewest mechanisms of the engine that suffice works and fails at the same values. "
         "The others are called likely, or not known."
     )
     odd = [limit for limit in mine if not limit.monotone]

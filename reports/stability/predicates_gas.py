@@ -77,7 +77,7 @@ def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
             "Enskog's rate of collisions",
         )
     )
-    if not np.isnan(collisions.impulse).any():  # Box2D 3.1 does not tell with what impulse it collisions
+    if not np.isnan(collisions.impulse).any():  # Box2D 3.1 reports no impulses
         exchanged = counted(played, collisions.j < 0, collisions.impulse)
         parts.append(_beside("pressure", exchanged, ought.force, "the pressure of the virial series"))
     return max(parts, key=lambda part: part.value)._replace(at=float(played.t[len(played) // 10]))

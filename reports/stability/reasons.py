@@ -34,15 +34,13 @@ class Reason(NamedTuple):
     mechanism: str = ""
 
 
-DISCRETE = "contacts are looked for at the ends of steps only, and lost once the centres have passed each other"
+DISCRETE = "contacts are detected at the ends of steps only, and missed once the centres have passed each other"
 GEOMETRY = "geometry: (v dt)² = (2R)² - b² between disks, v dt = R at a thin wall"
-EULER_OUT = (
-    "the force belongs to a place where the disk is not: with x' = x + v dt the oscillator's map grows by 1 + (w dt)²"
-)
+EULER_OUT = "the force is that of a position other than the new one: with x' = x + v dt the oscillator's map grows by 1 + (w dt)²"
 QUARTER = "nothing turns by more than pi/2 a step"
 MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES"
 SWEEP = "restitution is one sweep after the substeps, so a disk that touches two others in a step loses energy"
-FOUND_LATE = "a collision is found up to a step late, and each one lasts about a step longer than it should"
+FOUND_LATE = "a collision is detected up to a step late, and lasts about a step too long"
 
 
 def growth_limit(share: float) -> float:

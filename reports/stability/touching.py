@@ -90,7 +90,7 @@ class LawOf:
 
 
 def cradle(n: int) -> Touching:
-    """A disk collisions a row of n - 1."""
+    """A disk strikes a row of n - 1."""
     row = np.stack([2.0 * np.arange(n) - 2, np.zeros(n)], axis=-1)
     apart = np.stack([np.maximum(0.0, np.arange(n) - 1), np.zeros(n)], axis=-1)
     last, together = np.zeros((n, 2)), np.zeros((n, 2))
@@ -98,7 +98,7 @@ def cradle(n: int) -> Touching:
     together[:, 0] = 2 / n
     together[0, 0] -= 1
     return Touching(
-        f"A disk collisions a row of {n - 1}.", row, apart, {PAIRS: [last], AT_ONCE: [together]},
+        f"A disk strikes a row of {n - 1}.", row, apart, {PAIRS: [last], AT_ONCE: [together]},
         "equal masses swap velocities pair by pair; or e = 1 is asked of every contact in one solve",
     )  # fmt: skip
 
@@ -109,7 +109,7 @@ TOUCHING = {
     "touching_cradle_of_3": cradle(3),
     "touching_cradle_of_5": cradle(5),
     "touching_break": Touching(
-        "A disk collisions two, in their middle.",
+        "A disk strikes two, in their middle.",
         np.array([[-sqrt(3), 0], [0, 1], [0, -1]]),
         np.array([[0.0, 0], [0, 0], [sqrt(3) / 2, -1 / 2]]),
         {

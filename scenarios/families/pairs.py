@@ -1,4 +1,4 @@
-"""Two disks that collision once, or just not: head-on, oblique, unequal, slow, near."""
+"""Two disks that collide once, or just not: head-on, oblique, unequal, slow, near."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ class TruthRecord:
         angles = turning.angle, turning.angular_velocity
         until, reason = self.horizon, self.reason
         if self.float64_horizon < until:
-            until, reason = self.float64_horizon, "from there on the rounding of float64 leads any engine elsewhere"
+            until, reason = self.float64_horizon, "beyond it the rounding of float64 makes any engine diverge"
         return answer(scene, t, (position, velocity), collisions, angles, until, self.error_bound, reason)
 
 

@@ -61,7 +61,7 @@ def falling_meeting(k: Numbers, gap: Sequence[Number], limit: float) -> Number |
     """s until the gap c0 + c1 t + ... + c4 t^4 (m2) of two bodies that accelerate differently closes, or None.
 
     Only up to `limit` s. float64 finds between which times, by margins far above its rounding; many digits find the
-    time. Raises `Pressed`, and `Undecided` for balls where float64 cannot tell: the two graze.
+    time. Raises `Pressed`, and `Undecided` for balls where float64 cannot decide: the two graze.
     """
     touching = k.sign(gap[0]) <= 0
     approach = k.sign(gap[1] / 2) if touching else 0

@@ -15,7 +15,7 @@ from scenarios.truth.oracle.ties import Contact, Outcome
 
 CROWDED = 64  # collisions of one disk ...
 INSTANT = 1e-9  # ... within so many s: they pile up towards a point in time
-PILE = 1e-5  # s before it; whom it collision in between takes part
+PILE = 1e-5  # s before it; whom it strikes in between takes part
 
 
 class Ends(Exception):

@@ -72,7 +72,7 @@ class EventTruth:
             return float(times[-1]), ""
         if agree == len(position):
             return float(min(end, times[agree])), reason
-        return float(times[agree - 1]), "float64 cannot tell: a start one unit in the last place away leads elsewhere"
+        return float(times[agree - 1]), "float64 cannot decide: a start one unit in the last place away leads elsewhere"
 
     def play(self, scene: Scene, t: Array) -> tuple[Motion, Array, float, str]:
         """Position and velocity (k, n, 2) at as many of the times as are reached, collisions (h, 4); when and why it

@@ -43,7 +43,7 @@ def test_the_closed_forms_are_met_up_to_the_horizon(name):
     assert h == (reported.t <= last).sum()
     pairs = [
         sorted(zip(np.round(c.t[:h], 8), c.i[:h], c.j[:h])) for c in (reported, listed)
-    ]  # 49 balls collision at once
+    ]  # 49 balls collide at once
     assert pairs[0] == pairs[1]
     np.testing.assert_allclose(reported.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=chaos * 1e-12)
 

@@ -155,7 +155,7 @@ def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smalle
 
 
 def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """Without any time to draw scenes, a pair that collisions is tried."""
+    """Without any time to draw scenes, a pair that collides is tried."""
     monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
     with SolverProcess(read_solver(folder / "ben" / "Exercise.js")) as process:
         found = smallest_scene(process, 0.9)

@@ -97,7 +97,7 @@ def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literat
 
 
 def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
-    """All of it, for two draws; a gas hotter by a fifth collisions more often by a tenth."""
+    """All of it, for two draws; a gas hotter by a fifth collides more often by a tenth."""
     for run in range(2):
         scenario = CASES["thermometer"].scene(0.4, run)
         assert not judge(WRONG_GAS, scenario, play_as(EXACT, scenario)).failed
@@ -156,7 +156,7 @@ def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_
 
 
 def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
-    """At packing 0.6 an engine that waits for the end of a step collisions a tenth too seldom; in order within it,
+    """At packing 0.6 an engine that detects at the end of a step has a tenth too few collisions; in order within it,
     not."""
     scenario = CASES["thermometer"].scene(0.6, 0)
     late, in_order = (judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in AT_END_AND_IN_ORDER)
