@@ -221,7 +221,7 @@ def page(
     *sliders: Slider,
 ) -> Lesson:  # fmt: skip
     """A page of this lesson."""
-    exact = () if name == "position correction" else (TRUTH,)  # disks that overlap have no exact answer
+    exact = () if name == "correction" else (TRUTH,)  # disks that overlap have no exact answer
     return Lesson(name, f"6.{part}", title, asks, (text,), sliders, (*names, PLAIN, ABLATED, *exact), show)
 
 
@@ -259,7 +259,7 @@ MECHANISMS = (
         Slider("order", "Velocity that is turned round", tuple(ORDERS), 0), Slider("k", "Steps in 1/60 s", (1, 4), 1),
     ),
     page(
-        5, "position correction", "Slop and position correction", "What becomes of an overlap?",
+        5, "correction", "Slop and position correction", "What becomes of an overlap?",
         "The exercise projects an overlap away at once. Box2D undoes a share of it, three times a step, and leaves the "
         "last bit, the slop, so that a contact stays a contact. Here a disk begins 20 cm deep in a fixed one, which no "
         "exact answer allows. Box2D's continuous collision is off, because it undoes the overlap sooner.",

@@ -54,7 +54,7 @@ def test_with_nothing_switched_on_the_mechanisms_give_the_reference(name: str):
         ("gravity", "box2d:matched", (2, 1), (0, 1), 2400 * FLOAT32),
         ("gravity", "pymunk:matched", (1, 1), (2, 1), 1e-12),
         # mm: 24 steps with three position corrections each, of coordinates up to 1 m.
-        ("position correction", "box2d:matched+no_ccd", (2, 2), (2, 1), 1e3 * 72 * FLOAT32),
+        ("correction", "box2d:matched+no_ccd", (2, 2), (2, 1), 1e3 * 72 * FLOAT32),
         # mm: 360 substeps, of heights up to 4 m.
         ("substeps", "box2d_v3:matched", (2, 0), (1, 0), 1e3 * 360 * 4 * FLOAT32),
         ("digits", "box2d:shipped", (1, 2), (0, 2), 0.0),
@@ -87,8 +87,8 @@ def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name:
 
     assert shown.film is not None
     assert any(run.trajectory is not None for run in shown.film.runs)
-    assert (shown.film.truth is None) == (name == "position correction")  # its disks overlap from the start
-    assert (TRUTH in drawn) == (name not in ("position correction", "crowd"))  # nor has a cost in time
+    assert (shown.film.truth is None) == (name == "correction")  # its disks overlap from the start
+    assert (TRUTH in drawn) == (name not in ("correction", "crowd"))  # nor has a cost in time
     assert drawn | {run.name for run in shown.film.runs} <= set(lesson.names)
 
 
