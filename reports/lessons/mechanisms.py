@@ -90,9 +90,8 @@ def show_threshold(settings: Settings) -> Shown:
     closing = np.array([0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0])
     scenario = asked(pairs(closing, settings["e"]), 0.5)
     runs = runs_of(["box2d:shipped"], AblatedReference(threshold=settings["threshold"]), scenario, 4)
-    curves = over(closing, runs, separation(closing))
+    curves = [*over(closing, runs, separation(closing)), Curve(TRUTH, closing, np.full(len(closing), settings["e"]))]
     facts = [*setting_rows(runs, "restitution threshold in m/s"), distance(curves, "box2d:shipped", "")]
-    curves.append(Curve(TRUTH, closing, np.full(len(closing), settings["e"])))
     chart = LessonChart("Separation over approach speed", "closing speed in m/s", "e of the collision", curves, "x")
     return Shown([chart], filmed(scenario, runs), facts)
 
@@ -110,12 +109,10 @@ def show_mixing(settings: Settings) -> Shown:
                 found.setdefault(run.name, []).append(float(separation(closing)(run.trajectory)[0]))
         if e == SHOWN:
             film = filmed(scenario, runs)
-    curves = [Curve(name, stated, found[name], dots=True) for name in names]
+    curves = [*(Curve(name, stated, found[name], dots=True) for name in names), Curve(TRUTH, stated, stated)]
     facts = [("replayed: e on each of the two disks", number(SHOWN)), distance(curves, "pymunk:shipped", "")]
-    curves.append(Curve(TRUTH, stated, stated))
-    return Shown(
-        [LessonChart("Restitution of a pair", "e on each of the two disks", "e of the collision", curves)], film, facts
-    )
+    chart = LessonChart("Restitution of a pair", "e on each of the two disks", "e of the collision", curves)
+    return Shown([chart], film, facts)
 
 
 def falling(names: Sequence[str], on: AblatedReference, substeps: int) -> Shown:
@@ -163,9 +160,8 @@ def show_position_correction(settings: Settings) -> Shown:
     engine.close()
     curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
     facts = [*setting_rows(runs, "linear slop in m"), distance(curves, NO_CCD, "mm")]
-    return Shown(
-        [LessonChart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")], filmed(scenario, runs), facts
-    )
+    chart = LessonChart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")
+    return Shown([chart], filmed(scenario, runs), facts)
 
 
 def show_digits(settings: Settings) -> Shown:
