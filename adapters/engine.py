@@ -123,7 +123,7 @@ class EngineRow:
     """How to make an engine and all that the rest of the program needs to know of it.
 
     Attributes:
-        make: a new engine; imports its library only now. Takes the parameters that `features`, `work` and `variants`
+        make: a new engine; imports its library only now. Takes the parameters that `options`, `work` and `variants`
             name.
         summary: one line for `crosscheck list`.
         alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t is
@@ -134,7 +134,7 @@ class EngineRow:
         distributions: the installed packages, as pip names them, whose versions decide its numbers.
         mark: how it is drawn; None: a colour and a shape that no other engine has.
         work: what it lets one spend time on; None: nothing.
-        features: one thing more or less than the engine has, in a few words -> parameters of `make`; what each costs
+        options: one thing more or less than the engine has, in a few words -> parameters of `make`; what each costs
             and breaks is measured by `crosscheck speed`.
         variants: name, which goes behind a "+" -> what `crosscheck stability` plays besides to test a reason.
         searched: reads what `crosscheck tune` searches; None: nothing.
@@ -150,7 +150,7 @@ class EngineRow:
     distributions: tuple[str, ...] = ()
     mark: Mark | None = None
     work: Work | None = None
-    features: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
+    options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     variants: Mapping[str, Variant] = field(default_factory=dict, hash=False)
     searched: Callable[[], Searched] | None = None
     source: str = ""

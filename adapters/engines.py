@@ -100,7 +100,7 @@ _BULLETS = "continuous collision, what moves is a bullet"
 ENGINES: dict[str, EngineRow] = {
     "reference:exercise": _Reference(
         _exercise, "hand-written solver of exercise 11: symplectic Euler, project, impulse", 1.0, FLOAT64,
-        features={"kept in float32": {"precision": np.float32}},
+        options={"kept in float32": {"precision": np.float32}},
     ),
     "reference:lesson": _Reference(
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
@@ -113,7 +113,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "pymunk:matched": _Pymunk(
         partial(_pymunk, "matched"), "pymunk, matched: elasticity sqrt(e), small slop", 0.0, FLOAT64,
-        features={
+        options={
             "50 iterations, not 10": {"iterations": 50},
             "200 iterations, not 10": {"iterations": 200},
             "sleeping": {"sleep_time_threshold": 0.5},
@@ -131,7 +131,7 @@ ENGINES: dict[str, EngineRow] = {
     "box2d:matched": _Box2D(
         partial(_box2d, "matched"),
         "box2d-py, matched: units that lift its thresholds; CCD; no friction, sleep", 1.0, FLOAT32,
-        features={
+        options={
             "1 iteration, not 8": {"velocity_iterations": 1},
             "30 iterations, not 8": {"velocity_iterations": 30},
             "no position correction": {"position_iterations": 0},
@@ -152,7 +152,7 @@ ENGINES: dict[str, EngineRow] = {
     "box2d_v3:matched": _Box2DV3(
         partial(_box2d_v3, "matched"),
         "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction", 0.625, FLOAT32,
-        features={
+        options={
             "1 substep, not 4": {"substeps": 1},
             "16 substeps, not 4": {"substeps": 16},
             "CCD": {"continuous": True},

@@ -143,7 +143,7 @@ def velocity_max(view: View) -> Value | None:
 @over_judged
 def angular_velocity_max(view: View) -> Value | None:
     """Largest difference of angular velocity of any disk in any sample that `velocity_max` is judged in."""
-    return _largest_of_disks(np.where(view.judged, view.angular_velocity_apart, 0.0), view)
+    return _largest_of_disks(np.where(view.judged, view.angular_velocity_deviation, 0.0), view)
 
 
 def angle_rms(view: View) -> Value | None:

@@ -105,7 +105,7 @@ class View:
         return np.where(self.judged, laws.lengths(self.played.velocity - expected), np.nan)
 
     @cached_property
-    def angular_velocity_difference(self) -> Array:
+    def angular_velocity_deviation(self) -> Array:
         """(k, n) rad/s between the two; no collision changes a spin, so that none is late or early."""
         assert self.other is not None
         return np.abs(self.played.angular_velocity - self.other.angular_velocity)

@@ -111,7 +111,7 @@ def show_mixing(settings: Settings) -> Shown:
                 found.setdefault(run.name, []).append(float(separation(closing)(run.trajectory)[0]))
         if e == SHOWN:
             film = filmed(scenario, runs)
-    curves = [Curve(name, stated, found[name], dots=True) for name in names]
+    curves = [*(Curve(name, stated, found[name], dots=True) for name in names), Curve(TRUTH, stated, stated)]
     facts = [("replayed: e on each of the two disks", number(SHOWN)), distance(curves, "pymunk:shipped", "")]
     curves.append(Curve(TRUTH, stated, stated))
     chart = LessonChart("Restitution of a pair", "e on each of the two disks", "e of the collision", curves)

@@ -14,7 +14,7 @@ import numpy as np
 from adapters.engines import ENGINES
 from scenarios.model import Scenario
 
-ENGINES = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")  # wherever in these folders a file lies
+SOURCES = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")  # wherever in these folders a file lies
 ROOT = Path(__file__).parents[2]
 DECIDING = ("mini-racer", "numba", "numpy", "crosscheck2d")  # besides the distributions of the engines
 
@@ -83,5 +83,5 @@ def versions() -> dict[str, str]:
 @cache
 def source_hash(root: Path = ROOT) -> str:
     """A hash over the engines' source, so that a changed adapter is a changed cell."""
-    files = sorted(path for pattern in ENGINES for path in root.glob(pattern))
+    files = sorted(path for pattern in SOURCES for path in root.glob(pattern))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
