@@ -79,7 +79,7 @@ ADDED: dict[str, list[Added]] = {
         Added(
             "adapters/engines.py",
             '    "toy:plain": Row(_toy, "flies through everything", 0.5, FLOAT64, distributions=("typer",),\n'
-            '                     features={"as it is": {}}, variants={"as_it_is": Variant({}, "nothing")}),\n',
+            '                     options={"as it is": {}}, variants={"as_it_is": Variant({}, "nothing")}),\n',
             "}  # fmt: skip\n\nOWN",
         ),
     ],
