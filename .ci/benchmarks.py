@@ -1,7 +1,9 @@
-"""The kept tables of speed and the README's picture: uv run python .ci/benchmarks.py, alone on the machine.
+"""The kept tables of speed and the README's picture: uv run python .ci/benchmarks.py, alone on the
+machine.
 
-It takes about a quarter of an hour on two cores, says so, and goes on where it was interrupted. With --check it
-measures a few ratios anew, in a few seconds, and says, by its exit status too, whether they are still what is kept.
+It takes about a quarter of an hour on two cores, says so, and goes on where it was interrupted.
+With --check it measures a few ratios anew, in a few seconds, and says, by its exit status too,
+whether they are still what is kept.
 """
 
 import subprocess
@@ -15,7 +17,8 @@ from reports.speed import figures, sizes
 from reports.speed.timing import summed_up
 
 OUT = Path("reports/out/speed")
-ROUNDS, BUDGET, PATIENCE = 25, 1.0, 10.0  # the fastest of many short samples: CI machines are seldom alone
+# the fastest of many short samples: CI machines are seldom alone
+ROUNDS, BUDGET, PATIENCE = 25, 1.0, 10.0
 
 
 def make() -> None:
@@ -23,21 +26,34 @@ def make() -> None:
     crosscheck = Path(sys.executable).parent / "crosscheck"
     subprocess.run([crosscheck, "speed", "--full", "--resume", "--out", OUT], check=True)
     figures.keep(OUT)
-    subprocess.run([sys.executable, Path(__file__).parent / "picture.py", OUT / "speed.html"], check=True)
+    subprocess.run(
+        [sys.executable, Path(__file__).parent / "picture.py", OUT / "speed.html"], check=True
+    )
     kept = ", ".join(str(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED))
-    print(f"kept: {kept}, reports/speed/speed.png; what README.md says: python -m tests.reports.speed.statements")
+    print(
+        f"kept: {kept}, reports/speed/speed.png; what README.md says: python -m"
+        " tests.reports.speed.statements"
+    )
 
 
 def check() -> list[str]:
     """What has drifted since the figures were kept; every ratio is printed."""
-    print(f"the cost of a step against reference:exercise, the fastest of {ROUNDS} rounds", flush=True)
+    print(
+        f"the cost of a step against reference:exercise, the fastest of {ROUNDS} rounds", flush=True
+    )
     engines = {name: row.make for name, row in ENGINES.items()}
     samples, _ = sizes.costs(engines, figures.GATED, ROUNDS, BUDGET, PATIENCE, seed=0)
     rows = [
-        dict(zip(("engine", "profile"), sample.key[0].split(":")), at=sample.key[1], **sample._asdict())
+        dict(
+            zip(("engine", "profile"), sample.key[0].split(":")),
+            at=sample.key[1],
+            **sample._asdict(),
+        )
         for sample in samples
     ]
-    fresh = summed_up(pd.DataFrame(rows), ["engine", "profile", "at"]).assign(figure="cost of a step")
+    fresh = summed_up(pd.DataFrame(rows), ["engine", "profile", "at"]).assign(
+        figure="cost of a step"
+    )
     kept, now = figures.ratios(figures.read()), figures.ratios(fresh)
     for (name, n), ratio in now.items():
         print(f"{name:22} {n:5} disks  {ratio:8.3g}  kept {kept.get((name, n), float('nan')):8.3g}")

@@ -16,7 +16,8 @@ from reports.game.server import Game
 from tests.reports.page.browsing import chromium, served
 
 LEGEND = """() => Plotly.relayout(document.querySelector('#pooled .plot'), {
-  showlegend: true, legend: { x: 1.02, y: 1, itemwidth: 40 }, 'margin.r': 230, 'font.size': 13, autosize: true })"""
+  showlegend: true, legend: { x: 1.02, y: 1, itemwidth: 40 },
+  'margin.r': 230, 'font.size': 13, autosize: true })"""
 REPORTS = Path(__file__).parent.parent / "reports"
 PAD = 14  # pixels, so that nothing touches the edge
 STEER = """async ([key, down, frames]) => {
@@ -27,7 +28,14 @@ STEER = """async ([key, down, frames]) => {
     while (game.waiting) await new Promise((done) => setTimeout(done));
   }
 }"""
-FLIGHT = [("a", True, 8), ("a", False, 1), ("d", True, 8), ("d", False, 1), ("w", True, 150), ("a", True, 30)]
+FLIGHT = [
+    ("a", True, 8),
+    ("a", False, 1),
+    ("d", True, 8),
+    ("d", False, 1),
+    ("w", True, 150),
+    ("a", True, 30),
+]
 
 
 def pooled_chart(browser: Browser, page: str) -> None:
@@ -61,7 +69,9 @@ def lesson(browser: Browser, url: str) -> None:
     tab.wait_for_function("() => window.lesson")
     tab.locator(".sliders [name=order]").fill("2")
     tab.evaluate("lesson.ready")
-    tab.add_style_tag(content=".stage-lesson .player{display:none!important}:focus{outline:none!important}")
+    tab.add_style_tag(
+        content=".stage-lesson .player{display:none!important}:focus{outline:none!important}"
+    )
     clip(tab, "lessons/lesson.png", "h1", ".facts-table")
 
 

@@ -1,5 +1,5 @@
-"""box2d-py 2.3.8 (Box2D 2.3), float32: collide at the old position, then one velocity solve, then position
-correction."""
+"""box2d-py 2.3.8 (Box2D 2.3), float32: collide at the old position, then one velocity solve, then
+position correction."""
 
 from __future__ import annotations
 
@@ -42,26 +42,48 @@ MATCHED: dict[str, Any] = {
     "warm_starting": True,
     "skin": False,
 }
-"""What the profiles choose: `time_unit` in s, `length_unit` in smallest radii, position iterations at e < 1 and at
-e = 1. `adapters/matched.csv` holds what else was tried."""
+"""What the profiles choose: `time_unit` in s, `length_unit` in smallest radii, position iterations
+at e < 1 and at e = 1. `adapters/matched.csv` holds what else was tried."""
 
 SEARCHED = Searched(
     MATCHED,
     {
         "velocity_iterations": ((8, 20, 50, 100), "passes of the impulse solver; the manual has 8"),
-        "position_iterations": ((0, 1, 3, 8), "passes of the position correction at e < 1; the manual: 3"),
+        "position_iterations": (
+            (0, 1, 3, 8),
+            "passes of the position correction at e < 1; the manual: 3",
+        ),
         "elastic_position_iterations": ((0, 3), "the same at e = 1"),
-        "continuous": ((False, True), "continuous collision with walls and static disks; on by default"),
+        "continuous": (
+            (False, True),
+            "continuous collision with walls and static disks; on by default",
+        ),
         "bullet": ((False, True), "the same between disks that move, where `continuous` is on"),
         "elastic_continuous": ((False, True), "as `continuous`, at e = 1 without gravity"),
         "elastic_bullet": ((False, True), "as `bullet`, at e = 1 without gravity"),
-        "sub_stepping": ((False, True), "one continuous collision a call, where `continuous` is on"),
+        "sub_stepping": (
+            (False, True),
+            "one continuous collision a call, where `continuous` is on",
+        ),
         "warm_starting": ((True, False), "begin with the impulses of the last step; on by default"),
-        "time_unit": ((1.0, 1e3, 1e4),
-            "s; closing speeds below a unit of length in a unit of time are inelastic, which is compiled in"),
-        "length_unit": ((0.125, 0.25, 0.5, 1.0, 3.0),
-            "smallest radii; slop 0.005, tolerance of continuous collision 0.015 and cap 2 units are compiled in"),
-        "step_unit": ((1.0, 2.0, 4.0), "ways of the fastest disk in a step: a unit of length at least"),
+        "time_unit": (
+            (1.0, 1e3, 1e4),
+            (
+                "s; closing speeds below a unit of length in a unit of time are inelastic, which is"
+                " compiled in"
+            ),
+        ),
+        "length_unit": (
+            (0.125, 0.25, 0.5, 1.0, 3.0),
+            (
+                "smallest radii; slop 0.005, tolerance of continuous collision 0.015 and cap 2"
+                " units are compiled in"
+            ),
+        ),
+        "step_unit": (
+            (1.0, 2.0, 4.0),
+            "ways of the fastest disk in a step: a unit of length at least",
+        ),
     },
     (
         (("continuous", "bullet"), (False, True), (False, True)),
@@ -71,27 +93,31 @@ SEARCHED = Searched(
     {
         "radius of an edge (wall skin)": f"0: {GEOMETRY}",
         "walls of boxes or chains": "two-sided segments are what the scene states",
-        "b2_velocityThreshold, b2_linearSlop, b2_maxTranslation, b2_baumgarte, b2_toiSlop":
-            "compiled in; the binding's attributes of these names are copies; moved by the units alone",
+        "b2_velocityThreshold, b2_linearSlop, b2_maxTranslation, b2_baumgarte, b2_toiSlop": (
+            "compiled in; the binding's attributes of these names are copies; moved by the units"
+            " alone"
+        ),
         "contact.restitution in PreSolve": "Python code in place of the engine's own collision law",
         "friction, linearDamping, sleeping": "0, 0 and off: as the scene states",
     },
-)  # fmt: skip
+)
 
 
 class Box2DEngine:
     """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
 
-    `matched`: the scene in other units. Box2D treats collisions below 1 unit of length per unit of time as
-    inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The length unit
-    is a quarter of the smallest radius, which shrinks slop and the tolerance of continuous collision; or twice what
-    the fastest disk moves in a step where that is more, because nothing moves by more than 2 units a step; a scene that
-    comes there all the same is refused. Continuous collision, between disks, too, puts collisions at their own time
-    within a step; without gravity at e = 1 there is none, because it creates energy in a gas. No friction, sleep or
-    wall skin; at e = 1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
+    `matched`: the scene in other units. Box2D treats collisions below 1 unit of length per unit of
+    time as inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The
+    length unit is a quarter of the smallest radius, which shrinks slop and the tolerance of
+    continuous collision; or twice what the fastest disk moves in a step where that is more, because
+    nothing moves by more than 2 units a step; a scene that comes there all the same is refused.
+    Continuous collision, between disks, too, puts collisions at their own time within a step;
+    without gravity at e = 1 there is none, because it creates energy in a gas. No friction, sleep
+    or wall skin; at e = 1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
 
-    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the profile's),
-    `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.
+    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
+    profile's), `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of
+    `MATCHED`.
     """
 
     listening, wrapping = True, 0.0
@@ -115,7 +141,8 @@ class Box2DEngine:
         """Build a new world in the profile's units."""
         self.scene, self.dt, self.steps = scene, dt, 0
         chosen = self.chosen
-        self.time, self.length = 1.0, 1.0  # s in one unit of the engine's time, units of its length in one m
+        # s in one unit of the engine's time, units of its length in one m
+        self.time, self.length = 1.0, 1.0
         if self.matched:
             self.time = chosen["time_unit"]
             least = chosen["length_unit"] * scene.radius.min()
@@ -143,7 +170,8 @@ class Box2DEngine:
         self.continuous, self.bullet = chosen[elastic + "continuous"], chosen[elastic + "bullet"]
         self.world.continuousPhysics = self.continuous
         self.world.subStepping = chosen["sub_stepping"]
-        self.world.SetAllowSleeping(self.sleeping)  # `doSleep` only sets a Python attribute that the engine never sees
+        # `doSleep` only sets a Python attribute that the engine never sees
+        self.world.SetAllowSleeping(self.sleeping)
         self.world.warmStarting = chosen["warm_starting"]
         self.velocity_iterations = chosen["velocity_iterations"]
         self.position_iterations = chosen[
@@ -160,7 +188,11 @@ class Box2DEngine:
         scene, length = self.scene, self.length
         shape = Box2D.b2CircleShape(radius=float(scene.radius[i]) * length)
         fixture = Box2D.b2FixtureDef(shape=shape, density=1.0, **self._surface())
-        place = {"position": vector(scene.position[i] * length), "angle": float(scene.angle[i]), "userData": i}
+        place = {
+            "position": vector(scene.position[i] * length),
+            "angle": float(scene.angle[i]),
+            "userData": i,
+        }
         if scene.static[i]:
             return self.world.CreateStaticBody(**place, fixtures=fixture)
         body = self.world.CreateDynamicBody(
@@ -192,7 +224,8 @@ class Box2DEngine:
         self.bodies[disk].ApplyTorque(float(torque * self.length**2 * per_time2), True)
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `Step`; where the scene wraps, disks that leave are set onto the opposite edge."""
+        """`count` calls of `Step`; where the scene wraps, disks that leave are set onto the
+        opposite edge."""
         dt = self.dt / self.time
         for _ in range(count):
             self.world.Step(dt, self.velocity_iterations, self.position_iterations)
@@ -208,24 +241,34 @@ class Box2DEngine:
         for body in self.bodies:
             x, y = body.position
             if not (x0 <= x <= x1 and y0 <= y <= y1):
-                over = (x1 if x < x0 else x0 if x > x1 else x, y1 if y < y0 else y0 if y > y1 else y)
+                over = (
+                    x1 if x < x0 else x0 if x > x1 else x,
+                    y1 if y < y0 else y0 if y > y1 else y,
+                )
                 body.transform = (over, body.angle)
 
     def read(self) -> State:
         """Attribute by attribute: box2d-py has no bulk read."""
         n, bodies = self.scene.n, self.bodies
         position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2) / self.length
-        velocity = np.array([tuple(b.linearVelocity) for b in bodies], float).reshape(n, 2) / self.speed
+        velocity = (
+            np.array([tuple(b.linearVelocity) for b in bodies], float).reshape(n, 2) / self.speed
+        )
         angle = np.array([b.angle for b in bodies], float)
         angular_velocity = np.array([b.angularVelocity for b in bodies], float) / self.time
         if self.matched:
-            must_not_be_cut("speed", np.hypot(velocity[:, 0], velocity[:, 1]), self.speed_cap, "m/s")
+            must_not_be_cut(
+                "speed", np.hypot(velocity[:, 0], velocity[:, 1]), self.speed_cap, "m/s"
+            )
             must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
         return State(position, velocity, angle, angular_velocity)
 
     def collisions(self) -> list[ContactImpulse]:
         """From `PostSolve`, impulses back in N s."""
-        return [ContactImpulse(step, i, j, impulse / self.speed) for step, i, j, impulse in self.listener.log]
+        return [
+            ContactImpulse(step, i, j, impulse / self.speed)
+            for step, i, j, impulse in self.listener.log
+        ]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """Resolved values are read back from the world, a fixture and the engine's constants."""
@@ -244,7 +287,10 @@ class Box2DEngine:
             "restitution": (self.scene.restitution, fixture.restitution),
             "sleeping": (self.sleeping if matched else None, world.GetAllowSleeping()),
             "continuous collision": (self.continuous if matched else None, world.continuousPhysics),
-            "continuous collision between disks": (self.bullet if matched else None, self._bullets()),
+            "continuous collision between disks": (
+                self.bullet if matched else None,
+                self._bullets(),
+            ),
             "sub-stepping": (chosen["sub_stepping"] if matched else None, world.subStepping),
             "warm starting": (chosen["warm_starting"] if matched else None, world.warmStarting),
             "velocity, position iterations": (iterations, PASSED),

@@ -1,4 +1,5 @@
-"""pyb2d3 0.11 (Box2D v3.1), float32: soft substeps with speculative contacts, then one restitution sweep."""
+"""pyb2d3 0.11 (Box2D v3.1), float32: soft substeps with speculative contacts, then one restitution
+sweep."""
 
 from __future__ import annotations
 
@@ -36,15 +37,18 @@ MATCHED: dict[str, Any] = {
     "continuous": False,
     "bullet": False,
 }
-"""What the profiles choose: `length_unit` in smallest radii; `hertz`, `damping_ratio` and `push_speed` (m/s) are of the
-contacts. `adapters/matched.csv` holds what else was tried."""
+"""What the profiles choose: `length_unit` in smallest radii; `hertz`, `damping_ratio` and
+`push_speed` (m/s) are of the contacts. `adapters/matched.csv` holds what else was tried."""
 
 SEARCHED = Searched(
     MATCHED,
     {
         "length_unit": (
             (0.02, 0.1, 0.3, 0.5, 0.7, 1.0, 2.0),
-            "smallest radii; sets slop (0.005 units) and the margin in which contacts are foreseen (0.02 units)",
+            (
+                "smallest radii; sets slop (0.005 units) and the margin in which contacts are"
+                " foreseen (0.02 units)"
+            ),
         ),
         "substeps": ((1, 2, 4, 8), "of a step; the manual has 4"),
         "hertz": (
@@ -52,8 +56,14 @@ SEARCHED = Searched(
             "stiffness of a contact; 30 by default; cut at an eighth of the substeps a second",
         ),
         "damping_ratio": ((1.0, 3.0, 10.0, 30.0), "of a contact; 10 by default"),
-        "push_speed": ((0.0, 0.3, 3.0, 30.0), "m/s, at most, of a position correction; 3 by default"),
-        "continuous": ((False, True), "continuous collision with walls and static disks; on by default"),
+        "push_speed": (
+            (0.0, 0.3, 3.0, 30.0),
+            "m/s, at most, of a position correction; 3 by default",
+        ),
+        "continuous": (
+            (False, True),
+            "continuous collision with walls and static disks; on by default",
+        ),
         "bullet": ((False, True), "the same between disks that move, where `continuous` is on"),
     },
     (
@@ -74,7 +84,8 @@ SEARCHED = Searched(
     },
 )
 
-LENGTH_UNIT = Lock()  # it is global to the process: threads take turns, or worlds would be made in another's unit
+# it is global to the process: threads take turns, or worlds would be made in another's unit
+LENGTH_UNIT = Lock()
 
 
 def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
@@ -91,14 +102,16 @@ def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
 class Box2DV3:
     """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
 
-    `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap. The length unit is half of
-    the smallest radius: slop and speculative margin are shares of it, and a larger margin foresees more collisions, but
-    this is the largest without a spurious collision where two disks pass at 1 % of a radius. Contacts are as stiff as
-    the engine lets them be, an eighth of the substeps a second. The values are `MATCHED`, by `crosscheck tune`. The cap
-    on spins cannot be lifted: a scene that reaches it is refused.
+    `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap. The
+    length unit is half of the smallest radius: slop and speculative margin are shares of it, and a
+    larger margin foresees more collisions, but this is the largest without a spurious collision
+    where two disks pass at 1 % of a radius. Contacts are as stiff as the engine lets them be, an
+    eighth of the substeps a second. The values are `MATCHED`, by `crosscheck tune`. The cap on
+    spins cannot be lifted: a scene that reaches it is refused.
 
-    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the profile's),
-    `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of `MATCHED`.
+    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
+    profile's), `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of
+    `MATCHED`.
     """
 
     listening, wrapping = True, 0.0
@@ -120,12 +133,19 @@ class Box2DV3:
 
     @in_its_unit
     def load(self, scene: Scene, dt: float) -> None:
-        """Build a new world; the length unit is global to the process, so each profile sets its own."""
+        """Build a new world; the length unit is global to the process, so each profile sets its
+        own."""
         must_fit(
-            position=scene.position, velocity=scene.velocity, radius=scene.radius, mass=scene.mass,
-            inertia=scene.inertia, angle=scene.angle, angular_velocity=scene.angular_velocity,
-            walls=scene.walls, gravity=scene.gravity,
-        )  # fmt: skip
+            position=scene.position,
+            velocity=scene.velocity,
+            radius=scene.radius,
+            mass=scene.mass,
+            inertia=scene.inertia,
+            angle=scene.angle,
+            angular_velocity=scene.angular_velocity,
+            walls=scene.walls,
+            gravity=scene.gravity,
+        )
         self.scene, self.dt, self.steps = scene, dt, 0
         self.log: list[ContactImpulse] = []
         self.unit = float(self.chosen["length_unit"] * scene.radius.min()) if self.matched else 1.0
@@ -146,13 +166,19 @@ class Box2DV3:
             self.every.append(body)
         for w in range(len(scene.walls)):
             self._wall(w)
-        self.angle, self.spin, self.seen = np.array(scene.angle), np.array(scene.angular_velocity), 0
+        self.angle, self.spin, self.seen = (
+            np.array(scene.angle),
+            np.array(scene.angular_velocity),
+            0,
+        )
 
     def _tuning(self) -> tuple[float, float, float]:
         return self.chosen["hertz"], self.chosen["damping_ratio"], self.chosen["push_speed"]
 
     def _options(self) -> dict[str, float]:
-        options = {name: self.chosen[name] for name in ("restitution_threshold",) if name in self.chosen}
+        options = {
+            name: self.chosen[name] for name in ("restitution_threshold",) if name in self.chosen
+        }
         return options | ({"maximum_linear_speed": 1e9} if self.matched else {})
 
     def _shape(self) -> Any:
@@ -198,7 +224,8 @@ class Box2DV3:
 
     @in_its_unit
     def step(self, count: int = 1) -> None:
-        """`count` calls of `step`; collision events live for one step, so they are collected after each."""
+        """`count` calls of `step`; collision events live for one step, so they are collected after
+        each."""
         pyb2d3.set_length_units_per_meter(self.unit)  # another world may have set its own since
         for _ in range(count):
             self.world.step(self.dt, self.substeps)
@@ -227,7 +254,8 @@ class Box2DV3:
             self.bodies[i].set_transform(vector(over), self.bodies[i].rotation)
 
     def read(self) -> State:
-        """All bodies at once, as float32; the engine keeps (cos, sin), so the angle is unwound from read to read."""
+        """All bodies at once, as float32; the engine keeps (cos, sin), so the angle is unwound from
+        read to read."""
         n, every = self.scene.n, self.every
         position = every.get_positions(np.empty((n, 2), np.float32)).astype(float)
         velocity = every.get_linear_velocities(np.empty((n, 2), np.float32)).astype(float)
@@ -254,7 +282,10 @@ class Box2DV3:
         matched, world, options = self.matched, self.world, self.options
         return {
             "length unit in m": (self.unit if matched else None, self.unit_found),
-            "restitution threshold in m/s": (options.get("restitution_threshold"), world.restitution_threshold),
+            "restitution threshold in m/s": (
+                options.get("restitution_threshold"),
+                world.restitution_threshold,
+            ),
             "speed cap in m/s": (options.get("maximum_linear_speed"), NOT_READABLE),
             "spin cap in rad/s": (None, NOT_READABLE),
             "linear slop in m": (None, NOT_READABLE),
@@ -266,7 +297,10 @@ class Box2DV3:
             "friction": (self.friction, self.bodies[0].shapes[0].friction),
             "restitution": (self.scene.restitution, self.bodies[0].shapes[0].restitution),
             "sleeping": (self.sleeping if matched else None, world.sleeping_enabled),
-            "continuous collision": (self.chosen["continuous"] if matched else None, world.continuous_enabled),
+            "continuous collision": (
+                self.chosen["continuous"] if matched else None,
+                world.continuous_enabled,
+            ),
             "continuous collision between disks": (
                 self.chosen["bullet"] if matched else None,
                 any(body.bullet for body in self.bodies),

@@ -84,35 +84,56 @@ def _what_moves_is_a_bullet(engine: Any) -> None:
 # What all profiles of an engine have in common.
 _Reference = partial(EngineRow, mark=Mark("#0a4f9e", "#6cb8ff", "circle"))
 _Pymunk = partial(
-    EngineRow, distributions=("pymunk",), mark=Mark("#d1540a", "#ff9a4d", "triangle-up"), searched=_pymunk_searched,
+    EngineRow,
+    distributions=("pymunk",),
+    mark=Mark("#d1540a", "#ff9a4d", "triangle-up"),
+    searched=_pymunk_searched,
     work=Work("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
-)  # fmt: skip
+)
 _Box2D = partial(
-    EngineRow, distributions=("box2d-py",), mark=Mark("#00876c", "#5be0b5", "square"), searched=_box2d_searched,
+    EngineRow,
+    distributions=("box2d-py",),
+    mark=Mark("#00876c", "#5be0b5", "square"),
+    searched=_box2d_searched,
     work=Work("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
-)  # fmt: skip
+)
 _Box2DV3 = partial(
-    EngineRow, distributions=("pyb2d3",), mark=Mark("#b84fb0", "#c46bd8", "diamond"), searched=_box2d_v3_searched,
+    EngineRow,
+    distributions=("pyb2d3",),
+    mark=Mark("#b84fb0", "#c46bd8", "diamond"),
+    searched=_box2d_v3_searched,
     work=Work("substeps", "substeps", (1, 2, 4, 8, 16)),
-)  # fmt: skip
+)
 _BULLETS = "continuous collision, what moves is a bullet"
 
 ENGINES: dict[str, EngineRow] = {
     "reference:exercise": _Reference(
-        _exercise, "hand-written solver of exercise 11: symplectic Euler, project, impulse", 1.0, FLOAT64,
+        _exercise,
+        "hand-written solver of exercise 11: symplectic Euler, project, impulse",
+        1.0,
+        FLOAT64,
         options={"kept in float32": {"precision": np.float32}},
     ),
     "reference:lesson": _Reference(
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
     ),
     "reference:ordered": _Reference(
-        _ordered, "hand-written: exact flight, collisions in the order in which they happen within a step", 0.5, FLOAT64
+        _ordered,
+        "hand-written: exact flight, collisions in the order in which they happen within a step",
+        0.5,
+        FLOAT64,
     ),
     "pymunk:shipped": _Pymunk(
-        partial(_pymunk, "shipped"), "pymunk 7.3 as it comes: elasticity e on every shape", 0.0, FLOAT64
+        partial(_pymunk, "shipped"),
+        "pymunk 7.3 as it comes: elasticity e on every shape",
+        0.0,
+        FLOAT64,
     ),
     "pymunk:matched": _Pymunk(
-        partial(_pymunk, "matched"), "pymunk, matched: elasticity sqrt(e), small slop", 0.0, FLOAT64,
+        partial(_pymunk, "matched"),
+        "pymunk, matched: elasticity sqrt(e), small slop",
+        0.0,
+        FLOAT64,
         options={
             "50 iterations, not 10": {"iterations": 50},
             "200 iterations, not 10": {"iterations": 200},
@@ -122,15 +143,22 @@ ENGINES: dict[str, EngineRow] = {
         },
         variants={
             "fifty_iterations": Variant({"iterations": 50}, "50 iterations for 10"),
-            "position_correction": Variant({"collision_bias": (1 - 0.1) ** 60}, "position correction as shipped"),
+            "position_correction": Variant(
+                {"collision_bias": (1 - 0.1) ** 60}, "position correction as shipped"
+            ),
         },
     ),
     "box2d:shipped": _Box2D(
-        partial(_box2d, "shipped"), "box2d-py 2.3.8 as it comes: friction, sleep, threshold 1 m/s", 1.0, FLOAT32
+        partial(_box2d, "shipped"),
+        "box2d-py 2.3.8 as it comes: friction, sleep, threshold 1 m/s",
+        1.0,
+        FLOAT32,
     ),
     "box2d:matched": _Box2D(
         partial(_box2d, "matched"),
-        "box2d-py, matched: units that lift its thresholds; CCD; no friction, sleep", 1.0, FLOAT32,
+        "box2d-py, matched: units that lift its thresholds; CCD; no friction, sleep",
+        1.0,
+        FLOAT32,
         options={
             "1 iteration, not 8": {"velocity_iterations": 1},
             "30 iterations, not 8": {"velocity_iterations": 30},
@@ -142,16 +170,22 @@ ENGINES: dict[str, EngineRow] = {
             "no rotation": {"turning": False},
         },
         variants={
-            "bullets": Variant({"elastic_continuous": True, "continuous": True}, _BULLETS, _what_moves_is_a_bullet)
+            "bullets": Variant(
+                {"elastic_continuous": True, "continuous": True}, _BULLETS, _what_moves_is_a_bullet
+            )
         },
     ),
     "box2d_v3:shipped": _Box2DV3(
         partial(_box2d_v3, "shipped"),
-        "Box2D 3.1 (pyb2d3) as it comes: friction, sleep, threshold 1 m/s", 0.625, FLOAT32
+        "Box2D 3.1 (pyb2d3) as it comes: friction, sleep, threshold 1 m/s",
+        0.625,
+        FLOAT32,
     ),
     "box2d_v3:matched": _Box2DV3(
         partial(_box2d_v3, "matched"),
-        "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction", 0.625, FLOAT32,
+        "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction",
+        0.625,
+        FLOAT32,
         options={
             "1 substep, not 4": {"substeps": 1},
             "16 substeps, not 4": {"substeps": 16},
@@ -166,10 +200,13 @@ ENGINES: dict[str, EngineRow] = {
         },
     ),
     "event_driven:float64": EngineRow(
-        _event_driven, "event by event without steps: parabolas and contact times, in float64", 0.5, FLOAT64,
+        _event_driven,
+        "event by event without steps: parabolas and contact times, in float64",
+        0.5,
+        FLOAT64,
         mark=Mark("#6b5f00", "#d9c84a", "star"),
     ),
-}  # fmt: skip
+}
 
 OWN = ":own"  # the profile of a solver's file, whose path is its engine
 
@@ -190,7 +227,8 @@ def row_of(name: str) -> EngineRow:
 
 
 def read_row(name: str) -> EngineRow:
-    """The row of a solver's file, `PATH:own`, as it is now; `row_of` gives it from now on. Raises `NotASolver`."""
+    """The row of a solver's file, `PATH:own`, as it is now; `row_of` gives it from now on. Raises
+    `NotASolver`."""
     from adapters.own_solver.engine import engine_file
 
     _read[name] = row = engine_file(Path(name.removesuffix(OWN)))

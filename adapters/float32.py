@@ -9,19 +9,28 @@ from scenarios.model import Array, Scene
 
 
 def must_fit(**quantities: Array) -> None:
-    """Raise `Unsupported` if a number, in the engine's units, overflows in float32, or a size or mass underflows."""
+    """Raise `Unsupported` if a number, in the engine's units, overflows in float32, or a size or
+    mass underflows."""
     largest, smallest = float(np.finfo(np.float32).max), float(np.finfo(np.float32).tiny)
     for name, given in quantities.items():
         values = np.abs(given)
-        too_small = values < smallest if name in ("radius", "mass", "inertia") else np.zeros_like(values, bool)
+        too_small = (
+            values < smallest
+            if name in ("radius", "mass", "inertia")
+            else np.zeros_like(values, bool)
+        )
         for bad in values[too_small | (np.isfinite(values) & (values > largest))]:
             raise Unsupported(f"{name} {bad:g} does not fit into float32")
 
 
 def must_not_be_cut(what: str, values: Array, cap: float, unit: str) -> None:
-    """Raise `Unsupported` where the engine has cut `values` to its cap: a scene is played as it is or not at all."""
-    if np.abs(values).max() > cap * (1 - 1e-5):  # float32 leaves what was cut a little below the cap
-        raise Unsupported(f"a disk reaches a {what} of {cap:g} {unit}, where Box2D cuts it at this dt")
+    """Raise `Unsupported` where the engine has cut `values` to its cap: a scene is played as it is
+    or not at all."""
+    # float32 leaves what was cut a little below the cap
+    if np.abs(values).max() > cap * (1 - 1e-5):
+        raise Unsupported(
+            f"a disk reaches a {what} of {cap:g} {unit}, where Box2D cuts it at this dt"
+        )
 
 
 def rounding(scene: Scene) -> float:

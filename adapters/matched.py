@@ -9,17 +9,23 @@ from pathlib import Path
 from typing import Any
 
 TABLE = Path(__file__).with_suffix(".csv")
-GEOMETRY = "it would move what the scene states, so that a late collision and a wrong place make up for each other"
+GEOMETRY = (
+    "it would move what the scene states, so that a late collision and a wrong place make up for"
+    " each other"
+)
 
 
 @dataclass(frozen=True)
 class Searched:
-    """The public settings of an engine, of which `crosscheck tune` searches those of the matched profile.
+    """The public settings of an engine, of which `crosscheck tune` searches those of the matched
+    profile.
 
     Attributes:
         chosen: setting -> its value in the matched profile now; a test holds it to the table.
-        settings: setting -> (the values that are tried beside the chosen one, what it does and in which unit it is).
-        pairs: two settings that act on the same thing, tried together: names, values of the first, of the second.
+        settings: setting -> (the values that are tried beside the chosen one, what it does and in
+            which unit it is).
+        pairs: two settings that act on the same thing, tried together: names, values of the first,
+            of the second.
         left_alone: a setting that is not chosen by a search -> why.
     """
 
@@ -39,5 +45,6 @@ def chosen(engine: str, path: Path = TABLE) -> dict[str, str]:
     """Setting -> its value as the table has it, of what was searched for an engine."""
     return {
         row["setting"]: row["value"]
-        for row in searched(path) if row["engine"] == engine and row["verdict"] == "chosen"
-    }  # fmt: skip
+        for row in searched(path)
+        if row["engine"] == engine and row["verdict"] == "chosen"
+    }

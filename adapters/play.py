@@ -15,7 +15,8 @@ from adapters.engine import ContactImpulse, Engine, NotStarted, Unsupported
 from scenarios.model import Array, Collisions, Scenario, Scene, State, Thrust, Trajectory, frozen
 
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
-RUNAWAY = 1e3  # times as far as anything can fly in a scene: a disk beyond that has been thrown by the engine
+# times as far as anything can fly in a scene: a disk beyond that has been thrown by the engine
+RUNAWAY = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +57,14 @@ def unwatched(state: State) -> None:
 
 
 def play_once(
-    make: Callable[[], Engine], name: str, scenario: Scenario, dt: float, watch: Callable[[State], None] = unwatched
+    make: Callable[[], Engine],
+    name: str,
+    scenario: Scenario,
+    dt: float,
+    watch: Callable[[State], None] = unwatched,
 ) -> Run:
-    """`play` on a new engine, which is closed again whatever happens; `make` is `Row.make`, `name` `engine:profile`.
+    """`play` on a new engine, which is closed again whatever happens; `make` is `Row.make`, `name`
+    `engine:profile`.
 
     A library that is missing is a refusal, with its name. Raises what `play` raises.
     """
@@ -72,17 +78,30 @@ def play_once(
         return play(engine, name, scenario, dt, watch)
 
 
-def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callable[[State], None] = unwatched) -> Run:
-    """Play `scenario` in steps of `dt` s, which must divide its sample interval; `name` is `engine:profile`.
+def play(
+    engine: Engine,
+    name: str,
+    scenario: Scenario,
+    dt: float,
+    watch: Callable[[State], None] = unwatched,
+) -> Run:
+    """Play `scenario` in steps of `dt` s, which must divide its sample interval; `name` is
+    `engine:profile`.
 
-    `watch` is shown every good sample as soon as it is there, the start first: a crash leaves no other trace.
-    Refusals, exceptions and runaways become the run's status; only a dt that does not fit raises `ValueError`,
-    want of memory `MemoryError`, and an engine whose process cannot be had `NotStarted`.
+    `watch` is shown every good sample as soon as it is there, the start first: a crash leaves no
+    other trace. Refusals, exceptions and runaways become the run's status; only a dt that does not
+    fit raises `ValueError`, want of memory `MemoryError`, and an engine whose process cannot be had
+    `NotStarted`.
     """
     engine_name, profile = name.split(":")
     substeps = round(scenario.sample_interval / dt)
-    if substeps < 1 or abs(substeps * dt - scenario.sample_interval) > 1e-9 * scenario.sample_interval:
-        raise ValueError(f"dt {dt:g} s does not divide the sample interval {scenario.sample_interval:g} s")
+    if (
+        substeps < 1
+        or abs(substeps * dt - scenario.sample_interval) > 1e-9 * scenario.sample_interval
+    ):
+        raise ValueError(
+            f"dt {dt:g} s does not divide the sample interval {scenario.sample_interval:g} s"
+        )
     states: list[State] = []
     collisions: list[ContactImpulse] = []
     settings: dict[str, tuple[Any, Any]] = {}
@@ -111,11 +130,24 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Callab
     if states:
         collisions = collisions_of(engine)
     trajectory = (
-        gather(scenario, states, first_collisions(collisions, dt, weight_impulse(scenario.scene, dt)))
+        gather(
+            scenario, states, first_collisions(collisions, dt, weight_impulse(scenario.scene, dt))
+        )
         if states
         else None
     )
-    return Run(engine_name, profile, scenario.name, dt, status, reason, trajectory, seconds, settings, versions)
+    return Run(
+        engine_name,
+        profile,
+        scenario.name,
+        dt,
+        status,
+        reason,
+        trajectory,
+        seconds,
+        settings,
+        versions,
+    )
 
 
 def collisions_of(engine: Engine) -> list[ContactImpulse]:
@@ -127,11 +159,14 @@ def collisions_of(engine: Engine) -> list[ContactImpulse]:
 
 
 def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: float) -> float:
-    """Advance `count` steps from step number `first`, applying the thrusts that are on; the seconds inside `step`."""
+    """Advance `count` steps from step number `first`, applying the thrusts that are on; the seconds
+    inside `step`."""
     seconds = 0.0
     for step, acting in thrust_steps(scenario.thrusts, first, count, dt):
         for thrust, share in acting:
-            engine.apply_force(thrust.disk, world_force(thrust, engine) * share, thrust.torque * share)
+            engine.apply_force(
+                thrust.disk, world_force(thrust, engine) * share, thrust.torque * share
+            )
         started = perf_counter()
         engine.step(step)
         seconds += perf_counter() - started
@@ -141,10 +176,12 @@ def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: floa
 def thrust_steps(
     thrusts: Sequence[Thrust], first: int, count: int, dt: float
 ) -> Iterator[tuple[int, list[tuple[Thrust, float]]]]:
-    """Cut steps first .. first + count into (how many, acting): one by one where a thrust is on, else in one go.
+    """Cut steps first .. first + count into (how many, acting): one by one where a thrust is on,
+    else in one go.
 
-    A thrust carries the share of the step during which its thrust is on, so that its impulse is exact. It acts over all
-    of the step: what that displaces a disk by is reported by thrust_grid.py.
+    A thrust carries the share of the step during which its thrust is on, so that its impulse is
+    exact. It acts over all of the step: what that displaces a disk by is reported by
+    thrust_grid.py.
     """
     if not thrusts:
         yield count, []
@@ -152,7 +189,8 @@ def thrust_steps(
     free = 0
     for step in range(first, first + count):
         shares = [(t, min(t.stop / dt, step + 1) - max(t.start / dt, step)) for t in thrusts]
-        if acting := [(t, share) for t, share in shares if share > 1e-9]:  # less is rounding of start / dt
+        # less is rounding of start / dt
+        if acting := [(t, share) for t, share in shares if share > 1e-9]:
             if free:
                 yield free, []
             yield 1, acting
@@ -164,7 +202,8 @@ def thrust_steps(
 
 
 def world_force(thrust: Thrust, engine: Engine) -> Array:
-    """(2,) N in the world frame; a body-frame force is turned by the disk's angle at the start of the step."""
+    """(2,) N in the world frame; a body-frame force is turned by the disk's angle at the start of
+    the step."""
     if thrust.frame == "world":
         return thrust.force
     return turned(thrust.force, engine.read().angle[thrust.disk])
@@ -180,15 +219,26 @@ def reach(scenario: Scenario) -> float:
     """m from the origin, no less than any disk can get in free flight under gravity and thrust."""
     scene, t = scenario.scene, scenario.duration
     thrust = sum(float(np.linalg.norm(one.force)) for one in scenario.thrusts) / scene.mass.min()
-    start = max(np.abs(scene.position).max(), np.abs(scene.walls).max(initial=0.0), scene.radius.max())
-    return float(start + np.abs(scene.velocity).max() * t + (np.linalg.norm(scene.gravity) + thrust) * t * t / 2)
+    start = max(
+        np.abs(scene.position).max(), np.abs(scene.walls).max(initial=0.0), scene.radius.max()
+    )
+    return float(
+        start
+        + np.abs(scene.velocity).max() * t
+        + (np.linalg.norm(scene.gravity) + thrust) * t * t / 2
+    )
 
 
 def fault_of(state: State, farthest: float) -> str:
-    """What is wrong with a state that cannot be gone on from, or ""; `farthest` in m from the origin."""
-    # Asked after every sample, so sums of squares are asked first: they are finite only if every number is.
+    """What is wrong with a state that cannot be gone on from, or ""; `farthest` in m from the
+    origin."""
+    # Asked after every sample, so sums of squares are asked first: they are finite only if every
+    # number is.
     others = state.velocity, state.angle, state.angular_velocity
-    if np.vdot(state.position, state.position) <= farthest * farthest and sum(np.vdot(a, a) for a in others) < np.inf:
+    if (
+        np.vdot(state.position, state.position) <= farthest * farthest
+        and sum(np.vdot(a, a) for a in others) < np.inf
+    ):
         return ""
     for name in ("position", "velocity", "angle", "angular_velocity"):
         values = getattr(state, name)
@@ -205,12 +255,14 @@ def weight_impulse(scene: Scene, dt: float) -> float:
     return float(2 * moving * np.linalg.norm(scene.gravity) * dt)
 
 
-def first_collisions(collisions: Sequence[ContactImpulse], dt: float, weight: float = 0.0) -> Collisions:
+def first_collisions(
+    collisions: Sequence[ContactImpulse], dt: float, weight: float = 0.0
+) -> Collisions:
     """One collision where the impulses of a pair begin; its time is the end of the step.
 
-    An impulse in the step after another of the same pair continues it if it is no larger than `weight` N s, or if
-    the engine does not report how large it is: else it is a collision of its own. Impulses of less than a millionth of
-    the pair's strongest are rounding, and left out.
+    An impulse in the step after another of the same pair continues it if it is no larger than
+    `weight` N s, or if the engine does not report how large it is: else it is a collision of its
+    own. Impulses of less than a millionth of the pair's strongest are rounding, and left out.
     """
     if not collisions:
         return Collisions.of([])
@@ -221,7 +273,9 @@ def first_collisions(collisions: Sequence[ContactImpulse], dt: float, weight: fl
     order = np.lexsort((step, other, disk))
     rows = step[order], disk[order], other[order], impulse[order]
     starts = first_of_pair(rows[1], rows[2])
-    strongest = np.maximum.reduceat(np.nan_to_num(rows[3]), np.flatnonzero(starts))[np.cumsum(starts) - 1]
+    strongest = np.maximum.reduceat(np.nan_to_num(rows[3]), np.flatnonzero(starts))[
+        np.cumsum(starts) - 1
+    ]
     step, disk, other, impulse = (row[~(rows[3] < 1e-6 * strongest)] for row in rows)
     begins = first_of_pair(disk, other) | (np.diff(step, prepend=step[0]) > 1) | (impulse > weight)
     order = np.flatnonzero(begins)[np.lexsort((other[begins], disk[begins], step[begins]))]

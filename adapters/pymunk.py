@@ -1,4 +1,5 @@
-"""pymunk 7 (Munk2D, a fork of Chipmunk), float64: collide at the new position, then one velocity solve."""
+"""pymunk 7 (Munk2D, a fork of Chipmunk), float64: collide at the new position, then one velocity
+solve."""
 
 from __future__ import annotations
 
@@ -14,7 +15,10 @@ from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
 
 FIELDS = (
-    batch.BodyFields.POSITION | batch.BodyFields.ANGLE | batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+    batch.BodyFields.POSITION
+    | batch.BodyFields.ANGLE
+    | batch.BodyFields.VELOCITY
+    | batch.BodyFields.ANGULAR_VELOCITY
 )
 
 DEFAULT_BIAS = (1 - 0.1) ** 60
@@ -25,20 +29,26 @@ MATCHED: dict[str, Any] = {
     "elastic_bias": 1.0,
     "persistence": 1,
 }
-"""What `matched` chooses: `slop` in smallest radii; the biases are what is left of an overlap after 1 s, at e < 1 and
-at e = 1. `adapters/matched.csv` holds what else was tried."""
+"""What `matched` chooses: `slop` in smallest radii; the biases are what is left of an overlap after
+1 s, at e < 1 and at e = 1. `adapters/matched.csv` holds what else was tried."""
 
 SEARCHED = Searched(
     MATCHED,
     {
         "iterations": ((5, 10, 20, 50, 100, 200), "passes of the impulse solver; 10 by default"),
-        "slop": ((0.01, 1e-3, 1e-4, 1e-6, 0.0), "overlap left alone, in smallest radii; 0.1 m by default"),
+        "slop": (
+            (0.01, 1e-3, 1e-4, 1e-6, 0.0),
+            "overlap left alone, in smallest radii; 0.1 m by default",
+        ),
         "bias": (
             (1.0, 0.3, DEFAULT_BIAS, 1e-12, 1e-24, 1e-48, 0.0),
             "share of an overlap that is left after 1 s, at e < 1; 0.0018 by default",
         ),
         "elastic_bias": ((1.0, 0.3, DEFAULT_BIAS, 1e-24, 0.0), "the same at e = 1"),
-        "persistence": ((1, 2, 3), "steps for which a lost contact keeps its impulses; 3 by default"),
+        "persistence": (
+            (1, 2, 3),
+            "steps for which a lost contact keeps its impulses; 3 by default",
+        ),
     },
     (
         (("slop", "bias"), (1e-2, 1e-4, 0.0), (DEFAULT_BIAS, 1e-12, 1e-48, 0.0)),
@@ -58,25 +68,36 @@ SEARCHED = Searched(
 class Pymunk:
     """`shipped`: restitution goes into every shape's elasticity, all else is pymunk's default.
 
-    `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; and `MATCHED`, by `crosscheck tune`: ten
-    iterations, because more cost time and are no nearer; hardly any slop, because the default 0.1 is a length in the
-    scene's units; contacts are forgotten as soon as they part, because one that touches again within three steps
-    inherits an impulse that it is not given again, but that is reported, and may be taken back; at e = 1 no position
-    correction, because it adds energy.
+    `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; and `MATCHED`, by
+    `crosscheck tune`: ten iterations, because more cost time and are no nearer; hardly any slop,
+    because the default 0.1 is a length in the scene's units; contacts are forgotten as soon as they
+    part, because one that touches again within three steps inherits an impulse that it is not given
+    again, but that is reported, and may be taken back; at e = 1 no position correction, because it
+    adds energy.
 
-    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `turning` False gives every disk an
-    infinite inertia, `spatial_hash` (cell in m, count) replaces the tree of the broad phase; a key of `MATCHED` is the
-    matched profile's choice, any other of `settings` an attribute of the space.
+    Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `turning` False gives
+    every disk an infinite inertia, `spatial_hash` (cell in m, count) replaces the tree of the broad
+    phase; a key of `MATCHED` is the matched profile's choice, any other of `settings` an attribute
+    of the space.
     """
 
     listening, wrapping = True, 0.0
 
     def __init__(
-        self, profile: str, *, turning: bool = True, spatial_hash: tuple[float, int] | None = None, **settings: Any
+        self,
+        profile: str,
+        *,
+        turning: bool = True,
+        spatial_hash: tuple[float, int] | None = None,
+        **settings: Any,
     ) -> None:
         self.matched = profile == "matched"
         self.turning, self.spatial_hash = turning, spatial_hash
-        self.chosen = {name: settings.pop(name, value) for name, value in MATCHED.items()} if self.matched else {}
+        self.chosen = (
+            {name: settings.pop(name, value) for name, value in MATCHED.items()}
+            if self.matched
+            else {}
+        )
         self.changed = settings
 
     def load(self, scene: Scene, dt: float) -> None:
@@ -96,9 +117,13 @@ class Pymunk:
         for i in range(scene.n):
             self._add_disk(i)
         for w, (start, end) in enumerate(scene.walls):
-            self._add_shape(pymunk.Segment(self.space.static_body, tuple(start), tuple(end), 0.0), -1 - w)
+            self._add_shape(
+                pymunk.Segment(self.space.static_body, tuple(start), tuple(end), 0.0), -1 - w
+            )
         self.moving = np.flatnonzero(~scene.static)
-        self.start = np.column_stack([scene.position, scene.angle, scene.velocity, scene.angular_velocity])
+        self.start = np.column_stack(
+            [scene.position, scene.angle, scene.velocity, scene.angular_velocity]
+        )
         if self.listening:
             self.space.on_collision(None, None, post_solve=self._record)
         self.buffer = batch.Buffer()
@@ -149,7 +174,8 @@ class Pymunk:
             body.torque += torque
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `space.step`; where the scene wraps, disks that leave are set onto the opposite edge."""
+        """`count` calls of `space.step`; where the scene wraps, disks that leave are set onto the
+        opposite edge."""
         for _ in range(count):
             self.space.step(self.dt)
             self.steps += 1
@@ -163,11 +189,14 @@ class Pymunk:
         low, high = self.scene.wrap
         position = self._rows()[:, :2]
         for row in np.flatnonzero(((position < low) | (position > high)).any(axis=1)):
-            x = np.where(position[row] < low, high, np.where(position[row] > high, low, position[row]))
+            x = np.where(
+                position[row] < low, high, np.where(position[row] > high, low, position[row])
+            )
             self.bodies[self.moving[row]].position = tuple(x)
 
     def _rows(self) -> Array:
-        """(moving, 6): x, y, angle, vx, vy, angular velocity; static bodies follow in the buffer and are cut off."""
+        """(moving, 6): x, y, angle, vx, vy, angular velocity; static bodies follow in the buffer
+        and are cut off."""
         self.buffer.clear()
         batch.get_space_bodies(self.space, FIELDS, self.buffer)
         return np.frombuffer(self.buffer.float_buf()).reshape(-1, 6)[: len(self.moving)]

@@ -29,13 +29,16 @@ METHODS = {  # of the variants by their module
 class Reference:
     """Plays one variant of `reference_impl`, or any module with the `advance` of `exercise`.
 
-    `options` are fields of `World` that the exercise leaves free: split, approaching_only. `precision` is what the
-    disks are kept in: with numpy's float32 the same kernel is compiled once more.
+    `options` are fields of `World` that the exercise leaves free: split, approaching_only.
+    `precision` is what the disks are kept in: with numpy's float32 the same kernel is compiled once
+    more.
     """
 
     listening, wrapping = True, 0.0  # its own step wraps
 
-    def __init__(self, variant: ModuleType, *, precision: type = np.float64, **options: Any) -> None:
+    def __init__(
+        self, variant: ModuleType, *, precision: type = np.float64, **options: Any
+    ) -> None:
         self.variant, self.precision, self.options = variant, precision, options
 
     def load(self, scene: Scene, dt: float) -> None:
@@ -43,15 +46,24 @@ class Reference:
         self.dt, self.steps = dt, 0
         self.log: list[ContactImpulse] = []
         disks = make_disks(
-            scene.position, scene.velocity, scene.radius, scene.mass,
-            scene.inertia, scene.angle, scene.angular_velocity,
-        )  # fmt: skip
+            scene.position,
+            scene.velocity,
+            scene.radius,
+            scene.mass,
+            scene.inertia,
+            scene.angle,
+            scene.angular_velocity,
+        )
         self.disks = Disks(*(array.astype(self.precision) for array in disks))
         low, high = (np.full(2, -np.inf), np.full(2, np.inf)) if scene.wrap is None else scene.wrap
         self.world = World(
-            restitution=float(scene.restitution), gravity=np.array(scene.gravity),
-            walls=np.array(scene.walls), low=np.array(low), high=np.array(high), **self.options,
-        )  # fmt: skip
+            restitution=float(scene.restitution),
+            gravity=np.array(scene.gravity),
+            walls=np.array(scene.walls),
+            low=np.array(low),
+            high=np.array(high),
+            **self.options,
+        )
         self.forced = False
         self._advance(0)  # compiles, if nobody has yet
 
@@ -96,7 +108,10 @@ class Reference:
             return method
         return method | {
             "projection split": (self.options.get("split"), SPLITS[self.world.split]),
-            "approaching pairs only": (self.options.get("approaching_only"), self.world.approaching_only),
+            "approaching pairs only": (
+                self.options.get("approaching_only"),
+                self.world.approaching_only,
+            ),
         }
 
     def versions(self) -> dict[str, str]:
@@ -108,5 +123,6 @@ class Reference:
 
 
 def every_pair() -> Reference:
-    """The exercise as it is written, every pair asked in every step; `reference:exercise` gives the same bits."""
+    """The exercise as it is written, every pair asked in every step; `reference:exercise` gives the
+    same bits."""
     return Reference(exercise)

@@ -1,4 +1,5 @@
-"""What it costs every engine that a force acts for whole steps, where a thrust starts or stops inside one."""
+"""What it costs every engine that a force acts for whole steps, where a thrust starts or stops
+inside one."""
 
 from __future__ import annotations
 
@@ -10,24 +11,30 @@ ROUNDING = 1e-9  # of a step: of start / dt, as in `play`
 
 
 def off_grid(scenario: Scenario, dt: float) -> float:
-    """Radii by which the thrusts that start or stop inside a step of `dt` s displace a disk at most; 0: none does.
+    """Radii by which the thrusts that start or stop inside a step of `dt` s displace a disk at
+    most; 0: none does.
 
-    The force of such a step is lessened so that its impulse is exact, and acts over all of it. A thrust F that is on
-    for a share p of the step moves a disk of mass m by F dt2 p2 / 2m from its start on, and by F dt2 (p - p2 / 2) / m
-    up to its stop; spread over the step by F dt2 p / 2m. The difference is F dt2 p (1 - p) / 2m either way, up to
-    F dt2 / 8m. It stays, grows with every later collision, and is no engine's fault. A torque turns a
-    rim likewise. The displacements of a disk are added up without regard to direction.
+    The force of such a step is lessened so that its impulse is exact, and acts over all of it. A
+    thrust F that is on for a share p of the step moves a disk of mass m by F dt2 p2 / 2m from its
+    start on, and by F dt2 (p - p2 / 2) / m up to its stop; spread over the step by F dt2 p / 2m.
+    The difference is F dt2 p (1 - p) / 2m either way, up to F dt2 / 8m. It stays, grows with every
+    later collision, and is no engine's fault. A torque turns a rim likewise. The displacements of a
+    disk are added up without regard to direction.
     """
     shift = np.zeros(scenario.scene.n)
     for thrust in scenario.thrusts:
         scene, i = scenario.scene, thrust.disk
-        rate = np.linalg.norm(thrust.force) / (scene.mass[i] * scene.radius[i]) + abs(thrust.torque) / scene.inertia[i]
+        rate = (
+            np.linalg.norm(thrust.force) / (scene.mass[i] * scene.radius[i])
+            + abs(thrust.torque) / scene.inertia[i]
+        )
         shift[i] += rate * dt**2 * spread(thrust, scenario.duration, dt)
     return float(shift.max())
 
 
 def spread(thrust: Thrust, duration: float, dt: float) -> float:
-    """Sum of p (1 - p) / 2 over start and stop, p the share of the step for which the thrust is on (or off)."""
+    """Sum of p (1 - p) / 2 over start and stop, p the share of the step for which the thrust is on
+    (or off)."""
     parts = [(at / dt) % 1.0 for at in (thrust.start, thrust.stop) if at < duration]
     return sum(p * (1 - p) / 2 for p in parts if ROUNDING < p < 1 - ROUNDING)
 
@@ -38,4 +45,7 @@ def off_grid_note(scenario: Scenario) -> str:
     found = ", ".join(f"{radii:.2g} radii at dt = {dt:.4g} s" for dt, radii in off.items() if radii)
     if not found:
         return ""
-    return f"a thrust starts or stops inside a step: every engine is off by up to {found}, and more after a collision"
+    return (
+        f"a thrust starts or stops inside a step: every engine is off by up to {found}, and more"
+        " after a collision"
+    )

@@ -1,2 +1,2 @@
-"""The disk solver by hand: `exercise`, `lesson`, `ordered`; `verlet_list` and `neighbours` make the first fast for
-many."""
+"""The disk solver by hand: `exercise`, `lesson`, `ordered`; `verlet_list` and `neighbours` make the
+first fast for many."""

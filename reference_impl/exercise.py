@@ -1,7 +1,8 @@
-"""The solver of Visual Computing exercise 11: symplectic Euler; detect, project, impulse, update for every pair.
+"""The solver of Visual Computing exercise 11: symplectic Euler; detect, project, impulse, update
+for every pair.
 
-Every function is compiled by numba from the source you read; with NUMBA_DISABLE_JIT=1 the same source
-runs as plain Python and gives the same bits.
+Every function is compiled by numba from the source you read; with NUMBA_DISABLE_JIT=1 the same
+source runs as plain Python and gives the same bits.
 """
 
 from math import inf, sqrt
@@ -12,7 +13,8 @@ from reference_impl.state import BY_INVERSE_MASS, EQUAL, Disks, World
 
 @compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
-    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall w as j = -1 - w."""
+    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
+    w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
         step(disks, world, dt, k, collisions)
@@ -21,7 +23,8 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 
 @compiled
 def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> None:
-    """One step, as `performSimStep`: integrate all, collide every pair i < j in order, then the edges of the world."""
+    """One step, as `performSimStep`: integrate all, collide every pair i < j in order, then the
+    edges of the world."""
     integrate(disks, world, dt)
     n = len(disks.radius)
     for i in range(n):
@@ -35,8 +38,15 @@ def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> Non
 
 @kernel
 def integrate(disks: Disks, world: World, dt: float) -> None:
-    """Task 1, symplectic Euler: velocities from force and torque, then positions from the NEW velocities."""
-    x, v, g, force, torque = disks.position, disks.velocity, world.gravity, disks.force, disks.torque
+    """Task 1, symplectic Euler: velocities from force and torque, then positions from the NEW
+    velocities."""
+    x, v, g, force, torque = (
+        disks.position,
+        disks.velocity,
+        world.gravity,
+        disks.force,
+        disks.torque,
+    )
     for i in range(len(disks.mass)):
         if disks.mass[i] == inf:
             continue
@@ -51,14 +61,16 @@ def integrate(disks: Disks, world: World, dt: float) -> None:
 
 @kernel
 def collide(disks: Disks, a: int, b: int, world: World) -> float:
-    """Task 2, one pair; returns the impulse J in N s (positive: repulsive), 0 where there is none."""
+    """Task 2, one pair; returns the impulse J in N s (positive: repulsive), 0 where there is
+    none."""
     x, v, mass = disks.position, disks.velocity, disks.mass
 
     # (a) Detect: closer than the sum of the radii? Two static disks never move.
     if not touching(x, disks.radius, a, b) or (mass[a] == inf and mass[b] == inf):
         return 0.0
 
-    # (b) Project: displace them along n (from b to a) until they meet in one point; no velocity is touched.
+    # (b) Project: displace them along n (from b to a) until they meet in one point; no velocity is
+    # touched.
     distance, nx, ny = direction(x[a, 0] - x[b, 0], x[a, 1] - x[b, 1])
     overlap = disks.radius[a] + disks.radius[b] - distance
     share = share_of_a(mass[a], mass[b], world.split)
@@ -89,7 +101,8 @@ def collide_walls(disks: Disks, world: World, k: int, collisions: list) -> None:
 
 @kernel
 def collide_wall(disks: Disks, i: int, w: int, world: World) -> float:
-    """The same four parts for a disk and the nearest point of a wall, which acts as a static disk would."""
+    """The same four parts for a disk and the nearest point of a wall, which acts as a static disk
+    would."""
     x, v, mass = disks.position, disks.velocity, disks.mass
     if not touching_wall(x, disks.radius, i, world.walls, w) or mass[i] == inf:
         return 0.0
@@ -122,7 +135,8 @@ def touching_wall(x, radius, i: int, walls, w: int) -> bool:  # type: ignore[no-
 
 @kernel
 def direction(dx: float, dy: float) -> tuple[float, float, float]:
-    """Length and unit vector of (dx, dy); equal centres have no direction, so they are separated along x."""
+    """Length and unit vector of (dx, dy); equal centres have no direction, so they are separated
+    along x."""
     distance = sqrt(dx * dx + dy * dy)
     if distance == 0.0:
         return 0.0, 1.0, 0.0
@@ -131,7 +145,8 @@ def direction(dx: float, dy: float) -> tuple[float, float, float]:
 
 @kernel
 def share_of_a(mass_a: float, mass_b: float, split: int) -> float:
-    """The part of the overlap by which a moves, 0 to 1: free in the exercise, but a static disk never moves."""
+    """The part of the overlap by which a moves, 0 to 1: free in the exercise, but a static disk
+    never moves."""
     if split == BY_INVERSE_MASS or mass_a == inf or mass_b == inf:
         return (1.0 / mass_a) / (1.0 / mass_a + 1.0 / mass_b)
     return 0.5 if split == EQUAL else 1.0
@@ -155,7 +170,8 @@ def move(rows, i: int, nx: float, ny: float, by: float) -> None:  # type: ignore
 
 @kernel
 def wrap(x, world: World) -> None:  # type: ignore[no-untyped-def]
-    """As `projectObjects`: a centre beyond an edge of the box is set onto the opposite edge; its velocity stays."""
+    """As `projectObjects`: a centre beyond an edge of the box is set onto the opposite edge; its
+    velocity stays."""
     for axis in range(2):
         if world.low[axis] == -inf and world.high[axis] == inf:
             continue

@@ -1,7 +1,9 @@
-"""The solver of the lesson "Simple body dynamics": explicit Euler, walls that flip, collisions from two equations.
+"""The solver of the lesson "Simple body dynamics": explicit Euler, walls that flip, collisions from
+two equations.
 
-Every function is compiled by numba from the source you read; with NUMBA_DISABLE_JIT=1 the same source
-runs as plain Python and gives the same bits. It shares no kernel with `exercise`: read one file, know one method.
+Every function is compiled by numba from the source you read; with NUMBA_DISABLE_JIT=1 the same
+source runs as plain Python and gives the same bits. It shares no kernel with `exercise`: read one
+file, know one method.
 """
 
 from math import inf, sqrt
@@ -12,7 +14,8 @@ from reference_impl.state import Disks, World
 
 @compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
-    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall w as j = -1 - w."""
+    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
+    w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
         step(disks, world, dt, k, collisions)
@@ -21,13 +24,15 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 
 @compiled
 def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> None:
-    """One step: move, accelerate, bounce off the walls, collide every pair i < j, then the edges of the world."""
+    """One step: move, accelerate, bounce off the walls, collide every pair i < j, then the edges of
+    the world."""
     integrate(disks, world, dt)
     bounce(disks, world, k, collisions)
     x, r = disks.position, disks.radius
     for i in range(len(r)):
         for j in range(i + 1, len(r)):
-            # Colliding when the DISTANCE is below r1 + r2. (Printed is the sum of the positions: a slip.)
+            # Colliding when the DISTANCE is below r1 + r2. (Printed is the sum of the positions: a
+            # slip.)
             if sqrt((x[i, 0] - x[j, 0]) ** 2 + (x[i, 1] - x[j, 1]) ** 2) < r[i] + r[j]:
                 impulse = collide(disks, i, j, world)
                 if impulse != 0.0:
@@ -53,13 +58,16 @@ def integrate(disks: Disks, world: World, dt: float) -> None:
 
 @compiled
 def bounce(disks: Disks, world: World, k: int, collisions: list) -> None:
-    """A wall flips the normal velocity of a disk that comes in, v' = -c_r v; the position stays as it is."""
+    """A wall flips the normal velocity of a disk that comes in, v' = -c_r v; the position stays as
+    it is."""
     x, v, mass = disks.position, disks.velocity, disks.mass
     for i in range(len(mass)):
         for w in range(len(world.walls)):
             ax, ay = world.walls[w, 0, 0], world.walls[w, 0, 1]
             ux, uy = world.walls[w, 1, 0] - ax, world.walls[w, 1, 1] - ay
-            along = min(max(((x[i, 0] - ax) * ux + (x[i, 1] - ay) * uy) / (ux * ux + uy * uy), 0.0), 1.0)
+            along = min(
+                max(((x[i, 0] - ax) * ux + (x[i, 1] - ay) * uy) / (ux * ux + uy * uy), 0.0), 1.0
+            )
             nx, ny = x[i, 0] - (ax + along * ux), x[i, 1] - (ay + along * uy)
             distance = sqrt(nx * nx + ny * ny)
             speed = v[i, 0] * nx + v[i, 1] * ny
@@ -73,7 +81,8 @@ def bounce(disks: Disks, world: World, k: int, collisions: list) -> None:
 
 @compiled
 def collide(disks: Disks, a: int, b: int, world: World) -> float:
-    """Part an overlapping pair and exchange its normal velocities; returns the impulse in N s, or 0."""
+    """Part an overlapping pair and exchange its normal velocities; returns the impulse in N s, or
+    0."""
     x, v = disks.position, disks.velocity
     w1, w2, e = 1.0 / disks.mass[a], 1.0 / disks.mass[b], world.restitution
     nx, ny = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1]
@@ -88,7 +97,8 @@ def collide(disks: Disks, a: int, b: int, world: World) -> float:
     move(x, b, nx, ny, w2 / (w1 + w2) * delta)
 
     # The tangential parts stay. The normal parts follow from m1 v1 + m2 v2 = m1 V1 + m2 V2 and
-    # e = (V2 - V1) / (v1 - v2); divided by m1 m2, so that a static disk (w = 0) needs no case of its own.
+    # e = (V2 - V1) / (v1 - v2); divided by m1 m2, so that a static disk (w = 0) needs no case of
+    # its own.
     v1, v2 = v[a, 0] * nx + v[a, 1] * ny, v[b, 0] * nx + v[b, 1] * ny
     if world.approaching_only and v1 <= v2:
         return 0.0

@@ -1,8 +1,10 @@
-"""Which disks are near each other, and which are near a wall, so that many disks need not ask every pair in every step.
+"""Which disks are near each other, and which are near a wall, so that many disks need not ask every
+pair in every step.
 
-A neighbour list (Verlet, Phys. Rev. 159, 98, 1967), found by cells. It decides what is asked, never what is
-answered: the pairs stand in the order of the double loop over i < j, and one that is left out cannot touch as long as
-neither of its disks has moved by half the skin.
+A neighbour list (Verlet, Phys. Rev. 159, 98, 1967), found by cells. It decides what is asked, never
+what is
+answered: the pairs stand in the order of the double loop over i < j, and one that is left out
+cannot touch as long as neither of its disks has moved by half the skin.
 """
 
 from math import floor, sqrt
@@ -14,7 +16,8 @@ from reference_impl.compiled import compiled, kernel
 from reference_impl.state import Disks, World
 
 LASTS = 16  # steps of the fastest disk that a list is made for, unless fewer are left
-THIN, THICK = 0.125, 2.0  # the skin in mean radii: at least, so that disks at rest may fall; at most
+# the skin in mean radii: at least, so that disks at rest may fall; at most
+THIN, THICK = 0.125, 2.0
 FAR = 2.0**31  # cells from the origin, up to where rounding cannot put a disk into the wrong one
 ROOM = 32  # near pairs a disk, beyond which a list is given up
 
@@ -34,25 +37,30 @@ class NeighbourList(NamedTuple):
 
 @compiled
 def build_list(disks: Disks, world: World, dt: float, left: int) -> NeighbourList:
-    """All pairs that are apart by less than a skin, and the disks within half a skin of a wall; `left` steps to go.
+    """All pairs that are apart by less than a skin, and the disks within half a skin of a wall;
+    `left` steps to go.
 
-    Both disks of a pair may use up half of the skin. `half_skin` is a little less than that: 2 % of the skin are more
-    than what rounding makes of all the distances.
+    Both disks of a pair may use up half of the skin. `half_skin` is a little less than that: 2 % of
+    the skin are more than what rounding makes of all the distances.
     """
     x, radius = disks.position, disks.radius
     skin = skin_for(disks, dt, left)
-    cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))  # wider than needed by more than rounding
+    # wider than needed by more than rounding
+    cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))
     first, second = near_pairs(cells, skin)
     first, second = in_order(first, second, len(x))
     reach2 = (radius[first] + radius[second]) ** 2
     listed = len(cells.disk) > 0 and len(first) <= ROOM * len(x)
     disk, wall = near_walls(x, radius, 0.5 * skin, world.walls)
-    return NeighbourList(listed, x.copy().reshape(-1), 0.49 * skin, first, second, reach2, disk, wall)
+    return NeighbourList(
+        listed, x.copy().reshape(-1), 0.49 * skin, first, second, reach2, disk, wall
+    )
 
 
 @kernel
 def skin_for(disks: Disks, dt: float, left: int) -> float:
-    """m: the thicker, the more pairs are asked in vain; the thinner, the sooner the list is out of date."""
+    """m: the thicker, the more pairs are asked in vain; the thinner, the sooner the list is out of
+    date."""
     fastest = 0.0
     for i in range(len(disks.mass)):
         speed = abs(disks.velocity[i, 0]) + abs(disks.velocity[i, 1])
@@ -64,21 +72,25 @@ def skin_for(disks: Disks, dt: float, left: int) -> float:
 
 @kernel
 def beyond_skin(x, home, i: int, half_skin: float) -> bool:  # type: ignore[no-untyped-def]
-    """Whether disk i is farther from its home than half the skin; x (2n,) m, as `home`: rows of two are no vectors."""
+    """Whether disk i is farther from its home than half the skin; x (2n,) m, as `home`: rows of two
+    are no vectors."""
     dx, dy = x[2 * i] - home[2 * i], x[2 * i + 1] - home[2 * i + 1]
     return dx * dx + dy * dy > half_skin * half_skin
 
 
 class Cells(NamedTuple):
-    """The square cells of the plane, rolled up on a ring: cell (a, b) is number a + b row, modulo their count.
+    """The square cells of the plane, rolled up on a ring: cell (a, b) is number a + b row, modulo
+    their count.
 
-    Far cells may share a number, neighbours never do. The disks in cell c are start[c] to start[c + 1] of the lists;
-    the first two cells stand there once more at the end, so that three cells in a row are always one piece.
+    Far cells may share a number, neighbours never do. The disks in cell c are start[c] to start[c +
+    1] of the lists; the first two cells stand there once more at the end, so that three cells in a
+    row are always one piece.
     """
 
     row: int
     start: np.ndarray  # (cells + 3,)
-    disk: np.ndarray  # (m,) which disk it is; empty if one is too far out to say in which cell it is
+    # (m,) which disk it is; empty if one is too far out to say in which cell it is
+    disk: np.ndarray
     number: np.ndarray  # (m,) of its cell
     place: np.ndarray  # (m, 3) m: x, y and radius, side by side as they are needed
 
@@ -127,10 +139,12 @@ def near_pairs(cells: Cells, skin: float):  # type: ignore[no-untyped-def]
 
 @kernel
 def add_pairs(cells: Cells, skin: float, first, second, q: int, count: int) -> tuple[int, int]:  # type: ignore[no-untyped-def]
-    """Write the pairs of the disks from q on behind the first `count`, as far as there is room; returns both anew."""
+    """Write the pairs of the disks from q on behind the first `count`, as far as there is room;
+    returns both anew."""
     start, disk, place, last = cells.start, cells.disk, cells.place, len(cells.start) - 4
     for p in range(q, start[-3]):
-        # The rest of its own cell and the next one, then three cells in the row above: each pair is met once.
+        # The rest of its own cell and the next one, then three cells in the row above: each pair is
+        # met once.
         c = np.int64(cells.number[p])
         above = (c + cells.row - 1) & last
         begin, end = p + 1, start[c + 2]
@@ -140,7 +154,8 @@ def add_pairs(cells: Cells, skin: float, first, second, q: int, count: int) -> t
         for _ in range(2):
             for k in range(begin, end):
                 dx, dy, reach = x - place[k, 0], y - place[k, 1], r + place[k, 2]
-                # Written in any case, kept if it counts: a branch that nobody can foresee would take longer.
+                # Written in any case, kept if it counts: a branch that nobody can foresee would
+                # take longer.
                 first[count], second[count] = min(i, disk[k]), max(i, disk[k])
                 count += dx * dx + dy * dy < reach * reach
             begin, end = start[above], start[above + 3]
@@ -155,14 +170,16 @@ def longer(array):  # type: ignore[no-untyped-def]
 
 @compiled
 def in_order(first, second, n: int):  # type: ignore[no-untyped-def]
-    """The pairs in the order of the double loop: sorted by the second, then by the first, which keeps that order."""
+    """The pairs in the order of the double loop: sorted by the second, then by the first, which
+    keeps that order."""
     second, first = sorted_by(second, first, n)
     return sorted_by(first, second, n)
 
 
 @compiled
 def sorted_by(key, other, n: int):  # type: ignore[no-untyped-def]
-    """Both (p,) arrays by a counting sort of the keys, numbers below n; equal keys stay in order."""
+    """Both (p,) arrays by a counting sort of the keys, numbers below n; equal keys stay in
+    order."""
     free = np.zeros(n + 1, np.uint32)
     for k in key:
         free[k + 1] += 1
@@ -178,8 +195,13 @@ def sorted_by(key, other, n: int):  # type: ignore[no-untyped-def]
 
 @compiled
 def near_walls(x, radius, margin: float, walls):  # type: ignore[no-untyped-def]
-    """(b,), (b,): the disks, in order, that are within the margin of the upright rectangle around a wall, and which."""
-    disk, wall, count = np.empty(len(x) * len(walls), np.uint32), np.empty(len(x) * len(walls), np.uint32), 0
+    """(b,), (b,): the disks, in order, that are within the margin of the upright rectangle around a
+    wall, and which."""
+    disk, wall, count = (
+        np.empty(len(x) * len(walls), np.uint32),
+        np.empty(len(x) * len(walls), np.uint32),
+        0,
+    )
     for i in range(len(x)):
         reach = radius[i] + margin
         for w in range(len(walls)):

@@ -1,13 +1,15 @@
-"""The collisions of a step in the order in which they happen: exact flight, and every impulse where and when two meet.
+"""The collisions of a step in the order in which they happen: exact flight, and every impulse where
+and when two meet.
 
-The same law of impact as `exercise`, and no projection: all fly to the end of the step on their parabolas; then, as
-long as two met on the way, the two that met first go back to where they touched, get the impulse there, and fly to
-the end anew. Times count back from the end of the step: s = 0 is the end, s = -dt the start.
+The same law of impact as `exercise`, and no projection: all fly to the end of the step on their
+parabolas; then, as long as two met on the way, the two that met first go back to where they
+touched, get the impulse there, and fly to the end anew. Times count back from the end of the step:
+s = 0 is the end, s = -dt the start.
 
-Every search asks all pairs, so this is for some hundred disks at most. Where collisions accumulate (a ball that bounces
-ever lower, a stack) the work is bounded: a bounce that would last less than a `REST` of a step is the last one, and
-after `MOST` collisions a disk the rest of a step goes unresolved, which shows as overlap. Compiled by numba, as
-`exercise` is.
+Every search asks all pairs, so this is for some hundred disks at most. Where collisions accumulate
+(a ball that bounces ever lower, a stack) the work is bounded: a bounce that would last less than a
+`REST` of a step is the last one, and after `MOST` collisions a disk the rest of a step goes
+unresolved, which shows as overlap. Compiled by numba, as `exercise` is.
 """
 
 from math import inf, sqrt
@@ -24,7 +26,8 @@ NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the worl
 
 @compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
-    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall w as j = -1 - w."""
+    """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
+    w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     acceleration = np.zeros_like(disks.velocity)
     for k in range(count):
@@ -34,8 +37,8 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 
 @compiled
 def step(disks: Disks, world: World, acceleration, dt: float, k: int, collisions: list) -> None:  # type: ignore[no-untyped-def]
-    """One step: fly, then resolve meeting after meeting. `acceleration` (n, 2) m/s2 is what accelerates each disk
-    now."""
+    """One step: fly, then resolve meeting after meeting. `acceleration` (n, 2) m/s2 is what
+    accelerates each disk now."""
     fly(disks, world, acceleration, dt)
     now = -dt
     for _ in range(MOST * len(disks.radius)):
@@ -59,7 +62,9 @@ def fly(disks: Disks, world: World, acceleration, dt: float) -> None:  # type: i
             continue
         for axis in range(2):
             acceleration[i, axis] = world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
-            move(x, disks.remainder, i, axis, v[i, axis] * dt + acceleration[i, axis] * (dt * dt / 2))
+            move(
+                x, disks.remainder, i, axis, v[i, axis] * dt + acceleration[i, axis] * (dt * dt / 2)
+            )
             v[i, axis] += acceleration[i, axis] * dt
         turning = disks.torque[i] / disks.inertia[i]
         disks.angle[i] += spin[i] * dt + turning * (dt * dt / 2)
@@ -68,10 +73,11 @@ def fly(disks: Disks, world: World, acceleration, dt: float) -> None:  # type: i
 
 @compiled
 def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[no-untyped-def]
-    """Move disk i, and keep what rounding cuts off for the next time (Kahan, Comm. ACM 8, 40, 1965).
+    """Move disk i, and keep what rounding cuts off for the next time (Kahan, Comm. ACM 8, 40,
+    1965).
 
-    Hundreds of small steps would else round ten times as much as the few flights event by event that they
-    are.
+    Hundreds of small steps would else round ten times as much as the few flights event by event
+    that they are.
     """
     before, way = x[i, axis], way + remainder[i, axis]
     x[i, axis] = before + way
@@ -79,14 +85,18 @@ def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[n
 
 
 @compiled
-def first_meeting(disks: Disks, world: World, acceleration, now: float, dt: float) -> tuple[float, int, int]:  # type: ignore[no-untyped-def]
-    """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or the edge."""
+def first_meeting(  # type: ignore[no-untyped-def]
+    disks: Disks, world: World, acceleration, now: float, dt: float
+) -> tuple[float, int, int]:
+    """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or
+    the edge."""
     x, radius, mass, walls = disks.position, disks.radius, disks.mass, world.walls
     n, way = len(radius), longest_way(disks.velocity, acceleration, dt)
     first, who, whom = inf, NOBODY, NOBODY
     for i in range(n):
         for j in range(i + 1, n):
-            # Who met within the step cannot be farther apart at its end than both ways: passing through is seen, too.
+            # Who met within the step cannot be farther apart at its end than both ways: passing
+            # through is seen, too.
             dx, dy, reach = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], radius[i] + radius[j] + 2.0 * way
             if dx * dx + dy * dy < reach * reach and not (mass[i] == inf and mass[j] == inf):
                 s = meeting(path_to_disk(x, disks.velocity, acceleration, radius, i, j), now)
@@ -117,7 +127,10 @@ def longest_way(velocity, acceleration, dt: float) -> float:  # type: ignore[no-
     fastest2, strongest2 = 0.0, 0.0
     for i in range(len(velocity)):
         fastest2 = max(fastest2, velocity[i, 0] * velocity[i, 0] + velocity[i, 1] * velocity[i, 1])
-        strongest2 = max(strongest2, acceleration[i, 0] * acceleration[i, 0] + acceleration[i, 1] * acceleration[i, 1])
+        strongest2 = max(
+            strongest2,
+            acceleration[i, 0] * acceleration[i, 0] + acceleration[i, 1] * acceleration[i, 1],
+        )
     return (sqrt(fastest2) + sqrt(strongest2) * dt) * dt
 
 
@@ -125,23 +138,39 @@ def longest_way(velocity, acceleration, dt: float) -> float:  # type: ignore[no-
 def path_to_disk(x, v, acceleration, radius, i: int, j: int):  # type: ignore[no-untyped-def]
     """How disk i moves as seen from disk j, which is a wall without length."""
     return (
-        x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], v[i, 0] - v[j, 0], v[i, 1] - v[j, 1],
-        acceleration[i, 0] - acceleration[j, 0], acceleration[i, 1] - acceleration[j, 1], 0.0, 0.0, radius[i] + radius[j],
-    )  # fmt: skip
+        x[i, 0] - x[j, 0],
+        x[i, 1] - x[j, 1],
+        v[i, 0] - v[j, 0],
+        v[i, 1] - v[j, 1],
+        acceleration[i, 0] - acceleration[j, 0],
+        acceleration[i, 1] - acceleration[j, 1],
+        0.0,
+        0.0,
+        radius[i] + radius[j],
+    )
 
 
 @compiled
 def path_to_wall(x, v, acceleration, radius, i: int, walls, w: int):  # type: ignore[no-untyped-def]
-    """How disk i moves as seen from the start of wall w: place, velocity, acceleration; the wall, and the reach."""
+    """How disk i moves as seen from the start of wall w: place, velocity, acceleration; the wall,
+    and the reach."""
     return (
-        x[i, 0] - walls[w, 0, 0], x[i, 1] - walls[w, 0, 1], v[i, 0], v[i, 1], acceleration[i, 0], acceleration[i, 1],
-        walls[w, 1, 0] - walls[w, 0, 0], walls[w, 1, 1] - walls[w, 0, 1], radius[i],
-    )  # fmt: skip
+        x[i, 0] - walls[w, 0, 0],
+        x[i, 1] - walls[w, 0, 1],
+        v[i, 0],
+        v[i, 1],
+        acceleration[i, 0],
+        acceleration[i, 1],
+        walls[w, 1, 0] - walls[w, 0, 0],
+        walls[w, 1, 1] - walls[w, 0, 1],
+        radius[i],
+    )
 
 
 @compiled
 def contact(path, s: float) -> tuple[float, float, float, float]:  # type: ignore[no-untyped-def]
-    """At s: the gap in m, how fast it opens in m/s, and the normal, from the nearest point of the other to the disk."""
+    """At s: the gap in m, how fast it opens in m/s, and the normal, from the nearest point of the
+    other to the disk."""
     x, y, u, v, a, b, along, up, reach = path
     px, py = x + (u + a * s / 2) * s, y + (v + b * s / 2) * s
     if along != 0.0 or up != 0.0:
@@ -154,9 +183,11 @@ def contact(path, s: float) -> tuple[float, float, float, float]:  # type: ignor
 
 @compiled
 def lift(path, s: float, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
-    """m/s2 at which the gap opens at s as one slides past the other: v2 / distance, and nothing along a wall's face.
+    """m/s2 at which the gap opens at s as one slides past the other: v2 / distance, and nothing
+    along a wall's face.
 
-    Two that touch and slide past each other part, however hard they are pressed together, if that is more.
+    Two that touch and slide past each other part, however hard they are pressed together, if that
+    is more.
     """
     x, y, u, v, a, b, along, up, _ = path
     px, py = x + (u + a * s / 2) * s, y + (v + b * s / 2) * s
@@ -178,7 +209,8 @@ def meeting(path, since: float) -> float:  # type: ignore[no-untyped-def]
     closing, opening = contact(path, low)[1] < 0.0, contact(path, high)[1] >= 0.0
     if opening and not closing:
         return inf
-    if opening == closing:  # it turns in between: from closing to opening, or, as a ball thrown up, the other way
+    # it turns in between: from closing to opening, or, as a ball thrown up, the other way
+    if opening == closing:
         turn = halved(path, low, high, closing)
         low, high = (low, turn) if closing else (turn, high)
     if contact(path, high)[0] >= 0.0:
@@ -188,7 +220,8 @@ def meeting(path, since: float) -> float:  # type: ignore[no-untyped-def]
 
 @compiled
 def halved(path, low: float, high: float, closing: bool) -> float:  # type: ignore[no-untyped-def]
-    """Where the gap turns, to a 2^-50 of the step: its least or greatest value does not tell the difference."""
+    """Where the gap turns, to a 2^-50 of the step: its least or greatest value does not tell the
+    difference."""
     for _ in range(50):
         middle = (low + high) / 2
         if (contact(path, middle)[1] < 0.0) == closing:
@@ -200,7 +233,8 @@ def halved(path, low: float, high: float, closing: bool) -> float:  # type: igno
 
 @compiled
 def root(path, low: float, high: float) -> float:  # type: ignore[no-untyped-def]
-    """Where a gap that is open at low and closed at high closes: Newton, halving where that would leave the bracket."""
+    """Where a gap that is open at low and closed at high closes: Newton, halving where that would
+    leave the bracket."""
     s = high
     for _ in range(100):
         gap, rate, _, _ = contact(path, s)
@@ -219,7 +253,8 @@ def root(path, low: float, high: float) -> float:  # type: ignore[no-untyped-def
 
 @compiled
 def collide(disks: Disks, world: World, acceleration, i: int, j: int, s: float, dt: float) -> float:  # type: ignore[no-untyped-def]
-    """The impulse J = -(1 + e) (vi - vj).n / (1/mi + 1/mj) at s, and both on their new ways to the end; returns J."""
+    """The impulse J = -(1 + e) (vi - vj).n / (1/mi + 1/mj) at s, and both on their new ways to the
+    end; returns J."""
     x, v, e = disks.position, disks.velocity, world.restitution
     if j >= 0:
         path = path_to_disk(x, v, acceleration, disks.radius, i, j)
@@ -228,8 +263,13 @@ def collide(disks: Disks, world: World, acceleration, i: int, j: int, s: float, 
         path = path_to_wall(x, v, acceleration, disks.radius, i, world.walls, -1 - j)
         wi, wj = 1.0 / disks.mass[i], 0.0
     _, rate, nx, ny = contact(path, s)
-    speed, inward, hold = max(-rate, 0.0), -(path[4] * nx + path[5] * ny) - lift(path, s, nx, ny), 0.0
-    if 2.0 * e * speed < inward * dt * REST:  # it would be back at once, and ever sooner: it rests, and is held
+    speed, inward, hold = (
+        max(-rate, 0.0),
+        -(path[4] * nx + path[5] * ny) - lift(path, s, nx, ny),
+        0.0,
+    )
+    # it would be back at once, and ever sooner: it rests, and is held
+    if 2.0 * e * speed < inward * dt * REST:
         e, hold = 0.0, inward / (wi + wj)
     J = (1.0 + e) * speed / (wi + wj)
     fly_anew(disks, acceleration, i, wi * nx, wi * ny, J, hold, s)
@@ -239,8 +279,11 @@ def collide(disks: Disks, world: World, acceleration, i: int, j: int, s: float, 
 
 
 @compiled
-def fly_anew(disks: Disks, acceleration, i: int, wx: float, wy: float, J: float, hold: float, s: float) -> None:  # type: ignore[no-untyped-def]
-    """From s on, as if disk i had left with the impulse J and the force `hold` along n; (wx, wy) is n / mass."""
+def fly_anew(  # type: ignore[no-untyped-def]
+    disks: Disks, acceleration, i: int, wx: float, wy: float, J: float, hold: float, s: float
+) -> None:
+    """From s on, as if disk i had left with the impulse J and the force `hold` along n; (wx, wy) is
+    n / mass."""
     for axis, w in enumerate((wx, wy)):
         move(disks.position, disks.remainder, i, axis, (hold * (s * s / 2) - J * s) * w)
         disks.velocity[i, axis] += (J - hold * s) * w

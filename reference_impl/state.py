@@ -26,7 +26,8 @@ class Disks(NamedTuple):
     radius: np.ndarray  # (n,) m
     mass: np.ndarray  # (n,) kg
     inertia: np.ndarray  # (n,) kg m2
-    remainder: np.ndarray  # (n, 2) m: what rounding has cut off the position; only `ordered` keeps account of it
+    # (n, 2) m: what rounding has cut off the position; only `ordered` keeps account of it
+    remainder: np.ndarray
 
 
 class World(NamedTuple):
@@ -38,19 +39,27 @@ class World(NamedTuple):
     low: np.ndarray = np.full(2, -np.inf)  # (2,) m: a centre that leaves the box [low, high]
     high: np.ndarray = np.full(2, np.inf)  # is set onto the opposite edge
     split: int = BY_INVERSE_MASS
-    approaching_only: bool = True  # False: an impulse on separating pairs too, as the formula is printed
+    # False: an impulse on separating pairs too, as the formula is printed
+    approaching_only: bool = True
 
 
-def make_disks(position, velocity, radius, mass, inertia=None, angle=None, angular_velocity=None) -> Disks:  # type: ignore[no-untyped-def]
-    """Disks from copies of the given arrays; no force, no torque; solid disks (m r2 / 2) where no inertia is given."""
-    position, velocity, radius, mass = (np.array(a, float, order="C") for a in (position, velocity, radius, mass))
+def make_disks(  # type: ignore[no-untyped-def]
+    position, velocity, radius, mass, inertia=None, angle=None, angular_velocity=None
+) -> Disks:
+    """Disks from copies of the given arrays; no force, no torque; solid disks (m r2 / 2) where no
+    inertia is given."""
+    position, velocity, radius, mass = (
+        np.array(a, float, order="C") for a in (position, velocity, radius, mass)
+    )
     zero = np.zeros(len(radius))
     return Disks(
         position=position,
         velocity=velocity,
         force=np.zeros_like(position),
         angle=np.array(zero if angle is None else angle, dtype=float),
-        angular_velocity=np.array(zero if angular_velocity is None else angular_velocity, dtype=float),
+        angular_velocity=np.array(
+            zero if angular_velocity is None else angular_velocity, dtype=float
+        ),
         torque=zero.copy(),
         radius=radius,
         mass=mass,

@@ -1,7 +1,7 @@
 """The exercise's solver with a neighbour list, for many disks: the same steps, bit for bit.
 
-`exercise` is the solver; read that. This leaves out what cannot touch, by the list of `neighbours`, and divides by the
-masses once a call.
+`exercise` is the solver; read that. This leaves out what cannot touch, by the list of `neighbours`,
+and divides by the masses once a call.
 """
 
 from math import inf
@@ -16,10 +16,13 @@ from reference_impl.neighbours import NeighbourList, beyond_skin, build_list
 from reference_impl.state import Disks, World
 
 LISTED_FROM = (
-    64  # disks, from which on the list is cheaper than all pairs, even if a call is one step; if long, from 16 on
+    # disks, from which on the list is cheaper than all pairs, even if a call is one step; if long,
+    # from 16 on
+    64
 )
 EARLY = 0.8  # of half the skin: the rest is for what the collisions of a step move
-REBUILD = 256  # disks a look at all neighbours in mid-step: more rebuilds would cost more than asking all pairs
+# disks a look at all neighbours in mid-step: more rebuilds would cost more than asking all pairs
+REBUILD = 256
 NONE = -1  # in place of a number
 BLOCK = 256  # disks that fly at a time: few enough for the nearest cache
 
@@ -36,10 +39,12 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 
 @compiled
 def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> int:
-    """Advance by near pairs, however few the disks are; returns in how many steps all pairs had to be asked."""
+    """Advance by near pairs, however few the disks are; returns in how many steps all pairs had to
+    be asked."""
     acceleration, n, unlisted = accelerations_of(disks, world, dt), len(disks.radius), 0
     k, i, j, rebuilds = 0, 0, 0, 0  # in step k nothing has been asked from the pair (i, j) on
-    here = disks.position.reshape(-1)  # in place of homes while there is no list: nobody is far from where it is
+    # in place of homes while there is no list: nobody is far from where it is
+    here = disks.position.reshape(-1)
     if count > 0:
         fly(disks, dt, acceleration, here, inf)
     while k < count:
@@ -59,11 +64,13 @@ def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions
 
 
 class Accelerations(NamedTuple):
-    """What force, torque and gravity do in a step, and to whom; the same in every step of a call."""
+    """What force, torque and gravity do in a step, and to whom; the same in every step of a
+    call."""
 
     kick: np.ndarray  # (2n,) m/s, x and y in turn
     turn: np.ndarray  # (n,) rad/s
-    moving: np.ndarray  # (m, 2) who moves: the disks from .. to .., at most a block, without the static ones
+    # (m, 2) who moves: the disks from .. to .., at most a block, without the static ones
+    moving: np.ndarray
 
 
 @compiled
@@ -97,8 +104,8 @@ def play(
     i: int,
     j: int,
 ) -> tuple[int, int, int]:
-    """Go on from the pair (i, j) of step k up to `count` or until a disk has moved by half the skin; returns where that
-    is."""
+    """Go on from the pair (i, j) of step k up to `count` or until a disk has moved by half the
+    skin; returns where that is."""
     pairs, p = len(near.first), first_from(near, i, j)
     while True:
         k, p = next_touch(disks, world, dt, count, acceleration, near, k, p)
@@ -114,7 +121,8 @@ def play(
             p += 1
         else:
             i, w = by_wall(near, p)
-            for later in range(w, len(world.walls)):  # as it is moved, it may touch one that it was not near
+            # as it is moved, it may touch one that it was not near
+            for later in range(w, len(world.walls)):
                 impulse = collide_wall(disks, i, later, world)
                 if impulse != 0.0:
                     collisions.append((k, i, -1 - later, impulse))
@@ -123,12 +131,20 @@ def play(
 
 @kernel
 def next_touch(
-    disks: Disks, world: World, dt: float, count: int, acceleration: Accelerations, near: NeighbourList, k: int, p: int
+    disks: Disks,
+    world: World,
+    dt: float,
+    count: int,
+    acceleration: Accelerations,
+    near: NeighbourList,
+    k: int,
+    p: int,
 ) -> tuple[int, int]:
-    """(step, number) of the next near pair that touches, from number p of step k on; walls are numbered after pairs.
+    """(step, number) of the next near pair that touches, from number p of step k on; walls are
+    numbered after pairs.
 
-    Flies from step to step; (step, `NONE`) at the start of one where a disk is nearly beyond half the skin, or of
-    `count`.
+    Flies from step to step; (step, `NONE`) at the start of one where a disk is nearly beyond half
+    the skin, or of `count`.
     """
     pairs, walls = len(near.first), len(near.disk)
     while True:
@@ -145,11 +161,11 @@ def next_touch(
 
 @kernel
 def fly(disks: Disks, dt: float, acceleration: Accelerations, home, half_skin: float) -> int:  # type: ignore[no-untyped-def]
-    """As `exercise.integrate`, but for the angles; returns how many disks are then farther from home than half the
-    skin.
+    """As `exercise.integrate`, but for the angles; returns how many disks are then farther from
+    home than half the skin.
 
-    One thing at a time and no way out of a loop, so that it is done in vectors; and in blocks, so that the next loop
-    finds in the nearest cache what the one before has left there.
+    One thing at a time and no way out of a loop, so that it is done in vectors; and in blocks, so
+    that the next loop finds in the nearest cache what the one before has left there.
     """
     x, v, beyond = disks.position.reshape(-1), disks.velocity.reshape(-1), 0
     for run in range(len(acceleration.moving)):
@@ -164,8 +180,8 @@ def fly(disks: Disks, dt: float, acceleration: Accelerations, home, half_skin: f
 
 @kernel
 def turn(disks: Disks, dt: float, count: int, acceleration: Accelerations) -> None:
-    """The angles and spins of all steps, at last, as no collision asks for them: a block is fetched once for all of
-    them."""
+    """The angles and spins of all steps, at last, as no collision asks for them: a block is fetched
+    once for all of them."""
     angle, spin = disks.angle, disks.angular_velocity
     for run in range(len(acceleration.moving)):
         begin, end = np.int64(acceleration.moving[run, 0]), np.int64(acceleration.moving[run, 1])
@@ -177,7 +193,8 @@ def turn(disks: Disks, dt: float, count: int, acceleration: Accelerations) -> No
 
 @kernel
 def next_touching(disks: Disks, near: NeighbourList, p: int) -> int:
-    """The number of the next near pair that is `touching`, from p on; their count or p if there is none."""
+    """The number of the next near pair that is `touching`, from p on; their count or p if there is
+    none."""
     x, first, second, reach2 = disks.position.reshape(-1), near.first, near.second, near.reach2
     while p < len(first):
         a, b = 2 * np.int64(first[p]), 2 * np.int64(second[p])
@@ -190,7 +207,8 @@ def next_touching(disks: Disks, near: NeighbourList, p: int) -> int:
 
 @kernel
 def next_touching_wall(disks: Disks, world: World, near: NeighbourList, p: int) -> int:
-    """The number of the next disk that is `touching_wall` with one near it, from p on; of the end if there is none."""
+    """The number of the next disk that is `touching_wall` with one near it, from p on; of the end
+    if there is none."""
     x, radius, pairs = disks.position, disks.radius, len(near.first)
     while p < pairs + len(near.disk):
         if touching_wall(x, radius, near.disk[p - pairs], world.walls, near.wall[p - pairs]):
@@ -203,7 +221,9 @@ def next_touching_wall(disks: Disks, world: World, near: NeighbourList, p: int) 
 def first_from(near: NeighbourList, i: int, j: int) -> int:
     """The number of the first near pair from (i, j) on."""
     p = 0
-    while p < len(near.first) and (near.first[p] < i or (near.first[p] == i and near.second[p] < j)):
+    while p < len(near.first) and (
+        near.first[p] < i or (near.first[p] == i and near.second[p] < j)
+    ):
         p += 1
     return p
 
@@ -232,7 +252,9 @@ def past(near: NeighbourList, i: int, p: int) -> int:
 def pair_beyond_skin(disks: Disks, near: NeighbourList, a: int, b: int) -> bool:
     """Whether one of two disks is."""
     x = disks.position.reshape(-1)
-    return beyond_skin(x, near.home, a, near.half_skin) or beyond_skin(x, near.home, b, near.half_skin)
+    return beyond_skin(x, near.home, a, near.half_skin) or beyond_skin(
+        x, near.home, b, near.half_skin
+    )
 
 
 @compiled

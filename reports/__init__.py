@@ -1,1 +1,2 @@
-"""Everything a person looks at: the comparison, its tables and charts, the page, the command line."""
+"""Everything a person looks at: the comparison, its tables and charts, the page, the command
+line."""

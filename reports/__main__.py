@@ -1,5 +1,5 @@
-"""The command `crosscheck`, or `python -m reports`: it can be stopped by a signal before it has imported what it
-needs."""
+"""The command `crosscheck`, or `python -m reports`: it can be stopped by a signal before it has
+imported what it needs."""
 
 import os
 import sys
@@ -7,7 +7,8 @@ import sys
 
 def main() -> None:
     """Do what the command line asks for."""
-    sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))  # for the next line alone
+    # for the next line alone
+    sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     from adapters.safe_path import keep_path_safe  # and no adapters.py of the current folder
 
     keep_path_safe()  # before anything else is imported
@@ -17,9 +18,13 @@ def main() -> None:
     with ends_on_signals(), printing():
         if sys.flags.optimize > 1:
             refuse(
-                ["PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are explained by; unset it"]
+                [
+                    "PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are"
+                    " explained by; unset it"
+                ]
             )
-        from reports.cli import app  # which takes a second: what is raised while it is imported may be lost
+        # which takes a second: what is raised while it is imported may be lost
+        from reports.cli import app
 
         app()
 

@@ -1,4 +1,5 @@
-"""The command line. What a command needs is imported when it runs, so that `--help` answers at once."""
+"""The command line. What a command needs is imported when it runs, so that `--help` answers at
+once."""
 
 from __future__ import annotations
 
@@ -13,7 +14,10 @@ from reports.terminal.exits import refuse
 
 app = typer.Typer(
     name="crosscheck",
-    help="Cross-validation of 2D disk solvers: the same scenes through every engine, each against an exact answer.",
+    help=(
+        "Cross-validation of 2D disk solvers: the same scenes through every engine, each against an"
+        " exact answer."
+    ),
     no_args_is_help=False,
     add_completion=False,
     rich_markup_mode=None,
@@ -21,18 +25,29 @@ app = typer.Typer(
 )
 DEFAULT_OUT = Path("reports/out/latest")
 
-Scenes = Annotated[list[str] | None, typer.Argument(metavar="[SCENARIO|FILE.toml]...", help="Default: all scenarios.")]
+Scenes = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[SCENARIO|FILE.toml]...", help="Default: all scenarios."),
+]
 Engines = Annotated[
-    list[str] | None, typer.Option("--engine", metavar="NAME[:PROFILE]|FILE", help="Play only this engine; repeatable.")
+    list[str] | None,
+    typer.Option(
+        "--engine", metavar="NAME[:PROFILE]|FILE", help="Play only this engine; repeatable."
+    ),
 ]
 Dts = Annotated[
     list[float] | None,
-    typer.Option("--dt", metavar="S", help="Use this step size instead of the scenario's own; repeatable."),
+    typer.Option(
+        "--dt", metavar="S", help="Use this step size instead of the scenario's own; repeatable."
+    ),
 ]
 Full = Annotated[bool, typer.Option("--full", help="Add two finer step sizes to every scenario.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of random scenes.")]
 Out = Annotated[
-    Path, typer.Option(help="Folder for the results; an earlier run there is replaced when this one is done.")
+    Path,
+    typer.Option(
+        help="Folder for the results; an earlier run there is replaced when this one is done."
+    ),
 ]
 Workers = Annotated[int, typer.Option(min=0, help="Number of processes; 0: one per core.")]
 Timeout = Annotated[
@@ -41,26 +56,46 @@ Timeout = Annotated[
         min=0.1,
         max=1e6,
         metavar="S",
-        help="That a cell, or an exact answer, may take; then it is stopped, in C too (truth: given up to there).",
+        help=(
+            "That a cell, or an exact answer, may take; then it is stopped, in C too (truth: given"
+            " up to there)."
+        ),
     ),
 ]
 Memory = Annotated[
-    int, typer.Option(min=0, max=10**9, metavar="MB", help="Memory limit of a process; 0: its share of this machine's.")
+    int,
+    typer.Option(
+        min=0,
+        max=10**9,
+        metavar="MB",
+        help="Memory limit of a process; 0: its share of this machine's.",
+    ),
 ]
-Scheduler = Annotated[str, typer.Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")]
+Scheduler = Annotated[
+    str, typer.Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")
+]
 Timings = Annotated[
     int,
-    typer.Option(min=0, max=10_000, metavar="N", help="Rounds of timings after the run, one process at a time."),
+    typer.Option(
+        min=0,
+        max=10_000,
+        metavar="N",
+        help="Rounds of timings after the run, one process at a time.",
+    ),
 ]
 Resume = Annotated[
-    Path | None, typer.Option(metavar="OUT", help="Complete an earlier run: play what is missing or has changed.")
+    Path | None,
+    typer.Option(
+        metavar="OUT", help="Complete an earlier run: play what is missing or has changed."
+    ),
 ]
 Port = Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")]
 Opens = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
 
 
 def place(text: str) -> Path:
-    """A path as it was given; exits 2 for an empty one, which `Path` takes for the current folder."""
+    """A path as it was given; exits 2 for an empty one, which `Path` takes for the current
+    folder."""
     if not text:
         refuse(['"": is not there; name a file or a folder'])
     return Path(text)
@@ -68,7 +103,8 @@ def place(text: str) -> Path:
 
 @app.callback(invoke_without_command=True)
 def default(context: typer.Context) -> None:
-    """Without a command: the main job, all scenarios through all engines, to reports/out/latest/."""
+    """Without a command: the main job, all scenarios through all engines, to
+    reports/out/latest/."""
     if context.invoked_subcommand is None:
         run()
 
@@ -94,13 +130,17 @@ def run(
     means = run_command.means_of(workers, timeout, memory, scheduler)
     if resume is None:
         command = shlex.join(["crosscheck", *sys.argv[1:]])
-        run_command.run_plan(scenes or [], engine or [], dt or [], full, seed, timings, out, means, command)
+        run_command.run_plan(
+            scenes or [], engine or [], dt or [], full, seed, timings, out, means, command
+        )
     asked = [scenes, engine, dt, full, seed, timings, out != DEFAULT_OUT]
     run_command.resume(resume, means, alone=not any(asked))
 
 
 @app.command()
-def report(out: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")]) -> None:
+def report(
+    out: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
+) -> None:
     """Make the tables and the page of a run again, from its journal."""
     from reports.commands.report import report_again
 
@@ -113,7 +153,8 @@ def replay(
     out: Annotated[Path, typer.Option(help="The folder of the run.")] = DEFAULT_OUT,
     timeout: Timeout = 60.0,
 ) -> None:
-    """Play one cell again, step by step: a failed one from its last good state, others from the start."""
+    """Play one cell again, step by step: a failed one from its last good state, others from the
+    start."""
     from reports.commands import replay as replay_command
 
     replay_command.replay(cell, out, timeout)
@@ -133,7 +174,9 @@ def diff(
 @app.command()
 def truth(
     scene: Annotated[str, typer.Argument(metavar="SCENARIO|FILE.toml")],
-    events: Annotated[bool, typer.Option("--events", help="All collisions, not only the first and last ten.")] = False,
+    events: Annotated[
+        bool, typer.Option("--events", help="All collisions, not only the first and last ten.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     seed: Seed = 0,
     timeout: Timeout = 60.0,
@@ -148,19 +191,27 @@ def truth(
 def check(
     path: Annotated[
         Path,
-        typer.Argument(metavar="FILE|DIR", parser=place, help="An Exercise.js, a solver.py, or a folder of them."),
+        typer.Argument(
+            metavar="FILE|DIR",
+            parser=place,
+            help="An Exercise.js, a solver.py, or a folder of them.",
+        ),
     ],
     as_json: Annotated[bool, typer.Option("--json", help="Print all rows as JSON.")] = False,
     junit: Annotated[
-        Path | None, typer.Option(metavar="PATH", parser=place, help="Write the rows as JUnit XML, too.")
+        Path | None,
+        typer.Option(metavar="PATH", parser=place, help="Write the rows as JUnit XML, too."),
     ] = None,
     page: Annotated[
-        Path | None, typer.Option(metavar="PATH", parser=place, help="File of the page.  [default: check.html]")
+        Path | None,
+        typer.Option(metavar="PATH", parser=place, help="File of the page.  [default: check.html]"),
     ] = None,
 ) -> None:
-    """Check a hand-written solver of the exercise, and say what is wrong with it. The file is run as you.
+    """Check a hand-written solver of the exercise, and say what is wrong with it. The file is run
+    as you.
 
-    A Python file may import installed packages, and modules in its own folder whose names differ from theirs.
+    A Python file may import installed packages, and modules in its own folder whose names differ
+    from theirs.
     """
     from reports.check.command import check as check_and_say
 
@@ -170,7 +221,8 @@ def check(
 @app.command()
 def play(
     flight: Annotated[
-        Path | None, typer.Argument(metavar="[FLIGHT.toml]", parser=place, help="Fly a saved flight again.")
+        Path | None,
+        typer.Argument(metavar="[FLIGHT.toml]", parser=place, help="Fly a saved flight again."),
     ] = None,
     engine: Engines = None,
     port: Port = 8000,
@@ -190,11 +242,14 @@ def lesson(
     export: Annotated[
         Path | None,
         typer.Option(
-            metavar="PATH", parser=place, help="Write NAME as one page that needs no server, or all to a folder."
+            metavar="PATH",
+            parser=place,
+            help="Write NAME as one page that needs no server, or all to a folder.",
         ),
     ] = None,
 ) -> None:
-    """Learn why engines differ: short pages with scenes that run and the exact answer beside them."""
+    """Learn why engines differ: short pages with scenes that run and the exact answer beside
+    them."""
     if export is None:
         from reports.commands import serve
 
@@ -209,15 +264,27 @@ def lesson(
 def speed(
     scenes: Scenes = None,
     engine: Engines = None,
-    full: Annotated[bool, typer.Option("--full", help="All scenarios, finer steps, more rounds, more disks.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted run in --out.")] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="All scenarios, finer steps, more rounds, more disks.")
+    ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue an interrupted run in --out.")
+    ] = False,
     seed: Seed = 0,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("reports/out/speed"),
 ) -> None:
     """Measure error against time for every engine. Do not use the machine meanwhile."""
     from reports.speed.command import run_speed
 
-    run_speed(scenes or [], engine or [], full, resume, seed, out, "crosscheck " + shlex.join(sys.argv[1:]))
+    run_speed(
+        scenes or [],
+        engine or [],
+        full,
+        resume,
+        seed,
+        out,
+        "crosscheck " + shlex.join(sys.argv[1:]),
+    )
 
 
 VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
@@ -225,17 +292,28 @@ VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
 
 @app.command()
 def stability(
-    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE|FILE.toml]...", help="Default: all.")] = None,
+    cases: Annotated[
+        list[str] | None, typer.Argument(metavar="[CASE|FILE.toml]...", help="Default: all.")
+    ] = None,
     vary: Annotated[
         list[str] | None,
-        typer.Option(help="Of FILE.toml, repeatable: dt, speed, mass_ratio, restitution, scale, offset. Default: all."),
+        typer.Option(
+            help=(
+                "Of FILE.toml, repeatable: dt, speed, mass_ratio, restitution, scale, offset."
+                " Default: all."
+            )
+        ),
     ] = None,
     engine: Engines = None,
-    full: Annotated[bool, typer.Option("--full", help="16 runs per value, all values, narrower brackets.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted run in --out.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder for the stability report; one that is there is replaced.")] = Path(
-        "reports/out/stability"
-    ),
+    full: Annotated[
+        bool, typer.Option("--full", help="16 runs per value, all values, narrower brackets.")
+    ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue an interrupted run in --out.")
+    ] = False,
+    out: Annotated[
+        Path, typer.Option(help="Folder for the stability report; one that is there is replaced.")
+    ] = Path("reports/out/stability"),
     workers: Workers = 0,
 ) -> None:
     """Find the limit of every engine, and keep the first failing run."""
@@ -252,7 +330,8 @@ def tune(
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for matched.csv.")] = Path("reports/out/tune"),
 ) -> None:
-    """Search the public settings of engines for those nearest to the exact answers at equal cost."""
+    """Search the public settings of engines for those nearest to the exact answers at equal
+    cost."""
     from reports.tune.command import tune as search_settings
 
     search_settings(engine or [], out)

@@ -14,7 +14,8 @@ from scenarios.families.walls import WALLS
 from scenarios.model import Scenario
 
 SCENARIOS: dict[str, Callable[..., Scenario]] = {
-    builder().name: builder for builder in (*LESSON, *PAIRS, *WALLS, *ROWS, *THRUSTS, *EXERCISE, *CROWDS)
+    builder().name: builder
+    for builder in (*LESSON, *PAIRS, *WALLS, *ROWS, *THRUSTS, *EXERCISE, *CROWDS)
 }
 RANDOM = {"falling_box", "asteroids", "gas_of_100"}
 """Scenarios that are random (seed n); the others are the same for every seed."""

@@ -1,6 +1,8 @@
-"""The nouns: what is asked (`Scene`, `Thrust`, `Scenario`), what is answered (`State`, `Collisions`, `Trajectory`).
+"""The nouns: what is asked (`Scene`, `Thrust`, `Scenario`), what is answered (`State`,
+`Collisions`, `Trajectory`).
 
-SI units, float64, y up, counter-clockwise positive. n disks, w walls, k samples, h collisions; arrays are read-only.
+SI units, float64, y up, counter-clockwise positive. n disks, w walls, k samples, h collisions;
+arrays are read-only.
 """
 
 from __future__ import annotations
@@ -32,11 +34,13 @@ class Scene:
         velocity: (n, 2) m/s.
         radius: (n,) m, positive.
         mass: (n,) kg, positive; `inf` makes the disk static (it must be at rest).
-        restitution: normal speed after a collision over normal speed before it, 0 to 1, the same for all.
+        restitution: normal speed after a collision over normal speed before it, 0 to 1, the same
+            for all.
         angle: (n,) rad, default 0.
         angular_velocity: (n,) rad/s, default 0.
         inertia: (n,) kg m2, default m r2 / 2 of a solid disk.
-        walls: (w, 2, 2) m, segments from walls[:, 0] to walls[:, 1]; static, struck from both sides.
+        walls: (w, 2, 2) m, segments from walls[:, 0] to walls[:, 1]; static, struck from both
+            sides.
         gravity: (2,) m/s2, default none; acts on every disk that is not static.
         wrap: None, or (2, 2) m, low and high corner of the exercise's box: a disk whose centre is
             beyond an edge is set onto the opposite edge; disks do not see each other across it.
@@ -69,9 +73,16 @@ class Scene:
             "gravity": np.zeros(2),
         }
         shapes = {
-            "position": (n, 2), "velocity": (n, 2), "radius": (n,), "mass": (n,), "angle": (n,),
-            "angular_velocity": (n,), "inertia": (n,), "gravity": (2,), "wrap": (2, 2),
-        }  # fmt: skip
+            "position": (n, 2),
+            "velocity": (n, 2),
+            "radius": (n,),
+            "mass": (n,),
+            "angle": (n,),
+            "angular_velocity": (n,),
+            "inertia": (n,),
+            "gravity": (2,),
+            "wrap": (2, 2),
+        }
         for name in (*shapes, "walls"):
             given = getattr(self, name)
             if given is None and name == "wrap":
@@ -111,9 +122,14 @@ class Scene:
 
     def _wrap_faults(self, low: Array, high: Array) -> list[str]:
         if not (low < high).all():
-            return [f"wrap is {[low.tolist(), high.tolist()]}, must be [low, high] with low below high"]
+            return [
+                f"wrap is {[low.tolist(), high.tolist()]}, must be [low, high] with low below high"
+            ]
         outside = np.flatnonzero(((self.position < low) | (self.position > high)).any(axis=1))
-        return [f"position[{i}] is {self.position[i].tolist()} m, must be inside the wrap box" for i in outside]
+        return [
+            f"position[{i}] is {self.position[i].tolist()} m, must be inside the wrap box"
+            for i in outside
+        ]
 
     @property
     def n(self) -> int:
@@ -137,7 +153,8 @@ class Thrust:
 
     Attributes:
         disk: index into the scene.
-        start, stop: s; the thrust acts for start <= t < stop. Inside a step every engine is off (`thrust_grid.py`).
+        start, stop: s; the thrust acts for start <= t < stop. Inside a step every engine is off
+            (`thrust_grid.py`).
         force: (2,) N.
         torque: N m.
         frame: "world", or "body": the force turns with the disk's angle.
@@ -154,9 +171,14 @@ class Thrust:
         """Freeze and check."""
         object.__setattr__(self, "force", frozen(self.force))
         if self.force.shape != (2,) or not np.isfinite([*self.force, self.torque]).all():
-            raise ValueError(f"thrust: force {self.force} and torque {self.torque} must be finite (2,) and scalar")
+            raise ValueError(
+                f"thrust: force {self.force} and torque {self.torque} must be finite (2,) and"
+                " scalar"
+            )
         if not 0 <= self.start < self.stop:
-            raise ValueError(f"thrust: start {self.start:g} s must be at least 0 and before stop {self.stop:g} s")
+            raise ValueError(
+                f"thrust: start {self.start:g} s must be at least 0 and before stop {self.stop:g} s"
+            )
         if self.frame not in ("world", "body"):
             raise ValueError(f"thrust: frame is {self.frame!r}, must be 'world' or 'body'")
 
@@ -172,9 +194,11 @@ class Scenario:
         scene: the initial state and the physics.
         duration: s, a whole number of sample intervals.
         sample_interval: s; every engine is sampled at i * sample_interval.
-        substeps: the dt ladder, dt = sample_interval / k, coarse to fine; the middle one is the page's.
+        substeps: the dt ladder, dt = sample_interval / k, coarse to fine; the middle one is the
+            page's.
         thrusts: piecewise-constant thrusts.
-        truth: times (k,) s -> the exact `Trajectory` there, up to its horizon, or `NoTruth` (see `truth_at`); or None.
+        truth: times (k,) s -> the exact `Trajectory` there, up to its horizon, or `NoTruth` (see
+            `truth_at`); or None.
         without_truth: why there is no exact answer, in one sentence, where `truth` is None.
         seed: seed of a random scene, or None.
     """
@@ -196,19 +220,26 @@ class Scenario:
         object.__setattr__(self, "substeps", tuple(self.substeps))
         object.__setattr__(self, "thrusts", tuple(self.thrusts))
         if not re.fullmatch(r"[a-z0-9][a-z0-9_-]*", self.name):
-            raise ValueError(f"name is {self.name!r}, must be lower-case letters, digits, '_' and '-'")
+            raise ValueError(
+                f"name is {self.name!r}, must be lower-case letters, digits, '_' and '-'"
+            )
         if not (0 < self.sample_interval < np.inf and 0 < self.duration < np.inf):
             raise ValueError("duration and sample_interval must be positive and finite")
         if abs(self.duration / self.sample_interval - self.samples) > 1e-9 * self.samples:
             raise ValueError(
-                f"sample_interval {self.sample_interval:g} s does not divide the duration {self.duration:g} s"
+                f"sample_interval {self.sample_interval:g} s does not divide the duration"
+                f" {self.duration:g} s"
             )
         whole = all(k == int(k) and k >= 1 for k in self.substeps)
         if not self.substeps or not whole or sorted(set(self.substeps)) != list(self.substeps):
-            raise ValueError(f"substeps is {list(self.substeps)}, must be whole numbers from 1, increasing")
+            raise ValueError(
+                f"substeps is {list(self.substeps)}, must be whole numbers from 1, increasing"
+            )
         for thrust in self.thrusts:
             if not 0 <= thrust.disk < self.scene.n:
-                raise ValueError(f"thrust: disk {thrust.disk} is not one of the {self.scene.n} disks")
+                raise ValueError(
+                    f"thrust: disk {thrust.disk} is not one of the {self.scene.n} disks"
+                )
 
     @property
     def samples(self) -> int:
@@ -227,7 +258,8 @@ class Scenario:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Position (n, 2) m, velocity (n, 2) m/s, angle (n,) rad and angular velocity (n,) rad/s at one instant."""
+    """Position (n, 2) m, velocity (n, 2) m/s, angle (n,) rad and angular velocity (n,) rad/s at one
+    instant."""
 
     position: Array
     velocity: Array
@@ -237,7 +269,8 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Collisions:
-    """Collisions in order of time; one entry where the impulses of a contact begin, however long they last.
+    """Collisions in order of time; one entry where the impulses of a contact begin, however long
+    they last.
 
     Attributes:
         t: (h,) s; for a stepping engine the end of the step that resolved the collision.
@@ -253,7 +286,8 @@ class Collisions:
 
     @staticmethod
     def of(rows: Sequence[tuple[float, int, int, float]]) -> Collisions:
-        """Collisions from (t, i, j, impulse) rows; sorted by time, the lower disk of a pair first."""
+        """Collisions from (t, i, j, impulse) rows; sorted by time, the lower disk of a pair
+        first."""
         ordered = sorted((t, i, j, J) if j < 0 or i < j else (t, j, i, J) for t, i, j, J in rows)
         t, i, j, impulse = zip(*ordered) if ordered else ((), (), (), ())
         return Collisions(frozen(t), frozen(i, np.int64), frozen(j, np.int64), frozen(impulse))
@@ -279,7 +313,8 @@ class Trajectory:
         collisions: the collisions up to t[-1].
         horizon: s, the horizon up to which engines are held to a truth: no sample lies beyond it.
         reason: why the truth ends there; "" if it does not.
-        error_bound: m, how far a truth may be off before it; 0: a closed form, right to a few roundings.
+        error_bound: m, how far a truth may be off before it; 0: a closed form, right to a few
+            roundings.
     """
 
     t: Array

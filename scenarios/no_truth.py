@@ -1,4 +1,5 @@
-"""The one refusal of everything that answers exactly, and the verb that asks for an answer at all the times given."""
+"""The one refusal of everything that answers exactly, and the verb that asks for an answer at all
+the times given."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ class NoTruth(ValueError):
 
 
 def truth_at(scenario: Scenario, t: Array) -> Trajectory:
-    """The exact `Trajectory` at all the times t (k,) s, increasing; `scenario.truth(t)` gives as many as are known.
+    """The exact `Trajectory` at all the times t (k,) s, increasing; `scenario.truth(t)` gives as
+    many as are known.
 
     Raises:
         NoTruth: there is none, or none at a time beyond its horizon; says where that is and why.
@@ -26,6 +28,8 @@ def truth_at(scenario: Scenario, t: Array) -> Trajectory:
         late, until = t[len(truth)], truth.horizon
         why = f": {truth.reason}" if truth.reason else ""
         raise NoTruth(
-            f"t = {late:.9g} s: the truth of {scenario.name} ends at its horizon at {until:.9g} s{why}", until
+            f"t = {late:.9g} s: the truth of {scenario.name} ends at its horizon at {until:.9g}"
+            f" s{why}",
+            until,
         )
     return truth

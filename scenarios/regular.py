@@ -1,4 +1,5 @@
-"""Opens a file that ends: a pipe that nobody writes to would be waited for, a device may give bytes for ever."""
+"""Opens a file that ends: a pipe that nobody writes to would be waited for, a device may give bytes
+for ever."""
 
 from __future__ import annotations
 

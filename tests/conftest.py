@@ -1,4 +1,5 @@
-"""What the tests of all pages share: one browser a file; and what the independent checks have to say."""
+"""What the tests of all pages share: one browser a file; and what the independent checks have to
+say."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from tests.reports.page.browsing import chromium
 
 @pytest.fixture(autouse=True, scope="session")
 def forked_workers() -> Iterator[None]:
-    """A run that is played in the process of the tests forks its workers: each start anew would take seconds."""
+    """A run that is played in the process of the tests forks its workers: each start anew would
+    take seconds."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(worker, "start", Forked)
         yield
@@ -22,7 +24,8 @@ def forked_workers() -> Iterator[None]:
 
 @pytest.fixture
 def fresh_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For what is said of the workers themselves: each an interpreter of its own, as users have it."""
+    """For what is said of the workers themselves: each an interpreter of its own, as users have
+    it."""
     monkeypatch.setattr(worker, "start", FRESH)
 
 
@@ -34,7 +37,8 @@ def browser() -> Iterator[Browser]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """A line for everything that a test records as `found`: what an independent check compared, and how well it met."""
+    """A line for everything that a test records as `found`: what an independent check compared, and
+    how well it met."""
     for outcome in ("passed", "failed"):
         for report in terminalreporter.getreports(outcome):
             for name, value in report.user_properties:

@@ -1,4 +1,5 @@
-"""Processes that are forked from one in which everything is imported: a start takes 0.05 s of work, not some three.
+"""Processes that are forked from one in which everything is imported: a start takes 0.05 s of work,
+not some three.
 
 For tests in which it makes no difference how a process has started.
 """
@@ -21,10 +22,21 @@ from reports.run import worker
 
 FRESH = worker.start  # as users have it, an interpreter of its own
 ROOT = Path(__file__).parent.parent
-LOADED = ["tests.loaded", "reports.cli", "reports.run.arguments", "reports.commands.truth", "reports.commands.diff",
-          "reports.commands.replay", "reports.check.command", "reports.speed.command", "reports.stability.command",
-          "reports.lessons.command", "reports.tune.command"]  # fmt: skip
-# multiprocessing polls all of its processes whenever it starts one; what one thread has read, another waits for.
+LOADED = [
+    "tests.loaded",
+    "reports.cli",
+    "reports.run.arguments",
+    "reports.commands.truth",
+    "reports.commands.diff",
+    "reports.commands.replay",
+    "reports.check.command",
+    "reports.speed.command",
+    "reports.stability.command",
+    "reports.lessons.command",
+    "reports.tune.command",
+]
+# multiprocessing polls all of its processes whenever it starts one; what one thread has read,
+# another waits for.
 LOCK = threading.Lock()
 
 
@@ -46,15 +58,19 @@ def start(target: Callable[..., object], *args: object) -> BaseProcess:
 
 @cache
 def start_server() -> None:
-    """It starts with its first process, wherever that is; it imports from here, and is waited for."""
+    """It starts with its first process, wherever that is; it imports from here, and is waited
+    for."""
     with mock.patch.dict(os.environ, {"PYTHONPATH": str(ROOT)}):
         first = context().Process(target=os.getpid)
         first.start()
     first.join()
 
 
-def crosscheck_in(words: Sequence[str], cwd: Path, folder: Path, environment: Mapping[str, str]) -> None:
-    """In a fork: the command in `cwd`, which leads a group of its own and prints into files in `folder`."""
+def crosscheck_in(
+    words: Sequence[str], cwd: Path, folder: Path, environment: Mapping[str, str]
+) -> None:
+    """In a fork: the command in `cwd`, which leads a group of its own and prints into files in
+    `folder`."""
     from reports.__main__ import main
 
     os.setsid()
@@ -67,7 +83,8 @@ def crosscheck_in(words: Sequence[str], cwd: Path, folder: Path, environment: Ma
 
 
 class Forked:
-    """A worker process as `subprocess.Popen` would show it, of which it has what `Worker` asks for."""
+    """A worker process as `subprocess.Popen` would show it, of which it has what `Worker` asks
+    for."""
 
     def __init__(self, theirs: Connection, trail: int, printing: int, memory: int) -> None:
         """Serve `theirs` in a fork; in place of `reports.run.worker.start`."""

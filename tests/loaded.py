@@ -1,4 +1,5 @@
-"""Imported once, in the process that others are forked from: all that a run takes, with its kernels loaded."""
+"""Imported once, in the process that others are forked from: all that a run takes, with its kernels
+loaded."""
 
 from __future__ import annotations
 
@@ -12,8 +13,17 @@ from reports.compare.comparison import compare
 from scenarios.catalogue import scenario
 
 scene = scenario("slow_collision")
-compare(scene, [
-    play(ENGINES[name].make(), name, scene, scene.dt(scene.substeps[0]))
-    for name in ("reference:exercise", "reference:ordered", "event_driven:float64", "pymunk:matched", "box2d:matched",
-                 "box2d_v3:matched")
-])  # fmt: skip
+compare(
+    scene,
+    [
+        play(ENGINES[name].make(), name, scene, scene.dt(scene.substeps[0]))
+        for name in (
+            "reference:exercise",
+            "reference:ordered",
+            "event_driven:float64",
+            "pymunk:matched",
+            "box2d:matched",
+            "box2d_v3:matched",
+        )
+    ],
+)

@@ -1,4 +1,5 @@
-"""Adding is one file and one row: a copy of the source gets one of everything, which then appears everywhere."""
+"""Adding is one file and one row: a copy of the source gets one of everything, which then appears
+everywhere."""
 
 from __future__ import annotations
 
@@ -78,8 +79,9 @@ ADDED: dict[str, list[Added]] = {
         ),
         Added(
             "adapters/engines.py",
-            '    "toy:plain": Row(_toy, "flies through everything", 0.5, FLOAT64, distributions=("typer",),\n'
-            '                     options={"as it is": {}}, variants={"as_it_is": Variant({}, "nothing")}),\n',
+            '    "toy:plain": Row(_toy, "flies through everything", 0.5, FLOAT64,'
+            ' distributions=("typer",),\n                     options={"as it is": {}},'
+            ' variants={"as_it_is": Variant({}, "nothing")}),\n',
             "}  # fmt: skip\n\nOWN",
         ),
     ],
@@ -112,16 +114,19 @@ ADDED: dict[str, list[Added]] = {
             '    return Drawing("A toy chart", "There is nothing to draw.", None)\n\n\n',
             "CHARTS: dict",
         ),
-        Added("reports/page/charts.py", '    "toy_chart": Chart("a toy", toy_chart),\n', "}\n\n\ndef packed"),
+        Added(
+            "reports/page/charts.py",
+            '    "toy_chart": Chart("a toy", toy_chart),\n',
+            "}\n\n\ndef packed",
+        ),
     ],
     "a lesson": [
         Added(
             "reports/lessons/toy.py",
-            "from reports.lessons.lesson import Chart, Curve, Lesson, Shown\n\n\n"
-            "def show(settings):\n"
-            '    curve = Curve("toy:plain", np.arange(2.0), np.arange(2.0))\n'
-            '    return Shown([Chart("a toy", "x", "y", [curve])], None, [])\n'
-            '\n\nTOY = Lesson("toy", "9", "A toy lesson", "Is it here?", ["It is."], [], ["toy:plain"], show)\n',
+            "from reports.lessons.lesson import Chart, Curve, Lesson, Shown\n\n\ndef"
+            ' show(settings):\n    curve = Curve("toy:plain", np.arange(2.0), np.arange(2.0))\n   '
+            ' return Shown([Chart("a toy", "x", "y", [curve])], None, [])\n\n\nTOY = Lesson("toy",'
+            ' "9", "A toy lesson", "Is it here?", ["It is."], [], ["toy:plain"], show)\n',
         ),
         Added("reports/lessons/toy.py", "import numpy as np\n\n", "from reports.lessons.lesson"),
         Added("reports/lessons/catalogue.py", "from reports.lessons.toy import TOY\n", "\nALL"),
@@ -130,7 +135,8 @@ ADDED: dict[str, list[Added]] = {
     "a mechanism": [
         Added(
             "adapters/mechanisms/table.py",
-            '    "toy:plain": lambda reported, scene, dt: [Mechanism(FRICTION, {"friction": 0.0})],\n',
+            '    "toy:plain": lambda reported, scene, dt: [Mechanism(FRICTION, {"friction":'
+            " 0.0})],\n",
             '}\n"""The engines whose',
         ),
     ],
@@ -157,7 +163,12 @@ def python(grown: Path, *words: str | Path) -> str:
     """What Python prints that finds the copy first, run in an empty folder beside it."""
     environment = os.environ | {"PYTHONPATH": str(grown), "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run(
-        [sys.executable, *words], cwd=grown, env=environment, capture_output=True, text=True, timeout=500
+        [sys.executable, *words],
+        cwd=grown,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=500,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -179,11 +190,17 @@ def test_the_table_of_contributing_names_what_is_added_here_and_where():
 
 def test_nothing_of_it_is_in_the_source_itself():
     """Negative control: what is looked for below comes from what was added."""
-    assert [path for folder in SOURCE for path in (ROOT / folder).rglob("*.py") if "toy" in path.read_text()] == []
+    assert [
+        path
+        for folder in SOURCE
+        for path in (ROOT / folder).rglob("*.py")
+        if "toy" in path.read_text()
+    ] == []
 
 
 def test_all_that_is_added_is_known_everywhere(grown: Path):
-    """Tables, colour, version, feature, variant, error budget and lesson; and nothing else has changed its look."""
+    """Tables, colour, version, feature, variant, error budget and lesson; and nothing else has
+    changed its look."""
     code = """
 import json
 from adapters.conformance.conform import conform
@@ -200,8 +217,10 @@ from reports.stability.engines import PLAYED
 from scenarios.catalogue import SCENARIOS
 found = conform("toy:plain", ENGINES["toy:plain"])
 print(json.dumps({
-    "names": ["toy:plain" in ENGINES, "toy_scene" in SCENARIOS, "toy_metric" in METRICS, "toy_chart" in CHARTS],
-    "look": look("toy", "plain")[:2] + look("toy", "plain")[3:4] == PALETTE[0], "version": versions()["typer"],
+    "names": ["toy:plain" in ENGINES, "toy_scene" in SCENARIOS, "toy_metric" in METRICS,
+              "toy_chart" in CHARTS],
+    "look": look("toy", "plain")[:2] + look("toy", "plain")[3:4] == PALETTE[0],
+    "version": versions()["typer"],
     "alike": [name for name in ENGINES if look(*name.split(":"))[:2] == look("toy")[:2]],
     "feature": [each.change for each in FEATURES if each.engine == "toy:plain"],
     "variant": PLAYED["toy:plain+as_it_is"].switch,
@@ -227,7 +246,18 @@ print(json.dumps({
 @pytest.mark.slow
 def test_a_run_has_them_in_its_tables_and_on_its_page(grown: Path):
     """One cell: the toy engine on the toy scene, with probes, metric, chart, version and colour."""
-    words = ("run", "toy_scene", "--engine", "toy", "--dt", "0.0166666666666666", "--workers", "1", "--out", "out")
+    words = (
+        "run",
+        "toy_scene",
+        "--engine",
+        "toy",
+        "--dt",
+        "0.0166666666666666",
+        "--workers",
+        "1",
+        "--out",
+        "out",
+    )
     python(grown, "-m", "reports", *words)
     table = pd.read_csv(grown / "out" / "deviations.csv")
     page = (grown / "out" / "report.html").read_text(encoding="utf-8")
@@ -236,14 +266,26 @@ def test_a_run_has_them_in_its_tables_and_on_its_page(grown: Path):
     assert table[table.metric == "toy_metric"].value.tolist() == [42.0]
     assert set(table.scenario) == {"toy_scene"}
     assert "toyland" in runs.versions[0]
-    shown = ("toy<i>:<wbr>plain", "A toy chart", "toy_metric", "#5b6b7a", "toyland 1.5", "restitution_", "typer")
+    shown = (
+        "toy<i>:<wbr>plain",
+        "A toy chart",
+        "toy_metric",
+        "#5b6b7a",
+        "toyland 1.5",
+        "restitution_",
+        "typer",
+    )
     for text in shown:
         assert text in page, text
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("command", "names"), [("speed", ["free_fall"]), ("stability", ["slow_collision"])])
-def test_speed_and_stability_have_the_engine_on_their_pages(grown: Path, command: str, names: list[str]):
+@pytest.mark.parametrize(
+    ("command", "names"), [("speed", ["free_fall"]), ("stability", ["slow_collision"])]
+)
+def test_speed_and_stability_have_the_engine_on_their_pages(
+    grown: Path, command: str, names: list[str]
+):
     """In the tables and the charts."""
     python(grown, "-m", "reports", command, *names, "--engine", "toy", "--out", command)
     page = (grown / command / f"{command}.html").read_text(encoding="utf-8")
@@ -255,7 +297,8 @@ def test_speed_and_stability_have_the_engine_on_their_pages(grown: Path, command
 
 def test_an_engine_is_named_in_its_files_and_its_row_and_else_only_in_texts_about_it():
     """The youngest engine, for all: what holds for it holds for the next one."""
-    about_it = {"reports/lessons/mechanisms.py", "reports/lessons/motion.py"}  # which engines a lesson shows
+    # which engines a lesson shows
+    about_it = {"reports/lessons/mechanisms.py", "reports/lessons/motion.py"}
     about_it |= {
         "reports/stability/reasons.py",
         "reports/stability/ablations.py",
@@ -264,8 +307,9 @@ def test_an_engine_is_named_in_its_files_and_its_row_and_else_only_in_texts_abou
         path.relative_to(ROOT).as_posix()
         for folder in SOURCE
         for path in (ROOT / folder).rglob("*")
-        if path.suffix in (".py", ".js", ".j2", ".css") and "out" not in path.parts
+        if path.suffix in (".py", ".js", ".j2", ".css")
+        and "out" not in path.parts
         and re.search(r"\bbox2d_v3\b", path.read_text(encoding="utf-8"))
-    }  # fmt: skip
+    }
 
     assert named - about_it == {"adapters/engines.py", "adapters/mechanisms/table.py"}

@@ -19,7 +19,9 @@ from tests.solvers.mutants import CORRECT, MUTANTS
 ROOT = Path(__file__).parent.parent
 TOP = ("reference_impl", "scenarios", "adapters", "reports", "tests")
 DOCUMENTS = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md")]
-DOCUMENTS += sorted(path for top in TOP for path in (ROOT / top).rglob("README.md") if "out" not in path.parts)
+DOCUMENTS += sorted(
+    path for top in TOP for path in (ROOT / top).rglob("README.md") if "out" not in path.parts
+)
 TEXTS = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in DOCUMENTS}
 TEXT = TEXTS["README.md"]
 
@@ -29,18 +31,26 @@ def blocks_of(text: str) -> list[tuple[str, str]]:
     return re.findall(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
-LINES = list(dict.fromkeys(
-    line.split("  #")[0].strip()
-    for text in TEXTS.values() for kind, block in blocks_of(text) if kind == "sh"
-    for line in block.splitlines() if line.startswith("uv run")
-))  # fmt: skip
+LINES = list(
+    dict.fromkeys(
+        line.split("  #")[0].strip()
+        for text in TEXTS.values()
+        for kind, block in blocks_of(text)
+        if kind == "sh"
+        for line in block.splitlines()
+        if line.startswith("uv run")
+    )
+)
 CLUSTER = [line for line in LINES if "--extra cluster" in line]
 MINUTES = {"uv run crosscheck speed"}  # and the tests themselves
-SLOW = (" stability ", " speed ", " --solver ")  # ten seconds each, or pytest in a process of its own
+# ten seconds each, or pytest in a process of its own
+SLOW = (" stability ", " speed ", " --solver ")
 COMMANDS = [
     pytest.param(line, marks=[pytest.mark.slow] if any(word in line for word in SLOW) else [])
     for line in LINES
-    if line not in CLUSTER and line not in MINUTES and not (line.startswith("uv run pytest") and "--solver" not in line)
+    if line not in CLUSTER
+    and line not in MINUTES
+    and not (line.startswith("uv run pytest") and "--solver" not in line)
 ]
 # Files of a run, and what the exercise's author calls a solver.
 WRITTEN = {
@@ -89,7 +99,9 @@ def test_a_command_of_a_readme_succeeds(command: str, folder: Path):
     if program == "crosscheck":
         done = crosscheck(*arguments, cwd=folder)
     else:
-        done = subprocess.run([BIN / program, *arguments], cwd=folder, capture_output=True, text=True, timeout=300)
+        done = subprocess.run(
+            [BIN / program, *arguments], cwd=folder, capture_output=True, text=True, timeout=300
+        )
     assert done.returncode == 0, done.stderr
 
 
@@ -99,22 +111,38 @@ def test_the_three_commands_for_many_machines_play_a_run(tmp_path: Path):
     pytest.importorskip("distributed")
     scheduler, worker, run = (shlex.split(line)[4:] for line in CLUSTER)
     words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-    started = [subprocess.Popen([BIN / scheduler[0], *scheduler[1:], *words], stderr=subprocess.PIPE, text=True)]
+    started = [
+        subprocess.Popen(
+            [BIN / scheduler[0], *scheduler[1:], *words], stderr=subprocess.PIPE, text=True
+        )
+    ]
     try:
         said = iter(started[0].stderr.readline, "")
         address = next(found[0] for line in said if (found := re.search(r"tcp://[\d.]+:\d+", line)))
         here = [[re.sub(r"tcp://\S+", address, word) for word in words] for words in (worker, run)]
-        started.append(subprocess.Popen([BIN / here[0][0], *here[0][1:]], cwd=tmp_path, stderr=subprocess.DEVNULL))
+        started.append(
+            subprocess.Popen(
+                [BIN / here[0][0], *here[0][1:]], cwd=tmp_path, stderr=subprocess.DEVNULL
+            )
+        )
         next(line for line in said if "Register worker" in line)
         done = subprocess.run(
-            [BIN / here[1][0], *here[1][1:]], cwd=tmp_path, capture_output=True, text=True, timeout=300
+            [BIN / here[1][0], *here[1][1:]],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=300,
         )
     finally:
         for process in reversed(started):
             process.terminate()
             process.wait()
 
-    assert [scheduler, worker[:2], run[:2]] == [["dask", "scheduler"], ["dask", "worker"], ["crosscheck", "run"]]
+    assert [scheduler, worker[:2], run[:2]] == [
+        ["dask", "scheduler"],
+        ["dask", "worker"],
+        ["crosscheck", "run"],
+    ]
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "many" / "report.html").exists()
 
@@ -124,7 +152,9 @@ def test_the_python_blocks_run_one_after_the_other(folder: Path, monkeypatch: py
     monkeypatch.chdir(folder)
     names: dict[str, object] = {}
 
-    blocks = [block for text in TEXTS.values() for kind, block in blocks_of(text) if kind == "python"]
+    blocks = [
+        block for text in TEXTS.values() for kind, block in blocks_of(text) if kind == "python"
+    ]
     assert blocks
     for block in blocks:
         exec(block, names)
@@ -132,38 +162,54 @@ def test_the_python_blocks_run_one_after_the_other(folder: Path, monkeypatch: py
 
 def test_the_readme_counts_as_the_tables_do():
     """Scenes, engines, probes and lessons are as many as it says."""
-    patterns = (r"(\d+) scenes through\s+(\d+) engines", r"answers (\d+) probes", r"lesson`: (\d+) lessons")
+    patterns = (
+        r"(\d+) scenes through\s+(\d+) engines",
+        r"answers (\d+) probes",
+        r"lesson`: (\d+) lessons",
+    )
     said = [re.search(pattern, TEXT) for pattern in patterns]
 
     assert [int(number) for one in said if one for number in one.groups()] == [
-        len(SCENARIOS), len(ENGINES), len(PROBES), len(LESSONS),
-    ]  # fmt: skip
+        len(SCENARIOS),
+        len(ENGINES),
+        len(PROBES),
+        len(LESSONS),
+    ]
 
 
 def test_the_readme_counts_the_solvers_of_the_confusion_table():
     """As many faulty and correct ones as the catalogue has, and the table a row for each."""
     said = re.search(
-        r"what it says of (\d+) solvers with one fault each and of (\d+) without", TEXTS["reports/check/README.md"]
+        r"what it says of (\d+) solvers with one fault each and of (\d+) without",
+        TEXTS["reports/check/README.md"],
     )
 
     assert said is not None
     assert [int(number) for number in said.groups()] == [len(MUTANTS), len(CORRECT)]
-    assert len((ROOT / "tests" / "data" / "confusion.csv").read_text().splitlines()) == 1 + len(MUTANTS) + len(CORRECT)
+    assert len((ROOT / "tests" / "data" / "confusion.csv").read_text().splitlines()) == 1 + len(
+        MUTANTS
+    ) + len(CORRECT)
 
 
 @pytest.mark.parametrize("document", TEXTS)
 def test_every_file_that_a_document_names_exists(document: str):
-    """Links, and paths in backquotes that look like files of the repository or of the document's own folder."""
+    """Links, and paths in backquotes that look like files of the repository or of the document's
+    own folder."""
     folder = (ROOT / document).parent
     links = re.findall(r"\]\((?!https?:)([^)#]+)\)", TEXTS[document])
-    named = set(re.findall(r"`((?:reference_impl|scenarios|adapters|reports|tests|\.ci)/[\w./]*)`", TEXTS[document]))
+    named = set(
+        re.findall(
+            r"`((?:reference_impl|scenarios|adapters|reports|tests|\.ci)/[\w./]*)`", TEXTS[document]
+        )
+    )
     beside = set(re.findall(r"`(\w+\.(?:py|csv|json|html\.j2))`", TEXTS[document]))
 
     assert links or named or beside
     for path in links:
         assert (folder / path).exists(), path
     for path in named:
-        assert (ROOT / path).exists() or path.startswith("reports/out/"), path  # the latter is there after a run
+        # the latter is there after a run
+        assert (ROOT / path).exists() or path.startswith("reports/out/"), path
     for path in beside - WRITTEN:
         assert (folder / path).exists(), path
 
@@ -173,4 +219,6 @@ def test_the_front_page_is_short_and_leads_to_every_other():
     linked = re.findall(r"\]\(([^)]+)\)", TEXT + TEXTS["ARCHITECTURE.md"])
 
     assert len(TEXT.splitlines()) <= 120
-    assert set(TEXTS) - {"README.md"} <= {f"{path}/README.md" if "." not in path else path for path in linked}
+    assert set(TEXTS) - {"README.md"} <= {
+        f"{path}/README.md" if "." not in path else path for path in linked
+    }

@@ -1,4 +1,5 @@
-"""Every known departure of an engine from the scenes it is given, with its size and its cause: strict both ways."""
+"""Every known departure of an engine from the scenes it is given, with its size and its cause:
+strict both ways."""
 
 from __future__ import annotations
 
@@ -33,13 +34,19 @@ THRESHOLD = "collisions that close at less than 1 m/s are taken as inelastic"
 ASLEEP = "a disk below the sleep tolerance for 0.5 s is put to sleep, and its velocity set to 0"
 CAP = "a disk moves at most 2 units of length a step; the velocity is cut, not only the path"
 NO_FRICTION_IN_BOUNCE = (
-    "every shape has friction 0.6, bounded by the normal impulse before restitution is added: 0.6 / (1 + e)"
+    "every shape has friction 0.6, bounded by the normal impulse before restitution is added: 0.6 /"
+    " (1 + e)"
 )
-NORMALISED_EULER = "(cos, sin) += w h (-sin, cos) and then normalised turns by atan(w h) a substep h = dt / 4"
+NORMALISED_EULER = (
+    "(cos, sin) += w h (-sin, cos) and then normalised turns by atan(w h) a substep h = dt / 4"
+)
 
 MUNK_ARBITER = "Munk2D src/cpArbiter.c, cpArbiterUpdate: arb->e = a->e * b->e"
 BOX2D_SETTINGS = "Box2D 2.3 Common/b2Settings.h: "
-TURN = "a disk turns at most by a quarter (3.1: an eighth) of a circle a step; the spin is cut, and matched refuses"
+TURN = (
+    "a disk turns at most by a quarter (3.1: an eighth) of a circle a step; the spin is cut, and"
+    " matched refuses"
+)
 MAX_ROTATION = "Box2D 3.1 src/constants.h: B2_MAX_ROTATION (0.25f * B2_PI)"
 BOX2D_TYPES = "Box2D 3.1 src/types.c: "
 
@@ -48,11 +55,17 @@ DEPARTURES = [
     *(
         Departure("pymunk:shipped", probe, 0.25, 8 * FLOAT64, PRODUCT, MUNK_ARBITER)
         for probe in (
-            "restitution_0.01", "restitution_0.1", "restitution_0.5", "restitution_2", "restitution_10",
-            "restitution_100", "restitution_wall",
+            "restitution_0.01",
+            "restitution_0.1",
+            "restitution_0.5",
+            "restitution_2",
+            "restitution_10",
+            "restitution_100",
+            "restitution_wall",
         )
     ),
-    # What stops does so exactly: the two velocities of an inelastic collision agree to rounding in float32.
+    # What stops does so exactly: the two velocities of an inelastic collision agree to rounding in
+    # float32.
     *(
         Departure(engine, probe, 0.0, 8 * FLOAT32, THRESHOLD, source)
         for engine, source in (
@@ -61,36 +74,86 @@ DEPARTURES = [
         )
         for probe in ("restitution_0.01", "restitution_0.1", "restitution_0.5")
     ),
-    Departure("box2d:shipped", "slow_flight", 0.0, 0.0, ASLEEP, BOX2D_SETTINGS + "b2_linearSleepTolerance 0.01f"),
     Departure(
-        "box2d_v3:shipped", "slow_flight", 0.0, 0.0, ASLEEP, BOX2D_TYPES + "b2DefaultBodyDef, sleepThreshold = 0.05 m/s"
+        "box2d:shipped",
+        "slow_flight",
+        0.0,
+        0.0,
+        ASLEEP,
+        BOX2D_SETTINGS + "b2_linearSleepTolerance 0.01f",
+    ),
+    Departure(
+        "box2d_v3:shipped",
+        "slow_flight",
+        0.0,
+        0.0,
+        ASLEEP,
+        BOX2D_TYPES + "b2DefaultBodyDef, sleepThreshold = 0.05 m/s",
     ),
     # 2 units in 1/64 s, cut by a float32 ratio.
-    Departure("box2d:shipped", "fast_flight", 128.0, 128 * 4 * FLOAT32, CAP, BOX2D_SETTINGS + "b2_maxTranslation 2.0f"),
     Departure(
-        "box2d_v3:shipped", "fast_flight", 400.0, 400 * 4 * FLOAT32, "a disk is no faster than 400 m/s",
+        "box2d:shipped",
+        "fast_flight",
+        128.0,
+        128 * 4 * FLOAT32,
+        CAP,
+        BOX2D_SETTINGS + "b2_maxTranslation 2.0f",
+    ),
+    Departure(
+        "box2d_v3:shipped",
+        "fast_flight",
+        400.0,
+        400 * 4 * FLOAT32,
+        "a disk is no faster than 400 m/s",
         BOX2D_TYPES + "b2DefaultWorldDef, maximumLinearSpeed = 4 m * 100 / s",
     ),
     # A quarter or half a turn a step, cut by a float32 ratio.
-    Departure("box2d:shipped", "fast_spin", 32 * pi, 32 * pi * 4 * FLOAT32, TURN, BOX2D_SETTINGS + "b2_maxRotation"),
-    Departure("box2d:matched", "fast_spin", "refused", 0.0, TURN, BOX2D_SETTINGS + "b2_maxRotation (0.5f * b2_pi)"),
+    Departure(
+        "box2d:shipped",
+        "fast_spin",
+        32 * pi,
+        32 * pi * 4 * FLOAT32,
+        TURN,
+        BOX2D_SETTINGS + "b2_maxRotation",
+    ),
+    Departure(
+        "box2d:matched",
+        "fast_spin",
+        "refused",
+        0.0,
+        TURN,
+        BOX2D_SETTINGS + "b2_maxRotation (0.5f * b2_pi)",
+    ),
     Departure("box2d_v3:shipped", "fast_spin", 16 * pi, 16 * pi * 4 * FLOAT32, TURN, MAX_ROTATION),
     Departure("box2d_v3:matched", "fast_spin", "refused", 0.0, TURN, MAX_ROTATION),
     # A ratio of two momenta that round as often as a collision does.
     Departure(
-        "box2d:shipped", "friction", 0.2, 8 * FLOAT32, "every shape has friction 0.2, and the pair sqrt(0.2 * 0.2)",
+        "box2d:shipped",
+        "friction",
+        0.2,
+        8 * FLOAT32,
+        "every shape has friction 0.2, and the pair sqrt(0.2 * 0.2)",
         "Box2D 2.3 Dynamics/b2Fixture.h: b2FixtureDef, friction = 0.2f",
     ),
     Departure(
-        "box2d_v3:shipped", "friction", 0.6 / 1.5, 8 * FLOAT32, NO_FRICTION_IN_BOUNCE,
-        BOX2D_TYPES + "b2DefaultSurfaceMaterial, friction = 0.6f; src/contact_solver.c: b2ApplyRestitutionTask",
+        "box2d_v3:shipped",
+        "friction",
+        0.6 / 1.5,
+        8 * FLOAT32,
+        NO_FRICTION_IN_BOUNCE,
+        BOX2D_TYPES
+        + "b2DefaultSurfaceMaterial, friction = 0.6f; src/contact_solver.c: b2ApplyRestitutionTask",
     ),
     # 1024 substeps, each of which rounds cos and sin.
     *(
         Departure(
-            engine, "spins_freely", 1024 * atan(20 / 1024), 1024 * FLOAT32, NORMALISED_EULER,
+            engine,
+            "spins_freely",
+            1024 * atan(20 / 1024),
+            1024 * FLOAT32,
+            NORMALISED_EULER,
             "Box2D 3.1 include/box2d/math_functions.h: b2IntegrateRotation",
         )
         for engine in ("box2d_v3:shipped", "box2d_v3:matched")
     ),
-]  # fmt: skip
+]

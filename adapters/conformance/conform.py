@@ -40,7 +40,8 @@ class Finding:
 
 
 def conform(name: str, row: EngineRow) -> list[Finding]:
-    """One finding a probe, in the order of `PROBES`; only the finding "make" if the engine cannot be made.
+    """One finding a probe, in the order of `PROBES`; only the finding "make" if the engine cannot
+    be made.
 
     Whatever an engine raises becomes a finding: a refusal (`Unsupported`) departs, all else breaks.
     """
@@ -55,7 +56,17 @@ def conform(name: str, row: EngineRow) -> list[Finding]:
 def no_answer(name: str, what: str, why: str) -> Finding:
     """The one finding of an engine that could not be made, or did not survive its probes."""
     engine, profile = name.split(":")
-    return Finding(engine, profile, "make", "Does the engine answer?", "no", "yes", 0.0, "breaks", f"{what}: {why}")
+    return Finding(
+        engine,
+        profile,
+        "make",
+        "Does the engine answer?",
+        "no",
+        "yes",
+        0.0,
+        "breaks",
+        f"{what}: {why}",
+    )
 
 
 def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
@@ -67,7 +78,18 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
     except Unsupported as refusal:
         reading, verdict = ProbeReading("refused", "an answer", note=str(refusal)), "departs"
     except Exception as error:  # an engine may raise anything; the finding says what
-        reading, verdict = ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}"), "breaks"
+        reading, verdict = (
+            ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}"),
+            "breaks",
+        )
     return Finding(
-        engine, profile, name, probe.asked, reading.got, reading.expected, reading.bound, verdict, reading.note
+        engine,
+        profile,
+        name,
+        probe.asked,
+        reading.got,
+        reading.expected,
+        reading.bound,
+        verdict,
+        reading.note,
     )

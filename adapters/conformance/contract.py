@@ -1,4 +1,5 @@
-"""The probes of the protocol: an adapter that misses one of them is broken, and so is every number it gives."""
+"""The probes of the protocol: an adapter that misses one of them is broken, and so is every number
+it gives."""
 
 from __future__ import annotations
 
@@ -22,15 +23,21 @@ from adapters.engine import EngineRow
 from adapters.play import fault_of
 
 NONE = np.zeros(2)
-ROUNDINGS = 8  # a scale, an inverse mass, a product, a sum: no path from a force to a velocity rounds more often
+# a scale, an inverse mass, a product, a sum: no path from a force to a velocity rounds more often
+ROUNDINGS = 8
 
 
 def order_and_shapes(row: EngineRow) -> ProbeReading:
-    """Three disks of which the middle one is static; float32 keeps 2^-24 of a number, twice where units are scaled."""
+    """Three disks of which the middle one is static; float32 keeps 2^-24 of a number, twice where
+    units are scaled."""
     scene = scene_of(
-        position=[[1.0, 2.0], [-3.0, 0.5], [0.1, -4.0]], velocity=[[0.3, -0.7], [0.0, 0.0], [1.1, 0.2]],
-        angle=[0.2, -1.0, 7.0], angular_velocity=[0.9, 0.0, -1.3], radius=[0.5, 1.0, 0.25], mass=[1.0, np.inf, 5.0],
-    )  # fmt: skip
+        position=[[1.0, 2.0], [-3.0, 0.5], [0.1, -4.0]],
+        velocity=[[0.3, -0.7], [0.0, 0.0], [1.1, 0.2]],
+        angle=[0.2, -1.0, 7.0],
+        angular_velocity=[0.9, 0.0, -1.3],
+        radius=[0.5, 1.0, 0.25],
+        mass=[1.0, np.inf, 5.0],
+    )
     faults = []
     with loaded(row, scene) as engine:
         state = engine.read()
@@ -39,7 +46,10 @@ def order_and_shapes(row: EngineRow) -> ProbeReading:
         if array.dtype != np.float64 or array.shape != wanted.shape:
             faults.append(f"{name} is {array.dtype} {array.shape}")
         elif (off := np.abs(array - wanted)).max() > 4 * row.rounding * largest(wanted):
-            faults.append(f"{name} of disk {int(np.argwhere(off == off.max())[0][0])} is off by {off.max():.3g}")
+            faults.append(
+                f"{name} of disk {int(np.argwhere(off == off.max())[0][0])} is off by"
+                f" {off.max():.3g}"
+            )
     return ProbeReading("; ".join(faults) or "as the scene", "as the scene")
 
 
@@ -63,7 +73,8 @@ def read_copies(row: EngineRow) -> ProbeReading:
 
 
 def load_forgets(row: EngineRow) -> ProbeReading:
-    """An engine that has played, been struck, and still holds a force does after `load` what a fresh one does."""
+    """An engine that has played, been struck, and still holds a force does after `load` what a
+    fresh one does."""
     with loaded(row, head_on(2.0)) as used:
         for _ in range(12):
             used.apply_force(2, np.array([1.0, 2.0]), 3.0)
@@ -74,7 +85,9 @@ def load_forgets(row: EngineRow) -> ProbeReading:
         seen = history(used)
     with loaded(row, plain(), DT / 2) as fresh:
         wanted = history(fresh)
-    return ProbeReading("collisions at the start" if left else first_difference(seen, wanted), "nowhere")
+    return ProbeReading(
+        "collisions at the start" if left else first_difference(seen, wanted), "nowhere"
+    )
 
 
 def worlds_are_separate(row: EngineRow) -> ProbeReading:
@@ -167,7 +180,8 @@ def inertia_by_torque(row: EngineRow) -> ProbeReading:
 
 
 def same_instant(row: EngineRow) -> ProbeReading:
-    """After 1 s of free fall the speed is g t; half a step off it would be g dt / 2 = 0.02 m/s less or more."""
+    """After 1 s of free fall the speed is g t; half a step off it would be g dt / 2 = 0.02 m/s less
+    or more."""
     steps, gravity = 256, 9.81
     with loaded(row, one_disk(gravity=gravity)) as engine:
         engine.step(steps)
@@ -185,9 +199,12 @@ def collisions_are_reported(row: EngineRow) -> ProbeReading:
 def walls_are_reported(row: EngineRow) -> ProbeReading:
     """One collision on the second of two walls gives one collision, with this wall."""
     scene = scene_of(
-        position=[[0.0, 9.0], [0.0, 0.0]], velocity=[[0.0, 0.0], [2.0, 0.0]], radius=[0.5, 0.5], mass=[1.0, 1.0],
+        position=[[0.0, 9.0], [0.0, 0.0]],
+        velocity=[[0.0, 0.0], [2.0, 0.0]],
+        radius=[0.5, 0.5],
+        mass=[1.0, 1.0],
         walls=[[[-0.53, -2.0], [-0.53, 2.0]], [[0.53, -2.0], [0.53, 2.0]]],
-    )  # fmt: skip
+    )
     with loaded(row, scene) as engine:
         engine.step(12)
         return ProbeReading(reported(engine), "disk 1 and wall 1")
@@ -206,30 +223,38 @@ def collisions_name_their_step(row: EngineRow) -> ProbeReading:
 
 
 def impulse_is_reported(row: EngineRow) -> ProbeReading:
-    """The impulses reported add up to the momentum that changed hands; an engine may also report none (NaN)."""
+    """The impulses reported add up to the momentum that changed hands; an engine may also report
+    none (NaN)."""
     with loaded(row, head_on(2.0)) as engine:
         before = engine.read().velocity[2, 0]
         engine.step(12)
         moved = engine.read().velocity[2, 0] - before
         impulses = [collision.impulse for collision in engine.collisions()]
     if np.isnan(impulses).any():
-        return ProbeReading("not reported", "not reported", note="the engine's events carry no impulse")
+        return ProbeReading(
+            "not reported", "not reported", note="the engine's events carry no impulse"
+        )
     return ProbeReading(float(sum(impulses)), float(moved), ROUNDINGS * row.rounding * abs(moved))
 
 
 def static_stays(row: EngineRow) -> ProbeReading:
     """A static disk that is struck and under a force keeps its state to the bit."""
     scene = scene_of(
-        position=[[-1.02, 0.1], [0.0, 0.0]], velocity=[[2.0, 0.0], [0.0, 0.0]], radius=[0.5, 0.5], mass=[1.0, np.inf],
+        position=[[-1.02, 0.1], [0.0, 0.0]],
+        velocity=[[2.0, 0.0], [0.0, 0.0]],
+        radius=[0.5, 0.5],
+        mass=[1.0, np.inf],
         gravity=[0.0, -9.8],
-    )  # fmt: skip
+    )
     with loaded(row, scene) as engine:
         before = engine.read()
         for _ in range(12):
             engine.apply_force(1, np.array([5.0, 5.0]), 5.0)
             engine.step()
         after, collisions = engine.read(), reported(engine)
-    moved = [name for name, array in vars(after).items() if (array[1] != getattr(before, name)[1]).any()]
+    moved = [
+        name for name, array in vars(after).items() if (array[1] != getattr(before, name)[1]).any()
+    ]
     return ProbeReading(
         "; ".join(f"{name} changed" for name in moved) or f"stays, reported {collisions}",
         "stays, reported disk 0 and disk 1",
@@ -237,26 +262,52 @@ def static_stays(row: EngineRow) -> ProbeReading:
 
 
 CONTRACT: dict[str, Probe] = {
-    "order_and_shapes": Probe("Does read give float64 arrays in the scene's order?", order_and_shapes, "breaks"),
+    "order_and_shapes": Probe(
+        "Does read give float64 arrays in the scene's order?", order_and_shapes, "breaks"
+    ),
     "read_copies": Probe("Does read give copies?", read_copies, "breaks"),
-    "load_forgets": Probe("Where does a used engine differ from a fresh one after load?", load_forgets, "breaks"),
-    "worlds_are_separate": Probe("Where does a second engine disturb the first?", worlds_are_separate, "breaks"),
-    "counts_are_steps": Probe("Where does step(3) differ from three steps?", counts_are_steps, "breaks"),
-    "steps_obey_dt": Probe("How fast is a disk of 1.5 m/s by its path, at two dt? (m/s)", steps_obey_dt, "breaks"),
-    "stays_finite": Probe("Is every number finite for 20 steps of a plain scene?", stays_finite, "breaks"),
+    "load_forgets": Probe(
+        "Where does a used engine differ from a fresh one after load?", load_forgets, "breaks"
+    ),
+    "worlds_are_separate": Probe(
+        "Where does a second engine disturb the first?", worlds_are_separate, "breaks"
+    ),
+    "counts_are_steps": Probe(
+        "Where does step(3) differ from three steps?", counts_are_steps, "breaks"
+    ),
+    "steps_obey_dt": Probe(
+        "How fast is a disk of 1.5 m/s by its path, at two dt? (m/s)", steps_obey_dt, "breaks"
+    ),
+    "stays_finite": Probe(
+        "Is every number finite for 20 steps of a plain scene?", stays_finite, "breaks"
+    ),
     "force_lasts_one_step": Probe(
-        "How much faster is a disk 3 steps after a force than after its first step?", force_lasts_one_step, "breaks"
+        "How much faster is a disk 3 steps after a force than after its first step?",
+        force_lasts_one_step,
+        "breaks",
     ),
     "mass_by_force": Probe("What mass does a force see? (kg)", mass_by_force, "breaks"),
-    "inertia_by_torque": Probe("What inertia does a torque see? (kg m2)", inertia_by_torque, "breaks"),
-    "same_instant": Probe("How fast is a disk after 1 s under 9.81 m/s2? (m/s)", same_instant, "breaks"),
+    "inertia_by_torque": Probe(
+        "What inertia does a torque see? (kg m2)", inertia_by_torque, "breaks"
+    ),
+    "same_instant": Probe(
+        "How fast is a disk after 1 s under 9.81 m/s2? (m/s)", same_instant, "breaks"
+    ),
     "collisions_are_reported": Probe(
-        "Which collisions are reported when disks 1 and 2 meet once?", collisions_are_reported, "breaks"
+        "Which collisions are reported when disks 1 and 2 meet once?",
+        collisions_are_reported,
+        "breaks",
     ),
     "walls_are_reported": Probe(
         "Which collisions are reported when disk 1 meets wall 1 once?", walls_are_reported, "breaks"
     ),
-    "collisions_name_their_step": Probe("In which step is a collision reported?", collisions_name_their_step, "breaks"),
-    "impulse_is_reported": Probe("Which impulse is reported for a collision? (N s)", impulse_is_reported, "breaks"),
-    "static_stays": Probe("Does a static disk that is struck and under a force stay?", static_stays, "breaks"),
+    "collisions_name_their_step": Probe(
+        "In which step is a collision reported?", collisions_name_their_step, "breaks"
+    ),
+    "impulse_is_reported": Probe(
+        "Which impulse is reported for a collision? (N s)", impulse_is_reported, "breaks"
+    ),
+    "static_stays": Probe(
+        "Does a static disk that is struck and under a force stay?", static_stays, "breaks"
+    ),
 }

@@ -1,4 +1,5 @@
-"""The probes of the physics: an engine that misses one of them plays by the protocol, but not what the scene states."""
+"""The probes of the physics: an engine that misses one of them plays by the protocol, but not what
+the scene states."""
 
 from __future__ import annotations
 
@@ -6,18 +7,30 @@ from functools import partial
 
 import numpy as np
 
-from adapters.conformance.probe import DT, Probe, ProbeReading, head_on, largest, loaded, one_disk, scene_of
+from adapters.conformance.probe import (
+    DT,
+    Probe,
+    ProbeReading,
+    head_on,
+    largest,
+    loaded,
+    one_disk,
+    scene_of,
+)
 from adapters.engine import EngineRow
 
 SPEEDS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)  # m/s, on both sides of Box2D's threshold of 1
 ROUNDINGS = (
-    8  # a relative velocity, an effective mass, a target, an impulse, two updates: a collision rounds no more often
+    # a relative velocity, an effective mass, a target, an impulse, two updates: a collision rounds
+    # no more often
+    8
 )
 
 
 def free_flight(row: EngineRow) -> ProbeReading:
-    """The offset of a thrown disk from x0 + v0 t + a t2 / 2 after 1 s, in m; x' = x + v dt + alpha a dt2 gives
-    (alpha - 1/2) a dt t. Every step rounds a position and a velocity, whose error flies on."""
+    """The offset of a thrown disk from x0 + v0 t + a t2 / 2 after 1 s, in m; x' = x + v dt + alpha
+    a dt2 gives (alpha - 1/2) a dt t. Every step rounds a position and a velocity, whose error flies
+    on."""
     steps, gravity, speed = 256, 9.81, 4.1
     t = steps * DT
     with loaded(row, one_disk(velocity=(0.0, speed), gravity=gravity)) as engine:
@@ -25,7 +38,9 @@ def free_flight(row: EngineRow) -> ProbeReading:
         engine.step(steps)
         moved = float(engine.read().position[0, 1]) - start
     bound = row.rounding * steps * (1.0 + gravity * t * t)
-    return ProbeReading(moved - (speed * t - gravity * t * t / 2), -(row.alpha - 0.5) * gravity * DT * t, bound)
+    return ProbeReading(
+        moved - (speed * t - gravity * t * t / 2), -(row.alpha - 0.5) * gravity * DT * t, bound
+    )
 
 
 def slow_flight(row: EngineRow) -> ProbeReading:
@@ -63,12 +78,15 @@ def spins_freely(row: EngineRow) -> ProbeReading:
 
 
 def pair_momentum(row: EngineRow) -> ProbeReading:
-    """Change of momentum over sum m |v|, in an oblique collision of 1 kg and 7 kg; both velocities round once or
-    twice."""
+    """Change of momentum over sum m |v|, in an oblique collision of 1 kg and 7 kg; both velocities
+    round once or twice."""
     scene = scene_of(
-        position=[[-0.52, 0.2], [0.5, -0.1]], velocity=[[2.0, 0.3], [-1.0, 0.1]], radius=[0.5, 0.5], mass=[1.0, 7.0],
+        position=[[-0.52, 0.2], [0.5, -0.1]],
+        velocity=[[2.0, 0.3], [-1.0, 0.1]],
+        radius=[0.5, 0.5],
+        mass=[1.0, 7.0],
         angular_velocity=[3.0, -2.0],
-    )  # fmt: skip
+    )
     with loaded(row, scene) as engine:
         before = engine.read().velocity
         engine.step(24)
@@ -85,23 +103,32 @@ def restitution(row: EngineRow, closing: float) -> ProbeReading:
         before = engine.read().velocity
         engine.step(24)
         after = engine.read().velocity
-    return ProbeReading(float((after[2] - after[1])[0] / (before[1] - before[2])[0]), 0.5, ROUNDINGS * row.rounding)
+    return ProbeReading(
+        float((after[2] - after[1])[0] / (before[1] - before[2])[0]), 0.5, ROUNDINGS * row.rounding
+    )
 
 
 def wall_restitution(row: EngineRow) -> ProbeReading:
     """Speed after over speed before a collision of 2 m/s on a wall, e = 0.5."""
     scene = scene_of(
-        position=[[0.0, 0.0]], velocity=[[2.0, 0.0]], radius=[0.5], mass=[7.3],
+        position=[[0.0, 0.0]],
+        velocity=[[2.0, 0.0]],
+        radius=[0.5],
+        mass=[7.3],
         walls=[[[0.53, -2.0], [0.53, 2.0]]],
-    )  # fmt: skip
+    )
     with loaded(row, scene) as engine:
         engine.step(24)
-        return ProbeReading(-float(engine.read().velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.rounding)
+        return ProbeReading(
+            -float(engine.read().velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.rounding
+        )
 
 
 def friction(row: EngineRow) -> ProbeReading:
-    """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin fast: the effective
-    coefficient of friction while they slide. Frictionless, the sideways part is 0 and is not even rounded."""
+    """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin
+    fast: the effective coefficient of friction while they slide. Frictionless, the sideways part is
+    0 and is not even rounded.
+    """
     with loaded(row, head_on(2.0, spin=40.0)) as engine:
         before = engine.read().velocity[1]
         engine.step(24)
@@ -110,13 +137,25 @@ def friction(row: EngineRow) -> ProbeReading:
 
 
 PHYSICS: dict[str, Probe] = {
-    "free_flight": Probe("How far is a thrown disk from the parabola after 1 s? (m)", free_flight, "departs"),
-    "slow_flight": Probe("How fast is a free disk of 3.9 mm/s after 2 s? (m/s)", slow_flight, "departs"),
-    "fast_flight": Probe("How fast is a free disk of 512 m/s after 4 steps? (m/s)", fast_flight, "departs"),
-    "fast_spin": Probe("How fast does a free disk of 300 rad/s spin after 4 steps? (rad/s)", fast_spin, "departs"),
-    "spins_freely": Probe("What angle has a free disk after 1 s at 20 rad/s? (rad)", spins_freely, "departs"),
+    "free_flight": Probe(
+        "How far is a thrown disk from the parabola after 1 s? (m)", free_flight, "departs"
+    ),
+    "slow_flight": Probe(
+        "How fast is a free disk of 3.9 mm/s after 2 s? (m/s)", slow_flight, "departs"
+    ),
+    "fast_flight": Probe(
+        "How fast is a free disk of 512 m/s after 4 steps? (m/s)", fast_flight, "departs"
+    ),
+    "fast_spin": Probe(
+        "How fast does a free disk of 300 rad/s spin after 4 steps? (rad/s)", fast_spin, "departs"
+    ),
+    "spins_freely": Probe(
+        "What angle has a free disk after 1 s at 20 rad/s? (rad)", spins_freely, "departs"
+    ),
     "pair_momentum": Probe(
-        "How much momentum does a collision of two disks make? (of sum m v)", pair_momentum, "departs"
+        "How much momentum does a collision of two disks make? (of sum m v)",
+        pair_momentum,
+        "departs",
     ),
     **{
         f"restitution_{speed:g}": Probe(

@@ -1,4 +1,5 @@
-"""What a conformance probe is: a question on a tiny scene, asked of a fresh engine, and a reading with its bound."""
+"""What a conformance probe is: a question on a tiny scene, asked of a fresh engine, and a reading
+with its bound."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ DT = 1 / 256  # s; a power of two, so that a whole number of steps is a time wit
 
 
 class ProbeReading(NamedTuple):
-    """What a probe read: a number that must lie within `bound` of `expected`, or words that must equal it."""
+    """What a probe read: a number that must lie within `bound` of `expected`, or words that must
+    equal it."""
 
     got: float | str
     expected: float | str
@@ -40,8 +42,8 @@ class Probe:
     Attributes:
         asked: the question, one plain sentence.
         read: makes fresh engines from a row of `ENGINES` and closes them again.
-        failure: "breaks" if a miss means that the adapter breaks the protocol, so that no number of the engine
-            may be trusted; "departs" if it means other physics than the scene states.
+        failure: "breaks" if a miss means that the adapter breaks the protocol, so that no number of
+            the engine may be trusted; "departs" if it means other physics than the scene states.
     """
 
     asked: str
@@ -59,53 +61,78 @@ def loaded(row: EngineRow, scene: Scene, dt: float = DT) -> Iterator[Engine]:
 
 def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:
     """A scene from plain lists, by the names of its fields."""
-    return Scene(restitution=restitution, **{name: frozen(values) for name, values in arrays.items()})
+    return Scene(
+        restitution=restitution, **{name: frozen(values) for name, values in arrays.items()}
+    )
 
 
-def one_disk(velocity: tuple[float, float] = (0.0, 0.0), spin: float = 0.0, gravity: float = 0.0) -> Scene:
+def one_disk(
+    velocity: tuple[float, float] = (0.0, 0.0), spin: float = 0.0, gravity: float = 0.0
+) -> Scene:
     """A disk alone, whose mass and inertia are those of no density and no solid disk."""
     return scene_of(
-        position=[[0.25, -0.5]], velocity=[velocity], radius=[0.5], mass=[7.3], inertia=[0.9],
-        angular_velocity=[spin], gravity=[0.0, -gravity],
-    )  # fmt: skip
+        position=[[0.25, -0.5]],
+        velocity=[velocity],
+        radius=[0.5],
+        mass=[7.3],
+        inertia=[0.9],
+        angular_velocity=[spin],
+        gravity=[0.0, -gravity],
+    )
 
 
 def head_on(closing: float, spin: float = 0.0, lead: float = 4.5) -> Scene:
-    """A disk far off, and two equal ones that meet along x at `closing` m/s after `lead` steps; e = 0.5."""
+    """A disk far off, and two equal ones that meet along x at `closing` m/s after `lead` steps; e =
+    0.5."""
     gap = closing * DT * lead
     return scene_of(
         position=[[0.0, 9.0], [-0.5 - gap / 2, 0.0], [0.5 + gap / 2, 0.0]],
         velocity=[[0.0, 0.0], [closing / 2, 0.0], [-closing / 2, 0.0]],
         angular_velocity=[0.0, spin, spin],
-        radius=[0.5, 0.5, 0.5], mass=[1.0, 1.0, 1.0],
-    )  # fmt: skip
+        radius=[0.5, 0.5, 0.5],
+        mass=[1.0, 1.0, 1.0],
+    )
 
 
 def plain() -> Scene:
     """Two disks that collide obliquely after 2 steps, fall, spin, and bounce off a floor."""
     return scene_of(
-        position=[[-0.42, 0.1], [0.0, 0.4]], velocity=[[2.0, 0.0], [-1.0, 0.5]], radius=[0.25, 0.25], mass=[1.0, 3.0],
-        angle=[0.1, -0.2], angular_velocity=[1.0, -2.0], gravity=[0.0, -9.8],
+        position=[[-0.42, 0.1], [0.0, 0.4]],
+        velocity=[[2.0, 0.0], [-1.0, 0.5]],
+        radius=[0.25, 0.25],
+        mass=[1.0, 3.0],
+        angle=[0.1, -0.2],
+        angular_velocity=[1.0, -2.0],
+        gravity=[0.0, -9.8],
         walls=[[[-4.0, -0.2], [4.0, -0.2]]],
-    )  # fmt: skip
+    )
 
 
 def reported(engine: Engine, dt: float = DT) -> str:
     """The collisions an engine reports, as "disk 0 and disk 1, disk 0 and wall 2"."""
     collisions = first_collisions(engine.collisions(), dt)
-    names = [(f"disk {i}", f"disk {j}" if j >= 0 else f"wall {-1 - j}") for i, j in zip(collisions.i, collisions.j)]
+    names = [
+        (f"disk {i}", f"disk {j}" if j >= 0 else f"wall {-1 - j}")
+        for i, j in zip(collisions.i, collisions.j)
+    ]
     return ", ".join(" and ".join(pair) for pair in names) or "none"
 
 
 def history(engine: Engine, steps: int = 60) -> list[tuple[str, bytes]]:
-    """What an engine does from now on: (what and when, its bytes) for every array at every 10th step, then the
-    collisions."""
+    """What an engine does from now on: (what and when, its bytes) for every array at every 10th
+    step, then the collisions."""
     seen: list[tuple[str, bytes]] = []
     for k in range(0, steps + 1, 10):
         if k:
             engine.step(10)
-        seen += [(f"{name} after {k} steps", array.tobytes()) for name, array in vars(engine.read()).items()]
-    return [*seen, ("collisions", repr([collision[:3] for collision in engine.collisions()]).encode())]
+        seen += [
+            (f"{name} after {k} steps", array.tobytes())
+            for name, array in vars(engine.read()).items()
+        ]
+    return [
+        *seen,
+        ("collisions", repr([collision[:3] for collision in engine.collisions()]).encode()),
+    ]
 
 
 def first_difference(seen: list[tuple[str, bytes]], wanted: list[tuple[str, bytes]]) -> str:

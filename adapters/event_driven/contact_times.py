@@ -1,7 +1,8 @@
 """When two things meet: first contact times of disks, points and lines that fly on parabolas.
 
-Compiled by numba; with NUMBA_DISABLE_JIT=1 the same source runs as plain Python. Times are s from now, inf: never.
-A gap is positive before a contact. What rounding has closed too far counts as touching, never as lost.
+Compiled by numba; with NUMBA_DISABLE_JIT=1 the same source runs as plain Python. Times are s from
+now, inf: never. A gap is positive before a contact. What rounding has closed too far counts as
+touching, never as lost.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ Quartic = tuple[float, float, float, float, float]
 
 @kernel
 def line_time(gap: float, speed: float, acceleration: float) -> float:
-    """First t >= 0 at which gap + speed t + acceleration t2 / 2 goes down through 0, without a difference of near
-    equals.
+    """First t >= 0 at which gap + speed t + acceleration t2 / 2 goes down through 0, without a
+    difference of near equals.
 
-    Where the gap is below 0 and rises, it must come down again; where it never gets above 0, the answer is its top.
+    Where the gap is below 0 and rises, it must come down again; where it never gets above 0, the
+    answer is its top.
     """
     if gap <= 0.0 and (speed < 0.0 or (speed == 0.0 and acceleration < 0.0)):
         return 0.0
@@ -33,9 +35,11 @@ def line_time(gap: float, speed: float, acceleration: float) -> float:
 
 @kernel
 def disk_time(gap: float, closing: float, speed2: float) -> float:
-    """Contact of two disks with equal accelerations: gap = dr.dr - R2, closing = dr.dv, speed2 = dv.dv.
+    """Contact of two disks with equal accelerations: gap = dr.dr - R2, closing = dr.dv, speed2 =
+    dv.dv.
 
-    t = c / (-b + sqrt(b2 - a c)), which cancels nothing (Alder & Wainwright, J. Chem. Phys. 31, 459, 1959).
+    t = c / (-b + sqrt(b2 - a c)), which cancels nothing (Alder & Wainwright, J. Chem. Phys. 31,
+    459, 1959).
     """
     disc = closing * closing - speed2 * gap
     if closing >= 0.0 or disc <= 0.0:
@@ -45,15 +49,30 @@ def disk_time(gap: float, closing: float, speed2: float) -> float:
 
 @kernel
 def curved_time(
-    dx: float, dy: float, ux: float, uy: float, ax: float, ay: float, gap: float, closing: float, until: float
+    dx: float,
+    dy: float,
+    ux: float,
+    uy: float,
+    ax: float,
+    ay: float,
+    gap: float,
+    closing: float,
+    until: float,
 ) -> float:
-    """Contact of two disks with different accelerations up to `until` s: the first down-crossing of a quartic.
+    """Contact of two disks with different accelerations up to `until` s: the first down-crossing of
+    a quartic.
 
     d, u, a: position, velocity and acceleration of the one relative to the other; a != 0.
     """
     if gap <= 0.0 and closing < 0.0:
         return 0.0
-    f = (gap, 2.0 * closing, ux * ux + uy * uy + dx * ax + dy * ay, ux * ax + uy * ay, (ax * ax + ay * ay) / 4)
+    f = (
+        gap,
+        2.0 * closing,
+        ux * ux + uy * uy + dx * ax + dy * ay,
+        ux * ax + uy * ay,
+        (ax * ax + ay * ay) / 4,
+    )
     # All roots lie below 1 + the largest ratio of a coefficient to the leading one (Cauchy).
     end = min(until, 1.0 + max(abs(f[0]), abs(f[1]), abs(f[2]), abs(f[3])) / f[4])
     turns = turning_points(f, end)
@@ -69,7 +88,8 @@ def curved_time(
 
 @kernel
 def turning_points(f: Quartic, end: float) -> Quartic:
-    """Where f turns between 0 and `end`, and both: its third derivative's root parts the range for the second's.
+    """Where f turns between 0 and `end`, and both: its third derivative's root parts the range for
+    the second's.
 
     Their roots part it for the first's. Where a part has no root, its end stands for it.
     """
@@ -89,7 +109,8 @@ def value(f: Quartic, t: float) -> float:
 
 @kernel
 def root(f: Quartic, low: float, high: float) -> float:
-    """The root of what is monotone from low to high, or high: Newton, halving where that would leave the bracket."""
+    """The root of what is monotone from low to high, or high: Newton, halving where that would
+    leave the bracket."""
     rising = value(f, high) > 0.0
     if rising == (value(f, low) > 0.0):
         return high

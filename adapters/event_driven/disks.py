@@ -1,9 +1,11 @@
-"""What the event engine keeps: disks with a next-event record each, a cell grid, the rules; and how disks fly in it.
+"""What the event engine keeps: disks with a next-event record each, a cell grid, the rules; and how
+disks fly in it.
 
-A record holds the earliest contact of its disk with another one, as of when it was last looked for, and the earliest
-event of the disk by itself: a wall, an edge of its cell or of the wrap box. A contact is void if the other disk has
-been struck since (its `count` moved on); it is looked for again when its time comes, and is early rather than late
-until then. Every pair is covered by the record made last of its two (Lubachevsky, J. Comput. Phys. 94, 255, 1991).
+A record holds the earliest contact of its disk with another one, as of when it was last looked for,
+and the earliest event of the disk by itself: a wall, an edge of its cell or of the wrap box. A
+contact is void if the other disk has been struck since (its `count` moved on); it is looked for
+again when its time comes, and is early rather than late until then. Every pair is covered by the
+record made last of its two (Lubachevsky, J. Comput. Phys. 94, 255, 1991).
 """
 
 from __future__ import annotations
@@ -21,38 +23,57 @@ Ints = NDArray[np.int64]
 Links = NDArray[np.uint32]
 Disks = NDArray[np.void]  # (n,) of DISK
 Runs = NDArray[np.void]  # (n,) of RUN
-NONE = np.uint32(2**32 - 1)  # ends a chain; without a sign, so that nobody must ask whether to count from the end
+# ends a chain; without a sign, so that nobody must ask whether to count from the end
+NONE = np.uint32(2**32 - 1)
 NOBODY = -(2**31)
 DONE, GOES_ON, LOG_FULL, ACCUMULATION, REENTRY, ROUND_END = range(6)  # what the loop says
 BASE, STOP = 0, 1  # columns of Arena.clock
 LOGGED, WHO, WHOM, LEFT = range(4)  # and of Arena.counters
-EDGE, WRAP, END, WALL = 0, 4, 8, 9  # by itself: + side (left, right, bottom, top); the wall's end; + 3 wall + part
+# by itself: + side (left, right, bottom, top); the wall's end; + 3 wall + part
+EDGE, WRAP, END, WALL = 0, 4, 8, 9
 
-# A disk in three lines of the cache: what a search for contacts reads of others, its record, what only some need.
+# A disk in three lines of the cache: what a search for contacts reads of others, its record, what
+# only some need.
 DISK = np.dtype(
     [
-        ("x", "f8"), ("y", "f8"), ("vx", "f8"), ("vy", "f8"), ("t", "f8"),  # state at the disk's own time
+        # state at the disk's own time
+        ("x", "f8"),
+        ("y", "f8"),
+        ("vx", "f8"),
+        ("vy", "f8"),
+        ("t", "f8"),
         ("radius", "f8"),
         ("next", "u4"),  # the next disk in the chain of its cell
-        ("cx", "i4"), ("cy", "i4"),  # its cell
+        ("cx", "i4"),
+        ("cy", "i4"),  # its cell
         ("count", "i4"),  # collisions and changes of acceleration so far
         ("weight", "f8"),  # 1 / mass
-        ("noise", "f8"),  # m/s, what rounding may have left of the closing speed of its last collision
-        ("pair_time", "f8"), ("own_time", "f8"),  # when it meets another disk, or something by itself
-        ("partner", "u4"), ("partner_count", "i4"),  # that disk, and its count when this was found
+        # m/s, what rounding may have left of the closing speed of its last collision
+        ("noise", "f8"),
+        # when it meets another disk, or something by itself
+        ("pair_time", "f8"),
+        ("own_time", "f8"),
+        ("partner", "u4"),
+        ("partner_count", "i4"),  # that disk, and its count when this was found
         ("own_code", "i4"),  # what it meets by itself, as above
         ("last", "i4"),  # what it struck last: a disk, or -1 - wall
         ("before", "u4"),  # the disk before it in its chain
-        ("mark_collisions", "i4"), ("mark_time", "f8"),  # collisions since, to notice when they accumulate
-        ("ax", "f8"), ("ay", "f8"),  # acceleration; lying on a wall, only that along it
-        ("free_ax", "f8"), ("free_ay", "f8"),  # acceleration of free flight
-        ("ox", "f8"), ("oy", "f8"),  # where cell (0, 0) of its lap lies: the grid of an open scene repeats for ever
+        # collisions since, to notice when they accumulate
+        ("mark_collisions", "i4"),
+        ("mark_time", "f8"),
+        ("ax", "f8"),
+        ("ay", "f8"),  # acceleration; lying on a wall, only that along it
+        ("free_ax", "f8"),
+        ("free_ay", "f8"),  # acceleration of free flight
+        # where cell (0, 0) of its lap lies: the grid of an open scene repeats for ever
+        ("ox", "f8"),
+        ("oy", "f8"),
         ("wall", "i4"),  # the wall it lies on; -1: none; -2 - wall: none since it slid off that one
         ("bounces", "i4"),  # collisions in a row on the face of one wall
         ("corner", "i4"),  # the second wall of the corner in which it lies still; -1: none
         ("", "i4"),
     ]
-)  # fmt: skip
+)
 
 # Of each disk the collisions in a row between which it has not flown, see `event_rest.rattles`.
 RUN = np.dtype(
@@ -62,11 +83,12 @@ RUN = np.dtype(
         ("start", "f8"),  # s, when the first of the run was
         ("acceleration", "f8"),  # m/s2, the largest that acted on those who took part
     ]
-)  # fmt: skip
+)
 
 
 class Grid(NamedTuple):
-    """Cells at least as wide as the largest disk; in a torus leaving the grid shifts the disk, else its origin."""
+    """Cells at least as wide as the largest disk; in a torus leaving the grid shifts the disk, else
+    its origin."""
 
     side: tuple[float, float]  # m
     shape: tuple[int, int]  # at least 3
@@ -75,8 +97,8 @@ class Grid(NamedTuple):
     torus: bool
 
 
-# () where there are only disks and they fly straight, else (True,). Numba knows how long a tuple is when it compiles,
-# so that a gas has a loop of its own, without a trace of walls and accelerations.
+# () where there are only disks and they fly straight, else (True,). Numba knows how long a tuple is
+# when it compiles, so that a gas has a loop of its own, without a trace of walls and accelerations.
 Scenery = tuple[()] | tuple[bool]
 
 
@@ -88,7 +110,9 @@ class Rules(NamedTuple):
     mixed: bool  # not everything alike
     wrapped: bool
     lasting: bool  # bounces die out too slowly for `crowd`, or never
-    crowd: float  # units in the last place of the time: a disk that collides 64 times within so many has no single continuation
+    # units in the last place of the time: a disk that collides 64 times within so many has no
+    # single continuation
+    crowd: float
 
 
 class Walls(NamedTuple):
@@ -112,7 +136,9 @@ class Arena(NamedTuple):
     walls: Walls
     clock: Array  # s: when the present epoch began, when the answer ends
     log: Array  # (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
-    counters: Ints  # rows in the log; the two for whom the answer ends, as in the log; events until the loop comes back
+    # rows in the log; the two for whom the answer ends, as in the log; events until the loop comes
+    # back
+    counters: Ints
     runs: Runs  # untouched where there is no scenery
 
 
@@ -162,7 +188,8 @@ def lap(k: int, cells: int) -> int:
 
 @inlined
 def cross(disks: Disks, head: Links, g: Grid, i: int, side: int) -> None:
-    """Move disk `i` to the next cell; over the end of the grid, shift the disk (torus) or the grid under it."""
+    """Move disk `i` to the next cell; over the end of the grid, shift the disk (torus) or the grid
+    under it."""
     a = disks[i]
     unlink(disks, head, g, i)
     step = 2 * (side % 2) - 1

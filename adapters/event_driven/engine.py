@@ -1,5 +1,5 @@
-"""The float64 event engine of `scenarios` as an engine: event by event, and asked at the end of each
-step."""
+"""The float64 event engine of `scenarios` as an engine: event by event, and asked at the end of
+each step."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from scenarios.no_truth import NoTruth
 
 
 class EventDriven:
-    """Plays exactly but for rounding; dt says when it is looked at, and for how long a force acts."""
+    """Plays exactly but for rounding; dt says when it is looked at, and for how long a force
+    acts."""
 
     listening, wrapping = (
         True,
@@ -42,7 +43,8 @@ class EventDriven:
             self.forced.add(disk)
 
     def step(self, count: int = 1) -> None:
-        """Let the events of `count` steps happen; a force is an acceleration from the first one's start to its end."""
+        """Let the events of `count` steps happen; a force is an acceleration from the first one's
+        start to its end."""
         if self.forced and count:
             turning = self.torque / self.scene.inertia
             self.settle()  # it turned freely up to here
@@ -69,12 +71,14 @@ class EventDriven:
             raise Unsupported(str(refusal)) from refusal
 
     def settle(self, turning: Array | float = 0.0) -> None:
-        """Keep angle and spin as they are now, under an angular acceleration since they were kept last."""
+        """Keep angle and spin as they are now, under an angular acceleration since they were kept
+        last."""
         self.angle, self.spin = self.turn(turning)
         self.turned_at = self.steps
 
     def turn(self, turning: Array | float = 0.0) -> tuple[Array, Array]:
-        """Angle rad and angular velocity rad/s (n,) now, under an angular acceleration since they were kept."""
+        """Angle rad and angular velocity rad/s (n,) now, under an angular acceleration since they
+        were kept."""
         since = (self.steps - self.turned_at) * self.dt
         return self.angle + (self.spin + turning * since / 2) * since, self.spin + turning * since
 
@@ -87,12 +91,17 @@ class EventDriven:
         found = []
         for t, i, j, impulse in self.engine.collisions.tolist():
             step = int(t / self.dt)
-            found.append(ContactImpulse(step - (step * self.dt >= t and step > 0), int(i), int(j), impulse))
+            found.append(
+                ContactImpulse(step - (step * self.dt >= t and step > 0), int(i), int(j), impulse)
+            )
         return found
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """There is nothing to set: the scene is all."""
-        return {"contact times": (None, "roots of the gap"), "a force within a step": (None, "constant acceleration")}
+        return {
+            "contact times": (None, "roots of the gap"),
+            "a force within a step": (None, "constant acceleration"),
+        }
 
     def versions(self) -> dict[str, str]:
         """The compiler decides the last bit."""

@@ -1,8 +1,8 @@
-"""The float64 event engine: disks, walls, a torus or the exercise's wrap, event by event without time
-steps.
+"""The float64 event engine: disks, walls, a torus or the exercise's wrap, event by event without
+time steps.
 
-It has no step size and no tolerance: contact times are roots, flights are parabolas. Where the motion has no single
-continuation it says so (`NoTruth`) rather than go on.
+It has no step size and no tolerance: contact times are roots, flights are parabolas. Where the
+motion has no single continuation it says so (`NoTruth`) rather than go on.
 """
 
 from __future__ import annotations
@@ -42,19 +42,23 @@ from scenarios.no_truth import NoTruth
 
 LOG_ROWS = 1 << 14
 EVENTS = 1 << 14  # in one go, some ms, without looking up for Ctrl-C
-MOST = 400_000  # events, less than a second, after which the time they took must account for them, ...
-NARROW, CROWDED = 1e4, 1e2  # ... at so many in all, and so many a disk, while the fastest flies the smallest radius
+# events, less than a second, after which the time they took must account for them, ...
+MOST = 400_000
+# ... at so many in all, and so many a disk, while the fastest flies the smallest radius
+NARROW, CROWDED = 1e4, 1e2
 MOST_AHEAD = 1e9  # events, some ten minutes, that may still be to come at the present pace
 SLOWEST = 0.9999  # the restitution up to which bounces are waited for to die out
-WIDER = 1 + 1e-9  # cells are wider than the largest disk by more than rounding, so that contacts are always next door
+# cells are wider than the largest disk by more than rounding, so that contacts are always next door
+WIDER = 1 + 1e-9
 
 
 class EventEngine:
     """Plays a scene exactly, but for the rounding of float64.
 
-    torus: (2, 2) m, low and high corner of a periodic box in place of walls. cell: m, the least side of a grid cell;
-    it changes the speed only. Raises `NoTruth` where the start is no start: disks that overlap each other or a wall
-    or touch and close in, a disk larger than its box, a torus narrower than three diameters.
+    torus: (2, 2) m, low and high corner of a periodic box in place of walls. cell: m, the least
+    side of a grid cell; it changes the speed only. Raises `NoTruth` where the start is no start:
+    disks that overlap each other or a wall or touch and close in, a disk larger than its box, a
+    torus narrower than three diameters.
     """
 
     def __init__(self, scene: Scene, torus: ArrayLike | None = None, cell: float = 0.0) -> None:
@@ -62,16 +66,28 @@ class EventEngine:
         refuse_box(scene, box)
         self.scene = scene
         (grid, low), rules = grid_of(scene, box, cell), rules_of(scene, refuse_walls(scene))
-        position = scene.position if box is None else low + np.mod(scene.position - low, box[1] - low)
+        position = (
+            scene.position if box is None else low + np.mod(scene.position - low, box[1] - low)
+        )
         self.arena = Arena(
-            disks_of(scene, position, low), empty_queue(scene.n), head=np.full(np.prod(grid.shape), NONE),
-            near=np.full(scene.n + 9, NONE), grid=grid, rules=rules, walls=walls_of(scene, grid, low),
-            clock=np.zeros(2), log=np.zeros((LOG_ROWS, 5)), counters=np.zeros(4, np.int64),
+            disks_of(scene, position, low),
+            empty_queue(scene.n),
+            head=np.full(np.prod(grid.shape), NONE),
+            near=np.full(scene.n + 9, NONE),
+            grid=grid,
+            rules=rules,
+            walls=walls_of(scene, grid, low),
+            clock=np.zeros(2),
+            log=np.zeros((LOG_ROWS, 5)),
+            counters=np.zeros(4, np.int64),
             runs=np.zeros(scene.n, RUN).view(np.recarray),
-        )  # fmt: skip
+        )
         self.kept: list[Array] = []
-        self.spent, self.since = 0, 0.0  # events since refuse_crawl has looked, and when that was, s
-        self.scenery: Scenery = (True,) if rules.falling or rules.wrapped or len(scene.walls) else ()
+        # events since refuse_crawl has looked, and when that was, s
+        self.spent, self.since = 0, 0.0
+        self.scenery: Scenery = (
+            (True,) if rules.falling or rules.wrapped or len(scene.walls) else ()
+        )
         event_loop.begin(self.arena.disks, self.arena.head, self.arena.tree, grid)
         self.refuse_pairs()
 
@@ -87,17 +103,26 @@ class EventEngine:
                 self.refuse_crawl(until)
         at, i, j = float(self.arena.clock[STOP]), int(counters[WHO]), int(counters[WHOM])
         if status == ACCUMULATION:
-            raise NoTruth(f"the collisions of disk {i} on {self.partners(i, j, at)} accumulate at {at:.9g} s", at)
+            raise NoTruth(
+                f"the collisions of disk {i} on {self.partners(i, j, at)} accumulate at {at:.9g} s",
+                at,
+            )
         if status == REENTRY:
             raise NoTruth(f"disk {i} re-enters on top of disk {j} at {at:.9g} s", at)
         if status == ROUND_END:
-            raise NoTruth(f"disk {i} slides round the end of wall {-1 - j} at {at:.9g} s: no parabola goes there", at)
+            raise NoTruth(
+                f"disk {i} slides round the end of wall {-1 - j} at {at:.9g} s: no parabola goes"
+                " there",
+                at,
+            )
 
     def refuse_crawl(self, until: float) -> None:
-        """`NoTruth` if the last `MOST` events took less time than the scene accounts for, or if too many are to come.
+        """`NoTruth` if the last `MOST` events took less time than the scene accounts for, or if too
+        many are to come.
 
-        While the fastest disk flies its radius, or falls by it, a gas has some ten events a disk, and a disk that flies
-        to and fro in a gap has more as that is narrower: `CROWDED` and `NARROW` are far above both.
+        While the fastest disk flies its radius, or falls by it, a gas has some ten events a disk,
+        and a disk that flies to and fro in a gap has more as that is narrower: `CROWDED` and
+        `NARROW` are far above both.
         """
         disks, radius = self.arena.disks, float(self.scene.radius.min())
         now = min(until, float(self.arena.clock[BASE] + self.arena.tree[1].time))
@@ -117,7 +142,11 @@ class EventEngine:
         """What disk `i` has struck since a time, in words; `last` was the last of it."""
         log = np.concatenate([np.empty((0, 5)), *self.kept[-2:]])
         log = log[log[:, 0] >= since * (1 - 1e-12)]
-        found = {last, *log[log[:, 1] == i, 2].astype(int).tolist(), *log[log[:, 2] == i, 1].astype(int).tolist()}
+        found = {
+            last,
+            *log[log[:, 1] == i, 2].astype(int).tolist(),
+            *log[log[:, 2] == i, 1].astype(int).tolist(),
+        }
         disks, walls = (sorted(j for j in found if j >= 0), sorted(-1 - j for j in found if j < 0))
         return " and ".join([*(f"disk {j}" for j in disks), *(f"wall {w}" for w in walls)])
 
@@ -129,13 +158,15 @@ class EventEngine:
             counters[LOGGED] = 0
 
     def accelerate(self, disk: int, at: float, acceleration: Array) -> None:
-        """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so, (2,) m/s2."""
+        """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so,
+        (2,) m/s2."""
         self.arena = self.arena._replace(rules=self.arena.rules._replace(falling=True, mixed=True))
         self.scenery = (True,)
         event_loop.accelerate(self.arena, self.scenery, disk, at, acceleration[0], acceleration[1])
 
     def look(self, at: float) -> tuple[Array, Array]:
-        """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; nothing changes by looking."""
+        """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; nothing
+        changes by looking."""
         out = np.empty((self.scene.n, 4))
         event_loop.look(self.arena.disks, self.arena.clock[BASE], at, out)
         return out[:, :2], out[:, 2:]
@@ -147,12 +178,13 @@ class EventEngine:
 
     @property
     def cosines(self) -> Array:
-        """(h,) of the impact angle of each of the collisions, normal over whole speed: the smaller, the more a
-        graze."""
+        """(h,) of the impact angle of each of the collisions, normal over whole speed: the smaller,
+        the more a graze."""
         return np.concatenate([np.empty((0, 5)), *self.kept])[:, 4]
 
     def refuse_pairs(self) -> None:
-        """`NoTruth` if two disks overlap, or touch and close in, judged in rationals: floats cannot tell."""
+        """`NoTruth` if two disks overlap, or touch and close in, judged in rationals: floats cannot
+        tell."""
         disks, found = self.arena.disks, np.empty((8 * self.scene.n, 2), np.int64)
         count = event_loop.near_pairs(disks, self.arena.head, self.arena.grid, WIDER - 1, found)
         for i, j in found[:count]:
@@ -163,20 +195,30 @@ def refuse_pair(a: Any, b: Any, grid: Grid, i: int, j: int) -> None:
     """`NoTruth` if disks i and j overlap, or touch and close in."""
     apart = [Fraction(b.x) - Fraction(a.x), Fraction(b.y) - Fraction(a.y)]
     if grid.torus:
-        apart = [d - Fraction(span) * round(d / Fraction(span)) for d, span in zip(apart, grid.span)]
+        apart = [
+            d - Fraction(span) * round(d / Fraction(span)) for d, span in zip(apart, grid.span)
+        ]
     reach = Fraction(a.radius) + Fraction(b.radius)
     gap = sum(d * d for d in apart) - reach * reach
-    closing = apart[0] * (Fraction(b.vx) - Fraction(a.vx)) + apart[1] * (Fraction(b.vy) - Fraction(a.vy))
+    closing = apart[0] * (Fraction(b.vx) - Fraction(a.vx)) + apart[1] * (
+        Fraction(b.vy) - Fraction(a.vy)
+    )
     if gap < 0:
         overlap = -float(gap) / (float(reach) + np.hypot(float(apart[0]), float(apart[1])))
-        raise NoTruth(f"disks {i} and {j} overlap by {overlap:.3g} m at the start: move one {overlap:.3g} m away")
+        raise NoTruth(
+            f"disks {i} and {j} overlap by {overlap:.3g} m at the start: move one {overlap:.3g} m"
+            " away"
+        )
     if gap == 0 and closing < 0:
         speed = -float(closing) / float(reach)
-        raise NoTruth(f"disks {i} and {j} touch and close in at {speed:.3g} m/s at the start: leave a gap")
+        raise NoTruth(
+            f"disks {i} and {j} touch and close in at {speed:.3g} m/s at the start: leave a gap"
+        )
 
 
 def refuse_walls(scene: Scene) -> bool:
-    """Whether a disk that can move touches a wall; `NoTruth` if one overlaps a wall, or touches it and closes in."""
+    """Whether a disk that can move touches a wall; `NoTruth` if one overlaps a wall, or touches it
+    and closes in."""
     leaning = False
     for w, (start, end) in enumerate(scene.walls):
         along = end - start
@@ -188,24 +230,33 @@ def refuse_walls(scene: Scene) -> bool:
             if gap < 0:
                 overlap = scene.radius[i] - float(offset) ** 0.5
                 by = max(overlap, -float(gap) / (2 * scene.radius[i]))
-                raise NoTruth(f"disk {i} overlaps wall {w} by {by:.3g} m at the start: move it {by:.3g} m away")
+                raise NoTruth(
+                    f"disk {i} overlaps wall {w} by {by:.3g} m at the start: move it {by:.3g} m"
+                    " away"
+                )
             if gap == 0 and closing < 0:
                 raise NoTruth(f"disk {i} touches wall {w} and closes in at the start: leave a gap")
             leaning |= gap == 0
     return leaning
 
 
-def exact_offset(position: Array, velocity: Array, start: Array, end: Array) -> tuple[Fraction, Fraction]:
-    """Squared distance of a point from a segment, and half the rate at which it grows, in rationals."""
+def exact_offset(
+    position: Array, velocity: Array, start: Array, end: Array
+) -> tuple[Fraction, Fraction]:
+    """Squared distance of a point from a segment, and half the rate at which it grows, in
+    rationals."""
     p, v, a, b = ([Fraction(x) for x in point] for point in (position, velocity, start, end))
     u, d = [b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]
-    share = min(max((d[0] * u[0] + d[1] * u[1]) / (u[0] ** 2 + u[1] ** 2), Fraction(0)), Fraction(1))
+    share = min(
+        max((d[0] * u[0] + d[1] * u[1]) / (u[0] ** 2 + u[1] ** 2), Fraction(0)), Fraction(1)
+    )
     away = [d[0] - share * u[0], d[1] - share * u[1]]
     return away[0] ** 2 + away[1] ** 2, away[0] * v[0] + away[1] * v[1]
 
 
 def refuse_box(scene: Scene, torus: Array | None) -> None:
-    """`NoTruth` for a box too narrow for its largest disk, `ValueError` for a torus that is no box or has walls."""
+    """`NoTruth` for a box too narrow for its largest disk, `ValueError` for a torus that is no box
+    or has walls."""
     widest = 2 * float(scene.radius.max())
     if torus is not None:
         if scene.wrap is not None or len(scene.walls):
@@ -213,19 +264,35 @@ def refuse_box(scene: Scene, torus: Array | None) -> None:
         if torus.shape != (2, 2) or not (torus[0] < torus[1]).all():
             raise ValueError("torus must be [low, high], low below high")
         if (narrow := float((torus[1] - torus[0]).min())) < 3 * widest * WIDER:
-            raise NoTruth(f"the torus is {narrow:g} m wide: three diameters of its largest disk are {3 * widest:g} m")
+            raise NoTruth(
+                f"the torus is {narrow:g} m wide: three diameters of its largest disk are"
+                f" {3 * widest:g} m"
+            )
     if scene.wrap is not None and (narrow := float((scene.wrap[1] - scene.wrap[0]).min())) < widest:
-        raise NoTruth(f"the box is {narrow:g} m wide: its largest disk has a diameter of {widest:g} m")
+        raise NoTruth(
+            f"the box is {narrow:g} m wide: its largest disk has a diameter of {widest:g} m"
+        )
 
 
 def rules_of(scene: Scene, leaning: bool) -> Rules:
     """The scene's physics as the kernels take it; leaning: a disk touches a wall at the start."""
     falling, walled = bool(scene.gravity.any()), len(scene.walls) > 0
-    # What lies on a wall does not fall with the others; at e = 1 nothing comes to rest that did not begin so.
-    mixed = falling and ((walled and (leaning or scene.restitution < 1)) or bool(scene.static.any()))
-    # Where a bounce takes less than 1 / (1 - e) units in the last place, rounding the time gives back what it loses.
+    # What lies on a wall does not fall with the others; at e = 1 nothing comes to rest that did not
+    # begin so.
+    mixed = falling and (
+        (walled and (leaning or scene.restitution < 1)) or bool(scene.static.any())
+    )
+    # Where a bounce takes less than 1 / (1 - e) units in the last place, rounding the time gives
+    # back what it loses.
     crowd = 1e3 / (1 - min(scene.restitution, SLOWEST)) if scene.restitution < 1 else 1e3
-    return Rules(float(scene.restitution), falling, mixed, scene.wrap is not None, scene.restitution > SLOWEST, crowd)
+    return Rules(
+        float(scene.restitution),
+        falling,
+        mixed,
+        scene.wrap is not None,
+        scene.restitution > SLOWEST,
+        crowd,
+    )
 
 
 def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
@@ -234,18 +301,23 @@ def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
     length = np.hypot(*along.T) if len(along) else np.zeros(0)
     segment = np.column_stack([scene.walls[:, 0], along / length[:, None], length])
     wrap = np.zeros((2, 2)) if scene.wrap is None else np.array(scene.wrap)
-    return Walls(wrap, segment, *walls_by_cell(scene, low, np.array(grid.side), np.array(grid.shape)))
+    return Walls(
+        wrap, segment, *walls_by_cell(scene, low, np.array(grid.side), np.array(grid.shape))
+    )
 
 
 def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array]:
-    """The cell grid and its low corner: over the torus, or over all that is there and a cell around it."""
+    """The cell grid and its low corner: over the torus, or over all that is there and a cell around
+    it."""
     least = max(2 * scene.radius.max() * WIDER, cell)
     corners = np.empty((0, 2)) if scene.wrap is None else scene.wrap
     points = np.concatenate([scene.position, scene.walls.reshape(-1, 2), corners])
     low, high = (points.min(axis=0), points.max(axis=0)) if torus is None else torus
     extent = high - low
     # About four cells a disk are enough for the sparsest scene.
-    side = np.full(2, max(least, np.sqrt(extent.prod() / (4 * scene.n)), extent.max() / (4 * scene.n)))
+    side = np.full(
+        2, max(least, np.sqrt(extent.prod() / (4 * scene.n)), extent.max() / (4 * scene.n))
+    )
     if torus is None:
         low, shape = low - side, np.ceil(extent / side).astype(np.int64) + 3
         span, shift = side * shape, np.zeros(2)
@@ -260,16 +332,23 @@ def pair(array: NDArray) -> Any:
     return tuple(array.tolist())
 
 
-def walls_by_cell(scene: Scene, low: Array, side: Array, shape: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
-    """For each cell the walls that a disk in it may touch: where its list begins, (cells + 1,), and all lists."""
-    centre = low + side * (np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 2) + 0.5)
+def walls_by_cell(
+    scene: Scene, low: Array, side: Array, shape: NDArray[np.int64]
+) -> tuple[NDArray, NDArray]:
+    """For each cell the walls that a disk in it may touch: where its list begins, (cells + 1,), and
+    all lists."""
+    centre = low + side * (
+        np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 2) + 0.5
+    )
     reach = (np.hypot(*side) / 2 + scene.radius.max()) * WIDER
     near = np.zeros((len(centre), len(scene.walls)), bool)
     for w, (start, end) in enumerate(scene.walls):
         along = end - start
         share = np.clip((centre - start) @ along / (along @ along), 0, 1)
         near[:, w] = np.hypot(*(centre - start - share[:, None] * along).T) <= reach
-    return np.append(0, near.sum(axis=1).cumsum()).astype(np.int64), np.nonzero(near)[1].astype(np.int64)
+    return np.append(0, near.sum(axis=1).cumsum()).astype(np.int64), np.nonzero(near)[1].astype(
+        np.int64
+    )
 
 
 def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:

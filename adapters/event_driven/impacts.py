@@ -1,8 +1,8 @@
-"""What a collision does in the event engine: Newton's restitution along the line of centres, without friction; and its
-note.
+"""What a collision does in the event engine: Newton's restitution along the line of centres,
+without friction; and its note.
 
-A collision is logged and counted, so that those without an end are noticed: between which float64 resolves no time, or
-between which nothing flies.
+A collision is logged and counted, so that those without an end are noticed: between which float64
+resolves no time, or between which nothing flies.
 """
 
 from __future__ import annotations
@@ -13,17 +13,31 @@ from typing import Any
 import numpy as np
 
 from adapters.event_driven.compiled import inlined, kernel
-from adapters.event_driven.disks import ACCUMULATION, BASE, GOES_ON, LOGGED, NOBODY, STOP, WHO, WHOM, Arena, Walls
+from adapters.event_driven.disks import (
+    ACCUMULATION,
+    BASE,
+    GOES_ON,
+    LOGGED,
+    NOBODY,
+    STOP,
+    WHO,
+    WHOM,
+    Arena,
+    Walls,
+)
 from adapters.event_driven.rest import COLLISIONS, hold, jolt, rattles, rests, second_wall, slow
 from adapters.event_driven.search import ROUNDING, image
 
 
 @inlined
-def collide(a: Any, b: Any, i: int, j: int, shift: tuple[float, float], restitution: float) -> tuple[float, float]:
-    """Collision of disks i and j that are in contact; impulse N s, 0 if they do not close in, and cosine of the angle.
+def collide(
+    a: Any, b: Any, i: int, j: int, shift: tuple[float, float], restitution: float
+) -> tuple[float, float]:
+    """Collision of disks i and j that are in contact; impulse N s, 0 if they do not close in, and
+    cosine of the angle.
 
-    v_i -= q w_i dr, v_j += q w_j dr, q = -(1 + e) b / (dr.dr (w_i + w_j)): a normal that is made a unit vector by a
-    square root would let the energy drift by 1.5e-17 a collision.
+    v_i -= q w_i dr, v_j += q w_j dr, q = -(1 + e) b / (dr.dr (w_i + w_j)): a normal that is made a
+    unit vector by a square root would let the energy drift by 1.5e-17 a collision.
     """
     dx, dy = b.x - a.x + image(b.cx - a.cx, shift[0]), b.y - a.y + image(b.cy - a.cy, shift[1])
     ux, uy = b.vx - a.vx, b.vy - a.vy
@@ -42,7 +56,9 @@ def collide(a: Any, b: Any, i: int, j: int, shift: tuple[float, float], restitut
 
 
 @kernel
-def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) -> tuple[float, float]:
+def collide_wall(
+    walls: Walls, a: Any, w: int, part: int, restitution: float
+) -> tuple[float, float]:
     """Collision of a disk on a wall it touches, set exactly beside the face; as `collide`."""
     ux, uy, speed2 = walls.segment[w, 2], walls.segment[w, 3], a.vx * a.vx + a.vy * a.vy
     dx, dy = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
@@ -70,7 +86,13 @@ def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) ->
 def tell(arena: Arena, now: float, i: int, j: int, impulse: float, cosine: float) -> None:
     """Write a collision into the log."""
     log, k = arena.log, arena.counters[LOGGED]
-    log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = arena.clock[BASE] + now, i, j, impulse, cosine
+    log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = (
+        arena.clock[BASE] + now,
+        i,
+        j,
+        impulse,
+        cosine,
+    )
     arena.counters[LOGGED] += 1
 
 
@@ -82,8 +104,8 @@ def stop(arena: Arena, now: float, i: int, j: int) -> None:
 
 @inlined
 def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) -> bool:
-    """Count and log a collision; True if collisions of disk `i` follow each other faster than float64 resolves times
-    apart."""
+    """Count and log a collision; True if collisions of disk `i` follow each other faster than
+    float64 resolves times apart."""
     a.count += 1
     if impulse > 0.0:
         tell(arena, a.t, i, j, impulse, cosine)
@@ -105,20 +127,28 @@ def change(a: Any) -> None:
 
 
 @kernel
-def rattles_on_disk(run: Any, a: Any, b: Any, restitution: float, impulse: float, counts: bool) -> bool:
-    """Whether a disk that has just collided with disk `b` rattles between what it touches, see `rattles`."""
+def rattles_on_disk(
+    run: Any, a: Any, b: Any, restitution: float, impulse: float, counts: bool
+) -> bool:
+    """Whether a disk that has just collided with disk `b` rattles between what it touches, see
+    `rattles`."""
     if a.weight == 0.0:
         return False
     run.walls = 0
-    acceleration2 = max(a.free_ax * a.free_ax + a.free_ay * a.free_ay, b.free_ax * b.free_ax + b.free_ay * b.free_ay)
-    return rattles(run, a, impulse * (a.weight + b.weight) / (1.0 + restitution), sqrt(acceleration2), counts)
+    acceleration2 = max(
+        a.free_ax * a.free_ax + a.free_ay * a.free_ay, b.free_ax * b.free_ax + b.free_ay * b.free_ay
+    )
+    return rattles(
+        run, a, impulse * (a.weight + b.weight) / (1.0 + restitution), sqrt(acceleration2), counts
+    )
 
 
 @kernel
 def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
     """Disk `i` bounces off a wall, or comes to rest on its face or in a corner with another one.
 
-    Bounces to and fro in a corner go on, however many there are at one instant, until they have made it slow.
+    Bounces to and fro in a corner go on, however many there are at one instant, until they have
+    made it slow.
     """
     a, walls, run = arena.disks[i], arena.walls, arena.runs[i]
     changed = a.last != -1 - w

@@ -1,4 +1,5 @@
-"""The event engine's loop: take the earliest record, let its event happen, renew the records of who took part."""
+"""The event engine's loop: take the earliest record, let its event happen, renew the records of who
+took part."""
 
 from __future__ import annotations
 
@@ -36,7 +37,14 @@ from adapters.event_driven.disks import (
     settle,
     unlink,
 )
-from adapters.event_driven.impacts import change, collide, collision_wall, note, rattles_on_disk, stop
+from adapters.event_driven.impacts import (
+    change,
+    collide,
+    collision_wall,
+    note,
+    rattles_on_disk,
+    stop,
+)
 from adapters.event_driven.queue import Tree, put
 from adapters.event_driven.rest import across, bear, jolt, take_off
 from adapters.event_driven.search import ALL, ROUNDING, find_own, find_pair
@@ -49,9 +57,9 @@ EPOCH = 256.0  # s; the clock starts again after as many, so that its last place
 def advance(arena: Arena, scenery: Scenery, until: float) -> int:
     """Let everything up to `until` s happen.
 
-    Returns DONE; GOES_ON after counters[LEFT] events, or LOG_FULL, to be called again with counters[LOGGED] = 0; or
-    ACCUMULATION, REENTRY or ROUND_END, with clock[STOP], counters[WHO] and counters[WHOM] when and for whom the answer
-    ends.
+    Returns DONE; GOES_ON after counters[LEFT] events, or LOG_FULL, to be called again with
+    counters[LOGGED] = 0; or ACCUMULATION, REENTRY or ROUND_END, with clock[STOP], counters[WHO] and
+    counters[WHOM] when and for whom the answer ends.
     """
     disks, clock = arena.disks, arena.clock
     while arena.counters[LEFT] > 0:
@@ -79,13 +87,15 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
         elif a.own_code < WRAP:
             side = a.own_code - EDGE
             cross(disks, arena.head, arena.grid, i, side)
-            if not (len(scenery) and arena.rules.mixed):  # the contact in the record still holds: three cells are new
+            # the contact in the record still holds: three cells are new
+            if not (len(scenery) and arena.rules.mixed):
                 fresh, beyond = False, np.int64(side)
         elif len(scenery):
             status = alone(arena, i)
         if status != GOES_ON:
             return status
-        while i >= 0:  # one place from which to search, for one copy of the search in the machine code
+        # one place from which to search, for one copy of the search in the machine code
+        while i >= 0:
             if disks[i].weight > 0.0:
                 renew(arena, scenery, i, fresh, beyond)
             i, j = j, np.int64(-1)
@@ -94,7 +104,8 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
 
 @pasted
 def renew(arena: Arena, scenery: Scenery, i: int, fresh: bool, beyond: int) -> None:
-    """A new record of disk `i`, which is at the present; fresh: without the contact in the old one."""
+    """A new record of disk `i`, which is at the present; fresh: without the contact in the old
+    one."""
     a = arena.disks[i]
     if fresh:
         a.pair_time = inf
@@ -128,7 +139,8 @@ def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
 
 @kernel
 def alone(arena: Arena, i: int) -> int:
-    """What disk `i` does by itself but for changing its cell: it meets a wall, the wrap, the end of its wall."""
+    """What disk `i` does by itself but for changing its cell: it meets a wall, the wrap, the end of
+    its wall."""
     code = arena.disks[i].own_code
     if code >= WALL:
         return collision_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
@@ -137,7 +149,8 @@ def alone(arena: Arena, i: int) -> int:
 
 @kernel
 def leave(arena: Arena, i: int) -> int:
-    """Disk `i` reaches the end of the wall it lies on: it flies off, unless it is too slow and would turn about it."""
+    """Disk `i` reaches the end of the wall it lies on: it flies off, unless it is too slow and
+    would turn about it."""
     a, w = arena.disks[i], int(arena.disks[i].wall)
     speed2, press = a.vx * a.vx + a.vy * a.vy, -across(arena.walls, a, w, a.free_ax, a.free_ay)
     take_off(a)
@@ -210,7 +223,8 @@ def ask_again(a: Any, tree: Tree, i: int, now: float) -> None:
 
 @kernel
 def accelerate(arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float) -> None:
-    """From `at` s on, which must not lie before the last event, let disk `i` accelerate by (ax, ay)."""
+    """From `at` s on, which must not lie before the last event, let disk `i` accelerate by (ax,
+    ay)."""
     a, now = arena.disks[i], at - arena.clock[BASE]
     fly(a, now, scenery)
     a.free_ax, a.free_ay = ax, ay
@@ -221,7 +235,8 @@ def accelerate(arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay:
 
 @kernel
 def look(disks: Disks, base: float, at: float, out: Array) -> None:
-    """Position and velocity of all disks at `at` s, not before the last event, into out (n, 4); changes nothing."""
+    """Position and velocity of all disks at `at` s, not before the last event, into out (n, 4);
+    changes nothing."""
     for i in range(len(disks)):
         a = disks[i]
         t = at - base - a.t
@@ -231,7 +246,8 @@ def look(disks: Disks, base: float, at: float, out: Array) -> None:
 
 @kernel
 def near_pairs(disks: Disks, head: Links, g: Grid, slack: float, found: Ints) -> int:
-    """Pairs of disks that overlap, or nearly: rows (i, j) of found, as many as fit; their number."""
+    """Pairs of disks that overlap, or nearly: rows (i, j) of found, as many as fit; their
+    number."""
     count = 0
     for i in range(len(disks)):
         a = disks[i]

@@ -1,6 +1,7 @@
 """A winner tree: whose next event is the earliest, kept up to date in log n comparisons a change.
 
-Node k holds the earlier of 2 k and 2 k + 1, and node 1 the earliest of all; disk i is leaf p + i, p a power of two.
+Node k holds the earlier of 2 k and 2 k + 1, and node 1 the earliest of all; disk i is leaf p + i, p
+a power of two.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 
 from adapters.event_driven.compiled import inlined
 
-# Time and disk lie in one line of the cache. The disk is a float, so that the processor picks the winner's as it picks
-# the earlier time: by an integer it would branch, guess wrong at every other node, and take twice as long for an event.
+# Time and disk lie in one line of the cache. The disk is a float, so that the processor picks the
+# winner's as it picks the earlier time: by an integer it would branch, guess wrong at every other
+# node, and take twice as long for an event.
 NODE = np.dtype([("time", "f8"), ("who", "f8")])
 Tree = NDArray[np.void]
 

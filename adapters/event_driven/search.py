@@ -1,7 +1,8 @@
 """The event engine's searches: what a disk meets next by itself, and which other disk.
 
-The search among disks does not branch where the processor could only guess: it copies all candidates of the cells
-around into one list, and works out the contact time of every one, met or not.
+The search among disks does not branch where the processor could only guess: it copies all
+candidates of the cells around into one list, and works out the contact time of every one, met or
+not.
 """
 
 from __future__ import annotations
@@ -13,10 +14,24 @@ import numpy as np
 
 from adapters.event_driven.compiled import inlined, kernel, pasted
 from adapters.event_driven.contact_times import curved_time, disk_time, line_time
-from adapters.event_driven.disks import EDGE, END, NONE, WALL, WRAP, Arena, Disks, Grid, Links, Scenery, Walls
+from adapters.event_driven.disks import (
+    EDGE,
+    END,
+    NONE,
+    WALL,
+    WRAP,
+    Arena,
+    Disks,
+    Grid,
+    Links,
+    Scenery,
+    Walls,
+)
 
-ROUNDING = 1e-14  # relative, of a contact just resolved: squared gap and closing speed are sums of a few roundings
-ALL = -1  # which of the cells around a disk to search: all, or only those beyond the edge it has just crossed
+# relative, of a contact just resolved: squared gap and closing speed are sums of a few roundings
+ROUNDING = 1e-14
+# which of the cells around a disk to search: all, or only those beyond the edge it has just crossed
+ALL = -1
 
 
 @pasted
@@ -40,7 +55,8 @@ def next_edge(g: Grid, a: Any) -> tuple[float, int]:
 
 @kernel
 def next_own(g: Grid, walls: Walls, wrapped: bool, a: Any) -> tuple[float, int]:
-    """As `next_edge` on a parabola: also the wrap box, the walls near its cell, the end of the one it lies on."""
+    """As `next_edge` on a parabola: also the wrap box, the walls near its cell, the end of the one
+    it lies on."""
     best, code = inf, EDGE
     for axis in range(2):
         x, v, acceleration = (a.x, a.vx, a.ax) if axis == 0 else (a.y, a.vy, a.ay)
@@ -58,8 +74,13 @@ def next_own(g: Grid, walls: Walls, wrapped: bool, a: Any) -> tuple[float, int]:
     for k in range(walls.first[c], walls.first[c + 1]):
         w = walls.of[k]
         for part in range(3):
-            # Its own wall it does not meet; the face of one that it slid off it can only fall away from.
-            t = inf if a.wall == w or (a.wall == -2 - w and part == 0) else wall_time(walls, a, w, part, best)
+            # Its own wall it does not meet; the face of one that it slid off it can only fall away
+            # from.
+            t = (
+                inf
+                if a.wall == w or (a.wall == -2 - w and part == 0)
+                else wall_time(walls, a, w, part, best)
+            )
             if t < best:
                 best, code = t, WALL + 3 * w + part
     if a.wall >= 0:
@@ -84,13 +105,19 @@ def wall_time(walls: Walls, a: Any, w: int, part: int, until: float) -> float:
     for side in (1.0, -1.0):
         gap, v, p = side * height - a.radius, side * speed, side * acceleration
         if noise > 0.0 and side * height > 0.0:
-            if abs(gap) < ROUNDING * (abs(dx) + abs(dy) + a.radius):  # beside a wall's end it may be far below
+            # beside a wall's end it may be far below
+            if abs(gap) < ROUNDING * (abs(dx) + abs(dy) + a.radius):
                 gap = 0.0
             if abs(v) < noise:
                 v = 0.0
         t = line_time(gap, v, p)
-        along = (dx + (a.vx + a.ax * t / 2) * t) * ux + (dy + (a.vy + a.ay * t / 2) * t) * uy if t < first else -1.0
-        # At the contact the disk must be beside the wall, and on the side from which it was looked for.
+        along = (
+            (dx + (a.vx + a.ax * t / 2) * t) * ux + (dy + (a.vy + a.ay * t / 2) * t) * uy
+            if t < first
+            else -1.0
+        )
+        # At the contact the disk must be beside the wall, and on the side from which it was looked
+        # for.
         if 0.0 <= along <= length and side * height + (v + p * t / 2) * t > 0.0:
             first = t
     return first
@@ -103,13 +130,22 @@ def end_time(walls: Walls, a: Any) -> float:
     along = (a.x - walls.segment[a.wall, 0]) * ux + (a.y - walls.segment[a.wall, 1]) * uy
     speed, acceleration = a.vx * ux + a.vy * uy, a.ax * ux + a.ay * uy
     return min(
-        line_time(along, speed, acceleration), line_time(walls.segment[a.wall, 4] - along, -speed, -acceleration)
+        line_time(along, speed, acceleration),
+        line_time(walls.segment[a.wall, 4] - along, -speed, -acceleration),
     )
 
 
 @kernel
 def meeting(
-    dx: float, dy: float, ux: float, uy: float, ax: float, ay: float, reach: float, noise: float, until: float
+    dx: float,
+    dy: float,
+    ux: float,
+    uy: float,
+    ax: float,
+    ay: float,
+    reach: float,
+    noise: float,
+    until: float,
 ) -> float:
     """When two disks meet, from position, velocity and acceleration of one relative to the other.
 
@@ -139,7 +175,8 @@ def three(head: Links, near: Links, m: int, first: int, second: int, third: int)
 
 @inlined
 def neighbours(disks: Disks, head: Links, near: Links, g: Grid, a: Any, beyond: int) -> int:
-    """List the disks of the cells around that of disk `a`, or only of the three beyond an edge; how many there are."""
+    """List the disks of the cells around that of disk `a`, or only of the three beyond an edge; how
+    many there are."""
     here, row, ny = a.cy, a.cx * g.shape[1], g.shape[1]
     left = row - ny if a.cx > 0 else row + (g.shape[0] - 1) * ny
     right = row + ny if a.cx < g.shape[0] - 1 else 0
@@ -165,13 +202,15 @@ def neighbours(disks: Disks, head: Links, near: Links, g: Grid, a: Any, beyond: 
 
 @inlined
 def image(apart: int, shift: float) -> float:
-    """What to add to a coordinate for the image next door, m: by how far apart the cells are, not by nearness."""
+    """What to add to a coordinate for the image next door, m: by how far apart the cells are, not
+    by nearness."""
     return -shift if apart > 1 else (shift if apart < -1 else 0.0)
 
 
 @pasted
 def find_pair(arena: Arena, scenery: Scenery, i: int, beyond: int) -> None:
-    """Look for an earlier contact of disk `i`, which is at its own time, with those in the cells around its own."""
+    """Look for an earlier contact of disk `i`, which is at its own time, with those in the cells
+    around its own."""
     disks, near, g = arena.disks, arena.near, arena.grid
     a = disks[i]
     x, y, vx, vy, now, radius, cx, cy = a.x, a.y, a.vx, a.vy, a.t, a.radius, a.cx, a.cy

@@ -1,4 +1,5 @@
-"""The ablated reference as an engine: the exercise's solver with the mechanisms of other engines switched on or off."""
+"""The ablated reference as an engine: the exercise's solver with the mechanisms of other engines
+switched on or off."""
 
 from __future__ import annotations
 
@@ -16,13 +17,31 @@ from scenarios.model import Scene
 
 EXERCISE = ("accelerate", "move", "pairs", "walls")
 POSITION_FIRST = ("move", "pairs", "walls", "accelerate")
-# Collide where they are, then aim at a velocity after gravity, then move (Box2D 2.3, b2Island::Solve).
-BOX2D = ("detect", "by_island", "accelerate", "aim", "warm_start", "bounce", "cap", "move", "position_correction")
-# Move, collide there, aim at a velocity before gravity; the position correction moves in the next step (Munk2D,
-# cpSpaceStep).
+# Collide where they are, then aim at a velocity after gravity, then move (Box2D 2.3,
+# b2Island::Solve).
+BOX2D = (
+    "detect",
+    "by_island",
+    "accelerate",
+    "aim",
+    "warm_start",
+    "bounce",
+    "cap",
+    "move",
+    "position_correction",
+)
+# Move, collide there, aim at a velocity before gravity; the position correction moves in the next
+# step (Munk2D, cpSpaceStep).
 PYMUNK = ("move", "detect", "aim", "accelerate", "warm_start", "bounce", "nudge")
-# Collide and aim once, then soft substeps, then one sweep for restitution (Box2D 3.1, b2SolverStage).
-BOX2D_V3 = ("detect", "by_colour", "aim", *("accelerate", "warm_start", "soften", "move", "relax") * 4, "restitute")
+# Collide and aim once, then soft substeps, then one sweep for restitution (Box2D 3.1,
+# b2SolverStage).
+BOX2D_V3 = (
+    "detect",
+    "by_colour",
+    "aim",
+    *("accelerate", "warm_start", "soften", "move", "relax") * 4,
+    "restitute",
+)
 
 MIXING: dict[str, Callable[[float, float], float]] = {
     "as stated": lambda a, _: a,
@@ -34,27 +53,40 @@ MIXING: dict[str, Callable[[float, float], float]] = {
 
 
 class AblatedReference(Reference):
-    """`adapters.mechanisms.ablated_reference` with these parameters; without any the exercise's solver, to the bit.
+    """`adapters.mechanisms.ablated_reference` with these parameters; without any the exercise's
+    solver, to the bit.
 
-    order: the stages of a step; substeps: how often it is gone through in a dt, whose share falls to every move.
-    alpha: free flight advances by v dt + alpha a dt2 a step, whatever the order; None: as the order has it.
-    mixing: how the restitutions of two disks make that of the pair, a key of `MIXING`. `parameters`: fields of
-    `adapters.mechanisms.ablated_reference.Parameters`.
+    order: the stages of a step; substeps: how often it is gone through in a dt, whose share falls
+        to every move.
+    alpha: free flight advances by v dt + alpha a dt2 a step, whatever the order; None: as the order
+        has it.
+    mixing: how the restitutions of two disks make that of the pair, a key of `MIXING`.
+    `parameters`: fields of `adapters.mechanisms.ablated_reference.Parameters`.
     """
 
     def __init__(
-        self, order: Sequence[str] = EXERCISE, *, substeps: int = 1, alpha: float | None = None,
-        mixing: str = "as stated", precision: type = np.float64, **parameters: Any,
-    ) -> None:  # fmt: skip
+        self,
+        order: Sequence[str] = EXERCISE,
+        *,
+        substeps: int = 1,
+        alpha: float | None = None,
+        mixing: str = "as stated",
+        precision: type = np.float64,
+        **parameters: Any,
+    ) -> None:
         super().__init__(ablated_reference, precision=precision)
         self.order, self.substeps, self.alpha, self.mixing = tuple(order), substeps, alpha, mixing
         self.moves = substeps * self.order.count("move")
-        kinds = Parameters._field_defaults  # the solver is compiled once: an int in place of a float would be another
+        # the solver is compiled once: an int in place of a float would be another
+        kinds = Parameters._field_defaults
         numbers = {name: type(kinds[name])(value) for name, value in parameters.items()}
-        self.on = Parameters(np.array([STAGES.index(stage) for stage in self.order]), self._drift(), **numbers)
+        self.on = Parameters(
+            np.array([STAGES.index(stage) for stage in self.order]), self._drift(), **numbers
+        )
 
     def _drift(self) -> float:
-        """What each of the moves of a step has to add to v h, in a h2, for the whole step to have alpha."""
+        """What each of the moves of a step has to add to v h, in a h2, for the whole step to have
+        alpha."""
         if self.alpha is None:
             return 0.0
         after = self.order.index("accelerate") < self.order.index("move")
@@ -65,18 +97,30 @@ class AblatedReference(Reference):
         self.kept = no_contacts(scene.n, len(scene.walls), self.precision)
         super().load(scene, dt)
         self.disks.inertia[scene.static] = np.inf
-        self.world = self.world._replace(restitution=float(MIXING[self.mixing](scene.restitution, scene.restitution)))
+        self.world = self.world._replace(
+            restitution=float(MIXING[self.mixing](scene.restitution, scene.restitution))
+        )
 
     def _advance(self, count: int) -> None:
         h = self.precision(self.dt / self.moves)
-        collisions = ablated_reference.advance(self.disks, self.world, self.on, self.kept, h, count * self.substeps)
+        collisions = ablated_reference.advance(
+            self.disks, self.world, self.on, self.kept, h, count * self.substeps
+        )
         if self.listening:
             self.log += [
-                ContactImpulse(self.steps + k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions
+                ContactImpulse(self.steps + k // self.substeps, i, j, impulse)
+                for k, i, j, impulse in collisions
             ]
         self.steps += count
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """What is switched on."""
-        reported = {"mixing": self.mixing, "substeps": self.substeps, "alpha": self.alpha} | self.on._asdict()
-        return {name: (value, value) for name, value in (reported | {"order": ", ".join(self.order)}).items()}
+        reported = {
+            "mixing": self.mixing,
+            "substeps": self.substeps,
+            "alpha": self.alpha,
+        } | self.on._asdict()
+        return {
+            name: (value, value)
+            for name, value in (reported | {"order": ", ".join(self.order)}).items()
+        }

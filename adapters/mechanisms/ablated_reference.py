@@ -1,7 +1,9 @@
-"""The exercise's solver with every mechanism by which engines differ: an engine is an order of stages.
+"""The exercise's solver with every mechanism by which engines differ: an engine is an order of
+stages.
 
-Every stage is a function below, and `Parameters` holds the numbers they take. Accelerate, move, pairs, walls is the
-exercise, to the bit. It asks all pairs and is for some hundred disks. Compiled by numba, as `exercise` is.
+Every stage is a function below, and `Parameters` holds the numbers they take. Accelerate, move,
+pairs, walls is the exercise, to the bit. It asks all pairs and is for some hundred disks. Compiled
+by numba, as `exercise` is.
 """
 
 from math import inf, pi, sqrt
@@ -28,13 +30,41 @@ from reference_impl.exercise import collide, collide_wall, touching, touching_wa
 from reference_impl.state import Disks, World
 
 STAGES = (
-    "accelerate", "move", "pairs", "walls", "detect", "by_island", "by_colour", "aim", "warm_start", "bounce", "cap",
-    "position_correction", "nudge", "soften", "relax", "restitute",
-)  # fmt: skip
+    "accelerate",
+    "move",
+    "pairs",
+    "walls",
+    "detect",
+    "by_island",
+    "by_colour",
+    "aim",
+    "warm_start",
+    "bounce",
+    "cap",
+    "position_correction",
+    "nudge",
+    "soften",
+    "relax",
+    "restitute",
+)
 (
-    ACCELERATE, MOVE, PAIRS, WALLS, DETECT, BY_ISLAND, BY_COLOUR, AIM, WARM_START, BOUNCE, CAP,
-    POSITION_CORRECTION, NUDGE, SOFTEN, RELAX, RESTITUTE,
-) = range(len(STAGES))  # fmt: skip
+    ACCELERATE,
+    MOVE,
+    PAIRS,
+    WALLS,
+    DETECT,
+    BY_ISLAND,
+    BY_COLOUR,
+    AIM,
+    WARM_START,
+    BOUNCE,
+    CAP,
+    POSITION_CORRECTION,
+    NUDGE,
+    SOFTEN,
+    RELAX,
+    RESTITUTE,
+) = range(len(STAGES))
 
 
 class Parameters(NamedTuple):
@@ -62,8 +92,11 @@ class Parameters(NamedTuple):
 
 
 @compiled
-def advance(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, count: int) -> list:
-    """Advance `count` steps, each move by `h` s; return the collisions as `exercise.advance` does."""
+def advance(
+    disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, count: int
+) -> list:
+    """Advance `count` steps, each move by `h` s; return the collisions as `exercise.advance`
+    does."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
         kept.start[:], kept.moved[:] = disks.position, 0.0
@@ -77,8 +110,15 @@ def advance(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float
 
 
 @compiled
-def act(
-    stage: int, disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, k: int, collisions: list
+def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of functions
+    stage: int,
+    disks: Disks,
+    world: World,
+    on: Parameters,
+    kept: Contacts,
+    h: float,
+    k: int,
+    collisions: list,
 ) -> None:
     """One stage."""
     if stage == ACCELERATE:
@@ -121,7 +161,9 @@ def accelerate(disks: Disks, world: World, h: float) -> None:
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
             for axis in range(2):
-                disks.velocity[i, axis] += (world.gravity[axis] + disks.force[i, axis] / disks.mass[i]) * h
+                disks.velocity[i, axis] += (
+                    world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
+                ) * h
             disks.angular_velocity[i] += disks.torque[i] / disks.inertia[i] * h
 
 
@@ -129,7 +171,8 @@ def accelerate(disks: Disks, world: World, h: float) -> None:
 def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -> None:
     """x += v h + drift a h2, and what a nudge adds; the turning alike.
 
-    The moves of a step are added up first, as Box2D 3.1 does: it is them that are rounded, not the place.
+    The moves of a step are added up first, as Box2D 3.1 does: it is them that are rounded, not the
+    place.
     """
     v, moved, more = disks.velocity, kept.moved, on.drift * h * h
     for i in range(len(disks.mass)):
@@ -139,7 +182,9 @@ def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -
                 moved[i, axis] += (v[i, axis] + kept.nudge[i, axis]) * h + more * acceleration
                 disks.position[i, axis] = kept.start[i, axis] + moved[i, axis]
                 kept.nudge[i, axis] = 0.0
-            disks.angle[i] += disks.angular_velocity[i] * h + more * disks.torque[i] / disks.inertia[i]
+            disks.angle[i] += (
+                disks.angular_velocity[i] * h + more * disks.torque[i] / disks.inertia[i]
+            )
 
 
 @compiled
@@ -163,14 +208,25 @@ def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list) 
 
 
 @compiled
-def meet(disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, collisions: list) -> None:
-    """One pair, by the exercise; where nothing is to be projected, both are set back to where they met."""
+def meet(
+    disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, collisions: list
+) -> None:
+    """One pair, by the exercise; where nothing is to be projected, both are set back to where they
+    met."""
     x, other = disks.position, max(j, 0)
     xi, yi, xj, yj = x[i, 0], x[i, 1], x[other, 0], x[other, 1]
     _, nx, ny = gap_of(disks, world, i, j)
     law = world
     if on.threshold > 0.0 and closing(disks.velocity, i, j, nx, ny) >= -on.threshold:
-        law = World(0.0, world.gravity, world.walls, world.low, world.high, world.split, world.approaching_only)
+        law = World(
+            0.0,
+            world.gravity,
+            world.walls,
+            world.low,
+            world.high,
+            world.split,
+            world.approaching_only,
+        )
     impulse = collide(disks, i, j, law) if j >= 0 else collide_wall(disks, i, -1 - j, law)
     if not (on.project if j >= 0 else on.project_walls):
         x[i, 0], x[i, 1] = xi, yi
@@ -182,7 +238,8 @@ def meet(disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, col
 
 @compiled
 def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
-    """Fix, for every contact at once, the velocity it shall have: e times the closing speed; 0 for slow collisions."""
+    """Fix, for every contact at once, the velocity it shall have: e times the closing speed; 0 for
+    slow collisions."""
     for c in range(kept.found[0]):
         contact = kept.rows[c]
         speed = closing(v, contact.i, contact.j, contact.nx, contact.ny)
@@ -193,7 +250,8 @@ def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # typ
 def warm_start(disks: Disks, kept: Contacts) -> None:
     """Begin with the impulses that the contacts had in the last step.
 
-    What one had before that is not given, but counts as if it were, and may be taken back (Munk2D, cpArbiterUpdate).
+    What one had before that is not given, but counts as if it were, and may be taken back (Munk2D,
+    cpArbiterUpdate).
     """
     for c in range(kept.found[0]):
         contact = kept.rows[c]
@@ -206,7 +264,8 @@ def warm_start(disks: Disks, kept: Contacts) -> None:
 
 @compiled
 def bounce(disks: Disks, on: Parameters, kept: Contacts) -> None:
-    """Sequential impulses: go through all contacts again and again; an impulse may be taken back."""
+    """Sequential impulses: go through all contacts again and again; an impulse may be taken
+    back."""
     for _ in range(on.iterations):
         for c in range(kept.found[0]):
             rub(disks, kept.rows[c], on.friction)
@@ -239,8 +298,11 @@ def position_correction(disks: Disks, world: World, on: Parameters, kept: Contac
 
 
 @compiled
-def correct_island(disks: Disks, world: World, on: Parameters, kept: Contacts, first: int, end: int) -> float:
-    """Once through the contacts from `first` to before `end`; returns the smallest gap in m there was, at most 0."""
+def correct_island(
+    disks: Disks, world: World, on: Parameters, kept: Contacts, first: int, end: int
+) -> float:
+    """Once through the contacts from `first` to before `end`; returns the smallest gap in m there
+    was, at most 0."""
     worst = 0.0
     for c in range(first, end):
         i, j = kept.rows[c].i, kept.rows[c].j
@@ -254,7 +316,8 @@ def correct_island(disks: Disks, world: World, on: Parameters, kept: Contacts, f
 
 @compiled
 def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
-    """Give overlaps a velocity that lasts for the next move only, and undoes a share of what is beyond the slop."""
+    """Give overlaps a velocity that lasts for the next move only, and undoes a share of what is
+    beyond the slop."""
     for c in range(kept.found[0]):
         kept.rows[c].nudged = 0.0
     for _ in range(on.iterations):
@@ -269,10 +332,11 @@ def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: igno
 
 @compiled
 def soften(disks: Disks, on: Parameters, kept: Contacts, h: float, biased: bool) -> None:
-    """A damped spring a contact, solved for the end of the substep (E. Catto, Solver2D, 2024: soft step).
+    """A damped spring a contact, solved for the end of the substep (E. Catto, Solver2D, 2024: soft
+    step).
 
-    Not `biased` is its second pass, which takes the bias out of the velocities again. What is not yet touching may
-    come together, but no farther.
+    Not `biased` is its second pass, which takes the bias out of the velocities again. What is not
+    yet touching may come together, but no farther.
     """
     for c in range(kept.found[0]):
         contact = kept.rows[c]

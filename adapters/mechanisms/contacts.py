@@ -1,7 +1,8 @@
-"""Who touches whom, and their impulses: what `ablated_reference` keeps of a step, and from step to step.
+"""Who touches whom, and their impulses: what `ablated_reference` keeps of a step, and from step to
+step.
 
-A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i and is that of the moment
-it was found. Compiled by numba, as `exercise` is.
+A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i and is
+that of the moment it was found. Compiled by numba, as `exercise` is.
 """
 
 from math import inf
@@ -13,17 +14,23 @@ from reference_impl.compiled import compiled
 from reference_impl.exercise import direction, move, nearest_point
 from reference_impl.state import Disks, World
 
-CONTACT = np.dtype([
-    ("i", "i8"), ("j", "i8"),
-    ("nx", "f8"), ("ny", "f8"),  # the normal
-    ("gap", "f8"),  # m between the surfaces when it was found
-    ("target", "f8"),  # m/s: the speed of separation it is to have
-    ("impulse", "f8"), ("slide", "f8"),  # N s along the normal and along the tangent (-ny, nx)
-    ("strongest", "f8"),  # N s, of the impulses that one solve added
-    ("nudged", "f8"),  # N s, of `ablated_reference.nudge`
-    ("island", "i8"), ("colour", "i8"),  # from 1; 0: none yet
-    ("late", "b1"),  # whether its impulses are those of a step before the last
-])  # fmt: skip
+CONTACT = np.dtype(
+    [
+        ("i", "i8"),
+        ("j", "i8"),
+        ("nx", "f8"),
+        ("ny", "f8"),  # the normal
+        ("gap", "f8"),  # m between the surfaces when it was found
+        ("target", "f8"),  # m/s: the speed of separation it is to have
+        ("impulse", "f8"),
+        ("slide", "f8"),  # N s along the normal and along the tangent (-ny, nx)
+        ("strongest", "f8"),  # N s, of the impulses that one solve added
+        ("nudged", "f8"),  # N s, of `ablated_reference.nudge`
+        ("island", "i8"),
+        ("colour", "i8"),  # from 1; 0: none yet
+        ("late", "b1"),  # whether its impulses are those of a step before the last
+    ]
+)
 
 
 class Contacts(NamedTuple):
@@ -34,7 +41,8 @@ class Contacts(NamedTuple):
     start: np.ndarray  # (n, 2) m: where the disks were at the start of the step
     moved: np.ndarray  # (n, 2) m: what they have moved since
     nudge: np.ndarray  # (n, 2) m/s: what the next move adds to the velocity
-    before: np.ndarray  # (n, n + w, 4): impulse, slide, colour, and how many steps ago that was; 0 if long ago
+    # (n, n + w, 4): impulse, slide, colour, and how many steps ago that was; 0 if long ago
+    before: np.ndarray
 
 
 def no_contacts(n: int, walls: int, precision: type) -> Contacts:
@@ -52,20 +60,35 @@ def no_contacts(n: int, walls: int, precision: type) -> Contacts:
 
 
 @compiled
-def detect(disks: Disks, world: World, margin: float, skin: float, touching: bool, memory: int, kept: Contacts) -> None:
-    """Find all that are nearer than `margin`, pairs i < j first, then walls, which are thicker by `skin`.
+def detect(
+    disks: Disks,
+    world: World,
+    margin: float,
+    skin: float,
+    touching: bool,
+    memory: int,
+    kept: Contacts,
+) -> None:
+    """Find all that are nearer than `margin`, pairs i < j first, then walls, which are thicker by
+    `skin`.
 
-    If `touching`, also what is just as near. A pair has the impulses it last had, if not more than `memory` steps ago.
+    If `touching`, also what is just as near. A pair has the impulses it last had, if not more than
+    `memory` steps ago.
     """
     n = len(disks.radius)
     remember(memory, kept)
     kept.found[0] = 0
     for i in range(n):
         for j in range(i + 1, n):
-            dx, dy = disks.position[i, 0] - disks.position[j, 0], disks.position[i, 1] - disks.position[j, 1]
+            dx, dy = (
+                disks.position[i, 0] - disks.position[j, 0],
+                disks.position[i, 1] - disks.position[j, 1],
+            )
             reach = disks.radius[i] + disks.radius[j] + margin
             near = dx * dx + dy * dy - reach * reach
-            if (near < 0.0 or (touching and near == 0.0)) and (disks.mass[i] != inf or disks.mass[j] != inf):
+            if (near < 0.0 or (touching and near == 0.0)) and (
+                disks.mass[i] != inf or disks.mass[j] != inf
+            ):
                 note(disks, world, 0.0, kept, i, j)
     for i in range(n):
         for w in range(len(world.walls)):
@@ -112,9 +135,11 @@ def column(j: int, n: int) -> int:
 
 @compiled
 def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
-    """Sort the contacts into islands, which share no disk that moves, in the order in which a search finds them.
+    """Sort the contacts into islands, which share no disk that moves, in the order in which a
+    search finds them.
 
-    It goes from disk to disk, from the last on, and knows the last contact of a disk first (Box2D 2.3, b2World::Solve).
+    It goes from disk to disk, from the last on, and knows the last contact of a disk first (Box2D
+    2.3, b2World::Solve).
     """
     rows, n, count, copies = kept.rows, len(mass), kept.found[0], len(kept.rows) // 2
     for c in range(count):
@@ -143,13 +168,15 @@ def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
 def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
     """Sort the contacts by colours, none of which has a disk that moves twice.
 
-    A new contact takes the first colour that is free, or the second where only one can move, and keeps it for as long
-    as it lasts (Box2D 3.1, b2AssignGraphColor).
+    A new contact takes the first colour that is free, or the second where only one can move, and
+    keeps it for as long as it lasts (Box2D 3.1, b2AssignGraphColor).
     """
     rows, count, copies, most = kept.rows, kept.found[0], len(kept.rows) // 2, 0
     for c in range(count):
         if rows[c].colour == 0:
-            colour = 1 if rows[c].j >= 0 and mass[rows[c].i] != inf and mass[rows[c].j] != inf else 2
+            colour = (
+                1 if rows[c].j >= 0 and mass[rows[c].i] != inf and mass[rows[c].j] != inf else 2
+            )
             while taken(mass, kept, c, colour):
                 colour += 1
             rows[c].colour = colour
@@ -170,7 +197,9 @@ def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no
     moving_i, moving_j = mass[i] != inf, j >= 0 and mass[j] != inf
     for k in range(kept.found[0]):
         a, b = kept.rows[k].i, kept.rows[k].j
-        if kept.rows[k].colour == colour and ((moving_i and (a == i or b == i)) or (moving_j and (a == j or b == j))):
+        if kept.rows[k].colour == colour and (
+            (moving_i and (a == i or b == i)) or (moving_j and (a == j or b == j))
+        ):
             return True
     return False
 
@@ -190,7 +219,8 @@ def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, fl
 
 @compiled
 def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
-    """m: the gap when it was found, before anything moved, and what both have moved along its normal since."""
+    """m: the gap when it was found, before anything moved, and what both have moved along its
+    normal since."""
     i, j = contact.i, contact.j
     gap = contact.gap + moved[i, 0] * contact.nx + moved[i, 1] * contact.ny
     if j >= 0:
@@ -236,7 +266,8 @@ def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> N
 
 @compiled
 def rub(disks: Disks, contact, friction: float) -> None:  # type: ignore[no-untyped-def]
-    """Stop the sliding of the surfaces where they touch, by at most `friction` times what presses."""
+    """Stop the sliding of the surfaces where they touch, by at most `friction` times what
+    presses."""
     i, j, spin, inertia = contact.i, contact.j, disks.angular_velocity, disks.inertia
     arm = disks.radius[i] + contact.gap / 2
     speed = closing(disks.velocity, i, j, -contact.ny, contact.nx) - arm * spin[i]

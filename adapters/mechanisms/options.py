@@ -1,5 +1,5 @@
-"""What an engine costs with one option changed against its matched profile: a row an option, or a sweep of one
-parameter."""
+"""What an engine costs with one option changed against its matched profile: a row an option, or a
+sweep of one parameter."""
 
 from __future__ import annotations
 
@@ -46,7 +46,9 @@ def listing() -> Any:
 
     from reference_impl import verlet_list
 
-    advance = FunctionType(verlet_list.advance.py_func.__code__, vars(verlet_list) | {"LISTED_FROM": 0})
+    advance = FunctionType(
+        verlet_list.advance.py_func.__code__, vars(verlet_list) | {"LISTED_FROM": 0}
+    )
     return SimpleNamespace(__name__="verlet_list", advance=njit(error_model="numpy")(advance))
 
 
@@ -54,12 +56,19 @@ OPTIONS: tuple[Option, ...] = tuple(
     option
     for name, row in ENGINES.items()
     for option in (
-        *(Option(name, change, partial(changed, name, **settings)) for change, settings in row.options.items()),
-        *([Option(name, "broad phase, always", _always_listing)] if name == "reference:exercise" else []),
+        *(
+            Option(name, change, partial(changed, name, **settings))
+            for change, settings in row.options.items()
+        ),
+        *(
+            [Option(name, "broad phase, always", _always_listing)]
+            if name == "reference:exercise"
+            else []
+        ),
     )
 )
-"""What an engine cannot be changed in is not here: pymunk has no CCD and always starts warm, Box2D 3.1 hides its
-warm start, and no outside engine lets its broad phase be switched off."""
+"""What an engine cannot be changed in is not here: pymunk has no CCD and always starts warm, Box2D
+3.1 hides its warm start, and no outside engine lets its broad phase be switched off."""
 
 
 @dataclass(frozen=True)

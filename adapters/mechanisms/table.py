@@ -1,8 +1,9 @@
-"""The mechanisms of every engine: what it does otherwise than exact flight with end-of-step detection.
+"""The mechanisms of every engine: what it does otherwise than exact flight with end-of-step
+detection.
 
-Each can be switched on in `adapters.mechanisms.ablated_reference`; some can be switched off in the engine, too.
-The numbers are read off the engine. With all of its mechanisms the reference plays what the engine plays, mostly to
-rounding.
+Each can be switched on in `adapters.mechanisms.ablated_reference`; some can be switched off in the
+engine, too. The numbers are read off the engine. With all of its mechanisms the reference plays
+what the engine plays, mostly to rounding.
 """
 
 from __future__ import annotations
@@ -20,13 +21,24 @@ from adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReferenc
 from scenarios.model import Scene
 
 NAMES = (
-    "flight", "restitution", "impulse", "friction", "wall skin", "position correction", "float32", "CCD, sleep",
-)  # fmt: skip
+    "flight",
+    "restitution",
+    "impulse",
+    "friction",
+    "wall skin",
+    "position correction",
+    "float32",
+    "CCD, sleep",
+)
 FLIGHT, RESTITUTION, IMPULSE, FRICTION, SKIN, POSITION_CORRECTION, DIGITS, SWEPT = NAMES
-# Exact flight; what overlaps at the end of a step gets its impulse there and then; nothing is moved out of it.
+# Exact flight; what overlaps at the end of a step gets its impulse there and then; nothing is moved
+# out of it.
 END_OF_STEP: dict[str, Any] = {
-    "order": ("move", "accelerate", "pairs", "walls"), "alpha": 0.5, "project": False, "project_walls": False,
-}  # fmt: skip
+    "order": ("move", "accelerate", "pairs", "walls"),
+    "alpha": 0.5,
+    "project": False,
+    "project_walls": False,
+}
 
 
 @dataclass(frozen=True)
@@ -46,13 +58,20 @@ class Mechanism:
     without: Callable[[], Engine] | None = None
 
 
-def mechanisms_of(name: str, settings: Mapping[str, tuple[Any, Any]], scene: Scene, dt: float) -> list[Mechanism]:
-    """The mechanisms of an engine in `MECHANISMS`, in this scene at this dt; `settings` are those it reported once
-    loaded."""
+def mechanisms_of(
+    name: str, settings: Mapping[str, tuple[Any, Any]], scene: Scene, dt: float
+) -> list[Mechanism]:
+    """The mechanisms of an engine in `MECHANISMS`, in this scene at this dt; `settings` are those
+    it reported once loaded."""
     # What cannot be read back is as it was asked for.
-    resolved = {setting: asked if used in NOT_REPORTED else used for setting, (asked, used) in settings.items()}
+    resolved = {
+        setting: asked if used in NOT_REPORTED else used
+        for setting, (asked, used) in settings.items()
+    }
     flight = Mechanism(FLIGHT, {"alpha": row_of(name).alpha})
-    single = [Mechanism(DIGITS, {"precision": np.float32})] if row_of(name).rounding == FLOAT32 else []
+    single = (
+        [Mechanism(DIGITS, {"precision": np.float32})] if row_of(name).rounding == FLOAT32 else []
+    )
     return [flight, *MECHANISMS[name](resolved, scene, dt), *single]
 
 
@@ -79,15 +98,26 @@ def _lesson(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mec
 def _pymunk(reported: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
     from adapters.pymunk import Pymunk
 
-    # Its bounce reverses whatever speed a contact has, also one at which the two separate (cpArbiterPreStep).
+    # Its bounce reverses whatever speed a contact has, also one at which the two separate
+    # (cpArbiterPreStep).
     impulse = {
-        "order": PYMUNK, "iterations": reported["iterations"], "threshold": -np.inf,
+        "order": PYMUNK,
+        "iterations": reported["iterations"],
+        "threshold": -np.inf,
         "memory": reported["collision_persistence"],
-    }  # fmt: skip
-    correction = {"correction_share": 1.0 - reported["collision_bias"] ** dt, "slop": reported["collision_slop"]}
+    }
+    correction = {
+        "correction_share": 1.0 - reported["collision_bias"] ** dt,
+        "slop": reported["collision_slop"],
+    }
     return [
         Mechanism(IMPULSE, impulse),
-        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), partial(Pymunk, profile, collision_bias=1.0)),
+        Mechanism(
+            POSITION_CORRECTION,
+            correction,
+            (IMPULSE,),
+            partial(Pymunk, profile, collision_bias=1.0),
+        ),
     ]
 
 
@@ -104,14 +134,18 @@ def _pymunk_shipped(reported: Mapping[str, Any], scene: Scene, dt: float) -> lis
 def _box2d(reported: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
     from adapters.box2d import Box2DEngine
 
-    velocity, position = (int(count) for count in reported["velocity, position iterations"].split(","))
+    velocity, position = (
+        int(count) for count in reported["velocity, position iterations"].split(",")
+    )
     cap = reported["speed cap in m/s"] * dt
     impulse = {"order": BOX2D, "iterations": velocity, "touching": True, "cap": cap}
     # b2_baumgarte 0.2; b2_maxLinearCorrection 0.2 is a tenth of b2_maxTranslation, the cap.
     correction = {
-        "correction_share": 0.2 if position else 0.0, "correction_iterations": position, "slop": reported["linear slop in m"],
+        "correction_share": 0.2 if position else 0.0,
+        "correction_iterations": position,
+        "slop": reported["linear slop in m"],
         "correction_most": 0.1 * cap,
-    }  # fmt: skip
+    }
     without = partial(Box2DEngine, profile, position_iterations=0, elastic_position_iterations=0)
     return [
         Mechanism(RESTITUTION, {"threshold": reported["restitution threshold in m/s"]}),
@@ -124,7 +158,12 @@ def _box2d_matched(reported: Mapping[str, Any], scene: Scene, dt: float) -> list
     from adapters.box2d import Box2DEngine
 
     unswept = partial(
-        Box2DEngine, "matched", continuous=False, bullet=False, elastic_continuous=False, elastic_bullet=False
+        Box2DEngine,
+        "matched",
+        continuous=False,
+        bullet=False,
+        elastic_continuous=False,
+        elastic_bullet=False,
     )
     swept = [Mechanism(SWEPT, without=unswept)] if reported["continuous collision"] else []
     return [*_box2d(reported, scene, dt, "matched"), *swept]
@@ -136,19 +175,27 @@ def _box2d_shipped(reported: Mapping[str, Any], scene: Scene, dt: float) -> list
     shipped = partial(Box2DEngine, "shipped")
     return [
         *_box2d(reported, scene, dt, "shipped"),
-        Mechanism(FRICTION, {"friction": reported["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
+        Mechanism(
+            FRICTION, {"friction": reported["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)
+        ),
         # b2_polygonRadius, which an edge has, too: twice the slop.
         Mechanism(SKIN, {"skin": 2 * reported["linear slop in m"]}, (IMPULSE, POSITION_CORRECTION)),
-        Mechanism(SWEPT, without=partial(shipped, continuous=False, elastic_continuous=False, sleeping=False)),
+        Mechanism(
+            SWEPT,
+            without=partial(shipped, continuous=False, elastic_continuous=False, sleeping=False),
+        ),
     ]
 
 
 def _box2d_v3(reported: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Mechanism]:
     # b2_speculativeDistance: four slops of 0.005 units.
     impulse = {
-        "order": BOX2D_V3, "touching": True, "margin": 0.02 * reported["length unit in m"], "hertz": chosen["hertz"],
+        "order": BOX2D_V3,
+        "touching": True,
+        "margin": 0.02 * reported["length unit in m"],
+        "hertz": chosen["hertz"],
         "damping": chosen["damping_ratio"],
-    }  # fmt: skip
+    }
     return [
         Mechanism(IMPULSE, impulse),
         Mechanism(POSITION_CORRECTION, {"push_speed": chosen["push_speed"]}, (IMPULSE,)),
@@ -166,11 +213,19 @@ def _box2d_v3_shipped(reported: Mapping[str, Any], _scene: Scene, _dt: float) ->
 
     shipped = partial(Box2DV3, "shipped")
     # At the threshold itself it bounces, where Box2D 2.3 does not.
-    threshold = float(np.nextafter(np.float32(reported["restitution threshold in m/s"]), np.float32(0)))
+    threshold = float(
+        np.nextafter(np.float32(reported["restitution threshold in m/s"]), np.float32(0))
+    )
     return [
-        Mechanism(RESTITUTION, {"threshold": threshold}, without=partial(shipped, restitution_threshold=0.0)),
+        Mechanism(
+            RESTITUTION,
+            {"threshold": threshold},
+            without=partial(shipped, restitution_threshold=0.0),
+        ),
         *_box2d_v3(reported, SHIPPED),
-        Mechanism(FRICTION, {"friction": reported["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)),
+        Mechanism(
+            FRICTION, {"friction": reported["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)
+        ),
         Mechanism(SWEPT, without=partial(shipped, continuous=False, sleeping=False)),
     ]
 

@@ -1,6 +1,8 @@
-"""Makes a module with `advance(disks, world, dt, count)`, as in reference_impl, answer as the exercise's functions do.
+"""Makes a module with `advance(disks, world, dt, count)`, as in reference_impl, answer as the
+exercise's functions do.
 
-A step of 0 s moves nothing, so that it shows what happens to a pair; a step of one disk alone is its integration.
+A step of 0 s moves nothing, so that it shows what happens to a pair; a step of one disk alone is
+its integration.
 """
 
 from __future__ import annotations
@@ -42,14 +44,16 @@ def as_functions(module: ModuleType, restitution: float = 0.9) -> dict[str, Call
 
 
 class Whole:
-    """Plays scenes by the module's own `advance`, as the reference solver is played; it takes any restitution."""
+    """Plays scenes by the module's own `advance`, as the reference solver is played; it takes any
+    restitution."""
 
     def __init__(self, module: ModuleType) -> None:
         self.engine = Reference(module)
 
     def whole_load(self, argument: dict[str, Any]) -> None:
         """Begin a scene, given by the fields of `Scene`."""
-        walls = np.reshape(argument["scene"]["walls"], (-1, 2, 2))  # JSON has no empty array of that shape
+        # JSON has no empty array of that shape
+        walls = np.reshape(argument["scene"]["walls"], (-1, 2, 2))
         self.engine.load(Scene(**argument["scene"] | {"walls": walls}), argument["dt"])
 
     def whole_step(self, argument: dict[str, Any]) -> None:
@@ -62,11 +66,16 @@ class Whole:
     def whole_read(self, _argument: Any) -> list[list[float]]:
         """Position, velocity, angle and angular velocity of every disk."""
         state = self.engine.read()
-        return np.column_stack([state.position, state.velocity, state.angle, state.angular_velocity]).tolist()
+        return np.column_stack(
+            [state.position, state.velocity, state.angle, state.angular_velocity]
+        ).tolist()
 
     def whole_collisions(self, _argument: Any) -> list[list[float]]:
         """(step, i, j, impulse), as `advance` reported them."""
-        return [[int(step), int(i), int(j), float(impulse)] for step, i, j, impulse in self.engine.collisions()]
+        return [
+            [int(step), int(i), int(j), float(impulse)]
+            for step, i, j, impulse in self.engine.collisions()
+        ]
 
 
 def begin(module: ModuleType) -> None:
@@ -79,10 +88,14 @@ def begin(module: ModuleType) -> None:
 def disks_of(spheres: list[Any]) -> Disks:
     """Arrays from sphere objects."""
     disks = make_disks(
-        [(s.position.x, s.position.y) for s in spheres], [(s.velocity.x, s.velocity.y) for s in spheres],
-        [s.size for s in spheres], [s.mass for s in spheres], [s.MoI for s in spheres],
-        [s.alpha for s in spheres], [s.angularVelocity for s in spheres],
-    )  # fmt: skip
+        [(s.position.x, s.position.y) for s in spheres],
+        [(s.velocity.x, s.velocity.y) for s in spheres],
+        [s.size for s in spheres],
+        [s.mass for s in spheres],
+        [s.MoI for s in spheres],
+        [s.alpha for s in spheres],
+        [s.angularVelocity for s in spheres],
+    )
     disks.force[:] = [(s.force.x, s.force.y) for s in spheres]
     disks.torque[:] = [s.torque for s in spheres]
     return disks

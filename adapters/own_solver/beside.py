@@ -1,7 +1,9 @@
-"""What a solver.py imports from its own folder: found when the file is read, and imported from the texts read then.
+"""What a solver.py imports from its own folder: found when the file is read, and imported from the
+texts read then.
 
-A neighbour is a module that an import statement names, in the file or in another neighbour, and that is not installed:
-it never hides a library. What a file opens or imports by other means while it runs is its own affair.
+A neighbour is a module that an import statement names, in the file or in another neighbour, and
+that is not installed: it never hides a library. What a file opens or imports by other means while
+it runs is its own affair.
 """
 
 from __future__ import annotations
@@ -21,8 +23,11 @@ from typing import Any
 from adapters.safe_path import PACKAGES
 
 
-def modules_beside(folder: Path, text: str, read: Callable[[Path], str]) -> Iterator[tuple[str, str]]:
-    """File, relative to `folder`, and text of every neighbour that `text` imports, or that such a one imports."""
+def modules_beside(
+    folder: Path, text: str, read: Callable[[Path], str]
+) -> Iterator[tuple[str, str]]:
+    """File, relative to `folder`, and text of every neighbour that `text` imports, or that such a
+    one imports."""
     seen: set[str] = set()
     names = imported_by(text)
     while names:
@@ -37,7 +42,8 @@ def modules_beside(folder: Path, text: str, read: Callable[[Path], str]) -> Iter
 
 
 def imported_by(text: str) -> set[str]:
-    """The first names of all modules that the import statements of a text name; none if it is no Python."""
+    """The first names of all modules that the import statements of a text name; none if it is no
+    Python."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of the text, which are for who wrote it
@@ -45,7 +51,11 @@ def imported_by(text: str) -> set[str]:
     except (SyntaxError, ValueError, RecursionError, MemoryError):  # which is said where it is run
         return set()
     named = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
-    named += [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module and not node.level]
+    named += [
+        node.module
+        for node in nodes
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level
+    ]
     return {name.partition(".")[0] for name in named}
 
 
@@ -54,7 +64,8 @@ def is_library(name: str, folder: Path) -> bool:
     if name in sys.builtin_module_names or name in sys.stdlib_module_names or name in PACKAGES:
         return True
     spec = PathFinder.find_spec(name, [path for path in sys.path if Path(path).resolve() != folder])
-    return spec is not None and spec.origin is not None  # a folder without __init__.py is found after all others
+    # a folder without __init__.py is found after all others
+    return spec is not None and spec.origin is not None
 
 
 def files_of(folder: Path, name: str) -> Sequence[Path]:
@@ -75,13 +86,17 @@ class Neighbours(SourceLoader, MetaPathFinder):
     """Imports the neighbours of a solver from their texts, whatever has become of the files."""
 
     def __init__(self, folder: Path, texts: Mapping[str, str], copies: Path) -> None:
-        """`texts`: as `modules_beside` gives them, from `folder`; their code is said to be from files in `copies`."""
+        """`texts`: as `modules_beside` gives them, from `folder`; their code is said to be from
+        files in `copies`."""
         self.folder, self.texts, self.copies = folder, texts, copies
 
     def find_spec(self, fullname: str, *_: Any) -> ModuleSpec | None:
         """As the system finds it in the folder: a package, a module, or a folder of such."""
         place = fullname.replace(".", "/")
-        for file, within in ((f"{place}/__init__.py", [str(self.folder / place)]), (f"{place}.py", None)):
+        for file, within in (
+            (f"{place}/__init__.py", [str(self.folder / place)]),
+            (f"{place}.py", None),
+        ):
             if file in self.texts:
                 return spec_from_file_location(
                     fullname, self.folder / file, loader=self, submodule_search_locations=within
@@ -97,12 +112,19 @@ class Neighbours(SourceLoader, MetaPathFinder):
         return spec.origin
 
     def get_data(self, path: str | bytes) -> bytes:
-        """The text of a file; raises `OSError` for any other, such as one with code that was compiled before."""
+        """The text of a file; raises `OSError` for any other, such as one with code that was
+        compiled before."""
         file = Path(os.fsdecode(path)).relative_to(self.folder).as_posix()
         if file not in self.texts:
             raise OSError(f"{file} was not read with the solver")
         return self.texts[file].encode()
 
     def source_to_code(self, data: Any, path: Any = "<string>") -> CodeType:  # type: ignore[override]
-        """The code of a module; from text, for it is no more in the letters that its first line may name."""
-        return compile(data.decode(), str(self.copies / Path(path).relative_to(self.folder)), "exec", dont_inherit=True)
+        """The code of a module; from text, for it is no more in the letters that its first line may
+        name."""
+        return compile(
+            data.decode(),
+            str(self.copies / Path(path).relative_to(self.folder)),
+            "exec",
+            dont_inherit=True,
+        )

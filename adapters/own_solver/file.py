@@ -1,6 +1,7 @@
 """Reads the file of somebody's solver as text, and says in a sentence why it cannot be one.
 
-It is read once: what is played, checked and hashed is the text that was read, whatever is saved meanwhile.
+It is read once: what is played, checked and hashed is the text that was read, whatever is saved
+meanwhile.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from adapters.own_solver.beside import modules_beside
 from adapters.own_solver.gl_matrix import WHERE_TO, gl_matrix_of
 
 LARGEST = 2**20  # bytes; the exercise's file has about five thousand
-PATIENCE = 3  # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
+# times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
+PATIENCE = 3
 LONGEST = 300  # characters of a message
 KINDS = {".js": "javascript", ".py": "python"}
 
@@ -32,13 +34,14 @@ class SolverFailed(Exception):
 
     Attributes:
         kind: "error" (threw), "timeout", "memory" or "crashed".
-        what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is escaped, and what
-            goes on for more than `LONGEST` characters is cut.
+        what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is
+            escaped, and what goes on for more than `LONGEST` characters is cut.
         line, column: where in the solver's file, from 1; 0 where nobody can tell.
     """
 
     def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
-        what = printable(what[: LONGEST + 1])  # cut first: to escape millions of letters takes longer than a call may
+        # cut first: to escape millions of letters takes longer than a call may
+        what = printable(what[: LONGEST + 1])
         what = what if len(what) <= LONGEST else what[:LONGEST] + " ..."
         super().__init__(what)
         self.kind, self.what, self.line, self.column = kind, what, line, column
@@ -53,7 +56,8 @@ class SolverFailed(Exception):
 
 
 def printable(text: str) -> str:
-    """Somebody's text on one line, its control characters as they are written in code: they would act on a terminal."""
+    """Somebody's text on one line, its control characters as they are written in code: they would
+    act on a terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -66,8 +70,8 @@ class SolverText:
         kind: "javascript" or "python".
         text: with \\n at the end of lines.
         digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
-        beside: the modules that it imports from its own folder, or the gl-matrix that it calls: file, relative to the
-            folder or to the one above with its node_modules, -> text.
+        beside: the modules that it imports from its own folder, or the gl-matrix that it calls:
+            file, relative to the folder or to the one above with its node_modules, -> text.
     """
 
     path: Path
@@ -83,30 +87,41 @@ class SolverText:
 
 
 def read_solver(path: Path) -> SolverText:
-    """The text of `path`, and of what it imports from beside it; raises `NotASolver` with one sentence."""
+    """The text of `path`, and of what it imports from beside it; raises `NotASolver` with one
+    sentence."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
-        raise NotASolver(f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file")
+        raise NotASolver(
+            f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file"
+        )
     data = read_bytes(path, "name an Exercise.js or a solver.py")
     text = decoded(path, data)
     if not text.strip():
         raise NotASolver(f"{path}: is empty; save your solver into it")
     beside = read_beside(path, text) if kind == "python" else read_library(path, text)
-    return SolverText(path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(beside.items())))
+    return SolverText(
+        path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(beside.items()))
+    )
 
 
 def read_beside(path: Path, text: str) -> dict[str, str]:
-    """The texts of the modules that a solver of that `text` imports from its own folder; raises `NotASolver`."""
+    """The texts of the modules that a solver of that `text` imports from its own folder; raises
+    `NotASolver`."""
     itself, beside = path.resolve(), dict[str, str]()
-    for file, module in modules_beside(itself.parent, text, lambda one: text if one == itself else read_module(one)):
+    for file, module in modules_beside(
+        itself.parent, text, lambda one: text if one == itself else read_module(one)
+    ):
         beside[file] = module
         if sum(map(len, beside.values())) > LARGEST:
-            raise NotASolver(f"{path}: imports more than 1 MB from its folder; a solver has a few kilobytes")
+            raise NotASolver(
+                f"{path}: imports more than 1 MB from its folder; a solver has a few kilobytes"
+            )
     return beside
 
 
 def read_library(path: Path, text: str) -> dict[str, str]:
-    """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises `NotASolver`."""
+    """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises
+    `NotASolver`."""
     found = gl_matrix_of(path, text)
     return {} if found is None else {found[0]: decoded(found[1], read_bytes(found[1], WHERE_TO))}
 
@@ -117,19 +132,27 @@ def read_module(path: Path) -> str:
 
 
 def read_bytes(path: Path, wanted: str) -> bytes:
-    """All of a small file; raises `NotASolver`, with what is `wanted` in the place of something that is no file."""
+    """All of a small file; raises `NotASolver`, with what is `wanted` in the place of something
+    that is no file."""
     try:
         about = path.stat()
         if not stat.S_ISREG(about.st_mode):
             raise NotASolver(f"{path}: is no file; {wanted}")  # a pipe would be waited for
         size = about.st_size
         if size > LARGEST:
-            raise NotASolver(f"{path}: has {size / 1e6:.1f} MB; a solver has a few kilobytes, at most 1 MB is read")
+            raise NotASolver(
+                f"{path}: has {size / 1e6:.1f} MB; a solver has a few kilobytes, at most 1 MB is"
+                " read"
+            )
         return path.read_bytes()
     except OSError as fault:
         if dangling(path):
-            raise NotASolver(f"{path}: is a link to {path.readlink()}, which is not there") from None
-        raise NotASolver(f"{path}: {fault.strerror or fault}; name a file that can be read") from None
+            raise NotASolver(
+                f"{path}: is a link to {path.readlink()}, which is not there"
+            ) from None
+        raise NotASolver(
+            f"{path}: {fault.strerror or fault}; name a file that can be read"
+        ) from None
 
 
 def dangling(path: Path) -> bool:
@@ -141,7 +164,8 @@ def dangling(path: Path) -> bool:
 
 
 def decoded(path: Path, data: bytes) -> str:
-    """Text from UTF-8, from UTF-16 or UTF-32 with its mark, or from Windows' Latin letters; \\n ends its lines."""
+    """Text from UTF-8, from UTF-16 or UTF-32 with its mark, or from Windows' Latin letters; \\n
+    ends its lines."""
     return letters(path, data).replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -153,7 +177,9 @@ def letters(path: Path, data: bytes) -> str:
         return data.decode("utf-16", errors="replace")
     odd = next((k for k, byte in enumerate(data) if byte < 32 and byte not in b"\t\n\r\f\v"), None)
     if odd is not None:
-        raise NotASolver(f"{path}: is not text (byte {data[odd]} at offset {odd}); save it as UTF-8 text")
+        raise NotASolver(
+            f"{path}: is not text (byte {data[odd]} at offset {odd}); save it as UTF-8 text"
+        )
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -1,4 +1,5 @@
-"""Finds the gl-matrix that an Exercise.js calls: the one the exercise hands out beside the file, else that of npm."""
+"""Finds the gl-matrix that an Exercise.js calls: the one the exercise hands out beside the file,
+else that of npm."""
 
 from __future__ import annotations
 
@@ -11,8 +12,10 @@ NAMES = ("vec2", "vec3", "vec4", "mat2", "mat2d", "mat3", "mat4", "quat", "quat2
 CALLS = re.compile(rf"\b(?:{'|'.join(NAMES)})\b")
 HANDED_OUT = "gl-matrix*.js"
 WHERE_TO = "put the gl-matrix.js that the exercise hands out beside the file"
-BUILT = ("dist/gl-matrix.js", "dist/gl-matrix-min.js", "gl-matrix.js", "gl-matrix-min.js")  # 2.x, then 3.x
-# Up to version 2 vec2, mat4 ... are globals; from version 3 on they are inside glMatrix, and are taken out of it.
+# 2.x, then 3.x
+BUILT = ("dist/gl-matrix.js", "dist/gl-matrix-min.js", "gl-matrix.js", "gl-matrix-min.js")
+# Up to version 2 vec2, mat4 ... are globals; from version 3 on they are inside glMatrix, and are
+# taken out of it.
 TAKE_OUT = f"""if (typeof glMatrix === "object") {{
   for (const name of {json.dumps(NAMES)}) {{
     if (!(name in globalThis) && name in glMatrix) globalThis[name] = glMatrix[name];
@@ -21,15 +24,18 @@ TAKE_OUT = f"""if (typeof glMatrix === "object") {{
 
 
 def gl_matrix_of(solver: Path, text: str) -> tuple[str, Path] | None:
-    """Name, relative to where it was found, and file of what a solver of that `text` calls; None if there is none.
+    """Name, relative to where it was found, and file of what a solver of that `text` calls; None if
+    there is none.
 
-    It is loaded for who mentions one of its names only; whoever defines that name for himself is not disturbed.
+    It is loaded for who mentions one of its names only; whoever defines that name for himself is
+    not disturbed.
     """
     return next(found_from(solver), None) if CALLS.search(text) else None
 
 
 def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
-    """Beside the solver, gl-matrix.js before others; then the packages of its folder and of those above it."""
+    """Beside the solver, gl-matrix.js before others; then the packages of its folder and of those
+    above it."""
     folder = solver.resolve().parent
     beside = sorted(folder.glob(HANDED_OUT), key=lambda file: (len(file.name), file.name))
     yield from ((file.name, file) for file in beside if file != solver.resolve() and file.is_file())
@@ -40,7 +46,8 @@ def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
 
 
 def main_of(package: Path) -> str:
-    """The file that a package names as its main one; its own folder, which is no file, if it names none."""
+    """The file that a package names as its main one; its own folder, which is no file, if it names
+    none."""
     try:
         return str(json.loads((package / "package.json").read_text(encoding="utf-8"))["main"])
     except (OSError, ValueError, KeyError, TypeError):

@@ -9,7 +9,13 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
-from py_mini_racer import JSEvalException, JSOOMException, JSParseException, JSTimeoutException, MiniRacer
+from py_mini_racer import (
+    JSEvalException,
+    JSOOMException,
+    JSParseException,
+    JSTimeoutException,
+    MiniRacer,
+)
 
 from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
 from adapters.own_solver.gl_matrix import NAMES, TAKE_OUT, WHERE_TO
@@ -18,10 +24,12 @@ HEAP = 64 * 2**20  # bytes; a solver needs a hundredth of it
 LOAD_LIMIT = 2.0  # s
 NAME = "solver-file"  # how the solver's text is called in stack traces
 DRIVER = (Path(__file__).parent / "driver.js").read_text(encoding="utf-8")
-# Evaluated after the file, where its `let` and `const` can be seen too; a name that it lacks fails when it is used.
+# Evaluated after the file, where its `let` and `const` can be seen too; a name that it lacks fails
+# when it is used.
 BIND = """__crosscheck("bind", {
   integrate: typeof integrate === "undefined" ? null : integrate,
-  collide: typeof sphereSphereCollisionHandling === "undefined" ? null : sphereSphereCollisionHandling,
+  collide: typeof sphereSphereCollisionHandling === "undefined"
+    ? null : sphereSphereCollisionHandling,
   step: typeof performSimStep === "undefined" ? null : performSimStep,
   wrap: typeof projectObjects === "undefined" ? null : projectObjects,
   begin: typeof initScene === "undefined" ? null : initScene,
@@ -47,16 +55,20 @@ class JavaScriptSolver:
             raise self.failure(error, LOAD_LIMIT, "while it is loaded") from None
 
     def load_library(self, name: str, text: str) -> None:
-        """The gl-matrix, as the exercise's page loads it before the file. Raises `SolverFailed` if it is none."""
+        """The gl-matrix, as the exercise's page loads it before the file. Raises `SolverFailed` if
+        it is none."""
         try:
             self.engine.eval(f"{text}\n//# sourceURL={name}", timeout_sec=LOAD_LIMIT)
             self.engine.eval(TAKE_OUT)
         except JSEvalException as error:
             said = str(error).partition("\n")[0]
-            raise SolverFailed("error", f"calls {name}, which cannot be loaded ({said}); {WHERE_TO}") from None
+            raise SolverFailed(
+                "error", f"calls {name}, which cannot be loaded ({said}); {WHERE_TO}"
+            ) from None
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
-        """What the driver answers to a command; raises `SolverFailed` after `limit` s, or if the file threw."""
+        """What the driver answers to a command; raises `SolverFailed` after `limit` s, or if the
+        file threw."""
         code = f'__crosscheck("{command}", {json.dumps(json.dumps(argument))})'
         try:
             answer = json.loads(str(self.evaluated(code, limit, may_repeat=command == "ask")))
@@ -69,7 +81,8 @@ class JavaScriptSolver:
         return answer["done"]
 
     def evaluated(self, code: str, limit: float, may_repeat: bool) -> object:
-        """What V8 makes of `code`; what was stopped without having run for `limit` s is asked again if `may_repeat`.
+        """What V8 makes of `code`; what was stopped without having run for `limit` s is asked again
+        if `may_repeat`.
 
         V8 is stopped by the clock, on a busy machine before it has had its time.
         """
@@ -95,7 +108,9 @@ class JavaScriptSolver:
         place = re.match(r"[^\n]*?:(\d+): (.*)", first)
         if not place:
             return SolverFailed("error", plainly(first))
-        caret = next((line for line in rest.splitlines() if line.strip() and set(line.strip()) == {"^"}), "")
+        caret = next(
+            (line for line in rest.splitlines() if line.strip() and set(line.strip()) == {"^"}), ""
+        )
         stack = re.search(rf"{NAME}:(\d+):(\d+)", str(error))
         line, column = int(place[1]), caret.find("^") + 1
         if stack and not isinstance(error, JSParseException):
@@ -110,8 +125,18 @@ def thrown(error: dict[str, str]) -> SolverFailed:
     return SolverFailed("error", plainly(error["what"]), line, column)
 
 
-OUTSIDE = ("Date", "performance", "setTimeout", "setInterval", "requestAnimationFrame", "document", "window", "alert",
-           "fetch", "localStorage")  # fmt: skip
+OUTSIDE = (
+    "Date",
+    "performance",
+    "setTimeout",
+    "setInterval",
+    "requestAnimationFrame",
+    "document",
+    "window",
+    "alert",
+    "fetch",
+    "localStorage",
+)
 SCRIPT = "the exercise's page loads the file as a plain script, which has no modules; leave it out"
 
 

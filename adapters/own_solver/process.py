@@ -34,7 +34,8 @@ class SolverProcess:
     """A solver's text, loaded in a process of its own; use it in a `with`, or close it.
 
     Attributes:
-        functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it replaced.
+        functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it
+            replaced.
         kind: "javascript" or "python".
         surface: "exercise" (functions on spheres) or "advance" (arrays, as in reference_impl).
         versions: library -> version.
@@ -67,8 +68,9 @@ class SolverProcess:
     def start(self, solver: str, settings: dict[str, str]) -> Any:
         """Start the process and give it the solver; what it says then.
 
-        It stops a file that does not load by itself. A process that says nothing at all is started once more before
-        the file is blamed: a start of V8 has been seen to hang, so rarely that none of 1259 that were counted did.
+        It stops a file that does not load by itself. A process that says nothing at all is started
+        once more before the file is blamed: a start of V8 has been seen to hang, so rarely that
+        none of 1259 that were counted did.
         """
         for last in (False, True):
             try:
@@ -81,14 +83,19 @@ class SolverProcess:
         raise AssertionError("the second start returns or raises")
 
     def begin(self, settings: dict[str, str]) -> None:
-        """Start the process and hear that it is there, with nothing of the solver in it; raises `NotStarted`."""
+        """Start the process and hear that it is there, with nothing of the solver in it; raises
+        `NotStarted`."""
         self.process: subprocess.Popen[bytes] | None = None
         try:
             self.process = subprocess.Popen(
                 python(WORK),
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | settings,
-                start_new_session=True, bufsize=0,
-            )  # fmt: skip
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=os.environ | settings,
+                start_new_session=True,
+                bufsize=0,
+            )
             if self.receive(STARTING) == HERE:
                 return
             why = "it said something else than that it is there"
@@ -99,12 +106,18 @@ class SolverProcess:
     def __enter__(self) -> SolverProcess:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, value: object, trace: TracebackType | None
+    ) -> None:
         self.close()
 
-    def request(self, requests: Sequence[Request], total: float = float("inf")) -> list[Any | SolverFailed]:
-        """The answer to each, or how it failed, within `total` s; raises `SolverFailed` if the process is lost."""
-        # After one call that does not come back the worker puts no other like it, so a few limits are enough.
+    def request(
+        self, requests: Sequence[Request], total: float = float("inf")
+    ) -> list[Any | SolverFailed]:
+        """The answer to each, or how it failed, within `total` s; raises `SolverFailed` if the
+        process is lost."""
+        # After one call that does not come back the worker puts no other like it, so a few limits
+        # are enough.
         most = PATIENCE * max((limit for _, _, limit in requests), default=0.0)
         answers = self.exchange(requests, min(most + GRACE, total))
         if not isinstance(answers, list) or len(answers) != len(requests):
@@ -139,7 +152,9 @@ class SolverProcess:
             ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, left))
             if not ready or left < 0:  # for who writes without end is always ready
                 self.close()
-                raise SolverFailed("timeout", f"does not come back within {limit:g} s and had to be stopped")
+                raise SolverFailed(
+                    "timeout", f"does not come back within {limit:g} s and had to be stopped"
+                )
             chunk = os.read(self.process.stdout.fileno(), 1 << 20)
             if not chunk:
                 raise self.lost()
@@ -156,11 +171,17 @@ class SolverProcess:
         """Why the process is gone."""
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
-        ends_v8 = self.kind == "javascript" and -code in (signal.SIGTRAP, signal.SIGABRT)  # V8's word for a full heap
+        # V8's word for a full heap
+        ends_v8 = self.kind == "javascript" and -code in (signal.SIGTRAP, signal.SIGABRT)
         if ends_v8:
-            return SolverFailed("memory", "wants more memory than it is given, and its process was ended")
+            return SolverFailed(
+                "memory", "wants more memory than it is given, and its process was ended"
+            )
         if -code == signal.SIGKILL:
-            return SolverFailed("crashed", "its process was ended by SIGKILL, as a system does that runs out of memory")
+            return SolverFailed(
+                "crashed",
+                "its process was ended by SIGKILL, as a system does that runs out of memory",
+            )
         if -code == signal.SIGABRT:
             return SolverFailed("crashed", "its process was ended by SIGABRT")
         name = signal.Signals(-code).name if code < 0 else f"exit status {code}"
@@ -179,10 +200,12 @@ class SolverProcess:
 
 
 def kept_copies(solver: SolverText, kept: Path) -> Path | None:
-    """A folder below `kept` with the texts of a Python solver, named by what they are; None if it cannot be written.
+    """A folder below `kept` with the texts of a Python solver, named by what they are; None if it
+    cannot be written.
 
-    numba keeps what it compiled from a file under that file's place and content of the moment. The file itself may have
-    been saved since it was read, and what it imports is compiled into it: both would be taken for what they were not.
+    numba keeps what it compiled from a file under that file's place and content of the moment. The
+    file itself may have been saved since it was read, and what it imports is compiled into it: both
+    would be taken for what they were not.
     """
     copies = kept / "solvers" / solver.source
     try:

@@ -1,4 +1,5 @@
-"""Runs a solver.py: the exercise's functions on sphere objects, or `advance` on arrays as in reference_impl."""
+"""Runs a solver.py: the exercise's functions on sphere objects, or `advance` on arrays as in
+reference_impl."""
 
 from __future__ import annotations
 
@@ -25,8 +26,12 @@ def row_of(s: Any) -> list[float]:
     try:
         vectors = (s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y)
     except AttributeError:
-        raise AttributeError("a sphere is left with a position, velocity or force that has no x and y") from None
-    return [number(x) for x in (*vectors, s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size)]
+        raise AttributeError(
+            "a sphere is left with a position, velocity or force that has no x and y"
+        ) from None
+    return [
+        number(x) for x in (*vectors, s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size)
+    ]
 
 
 def number(x: Any) -> float:
@@ -41,7 +46,8 @@ class PythonSolver:
     """The file as a module of this process. Raises `SolverFailed` if it cannot be loaded."""
 
     def __init__(self, solver: SolverText, copies: Path | None = None) -> None:
-        """`copies`: where the texts lie as they were read, for numba: it keeps what it compiled by file and content."""
+        """`copies`: where the texts lie as they were read, for numba: it keeps what it compiled by
+        file and content."""
         here = solver.path.resolve()
         self.name = str(solver.path if copies is None else copies / here.name)
         sys.meta_path.insert(0, Neighbours(here.parent, dict(solver.beside), copies or here.parent))
@@ -52,9 +58,16 @@ class PythonSolver:
         with self.guarded(LOAD_LIMIT, "while it is loaded"):
             exec(compile(solver.text, self.name, "exec"), module.__dict__)
         self.surface = "advance" if callable(getattr(module, "advance", None)) else "exercise"
-        named = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling", "step": "performSimStep",
-                 "wrap": "projectObjects", "begin": "initScene"}  # fmt: skip
-        self.file: dict[str, Callable] = {k: vars(module)[f] for k, f in named.items() if callable(vars(module).get(f))}
+        named = {
+            "integrate": "integrate",
+            "collide": "sphereSphereCollisionHandling",
+            "step": "performSimStep",
+            "wrap": "projectObjects",
+            "begin": "initScene",
+        }
+        self.file: dict[str, Callable] = {
+            k: vars(module)[f] for k, f in named.items() if callable(vars(module).get(f))
+        }
         self.whole: Any = None  # plays whole scenes by `advance`, where the file has it
         if self.surface == "advance":
             from adapters.own_solver.arrays import Whole, as_functions
@@ -73,12 +86,16 @@ class PythonSolver:
 
     @contextmanager
     def guarded(self, limit: float, when: str) -> Iterator[None]:
-        """Turns whatever the file does into `SolverFailed`, and stops it after `limit` s of processor time."""
+        """Turns whatever the file does into `SolverFailed`, and stops it after `limit` s of
+        processor time."""
 
         def stop(_signal: int, _frame: FrameType | None) -> None:
             raise SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
 
-        timers = {signal.ITIMER_PROF: (signal.SIGPROF, limit), signal.ITIMER_REAL: (signal.SIGALRM, PATIENCE * limit)}
+        timers = {
+            signal.ITIMER_PROF: (signal.SIGPROF, limit),
+            signal.ITIMER_REAL: (signal.SIGALRM, PATIENCE * limit),
+        }
         for timer, (number, after) in timers.items():  # the clock stops what only waits
             signal.signal(number, stop)
             signal.setitimer(timer, after)
@@ -101,14 +118,20 @@ class PythonSolver:
         elif isinstance(error, SystemExit):
             what = f"ends the process (SystemExit: {error})"
         else:
-            what = f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}"
+            what = (
+                f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}"
+            )
         if "for ^" in what:
             what += "; a power is written **"
         elif isinstance(error, EOFError):
             what += "; input() is not available"
         if isinstance(error, SyntaxError) and error.filename == self.name:
             return SolverFailed("error", what, error.lineno or 0, error.offset or 0)
-        mine = [f for f in traceback.TracebackException.from_exception(error).stack if f.filename == self.name]
+        mine = [
+            f
+            for f in traceback.TracebackException.from_exception(error).stack
+            if f.filename == self.name
+        ]
         line, column = (mine[-1].lineno or 0, (mine[-1].colno or 0) + 1) if mine else (0, 0)
         return SolverFailed("error", what, line, column)
 
@@ -129,7 +152,8 @@ class PythonSolver:
             return None
 
     def ask(self, question: dict[str, Any]) -> dict[str, Any]:
-        """The spheres after each call of a question, and whether anything was returned, strayed or failed."""
+        """The spheres after each call of a question, and whether anything was returned, strayed or
+        failed."""
         states: list[list[list[float]]] = []
         returned, error = False, None
         spheres = self.placed(question)
@@ -139,17 +163,31 @@ class PythonSolver:
                 on = {"integrate": 1, "collide": 2}.get(name, 0)
                 result = self.file[name](*(spheres[i] for i in arguments[:on]), *arguments[on:])
                 if hasattr(result, "send"):
-                    raise TypeError(f"a call of {name} runs nothing: it is an async def, or has a yield")
-                returned = returned or isinstance(result, (Fields, dict, list, tuple)) or hasattr(result, "position")
+                    raise TypeError(
+                        f"a call of {name} runs nothing: it is an async def, or has a yield"
+                    )
+                returned = (
+                    returned
+                    or isinstance(result, (Fields, dict, list, tuple))
+                    or hasattr(result, "position")
+                )
                 spheres = self.everybody() if question["world"] else spheres
                 states.append([row_of(s) for s in spheres])
         except SolverFailed:
             raise
         except BaseException as raised:
             error = vars(self.failure(raised, "in one call"))
-        strange = sorted({name for s in spheres if isinstance(s, Fields) for name in vars(s)} - NAMES)
+        strange = sorted(
+            {name for s in spheres if isinstance(s, Fields) for name in vars(s)} - NAMES
+        )
         strayed = not question["world"] and not same(self.globals(), known)
-        return {"states": states, "returned": returned, "strayed": strayed, "strange": strange, "error": error}
+        return {
+            "states": states,
+            "returned": returned,
+            "strayed": strayed,
+            "strange": strange,
+            "error": error,
+        }
 
     def placed(self, question: dict[str, Any]) -> list[Any]:
         """The question's spheres, new ones or the file's own."""
@@ -174,7 +212,8 @@ class PythonSolver:
         self.spheres: list[Any] = [sphere_of(r) for r in scene["spheres"]]
 
     def step(self, argument: dict[str, Any]) -> None:
-        """Integrate all, collide every pair i < j, wrap; `count` times; forces act in the first, or in all if held."""
+        """Integrate all, collide every pair i < j, wrap; `count` times; forces act in the first, or
+        in all if held."""
         gx, gy = self.scene["gravity"]
         forces, held = argument["forces"], argument.get("held", False)
         for k in range(argument["count"]):
@@ -201,7 +240,9 @@ class PythonSolver:
         if before[2:4] != after[2:4] or before[6:] != after[6:]:
             du, dv = after[2] - before[2], after[3] - before[3]
             sign = -1.0 if du * x + dv * y < 0 else 1.0
-            self.collision_rows.append([self.steps, i, j, number(sign * a.mass * (du * du + dv * dv) ** 0.5)])
+            self.collision_rows.append(
+                [self.steps, i, j, number(sign * a.mass * (du * du + dv * dv) ** 0.5)]
+            )
         if (before != after or x * x + y * y < reach * reach) and len(self.log) < LOGGED:
             self.log.append([self.steps, i, j, *map(number, before), *map(number, after)])
 

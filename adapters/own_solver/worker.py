@@ -1,6 +1,8 @@
-"""The process in which a solver's file runs: bounded memory, no output, one JSON line in and one out per request.
+"""The process in which a solver's file runs: bounded memory, no output, one JSON line in and one
+out per request.
 
-It runs with the rights of the user who started it: the limits are against accidents, not against malice.
+It runs with the rights of the user who started it: the limits are against accidents, not against
+malice.
 """
 
 from __future__ import annotations
@@ -19,11 +21,13 @@ from typing import IO, Any
 from adapters.own_solver.file import SolverFailed, SolverText
 
 HERE = "here"  # what is said before anything of the solver is in this process
-MEMORY = 2 * 2**30  # bytes of data; V8 sets aside far more addresses than it uses, so that these cannot be bounded
+# bytes of data; V8 sets aside far more addresses than it uses, so that these cannot be bounded
+MEMORY = 2 * 2**30
 
 
 def main() -> None:
-    """Load the text that the first line holds, say what it has, then answer request by request until the input ends."""
+    """Load the text that the first line holds, say what it has, then answer request by request
+    until the input ends."""
     requests, answers = private_pipes()
     Thread(target=end_with_parent, args=(requests,), daemon=True).start()
     _, allowed = resource.getrlimit(resource.RLIMIT_DATA)  # which nobody but root may raise
@@ -36,14 +40,20 @@ def main() -> None:
     except SolverFailed as failure:
         tell(answers, {"failed": vars(failure)})
         return
-    tell(answers, {"functions": solver.functions, "surface": solver.surface, "versions": solver.versions()})
+    tell(
+        answers,
+        {"functions": solver.functions, "surface": solver.surface, "versions": solver.versions()},
+    )
     for line in requests:
         tell(answers, reply(solver, loads(line)))
 
 
 def private_pipes() -> tuple[IO[str], IO[str]]:
     """The two ends of the talk with the parent; what the solver prints or reads goes nowhere."""
-    requests, answers = os.fdopen(os.dup(0), encoding="utf-8"), os.fdopen(os.dup(1), "w", encoding="utf-8")
+    requests, answers = (
+        os.fdopen(os.dup(0), encoding="utf-8"),
+        os.fdopen(os.dup(1), "w", encoding="utf-8"),
+    )
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(nowhere, stream)
@@ -51,7 +61,8 @@ def private_pipes() -> tuple[IO[str], IO[str]]:
 
 
 def end_with_parent(requests: IO[str]) -> None:
-    """When nobody is left who could ask, end this process and all that the file has started, whatever it is doing."""
+    """When nobody is left who could ask, end this process and all that the file has started,
+    whatever it is doing."""
     hung_up = select.poll()
     hung_up.register(requests, 0)
     hung_up.poll()
@@ -70,7 +81,8 @@ def load(solver: SolverText, copies: Path | None) -> Any:
 
 
 def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, Any]]:
-    """An answer for every (command, argument, limit s) of a request; one that fails does not stop the others.
+    """An answer for every (command, argument, limit s) of a request; one that fails does not stop
+    the others.
 
     After a call that did not come back, no question is put that would make the same call again.
     """
@@ -80,7 +92,9 @@ def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, 
         calls = [call[0] for call in argument["calls"]] if command == "ask" else []
         known = next((endless[call] for call in calls if call in endless), None)
         try:
-            answers.append({"failed": known} if known else {"done": solver.run(command, argument, limit)})
+            answers.append(
+                {"failed": known} if known else {"done": solver.run(command, argument, limit)}
+            )
         except SolverFailed as failure:
             answers.append({"failed": vars(failure)})
             if failure.kind in ("timeout", "memory"):
@@ -99,5 +113,7 @@ def work() -> None:
     sys.dont_write_bytecode = True
     try:
         main()
-    finally:  # without Python's own end: taking down a V8 that was stopped in an endless loop never returns
+    finally:
+        # Without Python's own end: taking down a V8 that was stopped in an endless loop never
+        # returns.
         os._exit(0)

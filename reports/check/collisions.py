@@ -12,7 +12,8 @@ from scenarios.model import Array
 
 
 class PairCollision(NamedTuple):
-    """A pair before the call, m, m/s, kg: u = vA - vB, n from B to A, distance d, sum of sizes s; shifts of A and B."""
+    """A pair before the call, m, m/s, kg: u = vA - vB, n from B to A, distance d, sum of sizes s;
+    shifts of A and B."""
 
     va: Array
     vb: Array

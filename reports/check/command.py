@@ -28,13 +28,18 @@ if TYPE_CHECKING:
     from reports.check.smallest import Smallest
 
 # What an earlier file of ours begins with, and nothing else does: it may be written over.
-PAGE, JUNIT = b'<meta name="generator" content="crosscheck check">', b'<testsuites name="crosscheck check"'
+PAGE, JUNIT = (
+    b'<meta name="generator" content="crosscheck check">',
+    b'<testsuites name="crosscheck check"',
+)
 CHECKING = 600.0  # s that a file may take: what each of its calls may take adds up to less
-NOBODYS = (".", "__", "node_modules")  # how the names of files and folders begin that no student wrote
+# how the names of files and folders begin that no student wrote
+NOBODYS = (".", "__", "node_modules")
 
 
 def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) -> None:
-    """Check what is at `path` and say it; exits 0, 1 (a fault was found) or 2 (there is nothing to check)."""
+    """Check what is at `path` and say it; exits 0, 1 (a fault was found) or 2 (there is nothing to
+    check)."""
     files = files_of(path)
     if page is not None and path.is_dir():
         refuse([f"--page {page}: shows one file; {path} is a folder"])
@@ -56,7 +61,8 @@ def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) 
 
 
 def files_of(path: Path) -> list[Path]:
-    """The file, or all solvers below a folder, links to nothing too, in order of their names; exits 2 without any.
+    """The file, or all solvers below a folder, links to nothing too, in order of their names; exits
+    2 without any.
 
     Where every solver has a folder of its own, a folder without one stands among them.
     """
@@ -68,23 +74,36 @@ def files_of(path: Path) -> list[Path]:
         refuse([f"{path}: is not there; name an Exercise.js, a solver.py or a folder of them"])
     if not path.is_dir():
         return [path]
-    theirs = [one for one in path.rglob("*") if not any(p.startswith(NOBODYS) for p in one.relative_to(path).parts)]
+    theirs = [
+        one
+        for one in path.rglob("*")
+        if not any(p.startswith(NOBODYS) for p in one.relative_to(path).parts)
+    ]
     found = sorted(
-        file for file in theirs
-        if file.suffix.lower() in KINDS and (file.is_file() or dangling(file)) and not is_handed_out(file)
-    )  # fmt: skip
+        file
+        for file in theirs
+        if file.suffix.lower() in KINDS
+        and (file.is_file() or dangling(file))
+        and not is_handed_out(file)
+    )
     if not found:
         refuse([f"{path}: {NONE}"])
     owners = {file.relative_to(path).parts[0] for file in found}
-    empty = [one for one in theirs if one.parent == path and one.is_dir() and one.name not in owners]
+    empty = [
+        one for one in theirs if one.parent == path and one.is_dir() and one.name not in owners
+    ]
     return found if any(file.parent == path for file in found) else sorted(found + empty)
 
 
 def places_for(page: Path | None, junit: Path | None) -> None:
-    """Exit 2, before anything is checked, if what is to be written has no place or would take somebody else's."""
+    """Exit 2, before anything is checked, if what is to be written has no place or would take
+    somebody else's."""
     if page is not None and junit is not None and os.path.realpath(page) == os.path.realpath(junit):
         refuse([f"--junit {junit}: is where the page goes; name another file"])
-    marks = ("--page", page, PAGE, "page of a check"), ("--junit", junit, JUNIT, "JUnit file of a check")
+    marks = (
+        ("--page", page, PAGE, "page of a check"),
+        ("--junit", junit, JUNIT, "JUnit file of a check"),
+    )
     for option, path, mark, what in marks:
         if path is None:
             continue
@@ -104,7 +123,8 @@ def is_handed_out(file: Path) -> bool:
 
 
 def checked(files: Sequence[Path], progress: bool) -> list[FileCheck]:
-    """The checks in order, as many at once as there are cores, in workers: those can be stopped whatever they do."""
+    """The checks in order, as many at once as there are cores, in workers: those can be stopped
+    whatever they do."""
     tasks: dict[Hashable, Any] = {file: partial(check_file, file) for file in files}
     done: dict[Path, FileCheck] = {}
     with closing(run_all(tasks, min(os.cpu_count() or 1, len(files)), CHECKING)) as results:
@@ -140,7 +160,8 @@ def make_page(path: Path, one: FileCheck) -> None:
 
 
 def smallest_here(solver: SolverText, restitution: float) -> Smallest | None:
-    """In a worker: the smallest scene that shows a fault of a solver; None if none is found, or the solver fails."""
+    """In a worker: the smallest scene that shows a fault of a solver; None if none is found, or the
+    solver fails."""
     from reports.check.smallest import smallest_scene
 
     try:

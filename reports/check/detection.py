@@ -19,9 +19,15 @@ RULES: dict[str, Rule] = {
     "": lambda x, y, a, b: np.hypot(x, y) < a + b,
     "only the size of A is used": lambda x, y, a, b: np.hypot(x, y) < a,
     "only the size of B is used": lambda x, y, a, b: np.hypot(x, y) < b,
-    "the squared distance is compared with a size that is not squared": lambda x, y, a, b: x * x + y * y < a + b,
-    "the distance is compared with a squared size": lambda x, y, a, b: np.hypot(x, y) < (a + b) ** 2,
-    "the squares of the sizes are added, not their sum squared": lambda x, y, a, b: x * x + y * y < a * a + b * b,
+    "the squared distance is compared with a size that is not squared": lambda x, y, a, b: (
+        x * x + y * y < a + b
+    ),
+    "the distance is compared with a squared size": lambda x, y, a, b: (
+        np.hypot(x, y) < (a + b) ** 2
+    ),
+    "the squares of the sizes are added, not their sum squared": lambda x, y, a, b: (
+        x * x + y * y < a * a + b * b
+    ),
     "the sizes are taken for diameters": lambda x, y, a, b: np.hypot(x, y) < (a + b) / 2,
     "the sizes are doubled": lambda x, y, a, b: np.hypot(x, y) < 2 * (a + b),
     "the larger size is used alone": lambda x, y, a, b: np.hypot(x, y) < max(a, b),
@@ -30,7 +36,9 @@ RULES: dict[str, Rule] = {
     "the size of B is used twice": lambda x, y, a, b: np.hypot(x, y) < 2 * b,
     "the sizes are subtracted": lambda x, y, a, b: np.hypot(x, y) < abs(a - b),
     "the sizes are multiplied": lambda x, y, a, b: np.hypot(x, y) < a * b,
-    "x and y are compared one by one, as of boxes": lambda x, y, a, b: abs(x) < a + b and abs(y) < a + b,
+    "x and y are compared one by one, as of boxes": lambda x, y, a, b: (
+        abs(x) < a + b and abs(y) < a + b
+    ),
     "dx is taken for dy, too": lambda x, y, a, b: np.hypot(x, x) < a + b,
     "dy is taken for dx, too": lambda x, y, a, b: np.hypot(y, y) < a + b,
     "|dx| + |dy| is taken for the distance": lambda x, y, a, b: abs(x) + abs(y) < a + b,
@@ -55,7 +63,8 @@ REACHES: dict[str, Callable[[float], float]] = {
 
 
 def rooted(square: Callable[[float, float], float]) -> Rule:
-    """Whether the root is below the sum of the sizes; that of a negative number is NaN, which may go either way."""
+    """Whether the root is below the sum of the sizes; that of a negative number is NaN, which may
+    go either way."""
     return lambda x, y, a, b: None if square(x, y) < 0 else bool(square(x, y) < (a + b) ** 2)
 
 
@@ -66,7 +75,9 @@ def compared(square: Callable[[float, float], float], reach: Callable[[float], f
 
 BITS = "^ is no power but acts on bits (XOR)"
 # Only asked of a file that has a ^: some give the pattern of a file that compares nothing.
-XOR = {f"{BITS}: the root of {left}": rooted(square) for left, square in SQUARES.items() if "^" in left}
+XOR = {
+    f"{BITS}: the root of {left}": rooted(square) for left, square in SQUARES.items() if "^" in left
+}
 XOR |= {
     f"{BITS}: {left} is compared with {right}": compared(square, reach)
     for (left, square), (right, reach) in product(SQUARES.items(), REACHES.items())
@@ -74,9 +85,15 @@ XOR |= {
 }
 # >= and < bind before ^, too: what is compared is the 2.
 XOR |= {
-    f"{BITS}: dx ^ 2 + dy ^ 2 < (sizeA + sizeB) ^ 2": lambda x, y, a, b: (int(x) ^ int(2 + y) ^ (a + b > 2) ^ 2) != 0,
-    f"{BITS}: dx ^ 2 + dy ^ 2 >= (sizeA + sizeB) ^ 2": lambda x, y, a, b: (int(x) ^ int(2 + y) ^ (a + b <= 2) ^ 2) == 0,
-    f"{BITS}: dx ^ 2 + dy ^ 2 > (sizeA + sizeB) ^ 2": lambda x, y, a, b: (int(x) ^ int(2 + y) ^ (a + b < 2) ^ 2) == 0,
+    f"{BITS}: dx ^ 2 + dy ^ 2 < (sizeA + sizeB) ^ 2": lambda x, y, a, b: (
+        (int(x) ^ int(2 + y) ^ (a + b > 2) ^ 2) != 0
+    ),
+    f"{BITS}: dx ^ 2 + dy ^ 2 >= (sizeA + sizeB) ^ 2": lambda x, y, a, b: (
+        (int(x) ^ int(2 + y) ^ (a + b <= 2) ^ 2) == 0
+    ),
+    f"{BITS}: dx ^ 2 + dy ^ 2 > (sizeA + sizeB) ^ 2": lambda x, y, a, b: (
+        (int(x) ^ int(2 + y) ^ (a + b < 2) ^ 2) == 0
+    ),
     f"{BITS}: (a < b) ^ 2 is what is asked, and is never zero": lambda x, y, a, b: True,
 }
 
@@ -102,19 +119,30 @@ def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
         a, b = question.balls
         (dx, dy), size = np.subtract(a.x, b.x), (a.r, b.r)
         seen.append(((dx, dy, *size), bool(answer.balls) and acts(question.balls, answer.last)))
-    cause = next((name for name, rule in rules.items() if all(rule(*q) in (was, None) for q, was in seen)), None)
+    cause = next(
+        (name for name, rule in rules.items() if all(rule(*q) in (was, None) for q, was in seen)),
+        None,
+    )
     wrong = [(q, was) for q, was in seen if was != RULES[""](*q)]
     if no_number(answers):
         cause = "the distance is no number (a field that does not exist, a division by zero?)"
     if cause is None and mixed_up(answers):
         cause = "the distance is not the one between the centres: positions are added or mixed up"
     if not wrong:
-        return judged("reach", "2a", ASKED, "the pairs that overlap", "the pairs that overlap", True)
+        return judged(
+            "reach", "2a", ASKED, "the pairs that overlap", "the pairs that overlap", True
+        )
     (dx, dy, ra, rb), was = wrong[0]
     case = f"sizes {shown(ra)} and {shown(rb)} m at a distance of {shown(np.hypot(dx, dy))} m"
     got, expected = ("collide", "do not collide") if was else ("do not collide", "collide")
     return judged(
-        "reach", "2a", ASKED, f"{case}: {got} ({len(wrong)} of {len(seen)} pairs wrong)", expected, False, cause or ""
+        "reach",
+        "2a",
+        ASKED,
+        f"{case}: {got} ({len(wrong)} of {len(seen)} pairs wrong)",
+        expected,
+        False,
+        cause or "",
     )
 
 
@@ -151,6 +179,9 @@ def same_centre(answer: Answer) -> CheckRow:
     values = [] if answer.failed else [x for b in answer.last for x in (*b.x, *b.v, b.alpha, b.w)]
     if values and np.isfinite(values).all():
         return judged("same centre", "2a", asked, "yes", "yes", True)
-    cause = "divides by a distance of zero; the exercise does not say what to do, but the page loses both spheres"
+    cause = (
+        "divides by a distance of zero; the exercise does not say what to do, but the page loses"
+        " both spheres"
+    )
     got = f"fails: {answer.failed}" if answer.failed else "no, NaN or infinite"
     return CheckRow("same centre", "2a", asked, got, "yes, by a guard", "note", cause)

@@ -1,4 +1,5 @@
-"""Before a function is judged: is it there, does it come back, does it change what it is given and nothing else?"""
+"""Before a function is judged: is it there, does it come back, does it change what it is given and
+nothing else?"""
 
 from __future__ import annotations
 
@@ -13,8 +14,11 @@ FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
 MAY_FAIL = ("same centre",)  # is judged by a row of its own
 
 
-def implemented(task: str, there: bool, answers: dict[str, Answer], text: str) -> tuple[list[CheckRow], bool]:
-    """The rows on the function of a task and its arguments, and whether it can be judged further."""
+def implemented(
+    task: str, there: bool, answers: dict[str, Answer], text: str
+) -> tuple[list[CheckRow], bool]:
+    """The rows on the function of a task and its arguments, and whether it can be judged
+    further."""
     function = FUNCTIONS[task]
     asked = f"Does {function} do something with the spheres it is given?"
 
@@ -22,13 +26,23 @@ def implemented(task: str, there: bool, answers: dict[str, Answer], text: str) -
         return [judged("implemented", task, asked, got, "it changes them", False, cause)], False
 
     if not there:
-        return fault("there is no such function", 
-                     f"not implemented: the file has no function {function}{instead(function, text)}")  # fmt: skip
-    failed = {name: answer for name, answer in answers.items() if answer.failed and name not in MAY_FAIL}
+        return fault(
+            "there is no such function",
+            f"not implemented: the file has no function {function}{instead(function, text)}",
+        )
+    failed = {
+        name: answer for name, answer in answers.items() if answer.failed and name not in MAY_FAIL
+    }
     if failed:
         answer = next(iter(failed.values()))
-        return fault(f"it fails in {len(failed)} of {len(answers)} calls", f"{function}: {answer.failed}")
-    if not any(changed(QUESTIONS[name].balls, answer.last) for name, answer in answers.items() if answer.balls):
+        return fault(
+            f"it fails in {len(failed)} of {len(answers)} calls", f"{function}: {answer.failed}"
+        )
+    if not any(
+        changed(QUESTIONS[name].balls, answer.last)
+        for name, answer in answers.items()
+        if answer.balls
+    ):
         return fault("nothing is changed", nothing(function, answers.values()))
     return [arguments(task, function, answers.values())], True
 
@@ -64,9 +78,14 @@ def arguments(task: str, function: str, answers: Iterable[Answer]) -> CheckRow:
     cause = f"it writes the field {strange[0]!r}, which a sphere does not have" if strange else ""
     cause = "it changes the global ufo or asteroids, too" if strayed else cause
     return judged(
-        "input only", task, f"Does {function} change the spheres it is given and nothing else?",
-        "no" if cause else "yes", "yes", not cause, cause,
-    )  # fmt: skip
+        "input only",
+        task,
+        f"Does {function} change the spheres it is given and nothing else?",
+        "no" if cause else "yes",
+        "yes",
+        not cause,
+        cause,
+    )
 
 
 def changed(before: tuple[Ball, ...], after: list[Ball]) -> bool:

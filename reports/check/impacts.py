@@ -1,7 +1,8 @@
-"""What a solver may take for the impulse of a collision, and what it may do with it; and which of that it does.
+"""What a solver may take for the impulse of a collision, and what it may do with it; and which of
+that it does.
 
-J = -(1 + e) (vA - vB).n / (1/mA + 1/mB), vA' = vA + J n / mA, vB' = vB - J n / mB, n the unit vector from B to A
-(Newton's law of impact; Landau & Lifshitz, Mechanics, 17).
+J = -(1 + e) (vA - vB).n / (1/mA + 1/mB), vA' = vA + J n / mA, vB' = vB - J n / mB, n the unit
+vector from B to A (Newton's law of impact; Landau & Lifshitz, Mechanics, 17).
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ def tangent(h: PairCollision) -> Array:
 
 ONES: Array = np.ones(2)
 NEVER = "the velocities are never changed: not implemented, or it returns before"
-BACKWARDS = "the normal is the wrong way round for the signs it is used with: here it points from B to A"
+BACKWARDS = (
+    "the normal is the wrong way round for the signs it is used with: here it points from B to A"
+)
 APPROACH = "the test for approach has the wrong sign: only pairs that part get an impulse"
 # What a solver may take for J n, N s
 IMPULSES: dict[str, Impulse] = {
@@ -56,9 +59,15 @@ IMPULSES: dict[str, Impulse] = {
     "the sign of the normal or of J is wrong": scaled(lambda h, e: -1.0),
     "the impulse is counted twice": scaled(lambda h, e: 2.0),
     "the impulse is halved": scaled(lambda h, e: 0.5),
-    "brackets are missing: -1 + e vn instead of -(1 + e) vn": lambda h, e: (-1 + e * h.vn * h.mu) * h.n,
-    "brackets are missing: -1 - e vn instead of -(1 + e) vn": lambda h, e: (-1 - e * h.vn * h.mu) * h.n,
-    "a bracket closes late: -(1 + e vn) instead of -(1 + e) vn": lambda h, e: (-1 - e * h.vn) * h.mu * h.n,
+    "brackets are missing: -1 + e vn instead of -(1 + e) vn": lambda h, e: (
+        (-1 + e * h.vn * h.mu) * h.n
+    ),
+    "brackets are missing: -1 - e vn instead of -(1 + e) vn": lambda h, e: (
+        (-1 - e * h.vn * h.mu) * h.n
+    ),
+    "a bracket closes late: -(1 + e vn) instead of -(1 + e) vn": lambda h, e: (
+        (-1 - e * h.vn) * h.mu * h.n
+    ),
     "the masses are missing: J = -(1 + e) vn": scaled(lambda h, e: 1 / h.mu),
     "brackets are missing: / 1/mA + 1/mB instead of / (1/mA + 1/mB)": lambda h, e: (
         (-(1 + e) * h.vn / h.ma + 1 / h.mb) * h.n
@@ -66,8 +75,12 @@ IMPULSES: dict[str, Impulse] = {
     "brackets are missing: / (1/mA) + 1/mB instead of / (1/mA + 1/mB)": lambda h, e: (
         (-(1 + e) * h.vn * h.ma + 1 / h.mb) * h.n
     ),
-    "it multiplies by (mA + mB) instead of dividing by (1/mA + 1/mB)": scaled(lambda h, e: (h.ma + h.mb) / h.mu),
-    "it divides by (mA + mB) instead of (1/mA + 1/mB)": scaled(lambda h, e: 1 / (h.ma + h.mb) / h.mu),
+    "it multiplies by (mA + mB) instead of dividing by (1/mA + 1/mB)": scaled(
+        lambda h, e: (h.ma + h.mb) / h.mu
+    ),
+    "it divides by (mA + mB) instead of (1/mA + 1/mB)": scaled(
+        lambda h, e: 1 / (h.ma + h.mb) / h.mu
+    ),
     "it multiplies by (1/mA + 1/mB) instead of dividing": scaled(lambda h, e: 1 / h.mu**2),
     "it multiplies by mA mB without dividing by mA + mB": scaled(lambda h, e: h.ma * h.mb / h.mu),
     "only the mass of A is used": scaled(lambda h, e: h.ma / h.mu),
@@ -79,18 +92,36 @@ IMPULSES: dict[str, Impulse] = {
     "the normal is not normalised": scaled(lambda h, e: h.d * h.d),
     "the normal is not normalised (taken after the displacement)": scaled(lambda h, e: h.s * h.s),
     "the normal is not normalised in one of its two places": scaled(lambda h, e: h.d),
-    "the normal is not normalised in one of its two places (after the displacement)": scaled(lambda h, e: h.s),
+    "the normal is not normalised in one of its two places (after the displacement)": scaled(
+        lambda h, e: h.s
+    ),
     "it is divided by the distance once too often": scaled(lambda h, e: 1 / h.d),
-    "it is divided by the distance once too often (after the displacement)": scaled(lambda h, e: 1 / h.s),
-    "it is divided by n.n, though n is a unit vector, or a square root is missing": scaled(lambda h, e: 1 / h.d**2),
-    "it is divided by n.n, though n is a unit vector (after the displacement)": scaled(lambda h, e: 1 / h.s**2),
-    "the quotient is rounded down (// or floor)": lambda h, e: np.floor(-(1 + e) * h.vn * h.mu) * h.n,
+    "it is divided by the distance once too often (after the displacement)": scaled(
+        lambda h, e: 1 / h.s
+    ),
+    "it is divided by n.n, though n is a unit vector, or a square root is missing": scaled(
+        lambda h, e: 1 / h.d**2
+    ),
+    "it is divided by n.n, though n is a unit vector (after the displacement)": scaled(
+        lambda h, e: 1 / h.s**2
+    ),
+    "the quotient is rounded down (// or floor)": lambda h, e: (
+        np.floor(-(1 + e) * h.vn * h.mu) * h.n
+    ),
     "the velocity of B is left out": lambda h, e: -(1 + e) * (h.va @ h.n) * h.mu * h.n,
     "the velocity of A is left out": lambda h, e: (1 + e) * (h.vb @ h.n) * h.mu * h.n,
-    "the velocities are added, not subtracted": lambda h, e: -(1 + e) * ((h.va + h.vb) @ h.n) * h.mu * h.n,
-    "the whole relative velocity is taken, with its tangential part": lambda h, e: -(1 + e) * h.u * h.mu,
-    "the relative speed is taken for its normal part": lambda h, e: (1 + e) * np.hypot(*h.u) * h.mu * h.n,
-    "x and y are exchanged in the scalar product": lambda h, e: -(1 + e) * (h.u[::-1] @ h.n) * h.mu * h.n,
+    "the velocities are added, not subtracted": lambda h, e: (
+        -(1 + e) * ((h.va + h.vb) @ h.n) * h.mu * h.n
+    ),
+    "the whole relative velocity is taken, with its tangential part": lambda h, e: (
+        -(1 + e) * h.u * h.mu
+    ),
+    "the relative speed is taken for its normal part": lambda h, e: (
+        (1 + e) * np.hypot(*h.u) * h.mu * h.n
+    ),
+    "x and y are exchanged in the scalar product": lambda h, e: (
+        -(1 + e) * (h.u[::-1] @ h.n) * h.mu * h.n
+    ),
     "the normal is taken along x": along(lambda h: np.array([1.0, 0.0])),
     "the normal is taken along y": along(lambda h: np.array([0.0, 1.0])),
     "one part of the normal has the wrong sign": along(lambda h: h.n * [1, -1]),
@@ -104,7 +135,9 @@ IMPULSES: dict[str, Impulse] = {
     "the tangential part is thrown back, not the normal one": lambda h, e: (
         -(1 + e) * (h.u @ tangent(h)) * h.mu * tangent(h)
     ),
-    "the tangential part is lost, too": lambda h, e: h.mu * (-(1 + e) * h.vn * h.n - (h.u - h.vn * h.n)),
+    "the tangential part is lost, too": lambda h, e: (
+        h.mu * (-(1 + e) * h.vn * h.n - (h.u - h.vn * h.n))
+    ),
     "the tangential part is thrown back, too, without e": lambda h, e: (
         h.mu * (-(1 + e) * h.vn * h.n - 2 * (h.u - h.vn * h.n))
     ),
@@ -112,7 +145,8 @@ IMPULSES: dict[str, Impulse] = {
 
 
 class Update(NamedTuple):
-    """What a solver may do with P = J n: the changes of both velocities, m/s; and the task the mistake is in."""
+    """What a solver may do with P = J n: the changes of both velocities, m/s; and the task the
+    mistake is in."""
 
     change: Change
     task: str = "2d"
@@ -131,19 +165,27 @@ UPDATES: dict[str, Update] = {
     "A is not divided by its mass": Update(lambda h, P, e: (P, -P / h.mb)),
     "B is not divided by its mass": Update(lambda h, P, e: (P / h.ma, -P)),
     "they are multiplied by the masses": Update(lambda h, P, e: (P * h.ma, -P * h.mb)),
-    "they are set to J n / m, not changed by it": Update(lambda h, P, e: (P / h.ma - h.va, -P / h.mb - h.vb)),
+    "they are set to J n / m, not changed by it": Update(
+        lambda h, P, e: (P / h.ma - h.va, -P / h.mb - h.vb)
+    ),
     "B is computed from the new velocity of A": Update(
         lambda h, P, e: (P / h.ma, -P * (1 - (1 + e) * h.mu / h.ma) / h.mb)
     ),
     "only x is changed": Update(lambda h, P, e: (P / h.ma * [1, 0], -P / h.mb * [1, 0])),
     "only y is changed": Update(lambda h, P, e: (P / h.ma * [0, 1], -P / h.mb * [0, 1])),
-    "y gets the x part of the normal": Update(lambda h, P, e: (P[0] / h.ma * ONES, -P[0] / h.mb * ONES)),
-    "x gets the y part of the normal": Update(lambda h, P, e: (P[1] / h.ma * ONES, -P[1] / h.mb * ONES)),
+    "y gets the x part of the normal": Update(
+        lambda h, P, e: (P[0] / h.ma * ONES, -P[0] / h.mb * ONES)
+    ),
+    "x gets the y part of the normal": Update(
+        lambda h, P, e: (P[1] / h.ma * ONES, -P[1] / h.mb * ONES)
+    ),
     "the velocities are exchanged": Update(lambda h, P, e: (-h.u, h.u)),
     "each bounces off the other as off a wall": Update(
         lambda h, P, e: (-(1 + e) * (h.va @ h.n) * h.n, -(1 + e) * (h.vb @ h.n) * h.n)
     ),
-    "each velocity is turned round and multiplied by e": Update(lambda h, P, e: (-(1 + e) * h.va, -(1 + e) * h.vb)),
+    "each velocity is turned round and multiplied by e": Update(
+        lambda h, P, e: (-(1 + e) * h.va, -(1 + e) * h.vb)
+    ),
     "each velocity is turned round": Update(lambda h, P, e: (-2 * h.va, -2 * h.vb)),
     "the new velocities are multiplied by e": Update(
         lambda h, P, e: (e * P / h.ma - (1 - e) * h.va, -e * P / h.mb - (1 - e) * h.vb)
@@ -162,7 +204,8 @@ class Finding:
     """What the collisions say.
 
     Attributes:
-        impulse, update: the mistake in the impulse and the one in the update, "" where there is none.
+        impulse, update: the mistake in the impulse and the one in the update, "" where there is
+            none.
         task: of the update.
         e: the restitution used.
         law, change: what it takes for the impulse, and what it does with it.
@@ -182,7 +225,8 @@ class Finding:
 
 
 def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | None:
-    """The impulse and the update that give every collision, fewest mistakes first; None if nothing does."""
+    """The impulse and the update that give every collision, fewest mistakes first; None if nothing
+    does."""
     seen = [
         (collision_of(q.balls, answers[name].last), changes(q.balls, answers[name].last))
         for name, q in COLLISIONS.items()
@@ -191,7 +235,9 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
         return None
     for e in restitution.candidates:
         one = chain(((impulse, "") for impulse in SLIPS), (("", update) for update in UPDATES))
-        if (found := fitting(one, seen, e)) is None and (slips := components(seen, IMPULSES[""], e)) is not None:
+        if (found := fitting(one, seen, e)) is None and (
+            slips := components(seen, IMPULSES[""], e)
+        ) is not None:
             found = Finding("", slips[0], "2d", e, IMPULSES[""], slips[1])
         if found := found or fitting(product(IMPULSES, UPDATES), seen, e):
             wrong_way = found.impulse == NEVER and follows_print(answers, e)
@@ -199,7 +245,9 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
     return None
 
 
-def fitting(pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[PairCollision, Array]], e: float) -> Finding | None:
+def fitting(
+    pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[PairCollision, Array]], e: float
+) -> Finding | None:
     """The first impulse and update of `pairs` that give every collision."""
     with np.errstate(all="ignore"):
         for impulse, update in pairs:

@@ -16,40 +16,69 @@ SCHEMA = Path(__file__).parent / "check.schema.json"
 
 def as_json(checks: Sequence[FileCheck]) -> dict[str, Any]:
     """All files with all rows; the same shape for one file and for many."""
-    return {"crosscheck": version("crosscheck2d"), "passed": all(one.passed for one in checks), "files": [
-        {"file": str(one.path), "passed": one.passed, "refused": one.refused, "tasks": one.tasks,
-         "sentences": one.sentences, "rows": [row_as_json(row) for row in one.rows]}
-        for one in checks
-    ]}  # fmt: skip
+    return {
+        "crosscheck": version("crosscheck2d"),
+        "passed": all(one.passed for one in checks),
+        "files": [
+            {
+                "file": str(one.path),
+                "passed": one.passed,
+                "refused": one.refused,
+                "tasks": one.tasks,
+                "sentences": one.sentences,
+                "rows": [row_as_json(row) for row in one.rows],
+            }
+            for one in checks
+        ],
+    }
 
 
 def row_as_json(row: CheckRow) -> dict[str, str]:
     """A row, its fields in reading order."""
     return {
-        "name": row.name, "task": row.task, "asked": row.asked, "got": row.got, "expected": row.expected,
-        "verdict": row.verdict, "cause": row.cause, "read": row.read,
-    }  # fmt: skip
+        "name": row.name,
+        "task": row.task,
+        "asked": row.asked,
+        "got": row.got,
+        "expected": row.expected,
+        "verdict": row.verdict,
+        "cause": row.cause,
+        "read": row.read,
+    }
 
 
 def as_junit(checks: Sequence[FileCheck]) -> str:
-    """A test suite a file, a test case a row; a fault is a failure, what was not asked is skipped."""
+    """A test suite a file, a test case a row; a fault is a failure, what was not asked is
+    skipped."""
     suites = ElementTree.Element("testsuites", name="crosscheck check")
     for one in checks:
         skipped = sum(row.verdict == "not asked" for row in one.rows)
         suite = ElementTree.SubElement(
-            suites, "testsuite", name=plain(str(one.path)), tests=str(len(one.rows) or 1),
-            failures=str(len(one.faults)), errors=str(int(bool(one.refused))), skipped=str(skipped),
-        )  # fmt: skip
+            suites,
+            "testsuite",
+            name=plain(str(one.path)),
+            tests=str(len(one.rows) or 1),
+            failures=str(len(one.faults)),
+            errors=str(int(bool(one.refused))),
+            skipped=str(skipped),
+        )
         if one.refused:
-            case = ElementTree.SubElement(suite, "testcase", classname=plain(one.path.name), name="file: is a solver")
+            case = ElementTree.SubElement(
+                suite, "testcase", classname=plain(one.path.name), name="file: is a solver"
+            )
             ElementTree.SubElement(case, "error", message=plain(one.refused))
         for row in one.rows:
             case = ElementTree.SubElement(
-                suite, "testcase", classname=plain(one.path.name), name=plain(f"{row.task}: {row.name}")
+                suite,
+                "testcase",
+                classname=plain(one.path.name),
+                name=plain(f"{row.task}: {row.name}"),
             )
             if row.verdict == "fault":
                 failure = ElementTree.SubElement(case, "failure", message=plain(row.cause))
-                failure.text = plain(f"{row.asked}\ncame: {row.got}\nexpected: {row.expected}\nread: {row.read}")
+                failure.text = plain(
+                    f"{row.asked}\ncame: {row.got}\nexpected: {row.expected}\nread: {row.read}"
+                )
             elif row.verdict == "not asked":
                 ElementTree.SubElement(case, "skipped", message=plain(row.cause))
     ElementTree.indent(suites)
@@ -58,4 +87,7 @@ def as_junit(checks: Sequence[FileCheck]) -> str:
 
 def plain(text: str) -> str:
     """Text without the characters that XML 1.0 has no way to write."""
-    return "".join(c if c in "\t\n\r" or " " <= c <= "\ud7ff" or "\ue000" <= c <= "\ufffd" else "\ufffd" for c in text)
+    return "".join(
+        c if c in "\t\n\r" or " " <= c <= "\ud7ff" or "\ue000" <= c <= "\ufffd" else "\ufffd"
+        for c in text
+    )

@@ -1,7 +1,8 @@
-"""Task 1: one sphere, one step; the formula a wrong integration follows is found among those it could follow.
+"""Task 1: one sphere, one step; the formula a wrong integration follows is found among those it
+could follow.
 
-Symplectic Euler: v' = v + F/m dt, then x' = x + v' dt; spin and angle alike (Hairer, Lubich & Wanner, Geometric
-Numerical Integration, I.1).
+Symplectic Euler: v' = v + F/m dt, then x' = x + v' dt; spin and angle alike (Hairer, Lubich &
+Wanner, Geometric Numerical Integration, I.1).
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ UNDER_FORCE: dict[str, Law] = {
     "": lambda v, f, m, _o, dt: v + f / m * dt,
     "it is never changed": lambda v, *_: v,
     "the force is not divided by the {mass}": lambda v, f, _m, _o, dt: v + f * dt,
-    "the force is divided by the {other} instead of the {mass}": lambda v, f, _m, o, dt: v + f / o * dt,
+    "the force is divided by the {other} instead of the {mass}": lambda v, f, _m, o, dt: (
+        v + f / o * dt
+    ),
     "the force is multiplied by the {mass}": lambda v, f, m, _o, dt: v + f * m * dt,
     "dt is missing": lambda v, f, m, _o, _dt: v + f / m,
     "dt is squared": lambda v, f, m, _o, dt: v + f / m * dt * dt,
@@ -38,7 +41,9 @@ UNDER_FORCE: dict[str, Law] = {
     "the sign is wrong": lambda v, f, m, _o, dt: v - f / m * dt,
     "it is set to F/m dt, not changed by it": lambda v, f, m, _o, dt: f / m * dt + 0 * v,
     "the force is taken for a velocity": lambda v, f, _m, _o, _dt: f + 0 * v,
-    "gravity is added, which the exercise has not": lambda v, f, m, _o, dt: v + (f / m + G[: np.size(v)]) * dt,
+    "gravity is added, which the exercise has not": lambda v, f, m, _o, dt: (
+        v + (f / m + G[: np.size(v)]) * dt
+    ),
     "x and y of the force are exchanged": lambda v, f, m, _o, dt: v + np.flip(f) / m * dt,
     "y takes the force along x": lambda v, f, m, _o, dt: v + taken(f, 0) / m * dt,
     "x takes the force along y": lambda v, f, m, _o, dt: v + taken(f, 1) / m * dt,
@@ -46,14 +51,16 @@ UNDER_FORCE: dict[str, Law] = {
     "only x is changed": lambda v, f, m, _o, dt: v + f / m * dt * X[: np.size(v)],
     "only y is changed": lambda v, f, m, _o, dt: v + f / m * dt * Y[: np.size(v)],
     "it is in degrees": lambda v, f, m, _o, dt: v + np.degrees(f / m * dt),
-    "it is turned to radians, which it has already": lambda v, f, m, _o, dt: v + np.radians(f / m * dt),
+    "it is turned to radians, which it has already": lambda v, f, m, _o, dt: (
+        v + np.radians(f / m * dt)
+    ),
     "the step is written into the file as 0.001 s": lambda v, f, m, _o, _dt: v + f / m * 0.001,
 }
 # (x or alpha, v or w before, the same after, acceleration by the right formula, dt) -> x' or alpha'
 MOVED: dict[str, Law] = {
     "": lambda x, _v, new, _a, dt: x + new * dt,
-    "it is moved by the old {velocity} (explicit Euler); symplectic Euler takes the new one": lambda x, v, _n, _a, dt: (
-        x + v * dt
+    "it is moved by the old {velocity} (explicit Euler); symplectic Euler takes the new one": (
+        lambda x, v, _n, _a, dt: x + v * dt
     ),
     "it is never changed": lambda x, *_: x,
     "dt is missing": lambda x, _v, new, _a, _dt: x + new,
@@ -62,11 +69,13 @@ MOVED: dict[str, Law] = {
     "dt is counted twice": lambda x, _v, new, _a, dt: x + 2 * new * dt,
     "dt is halved": lambda x, _v, new, _a, dt: x + new * dt / 2,
     "the sign is wrong": lambda x, _v, new, _a, dt: x - new * dt,
-    "it is moved by v dt + a dt2 / 2, the mean of old and new {velocity}": lambda x, v, new, _a, dt: (
-        x + (v + new) / 2 * dt
+    "it is moved by v dt + a dt2 / 2, the mean of old and new {velocity}": (
+        lambda x, v, new, _a, dt: x + (v + new) / 2 * dt
     ),
     "it is moved by v dt + a dt2": lambda x, _v, new, a, dt: x + new * dt + a * dt * dt,
-    "it is moved by v dt + a dt2 / 2 with the new {velocity}": lambda x, _v, new, a, dt: x + new * dt + a * dt * dt / 2,
+    "it is moved by v dt + a dt2 / 2 with the new {velocity}": lambda x, _v, new, a, dt: (
+        x + new * dt + a * dt * dt / 2
+    ),
     "it is moved by the acceleration, not by the {velocity}": lambda x, _v, _n, a, dt: x + a * dt,
     "y takes the velocity along x": lambda x, _v, new, _a, dt: x + taken(new, 0) * dt,
     "x takes the velocity along y": lambda x, _v, new, _a, dt: x + taken(new, 1) * dt,
@@ -74,11 +83,15 @@ MOVED: dict[str, Law] = {
         x + X[: np.size(x)] * new.sum() * dt
     ),
     "it is moved by a dt2 / 2 alone": lambda x, _v, _n, a, dt: x + a * dt * dt / 2,
-    "it is set to {velocity} times dt, not changed by it": lambda x, _v, new, _a, dt: new * dt + 0 * x,
+    "it is set to {velocity} times dt, not changed by it": lambda x, _v, new, _a, dt: (
+        new * dt + 0 * x
+    ),
     "only x is moved": lambda x, _v, new, _a, dt: x + new * dt * X[: np.size(x)],
     "only y is moved": lambda x, _v, new, _a, dt: x + new * dt * Y[: np.size(x)],
     "it is in degrees": lambda x, _v, new, _a, dt: x + np.degrees(new * dt),
-    "it is turned to radians, which it has already": lambda x, _v, new, _a, dt: x + np.radians(new * dt),
+    "it is turned to radians, which it has already": lambda x, _v, new, _a, dt: (
+        x + np.radians(new * dt)
+    ),
     "the step is written into the file as 0.001 s": lambda x, _v, new, _a, _dt: x + new * 0.001,
     "the old {velocity} is kept in degrees": lambda x, v, _n, _a, dt: x + np.degrees(v * dt),
 }
@@ -86,32 +99,73 @@ MOVED: dict[str, Law] = {
 
 def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
     """The rows of task 1; the function has been called without failing."""
-    seen = [(QUESTIONS[name].balls[0], QUESTIONS[name].calls[0][2], answers[name].last[0]) for name in FORCED]
+    seen = [
+        (QUESTIONS[name].balls[0], QUESTIONS[name].calls[0][2], answers[name].last[0])
+        for name in FORCED
+    ]
     linear = [(np.array(b.v), np.array(b.F), b.m, b.MoI, dt) for b, dt, _ in seen]
     angular = [(np.array(b.w), np.array(b.torque), b.MoI, b.m, dt) for b, dt, _ in seen]
     # The positions are judged by the velocities that came, so that one mistake is found once.
-    places = [(np.array(b.x), np.array(b.v), np.array(a.v), np.array(b.F) / b.m, dt) for b, dt, a in seen]
-    angles = [(np.array(b.alpha), np.array(b.w), np.array(a.w), b.torque / b.MoI, dt) for b, dt, a in seen]
+    places = [
+        (np.array(b.x), np.array(b.v), np.array(a.v), np.array(b.F) / b.m, dt) for b, dt, a in seen
+    ]
+    angles = [
+        (np.array(b.alpha), np.array(b.w), np.array(a.w), b.torque / b.MoI, dt) for b, dt, a in seen
+    ]
     after = [a for _, _, a in seen]
-    velocity = law_row("velocity", "What velocity has a sphere after one step under a force?", "m/s", UNDER_FORCE, linear,
-                       [a.v for a in after], {"mass": "mass", "other": "MoI"})  # fmt: skip
-    spin = law_row("spin", "What angular velocity has it after one step under a torque?", "rad/s", UNDER_FORCE, angular,
-                   [a.w for a in after], {"mass": "MoI", "other": "mass"})  # fmt: skip
+    velocity = law_row(
+        "velocity",
+        "What velocity has a sphere after one step under a force?",
+        "m/s",
+        UNDER_FORCE,
+        linear,
+        [a.v for a in after],
+        {"mass": "mass", "other": "MoI"},
+    )
+    spin = law_row(
+        "spin",
+        "What angular velocity has it after one step under a torque?",
+        "rad/s",
+        UNDER_FORCE,
+        angular,
+        [a.w for a in after],
+        {"mass": "MoI", "other": "mass"},
+    )
     return [
         velocity,
-        law_row("position", "Where is it after that step, its velocity being what came?", "m", MOVED, places,
-                [a.x for a in after], {"velocity": "velocity"}),
+        law_row(
+            "position",
+            "Where is it after that step, its velocity being what came?",
+            "m",
+            MOVED,
+            places,
+            [a.x for a in after],
+            {"velocity": "velocity"},
+        ),
         spin,
-        law_row("angle", "What is its angle then, its angular velocity being what came?", "rad", MOVED, angles,
-                [a.alpha for a in after], {"velocity": "angular velocity"}),
+        law_row(
+            "angle",
+            "What is its angle then, its angular velocity being what came?",
+            "rad",
+            MOVED,
+            angles,
+            [a.alpha for a in after],
+            {"velocity": "angular velocity"},
+        ),
         coasting(seen[2][0], seen[2][2], velocity.cause or spin.cause),
         lasting(answers["force twice"]),
         untouched(seen),
-    ]  # fmt: skip
+    ]
 
 
 def law_row(
-    name: str, asked: str, unit: str, laws: dict[str, Law], given: list[tuple], came: list, words: dict[str, str]
+    name: str,
+    asked: str,
+    unit: str,
+    laws: dict[str, Law],
+    given: list[tuple],
+    came: list,
+    words: dict[str, str],
 ) -> CheckRow:
     """A row whose cause is the law of the table that gives what came."""
     found = follows(laws, given, came)
@@ -126,14 +180,19 @@ def law_row(
         cause = cause.replace("the force", "the torque").replace("F/m", "torque/MoI")
     if not np.isfinite(np.asarray(came[0], float)).all():
         cause = "it is no number (a field that does not exist, text, a division by zero?)"
-    return judged(name, "1", asked, f"{shown(came[0])} {unit}", f"{shown(right)} {unit}", found == "", cause)
+    return judged(
+        name, "1", asked, f"{shown(came[0])} {unit}", f"{shown(right)} {unit}", found == "", cause
+    )
 
 
 def one_axis(laws: dict[str, Law], given: list[tuple], came: list) -> str | None:
     """The mistakes in x and y where they are not the same, or one is right."""
     axes = []
     for axis in range(2):
-        asked = [tuple(value[axis] if np.ndim(value) else value for value in question) for question in given]
+        asked = [
+            tuple(value[axis] if np.ndim(value) else value for value in question)
+            for question in given
+        ]
         axes.append(follows(laws, asked, [np.asarray(value)[axis] for value in came]))
     if None in axes:
         return None
@@ -154,12 +213,14 @@ def damped(given: list[tuple], came: list) -> str | None:
 def coasting(before: Ball, after: Ball, mistake: str) -> CheckRow:
     """Without a force velocity and spin stay; `mistake`: what is known to be wrong with them."""
     return judged(
-        "coasting", "1", "Does a sphere keep its velocity and spin where nothing acts on it?",
+        "coasting",
+        "1",
+        "Does a sphere keep its velocity and spin where nothing acts on it?",
         f"v = {shown(after.v)} m/s, w = {shown(after.w)} rad/s",
         f"v = {shown(before.v)} m/s, w = {shown(before.w)} rad/s",
         near(after.v, before.v) and near(after.w, before.w),
         mistake or "something acts on it, though force and torque are zero",
-    )  # fmt: skip
+    )
 
 
 def lasting(answer: Answer) -> CheckRow:
@@ -168,22 +229,36 @@ def lasting(answer: Answer) -> CheckRow:
     right = near(after.F, before.F) and near(after.torque, before.torque)
     cleared = near(after.F, (0, 0)) or near(after.torque, 0)
     return judged(
-        "force kept", "1", "Are force and torque the same after a step?",
+        "force kept",
+        "1",
+        "Are force and torque the same after a step?",
         f"F = {shown(after.F)} N, torque = {shown(after.torque)} N m",
-        f"F = {shown(before.F)} N, torque = {shown(before.torque)} N m", right,
-        "they are cleared: a key that is held would act for one step only" if cleared else "integrate changes them",
-    )  # fmt: skip
+        f"F = {shown(before.F)} N, torque = {shown(before.torque)} N m",
+        right,
+        (
+            "they are cleared: a key that is held would act for one step only"
+            if cleared
+            else "integrate changes them"
+        ),
+    )
 
 
 def untouched(seen: list[tuple[Ball, float, Ball]]) -> CheckRow:
     """Mass, inertia and size are no business of an integration."""
     changed = [
-        name for name in ("m", "MoI", "r") for before, _, after in seen
+        name
+        for name in ("m", "MoI", "r")
+        for before, _, after in seen
         if not near(getattr(after, name), getattr(before, name))
-    ]  # fmt: skip
+    ]
     words = {"m": "mass", "MoI": "MoI", "r": "size"}
     what = ", ".join(dict.fromkeys(words[name] for name in changed))
     return judged(
-        "sphere kept", "1", "Does integrate leave mass, MoI and size alone?",
-        f"changes {what}" if what else "all as before", "all as before", not what, f"integrate writes {what}",
-    )  # fmt: skip
+        "sphere kept",
+        "1",
+        "Does integrate leave mass, MoI and size alone?",
+        f"changes {what}" if what else "all as before",
+        "all as before",
+        not what,
+        f"integrate writes {what}",
+    )

@@ -1,4 +1,5 @@
-"""Writes check.html: what was found in one file, and the smallest scene that shows it, yours beside the exact one."""
+"""Writes check.html: what was found in one file, and the smallest scene that shows it, yours beside
+the exact one."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from reports.terminal.foreign_text import put_text
 from scenarios.model import Scenario, Trajectory
 
 GENERATOR = "crosscheck check"
-YOURS = style.Look("#a3123a", "#ff7a93", (), "diamond", True)  # apart from the truth in any light, by style.py
+# apart from the truth in any light, by style.py
+YOURS = style.Look("#a3123a", "#ff7a93", (), "diamond", True)
 SCRIPTS = (*ENGINE, "check/check.js")
 
 
@@ -27,14 +29,23 @@ def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
     names = [style.TRUTH if run is None else run.name for run, _ in layers]
     looks = {name: style.look(name) if name == style.TRUTH else YOURS for name in names}
     html = render(
-        "check/check.html.j2", generator=GENERATOR, scripts=SCRIPTS if smallest else (), styles=["check/check.css"],
-        looks=looks, name=check.path.name, check=check, tasks=TASKS, smallest=smallest, layers=names,
-        scene=[] if smallest is None else scene_lines(smallest.scenario), dt=shown(DT),
+        "check/check.html.j2",
+        generator=GENERATOR,
+        scripts=SCRIPTS if smallest else (),
+        styles=["check/check.css"],
+        looks=looks,
+        name=check.path.name,
+        check=check,
+        tasks=TASKS,
+        smallest=smallest,
+        layers=names,
+        scene=[] if smallest is None else scene_lines(smallest.scenario),
+        dt=shown(DT),
         replay="" if smallest is None else pack_layers(smallest.scenario, layers),
         ratio=1 if smallest is None else ratio_of(smallest.scenario, layers),
         version=version("crosscheck2d"),
         digest="" if check.solver is None else check.solver.digest,
-    )  # fmt: skip
+    )
     put_text(path, sealed(html))
 
 
@@ -42,8 +53,12 @@ def layers_of(name: str, smallest: Smallest | None) -> list[tuple[Run | None, Tr
     """The file's motion, and the exact one on top, as the replay takes them."""
     if smallest is None:
         return []
-    yours = Run(name.replace(":", "_"), "own", smallest.scenario.name, DT, trajectory=smallest.yours)
-    exact: list[tuple[Run | None, Trajectory]] = [] if smallest.truth is None else [(None, smallest.truth)]
+    yours = Run(
+        name.replace(":", "_"), "own", smallest.scenario.name, DT, trajectory=smallest.yours
+    )
+    exact: list[tuple[Run | None, Trajectory]] = (
+        [] if smallest.truth is None else [(None, smallest.truth)]
+    )
     return [(yours, smallest.yours), *exact]
 
 
@@ -52,8 +67,8 @@ def scene_lines(scenario: Scenario) -> list[str]:
     scene, lines = scenario.scene, []
     for k in range(scene.n):
         lines.append(
-            f"at {shown(scene.position[k])} m, {shown(scene.velocity[k])} m/s, size {shown(scene.radius[k])} m, "
-            f"mass {shown(scene.mass[k])} kg"
+            f"at {shown(scene.position[k])} m, {shown(scene.velocity[k])} m/s, size"
+            f" {shown(scene.radius[k])} m, mass {shown(scene.mass[k])} kg"
         )
         for thrust in (thrust for thrust in scenario.thrusts if thrust.disk == k):
             lines[-1] += f", force {shown(thrust.force)} N, torque {shown(thrust.torque)} N m"

@@ -1,5 +1,5 @@
-"""Slips in one part of the formulas of a collision: in one product of a scalar product, in one velocity of one
-sphere."""
+"""Slips in one part of the formulas of a collision: in one product of a scalar product, in one
+velocity of one sphere."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from reports.check.rows import near
 from scenarios.model import Array
 
 Change = Callable[[PairCollision, Array, float], tuple[Array, Array]]
-# (velocity, of the other axis, of the other sphere, n, n of the other axis) -> one product of (vA - vB).n
+# (velocity, of the other axis, of the other sphere, n, n of the other axis) -> one product of (vA -
+# vB).n
 PRODUCTS: dict[str, Callable[[float, float, float, float, float], float]] = {
     "is left out": lambda v, across, other, n, m: 0.0,
     "has the wrong sign": lambda v, across, other, n, m: -v * n,
@@ -23,10 +24,15 @@ PRODUCTS: dict[str, Callable[[float, float, float, float, float], float]] = {
     "is not multiplied by n": lambda v, across, other, n, m: v,
 }
 PLACES = {  # (0: A, 1: B; 0: x, 1: y)
-    "(vA.x - vB.x) n.x": {(0, 0), (1, 0)}, "(vA.y - vB.y) n.y": {(0, 1), (1, 1)},
-    "vA.x n.x": {(0, 0)}, "vA.y n.y": {(0, 1)}, "vB.x n.x": {(1, 0)}, "vB.y n.y": {(1, 1)},
-    "vA.n": {(0, 0), (0, 1)}, "vB.n": {(1, 0), (1, 1)},
-}  # fmt: skip
+    "(vA.x - vB.x) n.x": {(0, 0), (1, 0)},
+    "(vA.y - vB.y) n.y": {(0, 1), (1, 1)},
+    "vA.x n.x": {(0, 0)},
+    "vA.y n.y": {(0, 1)},
+    "vB.x n.x": {(1, 0)},
+    "vB.y n.y": {(1, 1)},
+    "vA.n": {(0, 0), (0, 1)},
+    "vB.n": {(1, 0), (1, 1)},
+}
 
 
 def scalar_products() -> dict[str, Impulse]:
@@ -50,8 +56,8 @@ def with_slip(places: set[tuple[int, int]], one: Callable[..., float]) -> Impuls
     return impulse
 
 
-# (p: its part of +J n for A, -J n for B; q: the part along the other axis; all of it along n; mass, mass of the other;
-# velocity before; e) -> what is added to one velocity along one axis, m/s
+# (p: its part of +J n for A, -J n for B; q: the part along the other axis; all of it along n; mass,
+# mass of the other; velocity before; e) -> what is added to one velocity along one axis, m/s
 COMPONENTS: dict[str, Callable[..., float]] = {
     "": lambda p, q, whole, m, other, v, e: p / m,
     "is never changed": lambda p, q, whole, m, other, v, e: 0.0,
@@ -70,21 +76,27 @@ COMPONENTS: dict[str, Callable[..., float]] = {
 }
 
 
-def components(seen: Sequence[tuple[PairCollision, Array]], right: Impulse, e: float) -> tuple[str, Change] | None:
-    """What is done to each part of both velocities, with the right impulse; None if one of them follows no law."""
+def components(
+    seen: Sequence[tuple[PairCollision, Array]], right: Impulse, e: float
+) -> tuple[str, Change] | None:
+    """What is done to each part of both velocities, with the right impulse; None if one of them
+    follows no law."""
     found = {}
     for who, axis in product((0, 1), (0, 1)):
         came = [change[who, axis] for _, change in seen]
         fits = (
-            name for name in COMPONENTS
+            name
+            for name in COMPONENTS
             if near([component(name, h, right(h, e), who, axis, e) for h, _ in seen], came, 0.1)
-        )  # fmt: skip
+        )
         found[who, axis] = next(fits, None)
     if None in found.values():
         return None
 
     def change(h: PairCollision, P: Array, e: float) -> tuple[Array, Array]:
-        a, b = (np.array([component(found[who, k], h, P, who, k, e) for k in (0, 1)]) for who in (0, 1))
+        a, b = (
+            np.array([component(found[who, k], h, P, who, k, e) for k in (0, 1)]) for who in (0, 1)
+        )
         return a, b
 
     slips = [f"v{'AB'[who]}.{'xy'[k]} {slip}" for (who, k), slip in found.items() if slip]
@@ -95,4 +107,6 @@ def component(name: str | None, h: PairCollision, P: Array, who: int, axis: int,
     """What a law of `COMPONENTS` adds, m/s."""
     sign, masses, v = 1 - 2 * who, (h.ma, h.mb), (h.va, h.vb)[who]
     own, other = masses[who], masses[1 - who]
-    return COMPONENTS[name or ""](sign * P[axis], sign * P[1 - axis], sign * (P @ h.n), own, other, v[axis], e)
+    return COMPONENTS[name or ""](
+        sign * P[axis], sign * P[1 - axis], sign * (P @ h.n), own, other, v[axis], e
+    )

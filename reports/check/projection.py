@@ -14,7 +14,8 @@ from scenarios.model import Array
 
 
 class Shift(NamedTuple):
-    """How far a pair was moved: A along the normal, B against it, both in m; and the largest way across it."""
+    """How far a pair was moved: A along the normal, B against it, both in m; and the largest way
+    across it."""
 
     a: float
     b: float
@@ -34,19 +35,29 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "the sign is wrong, and the overlap is counted twice": lambda s, a, b: -2 * s.overlap,
     "the sign is wrong, and the overlap is halved twice": lambda s, a, b: -s.overlap / 2,
     "the normal is not normalised": lambda s, a, b: s.overlap * s.distance,
-    "the normal is not normalised, and the overlap is counted twice": lambda s, a, b: 2 * s.overlap * s.distance,
-    "the normal is not normalised, and the overlap is halved twice": lambda s, a, b: s.overlap * s.distance / 2,
+    "the normal is not normalised, and the overlap is counted twice": lambda s, a, b: (
+        2 * s.overlap * s.distance
+    ),
+    "the normal is not normalised, and the overlap is halved twice": lambda s, a, b: (
+        s.overlap * s.distance / 2
+    ),
     "it is divided by the distance once too often": lambda s, a, b: s.overlap / s.distance,
     "they are moved by the sum of the sizes, not by the overlap": lambda s, a, b: s.sizes,
     "they are moved by their distance, not by the overlap": lambda s, a, b: s.distance,
     "the overlap is taken of squares": lambda s, a, b: s.sizes**2 - s.distance**2,
     "the overlap is size plus distance": lambda s, a, b: s.sizes + s.distance,
-    "the squared distance is taken for the distance": lambda s, a, b: (s.sizes - s.distance**2) / s.distance,
-    "brackets are missing: each is moved by sizes - distance / 2": lambda s, a, b: 2 * s.sizes - s.distance,
+    "the squared distance is taken for the distance": lambda s, a, b: (
+        (s.sizes - s.distance**2) / s.distance
+    ),
+    "brackets are missing: each is moved by sizes - distance / 2": lambda s, a, b: (
+        2 * s.sizes - s.distance
+    ),
     "brackets are missing: sizes / 2 - distance": lambda s, a, b: s.sizes / 2 - s.distance,
     "only the size of A is used": lambda s, a, b: a.r - s.distance,
     "only the size of B is used": lambda s, a, b: b.r - s.distance,
-    "the shares are the inverse masses, which do not add up to 1": lambda s, a, b: s.overlap * (1 / a.m + 1 / b.m),
+    "the shares are the inverse masses, which do not add up to 1": lambda s, a, b: (
+        s.overlap * (1 / a.m + 1 / b.m)
+    ),
     "both are moved by the share of A": lambda s, a, b: 2 * s.overlap * a.m / (a.m + b.m),
     "both are moved by the share of B": lambda s, a, b: 2 * s.overlap * b.m / (a.m + b.m),
     "the shares are the masses, which do not add up to 1": lambda s, a, b: s.overlap * (a.m + b.m),
@@ -71,7 +82,10 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
 
 def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[CheckRow]:
     """The rows of (b); `found`: what the velocities say."""
-    seen = [(q.balls, shift_of(q.balls, answers[name].last), answers[name].last) for name, q in COLLISIONS.items()]
+    seen = [
+        (q.balls, shift_of(q.balls, answers[name].last), answers[name].last)
+        for name, q in COLLISIONS.items()
+    ]
     balls, shift, after = seen[0]
     distance = float(np.hypot(*np.subtract(after[0].x, after[1].x)))
     right = all(near(s.a + s.b, s.overlap, 0.1) for _, s, _ in seen)
@@ -79,29 +93,59 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
     backwards = found is not None and found.impulse == BACKWARDS
     explained = found is not None and bool(found.mistake) and found.task != "2b"
     rows = [
-        judged("one point", "2b", "How far apart are the centres of a pair after it?", f"{shown(distance)} m",
-               f"{shown(shift.sizes)} m: they meet in one point", right and along,
-               "" if right and along else BACKWARDS if backwards else total_cause(seen)),
-        judged("normal", "2b", "Are they moved along the line of their centres?",
-               f"{shown(shift.across)} m across it", "0 m across it", along, across_cause(seen)),
-        split(balls, shift) if right and along else not_asked("split", "2b", "they do not meet in one point"),
-    ]  # fmt: skip
+        judged(
+            "one point",
+            "2b",
+            "How far apart are the centres of a pair after it?",
+            f"{shown(distance)} m",
+            f"{shown(shift.sizes)} m: they meet in one point",
+            right and along,
+            "" if right and along else BACKWARDS if backwards else total_cause(seen),
+        ),
+        judged(
+            "normal",
+            "2b",
+            "Are they moved along the line of their centres?",
+            f"{shown(shift.across)} m across it",
+            "0 m across it",
+            along,
+            across_cause(seen),
+        ),
+        (
+            split(balls, shift)
+            if right and along
+            else not_asked("split", "2b", "they do not meet in one point")
+        ),
+    ]
     return [*rows, *at_rest(answers, explained), separation(answers["separate"])]
 
 
 def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
-    """What a pair at relative rest says of the displacement; nothing if the impulse explains it or is no number."""
+    """What a pair at relative rest says of the displacement; nothing if the impulse explains it or
+    is no number."""
     still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
     kept = all(near(x.v, y.v) for x, y in zip(still, after))
     numbers = bool(np.isfinite([b.v for b in after]).all())
     if not kept and (explained or not finite(answers, "v")):
         return []
-    return [judged(
-        "velocities", "2b" if numbers else "2c", "Is a pair at relative rest displaced without a change of velocity?",
-        shown(after[0].v) + " m/s", shown(still[0].v) + " m/s", kept,
-        "the displacement changes the velocity, too" if numbers
-        else "the velocities of a pair at relative rest become no numbers (a division by zero?)",
-    )]  # fmt: skip
+    return [
+        judged(
+            "velocities",
+            "2b" if numbers else "2c",
+            "Is a pair at relative rest displaced without a change of velocity?",
+            shown(after[0].v) + " m/s",
+            shown(still[0].v) + " m/s",
+            kept,
+            (
+                "the displacement changes the velocity, too"
+                if numbers
+                else (
+                    "the velocities of a pair at relative rest become no numbers (a division by"
+                    " zero?)"
+                )
+            ),
+        )
+    ]
 
 
 def total_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
@@ -126,7 +170,11 @@ def total_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
 
 def no_numbers(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
     """That positions are lost, before any other cause is looked for; "" if none is."""
-    return "" if np.isfinite([b.x for *_, after in seen for b in after]).all() else "the positions become no numbers"
+    return (
+        ""
+        if np.isfinite([b.x for *_, after in seen for b in after]).all()
+        else "the positions become no numbers"
+    )
 
 
 # (n, A or B before, the other) -> the direction in which a mistake would move it
@@ -151,12 +199,17 @@ def across_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
     moved = [way_of([(b[who], b[1 - who], after[who]) for b, _, after in seen]) for who in (0, 1)]
     if moved[0] == moved[1]:
         return f"they are moved {moved[0]}" if moved[0] else ""
-    parts = (f"{who}.{way}" if "is set" in way else f"{who} is moved {way}" for who, way in zip("AB", moved) if way)
+    parts = (
+        f"{who}.{way}" if "is set" in way else f"{who} is moved {way}"
+        for who, way in zip("AB", moved)
+        if way
+    )
     return "; ".join(parts)
 
 
 def way_of(seen: list[tuple[Ball, Ball, Ball]]) -> str | None:
-    """Along what one of a pair is moved, of (it before, the other, it after); "" along the normal, None if unknown."""
+    """Along what one of a pair is moved, of (it before, the other, it after); "" along the normal,
+    None if unknown."""
     ways = {"": lambda n, one, other: n} | WAYS
     for name, way in ways.items():
         crosses = []
@@ -165,14 +218,17 @@ def way_of(seen: list[tuple[Ball, Ball, Ball]]) -> str | None:
             crosses.append(x * v - y * u)
         if near(crosses, 0.0, 0.01):
             return name
-    return next((f"{which} is set, not changed (= for +=)" for which in SET if was_set(which, seen)), None)
+    return next(
+        (f"{which} is set, not changed (= for +=)" for which in SET if was_set(which, seen)), None
+    )
 
 
 SET = ("position", "position.x", "position.y")
 
 
 def was_set(which: str, seen: list[tuple[Ball, Ball, Ball]]) -> bool:
-    """Whether a position, or one part of it, is the displacement itself, which is along the normal."""
+    """Whether a position, or one part of it, is the displacement itself, which is along the
+    normal."""
     crosses = []
     for one, other, after in seen:
         n, moved = direction(one, other)[0], np.subtract(after.x, one.x)
@@ -187,20 +243,37 @@ def split(balls: tuple[Ball, ...], shift: Shift) -> CheckRow:
     a, b = balls
     share = shift.a / shift.overlap
     known = {
-        "shared equally": 0.5, "shared by inverse mass": b.m / (a.m + b.m), "A alone is moved": 1.0,
-        "shared by mass, so that the heavier moves farther": a.m / (a.m + b.m), "B alone is moved": 0.0,
-    }  # fmt: skip
-    how = next((name for name, wanted in known.items() if near(share, wanted)), f"A is moved by {share:.3g} of it")
+        "shared equally": 0.5,
+        "shared by inverse mass": b.m / (a.m + b.m),
+        "A alone is moved": 1.0,
+        "shared by mass, so that the heavier moves farther": a.m / (a.m + b.m),
+        "B alone is moved": 0.0,
+    }
+    how = next(
+        (name for name, wanted in known.items() if near(share, wanted)),
+        f"A is moved by {share:.3g} of it",
+    )
     centre = (a.m * shift.a - b.m * shift.b) / (a.m + b.m)
     aside = "stays" if abs(centre) < 1e-9 else f"is moved by {shown(abs(centre))} m"
     asked = f"How is the overlap shared, for masses of {shown(a.m)} and {shown(b.m)} kg?"
-    return CheckRow("split", "2b", asked, how, "any", "note", f"{how}; their centre of mass {aside}")
+    return CheckRow(
+        "split", "2b", asked, how, "any", "note", f"{how}; their centre of mass {aside}"
+    )
 
 
 def separation(answer: Answer) -> CheckRow:
     """A pair that overlaps and moves apart: displaced or left; free, as nothing is lost by it."""
     shift = shift_of(QUESTIONS["separate"].balls, answer.last)
     moved = abs(shift.a) + abs(shift.b) > 1e-9
-    said = "displaced as any other" if moved else "left as it is: an early return for pairs that part"
-    return CheckRow("separating pair", "2b", "Is a pair displaced that overlaps and moves apart?", "yes" if moved else "no",
-               "yes, or no if it returns early", "note", said)  # fmt: skip
+    said = (
+        "displaced as any other" if moved else "left as it is: an early return for pairs that part"
+    )
+    return CheckRow(
+        "separating pair",
+        "2b",
+        "Is a pair displaced that overlaps and moves apart?",
+        "yes" if moved else "no",
+        "yes, or no if it returns early",
+        "note",
+        said,
+    )

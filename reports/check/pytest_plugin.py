@@ -1,4 +1,5 @@
-"""`pytest --solver FILE`: the check of a solver as tests, in anybody's project; imports what it needs when it runs."""
+"""`pytest --solver FILE`: the check of a solver as tests, in anybody's project; imports what it
+needs when it runs."""
 
 from __future__ import annotations
 
@@ -15,13 +16,21 @@ if TYPE_CHECKING:
 def pytest_addoption(parser: pytest.Parser) -> None:
     """The option, repeatable."""
     group = parser.getgroup("crosscheck", "a hand-written solver of 2D disks")
-    group.addoption("--solver", action="append", default=[], metavar="FILE", help="check this Exercise.js or solver.py")
+    group.addoption(
+        "--solver",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="check this Exercise.js or solver.py",
+    )
 
 
 def pytest_collection_modifyitems(session: pytest.Session, items: list[pytest.Item]) -> None:
     """Add a test a row, before all others."""
     for name in reversed(session.config.getoption("--solver")):
-        items[:0] = SolverFile.from_parent(session, path=(session.config.invocation_params.dir / name)).collect()
+        items[:0] = SolverFile.from_parent(
+            session, path=(session.config.invocation_params.dir / name)
+        ).collect()
 
 
 class SolverFile(pytest.File):
@@ -37,7 +46,9 @@ class SolverFile(pytest.File):
         except NotASolver as refusal:
             raise pytest.UsageError(f"--solver {refusal}") from None
         for row in rows:
-            yield RowItem.from_parent(self, name=f"{row.task}-{row.name.replace(' ', '_')}", row=row)
+            yield RowItem.from_parent(
+                self, name=f"{row.task}-{row.name.replace(' ', '_')}", row=row
+            )
 
 
 class Fault(Exception):
@@ -58,7 +69,9 @@ class RowItem(pytest.Item):
         if self.row.verdict == "fault":
             raise Fault(self.row.cause)
 
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *given: Any, **named: Any) -> str:
+    def repr_failure(
+        self, excinfo: pytest.ExceptionInfo[BaseException], *given: Any, **named: Any
+    ) -> str:
         """The row in words, without a stack that is not the solver's."""
         if not isinstance(excinfo.value, Fault):
             return str(super().repr_failure(excinfo, *given, **named))

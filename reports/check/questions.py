@@ -17,7 +17,8 @@ LIMIT = 1.0  # s a question may take: it needs a few microseconds
 
 
 class Ball(NamedTuple):
-    """A sphere of the exercise: vectors x, v, F in m, m/s, N; angle, spin, torque, mass, MoI and size in SI."""
+    """A sphere of the exercise: vectors x, v, F in m, m/s, N; angle, spin, torque, mass, MoI and
+    size in SI."""
 
     x: tuple[float, float]
     v: tuple[float, float] = (0.0, 0.0)
@@ -31,7 +32,17 @@ class Ball(NamedTuple):
 
     def numbers(self) -> list[float]:
         """The 12 numbers that the worker makes a sphere of."""
-        return [*self.x, *self.v, *self.F, self.alpha, self.w, self.torque, self.m, self.MoI, self.r]
+        return [
+            *self.x,
+            *self.v,
+            *self.F,
+            self.alpha,
+            self.w,
+            self.torque,
+            self.m,
+            self.MoI,
+            self.r,
+        ]
 
 
 def ball(numbers: ArrayLike) -> Ball:
@@ -73,7 +84,8 @@ class Answer:
 
 
 def forced(dt: float, **changes: object) -> Question:
-    """A sphere with a force and a torque, integrated once; its mass and inertia are those of no solid disk."""
+    """A sphere with a force and a torque, integrated once; its mass and inertia are those of no
+    solid disk."""
     plain = Ball((0.3, -0.7), (1.1, -0.4), (2.0, 3.0), 0.2, 0.9, 0.7, 1.7, 0.6, 0.25)
     return Question((plain._replace(**changes),), (("integrate", 0, dt),))  # type: ignore[arg-type]
 
@@ -84,18 +96,35 @@ def pair(a: Ball, b: Ball, first: int = 0) -> Question:
 
 
 def meeting(
-    masses: tuple[float, float], va: tuple[float, float], vb: tuple[float, float], turn: float, depth: float = 0.12
+    masses: tuple[float, float],
+    va: tuple[float, float],
+    vb: tuple[float, float],
+    turn: float,
+    depth: float = 0.12,
 ) -> Question:
-    """Two spheres of 0.5 and 0.3 m that overlap by `depth` m, b lying in the direction `turn` rad from a."""
+    """Two spheres of 0.5 and 0.3 m that overlap by `depth` m, b lying in the direction `turn` rad
+    from a."""
     d = 0.8 - depth
     a = Ball((0.2, -0.1), va, (0.5, -0.3), 0.4, 0.6, 0.2, masses[0], 0.7, 0.5)
-    b = Ball((0.2 + d * np.cos(turn), -0.1 + d * np.sin(turn)), vb, (-0.2, 0.1), -0.3, -0.5, 0.1, masses[1], 0.3, 0.3)
+    b = Ball(
+        (0.2 + d * np.cos(turn), -0.1 + d * np.sin(turn)),
+        vb,
+        (-0.2, 0.1),
+        -0.3,
+        -0.5,
+        0.1,
+        masses[1],
+        0.3,
+        0.3,
+    )
     return pair(a, b)
 
 
-SIZES = ((0.25, 0.5), (0.6, 0.35), (1.5, 0.75), (0.9, 0.9))  # m; sums below, near and above 1, where squares tell
+# m; sums below, near and above 1, where squares tell
+SIZES = ((0.25, 0.5), (0.6, 0.35), (1.5, 0.75), (0.9, 0.9))
 TURNS = (0.0, 0.65, 1.57, 3.6)  # rad
-SHARES = (0.1, 0.3, 0.45, 0.6, 0.7, 0.85, 0.97, 1.03, 1.15, 1.3, 1.6, 2.2, 4.0)  # distances over the sum of sizes
+# distances over the sum of sizes
+SHARES = (0.1, 0.3, 0.45, 0.6, 0.7, 0.85, 0.97, 1.03, 1.15, 1.3, 1.6, 2.2, 4.0)
 COLLISIONS = {
     "collision/light on heavy": meeting((1.3, 5.1), (1.4, 0.3), (-0.6, 0.5), 0.5),
     "collision/heavy on light": meeting((4.2, 0.9), (0.7, -1.1), (0.2, 0.8), -1.1),
@@ -114,7 +143,9 @@ def questions() -> dict[str, Question]:
     """All but those about the file's own scene, by name."""
     found = {
         "force": forced(0.1),
-        "force, other numbers": forced(0.03, x=(-1.2, 0.4), v=(-0.5, 0.8), F=(-1.5, 4.0), m=0.6, MoI=1.9, w=-0.7),
+        "force, other numbers": forced(
+            0.03, x=(-1.2, 0.4), v=(-0.5, 0.8), F=(-1.5, 4.0), m=0.6, MoI=1.9, w=-0.7
+        ),
         "coast": forced(0.1, F=(0.0, 0.0), torque=0.0),
         "force twice": Question(forced(0.1).balls, (("integrate", 0, 0.1), ("integrate", 0, 0.1))),
         "touch": pair(Ball((0.0, 0.0), (1.0, 0.0), r=0.25), Ball((0.75, 0.0), (-1.0, 0.0), r=0.5)),
@@ -130,10 +161,14 @@ def questions() -> dict[str, Question]:
         name.replace("collision/", "swapped/"): question._replace(calls=(("collide", 1, 0),))
         for name, question in COLLISIONS.items()
     }
-    for k, (ra, rb, turn, share) in enumerate((*s, t, f) for s in SIZES for t in TURNS for f in SHARES):
+    for k, (ra, rb, turn, share) in enumerate(
+        (*s, t, f) for s in SIZES for t in TURNS for f in SHARES
+    ):
         n, d = np.array([np.cos(turn), np.sin(turn)]), share * (ra + rb)
         a = Ball((0.4, 0.3), tuple(0.9 * n), r=ra, m=1.3)
-        found[f"reach/{k}"] = pair(a, Ball(tuple(np.array(a.x) + d * n), tuple(-0.9 * n), r=rb, m=2.1))
+        found[f"reach/{k}"] = pair(
+            a, Ball(tuple(np.array(a.x) + d * n), tuple(-0.9 * n), r=rb, m=2.1)
+        )
     return found
 
 
@@ -143,7 +178,11 @@ QUESTIONS = questions()
 def ask(process: SolverProcess, asked: dict[str, Question]) -> dict[str, Answer]:
     """The answers by name; raises `SolverFailed` if the process is lost."""
     requests = [
-        ("ask", {"spheres": [b.numbers() for b in q.balls], "calls": q.calls, "world": q.world}, LIMIT)
+        (
+            "ask",
+            {"spheres": [b.numbers() for b in q.balls], "calls": q.calls, "world": q.world},
+            LIMIT,
+        )
         for q in asked.values()
     ]
     return {name: answered(reply) for name, reply in zip(asked, process.request(requests))}
@@ -167,7 +206,9 @@ def direction(a: Ball, b: Ball) -> tuple[Array, float]:
 
 def finite(answers: dict[str, Answer], part: str) -> bool:
     """Whether "x" or "v" of both spheres is a number after every collision."""
-    return bool(np.isfinite([getattr(b, part) for name in COLLISIONS for b in answers[name].last]).all())
+    return bool(
+        np.isfinite([getattr(b, part) for name in COLLISIONS for b in answers[name].last]).all()
+    )
 
 
 def named(answers: dict[str, Answer], prefix: str) -> Iterator[tuple[Question, Answer]]:

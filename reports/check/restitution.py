@@ -32,7 +32,8 @@ class Restitution:
     Attributes:
         own: the value written into it, or the exercise's if none is found.
         named: whether it is written in, by a name or as a number.
-        absurd: whether what came is no number from 0 to 1, and a name such as e or restitution gets it.
+        absurd: whether what came is no number from 0 to 1, and a name such as e or restitution gets
+            it.
         came: separation over approach speed of two equal spheres that meet head-on at 2 m/s.
         slow, fast: the same at 2 mm/s and at 200 m/s.
     """
@@ -46,7 +47,8 @@ class Restitution:
 
     @property
     def candidates(self) -> list[float]:
-        """The values a collision is explained by: the file's own first, then what came, if nothing contradicts it."""
+        """The values a collision is explained by: the file's own first, then what came, if nothing
+        contradicts it."""
         free = 0 <= self.came <= 1 and not self.named
         return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
 
@@ -58,10 +60,15 @@ class Restitution:
     @property
     def mistake(self) -> str:
         """What is wrong with the number that is written in, "" if nothing is."""
-        return f"e = {shown(self.came)} is written into the file; it must be from 0 to 1" if self.absurd else ""
+        return (
+            f"e = {shown(self.came)} is written into the file; it must be from 0 to 1"
+            if self.absurd
+            else ""
+        )
 
     def row(self, mistake: str) -> CheckRow:
-        """0.9 is right, another number is a note if the file says so, and a fault if it says something else.
+        """0.9 is right, another number is a note if the file says so, and a fault if it says
+        something else.
 
         `mistake`: what is known to be wrong with the collisions, if anything.
         """
@@ -69,19 +76,31 @@ class Restitution:
         if near(self.came, EXERCISE):
             return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
         if near(self.came, self.own) or len(self.candidates) > 1:
-            note = f"e = {shown(self.came)} is written into the file; the exercise has 0.9. It is judged by its own"
-            return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "note", note)
+            note = (
+                f"e = {shown(self.came)} is written into the file; the exercise has 0.9. It is"
+                " judged by its own"
+            )
+            return CheckRow(
+                "restitution", "2c", asked, shown(self.came), shown(EXERCISE), "note", note
+            )
         cause = mistake if np.isfinite(self.came) else "the velocities become no numbers"
-        cause = cause or f"e = {shown(self.own)} is written into the file, but its collisions have another"
+        cause = (
+            cause
+            or f"e = {shown(self.own)} is written into the file, but its collisions have another"
+        )
         return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
 
     def speeds(self, mistake: str) -> CheckRow:
         """The same at any speed; `mistake` as above."""
         return judged(
-            "any speed", "2c", "Is it the same for pairs that close at 2 mm/s and at 200 m/s?",
-            f"{shown(self.slow)} and {shown(self.fast)}", shown(self.came),
-            near([self.slow, self.fast], self.came), mistake or "the restitution depends on the speed",
-        )  # fmt: skip
+            "any speed",
+            "2c",
+            "Is it the same for pairs that close at 2 mm/s and at 200 m/s?",
+            f"{shown(self.slow)} and {shown(self.fast)}",
+            shown(self.came),
+            near([self.slow, self.fast], self.came),
+            mistake or "the restitution depends on the speed",
+        )
 
 
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
@@ -100,9 +119,12 @@ def named_in(text: str) -> list[float]:
 
 
 def written(text: str) -> list[float]:
-    """What may be the e of a file: numbers that a name such as e or restitution gets; 0.9 if that or 1.9 occurs."""
+    """What may be the e of a file: numbers that a name such as e or restitution gets; 0.9 if that
+    or 1.9 occurs."""
     numbers = [float(x) for x in NUMBER.findall(code_of(text))]
-    return [e for e in named_in(text) if 0 <= e <= 1] + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
+    return [e for e in named_in(text) if 0 <= e <= 1] + [EXERCISE] * (
+        EXERCISE in numbers or 1 + EXERCISE in numbers
+    )
 
 
 def separation(answer: Answer, name: str) -> float:

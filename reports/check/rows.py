@@ -1,4 +1,5 @@
-"""A row of the check: what was asked of a solver, what came, what was expected, and the likely cause."""
+"""A row of the check: what was asked of a solver, what came, what was expected, and the likely
+cause."""
 
 from __future__ import annotations
 
@@ -9,7 +10,8 @@ from typing import Literal
 import numpy as np
 
 Verdict = Literal["right", "fault", "note", "not asked"]
-# Single precision is allowed: a dozen operations of 6e-8 each. What is wrong is wrong by far more than that.
+# Single precision is allowed: a dozen operations of 6e-8 each. What is wrong is wrong by far more
+# than that.
 TOLERANCE = 1e-6
 FOLLOWS = "it follows from the faults above"
 UNKNOWN = "unknown: no common mistake gives these numbers"
@@ -63,9 +65,19 @@ class CheckRow:
         return READ[self.task]
 
 
-def judged(name: str, task: str, asked: str, got: str, expected: str, right: bool, cause: str = "") -> CheckRow:
+def judged(
+    name: str, task: str, asked: str, got: str, expected: str, right: bool, cause: str = ""
+) -> CheckRow:
     """A row that is right or a fault with its cause."""
-    return CheckRow(name, task, asked, got, expected, "right" if right else "fault", "" if right else cause or UNKNOWN)
+    return CheckRow(
+        name,
+        task,
+        asked,
+        got,
+        expected,
+        "right" if right else "fault",
+        "" if right else cause or UNKNOWN,
+    )
 
 
 def not_asked(name: str, task: str, why: str) -> CheckRow:
@@ -82,7 +94,9 @@ def near(got: object, expected: object, scale: float = 1.0) -> bool:
 Law = Callable[..., object]
 
 
-def follows(laws: Mapping[str, Law], asked: Sequence[Sequence[object]], came: Sequence[object]) -> str | None:
+def follows(
+    laws: Mapping[str, Law], asked: Sequence[Sequence[object]], came: Sequence[object]
+) -> str | None:
     """The first law that gives what came, for everything that was asked; None if there is none."""
     with np.errstate(all="ignore"):
         for name, law in laws.items():
@@ -97,7 +111,11 @@ def shown(value: object) -> str:
     if array.ndim:
         return "(" + ", ".join(shown(x) for x in array) + ")"
     x = float(array)
-    return ("NaN" if np.isnan(x) else "infinite") if not np.isfinite(x) else f"{0.0 if abs(x) < 1e-12 else x:.4g}"
+    return (
+        ("NaN" if np.isnan(x) else "infinite")
+        if not np.isfinite(x)
+        else f"{0.0 if abs(x) < 1e-12 else x:.4g}"
+    )
 
 
 def worst(rows: Iterable[CheckRow]) -> Verdict:

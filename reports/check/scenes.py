@@ -1,4 +1,5 @@
-"""Whole scenes: a solver's motion against the exact one, within what dt explains, and its first wrong collision."""
+"""Whole scenes: a solver's motion against the exact one, within what dt explains, and its first
+wrong collision."""
 
 from __future__ import annotations
 
@@ -43,28 +44,41 @@ def step_of(process: SolverProcess) -> float:
 
 
 def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> SceneAnswer:
-    """Play it by the file's own functions; its forces last as long as it does. Raises `SolverFailed`."""
+    """Play it by the file's own functions; its forces last as long as it does. Raises
+    `SolverFailed`."""
     scene, count = scenario.scene, round(scenario.sample_interval / dt)
     forces = np.zeros((scene.n, 3))
     for thrust in scenario.thrusts:
         forces[thrust.disk] += [*thrust.force, thrust.torque]
     step = {"count": count, "forces": forces.tolist() if forces.any() else None, "held": True}
-    start: dict[str, Any] = {"spheres": spheres_of(scene), "dt": dt, "gravity": [0.0, 0.0], "wrap": None}
+    start: dict[str, Any] = {
+        "spheres": spheres_of(scene),
+        "dt": dt,
+        "gravity": [0.0, 0.0],
+        "wrap": None,
+    }
     requests = [("load", start, LIMIT), ("read", None, LIMIT)]
     for _ in range(scenario.samples):
         requests += [("step", step, LIMIT), ("read", None, LIMIT)]
     *answers, contacts = process.request([*requests, ("contacts", None, LIMIT)], SCENE_LIMIT)
-    failed = next((answer for answer in (*answers, contacts) if isinstance(answer, SolverFailed)), None)
+    failed = next(
+        (answer for answer in (*answers, contacts) if isinstance(answer, SolverFailed)), None
+    )
     if failed:
         raise failed
     rows = np.array(answers[1::2], float)
     return SceneAnswer(
-        rows[..., 0:2], rows[..., 2:4], rows[..., 6], rows[..., 7], np.array(contacts, float).reshape(-1, 19)
+        rows[..., 0:2],
+        rows[..., 2:4],
+        rows[..., 6],
+        rows[..., 7],
+        np.array(contacts, float).reshape(-1, 19),
     )
 
 
 def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None) -> list[CheckRow]:
-    """The rows on whole scenes with restitution `e`, and the one on the first wrong collision in any of them."""
+    """The rows on whole scenes with restitution `e`, and the one on the first wrong collision in
+    any of them."""
     if any(row.name == "implemented" for row in rows):
         return [not_asked("scenes", "scenes", "a function of the file cannot be used")]
     blamed = any(row.verdict == "fault" for row in rows)
@@ -79,29 +93,57 @@ def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None
             if not np.isfinite(played.position).all():
                 break  # what is no number may also be slow, and says no more in the other scenes
     except SolverFailed as failure:
-        return [judged("scenes", "scenes", "Does it play whole scenes?", "it fails", "yes", False,
-                       FOLLOWS if blamed else str(failure))]  # fmt: skip
-    return [*found, judged("first wrong collision", "scenes", "Is every collision in these scenes right by itself?",
-                           wrong or "yes", "yes", not wrong, FOLLOWS if blamed else "")]  # fmt: skip
+        return [
+            judged(
+                "scenes",
+                "scenes",
+                "Does it play whole scenes?",
+                "it fails",
+                "yes",
+                False,
+                FOLLOWS if blamed else str(failure),
+            )
+        ]
+    return [
+        *found,
+        judged(
+            "first wrong collision",
+            "scenes",
+            "Is every collision in these scenes right by itself?",
+            wrong or "yes",
+            "yes",
+            not wrong,
+            FOLLOWS if blamed else "",
+        ),
+    ]
 
 
-def scene_row(scenario: Scenario, record: TruthRecord | None, played: SceneAnswer, dt: float, cause: str) -> CheckRow:
+def scene_row(
+    scenario: Scenario, record: TruthRecord | None, played: SceneAnswer, dt: float, cause: str
+) -> CheckRow:
     """The largest distance from the exact positions, beside what the step size explains."""
     truth = truth_of(scenario, record)
     k = len(truth)
     away = np.hypot(*np.moveaxis(played.position[:k] - truth.position, -1, 0))
-    allowed = (bounds(scenario, record, truth.t, dt) + rounding(truth.position, truth.velocity, truth.t, dt))[:, None]
+    allowed = (
+        bounds(scenario, record, truth.t, dt)
+        + rounding(truth.position, truth.velocity, truth.t, dt)
+    )[:, None]
     ratio = np.where(np.isfinite(away), away, np.inf) / allowed
     at, disk = np.unravel_index(int(ratio.argmax()), ratio.shape)
     turned = np.abs(played.angle[:k] - truth.angle)
-    may_turn = turning_bounds(scenario, truth.t, dt) + rounding(truth.angle, truth.angular_velocity, truth.t, dt)
+    may_turn = turning_bounds(scenario, truth.t, dt) + rounding(
+        truth.angle, truth.angular_velocity, truth.t, dt
+    )
     if not (turned <= may_turn[:, None]).all():
         got = f"a sphere is turned by {shown(turned.max())} rad too much or too little"
         expected = f"at most {shown(may_turn[-1])} rad, by dt = {shown(dt)} s"
         return judged(scenario.name, "scenes", scenario.asks, got, expected, False, cause)
     got = f"sphere {disk} is {shown(away[at, disk])} m away at {shown(truth.t[at])} s"
     expected = f"at most {shown(allowed[at, 0])} m, by dt = {shown(dt)} s"
-    return judged(scenario.name, "scenes", scenario.asks, got, expected, bool(ratio.max() <= 1), cause)
+    return judged(
+        scenario.name, "scenes", scenario.asks, got, expected, bool(ratio.max() <= 1), cause
+    )
 
 
 def truth_of(scenario: Scenario, record: TruthRecord | None) -> Trajectory:
@@ -112,26 +154,33 @@ def truth_of(scenario: Scenario, record: TruthRecord | None) -> Trajectory:
 
 
 def rounding(place: Array, rate: Array, t: Array, dt: float) -> Array:
-    """(k,) what single precision may add, in the unit of `place`: every step rounds place and rate by 2^-24."""
+    """(k,) what single precision may add, in the unit of `place`: every step rounds place and rate
+    by 2^-24."""
     return TOLERANCE + 2.0**-24 * t / dt * (np.abs(place).max() + np.abs(rate).max() * t / 2)
 
 
 def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
-    """(k,) rad, how far an angle may be off: symplectic Euler is w' dt t / 2 ahead, and a collision turns nothing."""
-    spin_up = max((abs(p.torque) / scenario.scene.inertia[p.disk] for p in scenario.thrusts), default=0.0)
+    """(k,) rad, how far an angle may be off: symplectic Euler is w' dt t / 2 ahead, and a collision
+    turns nothing."""
+    spin_up = max(
+        (abs(p.torque) / scenario.scene.inertia[p.disk] for p in scenario.thrusts), default=0.0
+    )
     return 1.001 * spin_up * dt * t / 2
 
 
 def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) -> Array:
     """(k,) m, how far a right solver in steps of `dt` s may be off at the times t (k,) s.
 
-    Free flight under a thrust: symplectic Euler is a dt t / 2 ahead. A collision is found up to dt late, so that each
-    disk goes on for u dt; its normal is turned by that and by what the disks were off before, over (rA + rB) cos, which
-    sends them off by as much of their change of velocity. Errors add up and grow with time, so that
-    after several strikes it is generous: there the row on the first wrong collision is the one that sees.
+    Free flight under a thrust: symplectic Euler is a dt t / 2 ahead. A collision is found up to dt
+    late, so that each disk goes on for u dt; its normal is turned by that and by what the disks
+    were off before, over (rA + rB) cos, which sends them off by as much of their change of
+    velocity. Errors add up and grow with time, so that after several strikes it is generous: there
+    the row on the first wrong collision is the one that sees.
     """
     scene = scenario.scene
-    fastest = max((float(np.hypot(*p.force)) / scene.mass[p.disk] for p in scenario.thrusts), default=0.0)
+    fastest = max(
+        (float(np.hypot(*p.force)) / scene.mass[p.disk] for p in scenario.thrusts), default=0.0
+    )
     if record is None:
         return 1.001 * fastest * dt * t / 2
     place, speed, before = 0.0, 0.0, 0.0
@@ -147,13 +196,15 @@ def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) 
         steps.append((at, place, speed))
         before = at
     known = np.array(steps)
-    # A solver may be a step late, so that what a collision adds is allowed from a step before it on.
+    # A solver may be a step late, so that what a collision adds is allowed from a step before it
+    # on.
     leg = np.searchsorted(known[:, 0] - dt, t, side="right") - 1
     return SLACK * (known[leg, 1] + known[leg, 2] * np.abs(t - known[leg, 0]))
 
 
 def first_wrong(scenario: Scenario, contacts: Array, dt: float) -> str:
-    """The first contact that is not what the formula makes of the state before it, in a sentence; "" if none."""
+    """The first contact that is not what the formula makes of the state before it, in a sentence;
+    "" if none."""
     scene = scenario.scene
     for row in contacts:
         step, i, j = int(row[0]), int(row[1]), int(row[2])
@@ -163,7 +214,8 @@ def first_wrong(scenario: Scenario, contacts: Array, dt: float) -> str:
 
 
 def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
-    """What is wrong with one call: states (2, 2, 4) before and after, of i and j, x, y, vx, vy; "" if nothing is."""
+    """What is wrong with one call: states (2, 2, 4) before and after, of i and j, x, y, vx, vy; ""
+    if nothing is."""
     (a, b), (a2, b2) = states
     if not np.isfinite(states).all():
         return "the numbers become NaN or infinite"
@@ -175,7 +227,9 @@ def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
         return ""
     if d > reach and not touching:
         return (
-            "" if near(states[1], states[0]) else f"they react at a distance of {shown(d)} m, beyond {shown(reach)} m"
+            ""
+            if near(states[1], states[0])
+            else f"they react at a distance of {shown(d)} m, beyond {shown(reach)} m"
         )
     n, apart = r / d, float(np.hypot(*(a2[:2] - b2[:2])))
     vn = float((a[2:] - b[2:]) @ n)
@@ -188,45 +242,76 @@ def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
         return ""
     k = 0 if not near(came[0], change[0]) else 1
     return (
-        f"sphere {(i, j)[k]} has {shown(states[1, k, 2:])} m/s after it, not {shown(states[0, k, 2:] + change[k])} m/s"
+        f"sphere {(i, j)[k]} has {shown(states[1, k, 2:])} m/s after it, not"
+        f" {shown(states[0, k, 2:] + change[k])} m/s"
     )
 
 
 # question, s, then a row x, y, vx, vy (m, m/s) for every sphere, radii m, masses kg
 MET: dict[str, tuple] = {
     "head_on": (
-        "Where are two unequal spheres after they meet head-on?", 1.0,
-        [[-0.6, 0.0, 0.9, 0.0], [0.5, 0.0, -0.7, 0.0]], [0.25, 0.3], [1.0, 2.5],
+        "Where are two unequal spheres after they meet head-on?",
+        1.0,
+        [[-0.6, 0.0, 0.9, 0.0], [0.5, 0.0, -0.7, 0.0]],
+        [0.25, 0.3],
+        [1.0, 2.5],
     ),
     "oblique": (
-        "Where are two unequal spheres after an oblique collision?", 1.0,
-        [[-0.7, 0.1, 1.1, 0.1], [0.5, -0.05, -0.5, 0.0]], [0.3, 0.25], [2.0, 0.8],
+        "Where are two unequal spheres after an oblique collision?",
+        1.0,
+        [[-0.7, 0.1, 1.1, 0.1], [0.5, -0.05, -0.5, 0.0]],
+        [0.3, 0.25],
+        [2.0, 0.8],
     ),
     "row": (
-        "Where are three spheres in a row after the first has struck the second, and that the third?", 1.2,
-        [[-1.0, 0.0, 1.3, 0.0], [0.0, 0.0, 0.0, 0.0], [0.9, 0.0, 0.0, 0.0]], [0.25, 0.25, 0.25], [1.0, 1.5, 0.7],
+        (
+            "Where are three spheres in a row after the first has struck the second, and that the"
+            " third?"
+        ),
+        1.2,
+        [[-1.0, 0.0, 1.3, 0.0], [0.0, 0.0, 0.0, 0.0], [0.9, 0.0, 0.0, 0.0]],
+        [0.25, 0.25, 0.25],
+        [1.0, 1.5, 0.7],
     ),
     "crowd": (
-        "Where are five spheres after they have collided?", 1.0,
-        [[-1.1, 0.0, 1.4, 0.1], [-0.2, 0.1, 0.0, 0.0], [0.8, 0.3, -0.7, 0.0], [0.1, 1.0, 0.0, -0.8],
-         [0.2, -1.1, 0.1, 0.7]],
-        [0.3, 0.25, 0.2, 0.25, 0.3], [1.0, 2.0, 0.5, 1.2, 0.8],
+        "Where are five spheres after they have collided?",
+        1.0,
+        [
+            [-1.1, 0.0, 1.4, 0.1],
+            [-0.2, 0.1, 0.0, 0.0],
+            [0.8, 0.3, -0.7, 0.0],
+            [0.1, 1.0, 0.0, -0.8],
+            [0.2, -1.1, 0.1, 0.7],
+        ],
+        [0.3, 0.25, 0.2, 0.25, 0.3],
+        [1.0, 2.0, 0.5, 1.2, 0.8],
     ),
-}  # fmt: skip
+}
 
 
 @lru_cache(maxsize=8)
 def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
-    """The scenes of a check with restitution `e`, each with its exact motion: a closed form, or many digits."""
+    """The scenes of a check with restitution `e`, each with its exact motion: a closed form, or
+    many digits."""
     forced = Scenario(
-        name="forced", asks="Where is a sphere that a force forces and a torque turns for a second?", source="F = m a",
+        name="forced",
+        asks="Where is a sphere that a force forces and a torque turns for a second?",
+        source="F = m a",
         scene=scene_of([[-1.0, 0.5, 0.6, -0.2]], [0.3], [1.4], e),
-        duration=1.0, sample_interval=INTERVAL, thrusts=[Thrust(0, 0.0, 1.0, np.array([0.5, 0.9]), 0.02)],
-    )  # fmt: skip
+        duration=1.0,
+        sample_interval=INTERVAL,
+        thrusts=[Thrust(0, 0.0, 1.0, np.array([0.5, 0.9]), 0.02)],
+    )
     found: list[tuple[Scenario, TruthRecord | None]] = [(forced, None)]
     for name, (asks, duration, rows, radius, mass) in MET.items():
-        scenario = Scenario(name=name, asks=asks, source="drawn for this check", scene=scene_of(rows, radius, mass, e),
-                            duration=duration, sample_interval=INTERVAL)  # fmt: skip
+        scenario = Scenario(
+            name=name,
+            asks=asks,
+            source="drawn for this check",
+            scene=scene_of(rows, radius, mass, e),
+            duration=duration,
+            sample_interval=INTERVAL,
+        )
         try:
             found.append((scenario, computed(scenario)))
         except NoTruth:  # e = 0 leaves touching spheres, whose motion the oracle does not follow
@@ -234,9 +319,15 @@ def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
     return tuple(found)
 
 
-def scene_of(rows: Sequence[Sequence[float]], radius: Sequence[float], mass: Sequence[float], e: float) -> Scene:
+def scene_of(
+    rows: Sequence[Sequence[float]], radius: Sequence[float], mass: Sequence[float], e: float
+) -> Scene:
     """A scene from rows x, y, vx, vy, in m and m/s."""
     state = np.array(rows, float)
     return Scene(
-        position=state[:, :2], velocity=state[:, 2:], radius=np.array(radius), mass=np.array(mass), restitution=e
+        position=state[:, :2],
+        velocity=state[:, 2:],
+        radius=np.array(radius),
+        mass=np.array(mass),
+        restitution=e,
     )

@@ -1,4 +1,5 @@
-"""The smallest scene that shows a fault: drawn and shrunk by hypothesis, each judged by closed forms alone."""
+"""The smallest scene that shows a fault: drawn and shrunk by hypothesis, each judged by closed
+forms alone."""
 
 from __future__ import annotations
 
@@ -22,11 +23,14 @@ from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import computed
 
-DT = 1e-2  # s, coarse: a scene is played in milliseconds, and a collision found late is judged by the state it is found in
+# s, coarse: a scene is played in milliseconds, and a collision found late is judged by the state it
+# is found in
+DT = 1e-2
 SECONDS = 1.5  # for drawing and shrinking together
 DURATION, INTERVAL = 1.0, 0.02  # s
 DRAWS = 400
-SINGLE = 2.0**-24 * DURATION / DT * 4 / TOLERANCE  # m or rad: every step of single precision may round 4 m that much
+# m or rad: every step of single precision may round 4 m that much
+SINGLE = 2.0**-24 * DURATION / DT * 4 / TOLERANCE
 GAP = 0.05  # m, least distance of two surfaces at the start
 
 Sphere = tuple[int, int, int, int, int, int]
@@ -43,7 +47,8 @@ FIRST: list[Drawn] = [
 
 @dataclass(frozen=True)
 class Smallest:
-    """A scene that shows a fault, what is wrong in it, the file's motion and the exact one where there is one."""
+    """A scene that shows a fault, what is wrong in it, the file's motion and the exact one where
+    there is one."""
 
     scenario: Scenario
     fault: str
@@ -64,12 +69,19 @@ def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
         return True
 
     sphere = st.tuples(ints(4), ints(3), ints(2), ints(2), st.integers(1, 2), st.integers(1, 3))
-    scene = st.tuples(st.lists(sphere, min_size=1, max_size=3), st.tuples(ints(2), ints(2), ints(1)))
+    scene = st.tuples(
+        st.lists(sphere, min_size=1, max_size=3), st.tuples(ints(2), ints(2), ints(1))
+    )
     rules = settings(
-        max_examples=DRAWS, derandomize=True, database=None, deadline=None,
-        suppress_health_check=list(HealthCheck), phases=(Phase.generate, Phase.shrink),
-    )  # fmt: skip
-    with homeless(), suppress(NoSuchExample, Flaky):  # nothing found, or the time was up while it shrank
+        max_examples=DRAWS,
+        derandomize=True,
+        database=None,
+        deadline=None,
+        suppress_health_check=list(HealthCheck),
+        phases=(Phase.generate, Phase.shrink),
+    )
+    # nothing found, or the time was up while it shrank
+    with homeless(), suppress(NoSuchExample, Flaky):
         find(scene, faulty, settings=rules)
     return shown_by(process, *without_idlers(process, *best, e), e) if best else None
 
@@ -77,12 +89,15 @@ def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
 def size(drawn: Drawn) -> tuple[int, int]:
     """How many spheres a scene has, and how large its numbers are."""
     spheres, thrust = drawn
-    return len(spheres), sum(map(abs, thrust)) + sum(abs(number) for sphere in spheres for number in sphere)
+    return len(spheres), sum(map(abs, thrust)) + sum(
+        abs(number) for sphere in spheres for number in sphere
+    )
 
 
 @contextmanager
 def homeless() -> Iterator[None]:
-    """Hypothesis keeps what it has read in .hypothesis of the folder the user works in; here in one that goes."""
+    """Hypothesis keeps what it has read in .hypothesis of the folder the user works in; here in one
+    that goes."""
     with TemporaryDirectory() as home:
         set_hypothesis_home_dir(home)
         try:
@@ -94,7 +109,8 @@ def homeless() -> Iterator[None]:
 def without_idlers(
     process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float
 ) -> tuple[list[Sphere], tuple[int, int, int]]:
-    """The scene without the spheres that the fault does not need: the time may be up before hypothesis sees to it."""
+    """The scene without the spheres that the fault does not need: the time may be up before
+    hypothesis sees to it."""
     for k in range(len(spheres)):
         fewer = spheres[:k] + spheres[k + 1 :]
         if fewer and fault_of(process, fewer, thrust, e):
@@ -107,24 +123,39 @@ def ints(most: int) -> st.SearchStrategy[int]:
     return st.integers(-most, most)
 
 
-def scenario_of(spheres: list[Sphere], thrust: tuple[int, int, int], e: float, interval: float) -> Scenario | None:
-    """The scene of these numbers; None if spheres are too near each other at the start. One alone also has a thrust."""
+def scenario_of(
+    spheres: list[Sphere], thrust: tuple[int, int, int], e: float, interval: float
+) -> Scenario | None:
+    """The scene of these numbers; None if spheres are too near each other at the start. One alone
+    also has a thrust."""
     rows = [(x / 2, y / 2, float(u), float(v)) for x, y, u, v, _, _ in spheres]
     radius, mass = [r / 4 for *_, r, _ in spheres], [float(m) for *_, m in spheres]
     for i in range(len(rows)):
         for j in range(i):
-            if np.hypot(rows[i][0] - rows[j][0], rows[i][1] - rows[j][1]) < radius[i] + radius[j] + GAP:
+            if (
+                np.hypot(rows[i][0] - rows[j][0], rows[i][1] - rows[j][1])
+                < radius[i] + radius[j] + GAP
+            ):
                 return None
     alone = len(rows) == 1 and any(thrust)
-    thrusts = [Thrust(0, 0.0, DURATION, np.array(thrust[:2], float), thrust[2] * 0.1)] if alone else []
+    thrusts = (
+        [Thrust(0, 0.0, DURATION, np.array(thrust[:2], float), thrust[2] * 0.1)] if alone else []
+    )
     return Scenario(
-        name="smallest", asks="Which scene is the smallest that shows the fault?", source="drawn and shrunk",
-        scene=scene_of(rows, radius, mass, e), duration=DURATION, sample_interval=interval,
-        substeps=(round(interval / DT),), thrusts=thrusts,
-    )  # fmt: skip
+        name="smallest",
+        asks="Which scene is the smallest that shows the fault?",
+        source="drawn and shrunk",
+        scene=scene_of(rows, radius, mass, e),
+        duration=DURATION,
+        sample_interval=interval,
+        substeps=(round(interval / DT),),
+        thrusts=thrusts,
+    )
 
 
-def fault_of(process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float) -> str:
+def fault_of(
+    process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float
+) -> str:
     """What is wrong with the file's motion in a scene; "" if nothing is, or it is no scene."""
     scenario = scenario_of(spheres, thrust, e, DURATION)
     if scenario is None:
@@ -137,7 +168,8 @@ def fault_of(process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, i
 
 
 def flight_fault(scenario: Scenario, played: SceneAnswer) -> str:
-    """Whether a sphere that meets nobody flies as symplectic Euler does: x0 + v0 t + a t (t + dt) / 2 after t."""
+    """Whether a sphere that meets nobody flies as symplectic Euler does: x0 + v0 t + a t (t + dt) /
+    2 after t."""
     scene, t = scenario.scene, scenario.duration
     met = {int(i) for row in played.contacts for i in row[1:3]}
     for k in set(range(scene.n)) - met:
@@ -146,25 +178,39 @@ def flight_fault(scenario: Scenario, played: SceneAnswer) -> str:
         x = scene.position[k] + scene.velocity[k] * t + force / scene.mass[k] * t * (t + DT) / 2
         angle = torque / scene.inertia[k] * t * (t + DT) / 2
         if not near(played.position[-1, k], x, SINGLE):
-            return f"sphere {k} is at {shown(played.position[-1, k])} m after {shown(t)} s, not at {shown(x)} m"
+            return (
+                f"sphere {k} is at {shown(played.position[-1, k])} m after {shown(t)} s, not at"
+                f" {shown(x)} m"
+            )
         if not near(played.angle[-1, k], angle, SINGLE):
             turned = shown(played.angle[-1, k])
-            return f"sphere {k} is turned by {turned} rad after {shown(t)} s, not by {shown(angle)} rad"
+            return (
+                f"sphere {k} is turned by {turned} rad after {shown(t)} s, not by"
+                f" {shown(angle)} rad"
+            )
     return ""
 
 
-def shown_by(process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float) -> Smallest:
+def shown_by(
+    process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float
+) -> Smallest:
     """The scene with the file's motion and the exact one."""
     scenario = scenario_of(spheres, thrust, e, INTERVAL)
     assert scenario is not None
     fault = fault_of(process, spheres, thrust, e)
     played = play_scene(process, scenario, DT)
     kicked = [row for row in played.contacts if not near(row[[5, 6, 9, 10]], row[[13, 14, 17, 18]])]
-    collisions = Collisions.of([((row[0] + 1) * DT, int(row[1]), int(row[2]), float("nan")) for row in kicked])
+    collisions = Collisions.of(
+        [((row[0] + 1) * DT, int(row[1]), int(row[2]), float("nan")) for row in kicked]
+    )
     yours = Trajectory(
-        frozen(scenario.times), frozen(played.position), frozen(played.velocity), frozen(played.angle),
-        frozen(played.angular_velocity), collisions,
-    )  # fmt: skip
+        frozen(scenario.times),
+        frozen(played.position),
+        frozen(played.velocity),
+        frozen(played.angle),
+        frozen(played.angular_velocity),
+        collisions,
+    )
     try:
         truth = truth_of(scenario, None if scenario.scene.n == 1 else computed(scenario))
     except NoTruth:

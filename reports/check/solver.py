@@ -43,7 +43,13 @@ def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
             return rows_of(process, solver.text)
     except SolverFailed as failure:
         lost = judged(
-            "answers", "file", "Does it answer when its functions are called?", "no", "yes", False, str(failure)
+            "answers",
+            "file",
+            "Does it answer when its functions are called?",
+            "no",
+            "yes",
+            False,
+            str(failure),
         )
         return [loads(process), lost], None
 
@@ -52,10 +58,15 @@ LOADS = "Can the file be loaded, and does it leave the language as it is?"
 
 
 def rows_of(process: SolverProcess, text: str) -> tuple[list[CheckRow], float | None]:
-    """The rows of a file that is loaded, and its restitution; raises `SolverFailed` if its process is lost."""
+    """The rows of a file that is loaded, and its restitution; raises `SolverFailed` if its process
+    is lost."""
     # Makes the globals that must not change; judged with the step.
     begun = process.request([("begin", None, 2.0)])[0] if process.functions["begin"] else None
-    asked = {k: q for k, q in QUESTIONS.items() if process.functions["integrate" if k in MOTION else "collide"]}
+    asked = {
+        k: q
+        for k, q in QUESTIONS.items()
+        if process.functions["integrate" if k in MOTION else "collide"]
+    }
     answers = ask(process, asked)
     rows = [loads(process), *task_1(process, answers, text)]
     contact, restitution = task_2(process, answers, text)
@@ -71,11 +82,15 @@ def rows_of(process: SolverProcess, text: str) -> tuple[list[CheckRow], float | 
 
 
 def hinted(rows: list[CheckRow], text: str) -> list[CheckRow]:
-    """The rows, the first fault with a word on a condition that sets a variable, if the file has one.
+    """The rows, the first fault with a word on a condition that sets a variable, if the file has
+    one.
 
     Python takes no such condition.
     """
-    slip, faulty = SET_IN_CONDITION.search(code_of(text)), (row for row in rows if row.verdict == "fault")
+    slip, faulty = (
+        SET_IN_CONDITION.search(code_of(text)),
+        (row for row in rows if row.verdict == "fault"),
+    )
     if slip is None or (first := next(faulty, None)) is None:
         return rows
     line = text.count("\n", 0, slip.start()) + 1
@@ -91,25 +106,40 @@ MOTION = ("force", "force, other numbers", "coast", "force twice")
 
 def stuck(answers: dict[str, Answer]) -> bool:
     """Whether a call had to be stopped: whatever makes it again would have to be stopped, too."""
-    return any(answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values())
+    return any(
+        answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values()
+    )
 
 
 def loads(process: SolverProcess) -> CheckRow:
     """Loaded, and which built-ins it has replaced for everybody."""
     replaced = process.functions["replaced"]
     what = ", ".join(replaced)
-    return judged("loads", "file", LOADS, f"replaces {what}" if what else "yes", "yes", not replaced,
-                  f"the file replaces {what}, which the rest of the page uses, too")  # fmt: skip
+    return judged(
+        "loads",
+        "file",
+        LOADS,
+        f"replaces {what}" if what else "yes",
+        "yes",
+        not replaced,
+        f"the file replaces {what}, which the rest of the page uses, too",
+    )
 
 
 def task_1(process: SolverProcess, answers: dict[str, Answer], text: str) -> list[CheckRow]:
     """The rows of integrate."""
     mine = {name: answer for name, answer in answers.items() if name in MOTION}
     rows, usable = implemented("1", process.functions["integrate"], mine, text)
-    return rows + (motion_rows(mine) if usable else [not_asked("velocity", "1", "integrate cannot be judged further")])
+    return rows + (
+        motion_rows(mine)
+        if usable
+        else [not_asked("velocity", "1", "integrate cannot be judged further")]
+    )
 
 
-def task_2(process: SolverProcess, answers: dict[str, Answer], text: str) -> tuple[list[CheckRow], Restitution | None]:
+def task_2(
+    process: SolverProcess, answers: dict[str, Answer], text: str
+) -> tuple[list[CheckRow], Restitution | None]:
     """The rows of the collision function, and its restitution where it has one."""
     mine = {name: answer for name, answer in answers.items() if name not in MOTION}
     rows, usable = implemented("2a", process.functions["collide"], mine, text)
@@ -131,6 +161,8 @@ def task_2(process: SolverProcess, answers: dict[str, Answer], text: str) -> tup
 def reacts(answers: dict[str, Answer]) -> bool:
     """Whether every pair that is asked about beyond detection does something."""
     return all(
-        not np.array_equal([b.numbers() for b in answers[name].last], [b.numbers() for b in QUESTIONS[name].balls])
+        not np.array_equal(
+            [b.numbers() for b in answers[name].last], [b.numbers() for b in QUESTIONS[name].balls]
+        )
         for name in COLLISIONS
     )

@@ -33,10 +33,14 @@ def print_file(one: FileCheck) -> None:
             faults = sum(row.verdict == "fault" for row in rows)
             table.add_row(title, Text(word, STYLE[word]), str(asked), str(faults or ""))
     console.print(table)
-    details = Table("task", "row", "came", "expected", "cause or choice", box=None, padding=(0, 2, 0, 0))
+    details = Table(
+        "task", "row", "came", "expected", "cause or choice", box=None, padding=(0, 2, 0, 0)
+    )
     shown = [row for row in one.rows if row.verdict in ("fault", "note")]
     for row in shown:
-        details.add_row(row.task, Text(row.name, STYLE[row.verdict]), row.got, row.expected, row.cause)
+        details.add_row(
+            row.task, Text(row.name, STYLE[row.verdict]), row.got, row.expected, row.cause
+        )
     if shown:
         console.print()
         console.print(details)
@@ -48,7 +52,8 @@ def name_in(folder: Path, one: FileCheck) -> str:
 
 
 def elided(name: str, room: int) -> str:
-    """A name that fits, without its middle if it is too long: who it is and which file stand at its ends."""
+    """A name that fits, without its middle if it is too long: who it is and which file stand at its
+    ends."""
     if len(name) <= room:
         return name
     end = max(room // 2, 1)
@@ -56,16 +61,23 @@ def elided(name: str, room: int) -> str:
 
 
 def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
-    """A row a file, a verdict for every task or "-" if it is no solver; below, of each the sentence to begin with."""
+    """A row a file, a verdict for every task or "-" if it is no solver; below, of each the sentence
+    to begin with."""
     console = Console()
     table = Table("solver", *TASKS, box=None, padding=(0, 1, 0, 0))
-    widest = {task: max(len(task), *(len(SHORT[one.tasks[task]]) for one in checks)) for task in TASKS}
+    widest = {
+        task: max(len(task), *(len(SHORT[one.tasks[task]]) for one in checks)) for task in TASKS
+    }
     room = console.width - sum(width + 1 for width in widest.values()) - 1
     for one in checks:
         words = [Text(SHORT[word], STYLE[word]) for word in one.tasks.values()]
         table.add_row(elided(name_in(folder, one), room), *words)
     console.print(table)
-    first = {name_in(folder, one): one.sentences[0].removeprefix(f"{one.path}: ") for one in checks if not one.passed}
+    first = {
+        name_in(folder, one): one.sentences[0].removeprefix(f"{one.path}: ")
+        for one in checks
+        if not one.passed
+    }
     if first:
         console.print("\nTo begin with:")
     for name, sentence in first.items():
@@ -73,4 +85,6 @@ def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
         console.print(Padding(begin, (0, 0, 0, 2)), highlight=False)
     right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
     rest = f"; {refused} not checked" if refused else ""
-    console.print(f"\n{right} of {len(checks) - refused} files without a fault{rest}.", highlight=False)
+    console.print(
+        f"\n{right} of {len(checks) - refused} files without a fault{rest}.", highlight=False
+    )

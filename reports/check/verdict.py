@@ -16,7 +16,8 @@ NONE = "holds no .js and no .py file"
 
 @dataclass(frozen=True)
 class FileCheck:
-    """One file, its rows and the restitution its scenes have; or why it is no solver at all, and then no rows.
+    """One file, its rows and the restitution its scenes have; or why it is no solver at all, and
+    then no rows.
 
     solver: the text that was checked; None if there is none.
     """
@@ -48,13 +49,15 @@ class FileCheck:
 
     @property
     def sentences(self) -> list[str]:
-        """At most `MOST`, the one to begin with first: a mistake once, without what only follows from it."""
+        """At most `MOST`, the one to begin with first: a mistake once, without what only follows
+        from it."""
         if self.refused:
             return [self.refused]
         if not self.faults:
             asked = [row for row in self.rows if row.verdict in ("right", "note")]
             return [
-                f"No fault found: {len(asked)} questions, {sum(row.verdict == 'note' for row in asked)} free choices."
+                f"No fault found: {len(asked)} questions,"
+                f" {sum(row.verdict == 'note' for row in asked)} free choices."
             ]
         first = {row.cause: row for row in reversed(self.faults) if row.cause != FOLLOWS}
         rows = sorted(first.values(), key=self.faults.index) or self.faults[:1]
@@ -63,9 +66,16 @@ class FileCheck:
 
 def sentence(row: CheckRow) -> str:
     """Where, what is likely wrong, and the numbers that say so."""
-    numbers = "" if row.name in ("implemented", "loads", "answers") else f" Came: {row.got}. Expected: {row.expected}."
-    return f"Task {TASKS[row.task]}, {row.name}: {row.cause}.{numbers}" if row.task[0] in "12" else (
-        f"{TASKS[row.task].capitalize()}, {row.name}: {row.cause}.{numbers}")  # fmt: skip
+    numbers = (
+        ""
+        if row.name in ("implemented", "loads", "answers")
+        else f" Came: {row.got}. Expected: {row.expected}."
+    )
+    return (
+        f"Task {TASKS[row.task]}, {row.name}: {row.cause}.{numbers}"
+        if row.task[0] in "12"
+        else (f"{TASKS[row.task].capitalize()}, {row.name}: {row.cause}.{numbers}")
+    )
 
 
 def check_file(path: Path) -> FileCheck:

@@ -1,4 +1,5 @@
-"""`crosscheck diff A B`: what changed between two runs, as a table; exit 1 if something got worse."""
+"""`crosscheck diff A B`: what changed between two runs, as a table; exit 1 if something got
+worse."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ def show_difference(before: Path, after: Path) -> NoReturn:
         refuse([str(fault)])
     console = Console()
     for warning in changed.warnings:
-        console.print(f"differs in {warning}" if ":" in warning else warning, style="yellow", highlight=False)
+        console.print(
+            f"differs in {warning}" if ":" in warning else warning, style="yellow", highlight=False
+        )
     console.print(by_engine(changed))
     if worst := sorted((*changed.statuses, *changed.numbers), key=gravity)[:SHOWN]:
         console.print(changes_of(worst, len(changed.statuses) + len(changed.numbers)))
@@ -38,18 +41,37 @@ def show_difference(before: Path, after: Path) -> NoReturn:
 def by_engine(changed: Difference) -> Table:
     """A row an engine: statuses and numbers that changed, and how much longer it takes."""
     table = Table(box=None, padding=(0, 1, 0, 0), title="What changed", title_justify="left")
-    for column in ("engine", "status worse", "better", "numbers the same", "worse", "better", "other", "time taken"):
+    for column in (
+        "engine",
+        "status worse",
+        "better",
+        "numbers the same",
+        "worse",
+        "better",
+        "other",
+        "time taken",
+    ):
         left = column in ("engine", "time taken")
         table.add_column(column, justify="left" if left else "right", no_wrap=column == "engine")
     timings = {timing.engine: timing for timing in changed.timings}
-    every = (*changed.same, *(change.engine for change in (*changed.statuses, *changed.numbers)), *timings)
+    every = (
+        *changed.same,
+        *(change.engine for change in (*changed.statuses, *changed.numbers)),
+        *timings,
+    )
     for engine in dict.fromkeys(every):
-        statuses, numbers = ([one for one in kind if one.engine == engine]
-                             for kind in (changed.statuses, changed.numbers))  # fmt: skip
+        statuses, numbers = (
+            [one for one in kind if one.engine == engine]
+            for kind in (changed.statuses, changed.numbers)
+        )
         counts = [
-            count(statuses, "worse"), count(statuses, "better"), str(changed.same[engine]),
-            count(numbers, "worse"), count(numbers, "better"), count(numbers, "other"),
-        ]  # fmt: skip
+            count(statuses, "worse"),
+            count(statuses, "better"),
+            str(changed.same[engine]),
+            count(numbers, "worse"),
+            count(numbers, "better"),
+            count(numbers, "other"),
+        ]
         table.add_row(engine, *counts, said_of(timings.get(engine)))
     return table
 
@@ -76,12 +98,20 @@ def gravity(change: Change) -> tuple[bool, bool, float]:
 
 def changes_of(changes: list[Change], total: int) -> Table:
     """The changes, a row each."""
-    title = f"The gravest {len(changes)} of {total} changes" if total > len(changes) else "The changes"
+    title = (
+        f"The gravest {len(changes)} of {total} changes" if total > len(changes) else "The changes"
+    )
     table = Table(box=None, padding=(0, 1, 0, 0), title=title, title_justify="left")
     for column in ("engine", "what", "before", "after", ""):
         table.add_column(column, overflow="fold")
     for change in changes:
-        table.add_row(change.engine, change.what, change.before or "nan", change.after or "nan", change.verdict)
+        table.add_row(
+            change.engine,
+            change.what,
+            change.before or "nan",
+            change.after or "nan",
+            change.verdict,
+        )
     return table
 
 
@@ -89,7 +119,10 @@ def sentence(changed: Difference) -> str:
     """What it comes to."""
     said = f"{changed.worse} got worse." if changed.worse else "Nothing got worse."
     if not changed.timings:
-        return f"{said} Timings were not compared: that takes two runs on one machine with --timings 5."
+        return (
+            f"{said} Timings were not compared: that takes two runs on one machine with"
+            " --timings 5."
+        )
     return (
         f"{said} A time is called worse if the 99 % interval of its rounds lies above 1, "
         f"and the least of them has grown by more than ×{FACTOR:g}."

@@ -18,7 +18,10 @@ def explain(what: str) -> None:
     kinds = {
         "engines": ("engine:profile", {name: row.summary for name, row in ENGINES.items()}),
         "scenarios": ("scenario", {name: _line(name) for name in SCENARIOS}),
-        "metrics": ("metric, unit", {f"{name}, {row.unit}": row.summary for name, row in METRICS.items()}),
+        "metrics": (
+            "metric, unit",
+            {f"{name}, {row.unit}": row.summary for name, row in METRICS.items()},
+        ),
     }
     if what and what not in kinds:
         refuse([unknown("list", what, kinds)])

@@ -1,4 +1,5 @@
-"""`crosscheck replay CELL`: one cell again, step by step from its last good state, with all that its engine prints."""
+"""`crosscheck replay CELL`: one cell again, step by step from its last good state, with all that
+its engine prints."""
 
 from __future__ import annotations
 
@@ -30,8 +31,11 @@ from scenarios.model import Scenario, Trajectory
 REMEMBERED = ", the last good state (the engine's internal state begins anew)"
 
 
-def replay(name: str, out: Path, timeout: float, engines: Mapping[str, EngineRow] = ENGINES) -> NoReturn:
-    """Play the cell of the run in `out` whose key begins with `name`; exits 0, 1 (it failed again) or 2."""
+def replay(
+    name: str, out: Path, timeout: float, engines: Mapping[str, EngineRow] = ENGINES
+) -> NoReturn:
+    """Play the cell of the run in `out` whose key begins with `name`; exits 0, 1 (it failed again)
+    or 2."""
     try:
         archive = Archive.read(found(Path(os.path.abspath(out))))
         record = record_of(archive, name)
@@ -48,12 +52,17 @@ def replay(name: str, out: Path, timeout: float, engines: Mapping[str, EngineRow
         refuse([str(fault)])
     cell = Cell(record["scene"], record["seed"], engine, record["substeps"])
     if row.source and record["cell"] != cell.key(record["scene_hash"], row.source):
-        say(f"{engine.removesuffix(OWN)} or a version has changed since: what is played is what is there now")
+        say(
+            f"{engine.removesuffix(OWN)} or a version has changed since: what is played is what is"
+            " there now"
+        )
     k = len(before) - 1 if before is not None and record["status"] != "ok" else 0
     substeps = record["substeps"]
     show(f"{record['scenario']}  {record['engine']}:{record['profile']}  dt {record['dt_s']:.4g} s")
     show(f"was:    {ending(record['status'], record['reason'])}")
-    show(f"from:   step {k * substeps}, {scenario.times[k]:g} s{REMEMBERED if k else ', the start'}")
+    show(
+        f"from:   step {k * substeps}, {scenario.times[k]:g} s{REMEMBERED if k else ', the start'}"
+    )
     status, reason, after = again(record, row, continued(scenario, substeps, before, k), timeout)
     step = k * substeps + (len(after) - 1 if after is not None else 0)
     show(f"now:    {ending(status, reason)}")
@@ -74,7 +83,8 @@ def ending(status: str, reason: str) -> str:
 
 
 def record_of(archive: Archive, name: str) -> dict[str, Any]:
-    """The line of the one cell whose key begins with `name`; raises `ValueError` naming what is near."""
+    """The line of the one cell whose key begins with `name`; raises `ValueError` naming what is
+    near."""
     keys = {record["cell"]: record for record in archive.records}
     matching = [key for key in keys if key.startswith(name)]
     if len(matching) == 1:
@@ -83,7 +93,11 @@ def record_of(archive: Archive, name: str) -> dict[str, Any]:
     near = matching or difflib.get_close_matches(name, keys, n=3, cutoff=0.5) or failed
     named = ", ".join(f"{key} ({keys[key]['scenario']} {keys[key]['engine']})" for key in near[:3])
     why = "is no cell" if not matching else f"begins {len(matching)} cells"
-    hint = f"did you mean {named}?" if near else f"see the column cell of {archive.folder / 'runs.csv'}"
+    hint = (
+        f"did you mean {named}?"
+        if near
+        else f"see the column cell of {archive.folder / 'runs.csv'}"
+    )
     raise ValueError(f"{name!r} {why} of {archive.folder}; {hint}")
 
 
@@ -111,7 +125,8 @@ def continued(scenario: Scenario, substeps: int, before: Trajectory | None, k: i
 def again(
     record: dict[str, Any], row: EngineRow, scenario: Scenario, timeout: float
 ) -> tuple[str, str, Trajectory | None]:
-    """Status, reason and trajectory, from a process of its own that prints where the user sees it."""
+    """Status, reason and trajectory, from a process of its own that prints where the user sees
+    it."""
     cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", 1)
     worker = Worker(memory=0, show=True)
     try:
@@ -119,18 +134,29 @@ def again(
     finally:
         worker.close()
     if outcome is None:
-        return "crashed", "its process ended as if from outside", from_trail(worker.left(), scenario)
+        return (
+            "crashed",
+            "its process ended as if from outside",
+            from_trail(worker.left(), scenario),
+        )
     if isinstance(outcome, bytes):
         outcome = pickle.loads(outcome)
     if isinstance(outcome, Failure):
         return outcome.status, outcome.reason, from_trail(outcome.trail, scenario)
-    return outcome.run.status, outcome.run.reason, load_trajectory(io.BytesIO(outcome.file)) if outcome.file else None
+    return (
+        outcome.run.status,
+        outcome.run.reason,
+        load_trajectory(io.BytesIO(outcome.file)) if outcome.file else None,
+    )
 
 
 def recorded(archive: Archive, record: dict[str, Any]) -> Trajectory | None:
     """The samples that the run has of a cell; None if it has none."""
     if record["damage"]:
-        say(f"{archive.folder / 'trajectories'}: {record['damage']}, so the cell is played from the start")
+        say(
+            f"{archive.folder / 'trajectories'}: {record['damage']}, so the cell is played from the"
+            " start"
+        )
     return stored_trajectory(archive.folder, record)
 
 
@@ -138,4 +164,7 @@ def same(before: Trajectory | None, after: Trajectory | None, substeps: int) -> 
     """Whether a cell that was sampled at every step has the bits of its record."""
     if before is None or after is None:
         return before is after
-    return all(getattr(before, name).tobytes() == getattr(after, name)[::substeps].tobytes() for name in STATE)
+    return all(
+        getattr(before, name).tobytes() == getattr(after, name)[::substeps].tobytes()
+        for name in STATE
+    )

@@ -1,4 +1,5 @@
-"""`crosscheck report OUT`, and how every run ends: tables and page from the journal, the summary, the exit status."""
+"""`crosscheck report OUT`, and how every run ends: tables and page from the journal, the summary,
+the exit status."""
 
 from __future__ import annotations
 
@@ -21,12 +22,16 @@ from reports.terminal.progress import Progress
 
 
 def finish(report: Report, out: Path) -> NoReturn:
-    """Print the summary; exit 1 if there is an engine, or a scene, of which not all that was asked for is compared."""
+    """Print the summary; exit 1 if there is an engine, or a scene, of which not all that was asked
+    for is compared."""
     print_summary(report, str((out / "report.html").resolve()))
     runs = [run for comparison in report.comparisons for run in comparison.runs]
     played = {run.name for run in runs if run.status == "ok"}
     if lost := sorted({run.name for run in runs} - played):
-        say(f"no cell of {', '.join(lost)} was played to its end: see the status column of {out / 'runs.csv'}")
+        say(
+            f"no cell of {', '.join(lost)} was played to its end: see the status column of"
+            f" {out / 'runs.csv'}"
+        )
     for name, why in report.unjudged.items():
         say(f"{name} is not judged: {why}")
     sys.exit(FAILED if lost or report.unjudged else DONE)
@@ -43,7 +48,10 @@ def report_again(out: Path) -> NoReturn:
 def print_summary(report: Report, page: str) -> None:
     """Medians over the scenarios at their middle step, the finding, and where the page is."""
     console = Console()
-    title = "Largest error, median over the scenarios, each at the middle of its dt ladder; lower is better"
+    title = (
+        "Largest error, median over the scenarios, each at the middle of its dt ladder; lower is"
+        " better"
+    )
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine", no_wrap=True)
     for column in overview.SUMMARY.values():

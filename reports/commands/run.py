@@ -14,8 +14,23 @@ from reports.commands.report import finish
 from reports.lessons.catalogue import LESSONS
 from reports.page.report import make_report
 from reports.run.archive import Archive, stored_scene
-from reports.run.arguments import checked_engines, checked_scenes, go_where_files_are, opening, refusing
-from reports.run.folders import RUN, given_back, open_again, open_new, part_of, place_of, reopened, replace_folder
+from reports.run.arguments import (
+    checked_engines,
+    checked_scenes,
+    go_where_files_are,
+    opening,
+    refusing,
+)
+from reports.run.folders import (
+    RUN,
+    given_back,
+    open_again,
+    open_new,
+    part_of,
+    place_of,
+    reopened,
+    replace_folder,
+)
 from reports.run.journal import JOURNAL, Journal
 from reports.run.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
 from reports.run.suite import Means, OtherVersions, RunPlan, carry_out
@@ -35,7 +50,8 @@ def run_plan(
     means: Means,
     command: str,
 ) -> NoReturn:
-    """Play, compare, report into `out`; exits 0, 1 (an engine or a scene could not be compared), 2, 130 or 143."""
+    """Play, compare, report into `out`; exits 0, 1 (an engine or a scene could not be compared), 2,
+    130 or 143."""
     with opening(out):
         out, folder = place_of(out), os.getcwd()
     plan = RunPlan(
@@ -60,7 +76,12 @@ def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means
     """
     workers = affordable(workers or os.cpu_count() or 1)
     if 0 < memory < LEAST_MEMORY:
-        refuse([f"--memory {memory}: a worker takes {LEAST_MEMORY} MB before it has played anything; allowed is more"])
+        refuse(
+            [
+                f"--memory {memory}: a worker takes {LEAST_MEMORY} MB before it has played"
+                " anything; allowed is more"
+            ]
+        )
     if scheduler:
         try:
             cluster(scheduler).close()
@@ -76,8 +97,12 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
     `alone`: nothing is asked for but to resume, and with which means.
     """
     if not alone:
-        refuse(["--resume goes on with a run as it was asked for: it takes no scenarios, --engine, --dt, --full, "
-                "--seed, --timings and --out"])  # fmt: skip
+        refuse(
+            [
+                "--resume goes on with a run as it was asked for: it takes no scenarios, --engine,"
+                " --dt, --full, --seed, --timings and --out"
+            ]
+        )
     with refusing(f"--resume {out}"):
         out = place_of(out, "--resume")
         journal = open_again(out)
@@ -88,31 +113,42 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
 
 
 def plan_of(folder: Path, part: Path) -> RunPlan:
-    """What was asked for, as the journal has it, wherever one is now; of a scene file that is gone the copy is played.
+    """What was asked for, as the journal has it, wherever one is now; of a scene file that is gone
+    the copy is played.
 
-    `part`: where `folder` will be when that is carried out. Exits 2 where a scene file, or a solver's, is at fault.
+    `part`: where `folder` will be when that is carried out. Exits 2 where a scene file, or a
+    solver's, is at fault.
     """
     header = {"folder": os.getcwd()} | Archive.read(folder).header
-    files = {scene: file_of(scene, folder, header) for scene in header["scenes"] if scene.endswith(".toml")}
+    files = {
+        scene: file_of(scene, folder, header)
+        for scene in header["scenes"]
+        if scene.endswith(".toml")
+    }
     scenes = checked_scenes(header["scenes"], header["dts"], header["full"], header["seed"], files)
     go_where_files_are(header, header["engines"])
     engines = {name: row_of(name) for name in checked_engines(header["engines"])}
     moved = {
-        scene: part / path.relative_to(folder) if path.is_relative_to(folder) else path for scene, path in files.items()
+        scene: part / path.relative_to(folder) if path.is_relative_to(folder) else path
+        for scene, path in files.items()
     }
     names = ("seed", "dts", "full", "timings", "command", "folder")
-    return RunPlan(scenes=scenes, engines=engines, files=moved, **{name: header[name] for name in names})
+    return RunPlan(
+        scenes=scenes, engines=engines, files=moved, **{name: header[name] for name in names}
+    )
 
 
 def file_of(scene: str, folder: Path, header: Mapping[str, Any]) -> Path:
-    """The file of a scene, from where the run was begun, or where that is gone the copy in the run's folder."""
+    """The file of a scene, from where the run was begun, or where that is gone the copy in the
+    run's folder."""
     path = Path(header["folder"], scene)
     copy = stored_scene(folder, header["names"].get(scene, ""))
     return copy if not path.exists() and copy.exists() else path
 
 
 def carry_on(plan: RunPlan, means: Means, journal: Journal, out: Path) -> NoReturn:
-    """Carry out the plan, report, and put it all in its place; what was played is kept, whatever happens."""
+    """Carry out the plan, report, and put it all in its place; what was played is kept, whatever
+    happens."""
     part = journal.path.parent
     try:
         with broken_off(part, partial(what_is_kept, out)), journal, Progress() as progress:

@@ -1,4 +1,5 @@
-"""`crosscheck play` and `crosscheck lesson`: one web application, the game at / and the lessons below /lesson."""
+"""`crosscheck play` and `crosscheck lesson`: one web application, the game at / and the lessons
+below /lesson."""
 
 from __future__ import annotations
 
@@ -25,6 +26,7 @@ def play(flight: Path | None, engines: Sequence[str], port: int, opens: bool) ->
 
 
 def lesson(name: str, port: int, opens: bool) -> None:
-    """Serve the lessons, opened at `name` or their list, until Ctrl-C; exits 2 if there is no such lesson."""
+    """Serve the lessons, opened at `name` or their list, until Ctrl-C; exits 2 if there is no such
+    lesson."""
     path = f"/lesson/{checked_lesson(name)}".rstrip("/")
     server.serve(application(Game(list(FIRST))), port, path, opens)

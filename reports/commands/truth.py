@@ -1,4 +1,5 @@
-"""`crosscheck truth`: the exact answer to one scene, its collisions, how far it reaches and what ends it."""
+"""`crosscheck truth`: the exact answer to one scene, its collisions, how far it reaches and what
+ends it."""
 
 from __future__ import annotations
 
@@ -30,15 +31,23 @@ HEADINGS = ("t, s", "disk", "other", "impulse, N s", "cos of impact angle")
 
 
 def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float) -> NoReturn:
-    """Print the exact answer to a scene, up to where `timeout` s lead; exits 1 where there is none, 2 on no scene."""
+    """Print the exact answer to a scene, up to where `timeout` s lead; exits 1 where there is none,
+    2 on no scene."""
     (checked,) = checked_scenes([scene], [], False, seed)
     scenario = open_scene(checked, seed)
     # In a worker, which can be stopped whatever it is doing.
     task = partial(record_here, checked, seed, timeout)
-    with waiting(f"the exact answer to {scenario.name}"), closing(run_all({checked: task}, 1, timeout)) as results:
+    with (
+        waiting(f"the exact answer to {scenario.name}"),
+        closing(run_all({checked: task}, 1, timeout)) as results,
+    ):
         [(_, record)] = results
     if isinstance(record, Failure | str):
-        why = f"no exact answer: {record}" if isinstance(record, str) else no_answer(record, timeout).reason
+        why = (
+            f"no exact answer: {record}"
+            if isinstance(record, str)
+            else no_answer(record, timeout).reason
+        )
         say(f"{scenario.name}: {why}")
         sys.exit(FAILED)
     if as_json:
@@ -73,21 +82,30 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
     ]
     return plain(
         {
-            "scenario": scenario.name, "method": record.method, "bits": record.bits, "duration_s": scenario.duration,
+            "scenario": scenario.name,
+            "method": record.method,
+            "bits": record.bits,
+            "duration_s": scenario.duration,
             "horizon_s": min(record.horizon, scenario.duration),
-            "float64_horizon_s": min(record.float64_horizon, scenario.duration), "reason": record.reason,
-            "error_bound_m": record.error_bound, "collisions": collisions, "outcomes": outcomes(record),
+            "float64_horizon_s": min(record.float64_horizon, scenario.duration),
+            "reason": record.reason,
+            "error_bound_m": record.error_bound,
+            "collisions": collisions,
+            "outcomes": outcomes(record),
             "still_known": list(record.remains),
         }
-    )  # fmt: skip
+    )
 
 
 def outcomes(record: TruthRecord) -> list[dict]:
-    """How a simultaneous collision may end: the velocity (m/s) of each disk, and the collisions in one order that leads
-    there."""
+    """How a simultaneous collision may end: the velocity (m/s) of each disk, and the collisions in
+    one order that leads there."""
     return [
         {
-            "velocities_m_s": {str(int(i)): [vx, vy] for _, i, vx, vy in record.outcomes[record.outcomes[:, 0] == k]},
+            "velocities_m_s": {
+                str(int(i)): [vx, vy]
+                for _, i, vx, vy in record.outcomes[record.outcomes[:, 0] == k]
+            },
             "order": [[int(i), int(j)] for _, i, j in record.orders[record.orders[:, 0] == k]],
         }
         for k in sorted({*record.outcomes[:, 0]})
@@ -97,15 +115,23 @@ def outcomes(record: TruthRecord) -> list[dict]:
 def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
     """The record for people."""
     console = Console()
-    ends = f"{number(min(record.horizon, scenario.duration), 6)} s of {number(scenario.duration, 6)} s"
+    ends = (
+        f"{number(min(record.horizon, scenario.duration), 6)} s of {number(scenario.duration, 6)} s"
+    )
     lines = {
         "scenario": f"{scenario.name}: {scenario.asks}",
         "method": record.method,
         "precision": precision(record),
         "horizon": ends,
-        "ends because": record.reason or "it is asked for no longer" * (record.horizon >= scenario.duration),
-        "horizon of float64": f"up to {number(min(record.float64_horizon, record.horizon, scenario.duration), 6)} s",
-        "error bound": f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64",
+        "ends because": (
+            record.reason or "it is asked for no longer" * (record.horizon >= scenario.duration)
+        ),
+        "horizon of float64": (
+            f"up to {number(min(record.float64_horizon, record.horizon, scenario.duration), 6)} s"
+        ),
+        "error bound": (
+            f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64"
+        ),
         "still known": "\n".join(record.remains),
         "collisions": str(int((record.events[:, 3] != 0).sum())),
     }
@@ -124,7 +150,9 @@ def precision(record: TruthRecord) -> str:
     """What the record was computed with."""
     if record.bits == 53:
         return "float64"
-    return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (record.method == "two-precision")
+    return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (
+        record.method == "two-precision"
+    )
 
 
 def table_of_collisions(record: TruthRecord, every: bool) -> Table:
@@ -146,11 +174,18 @@ def table_of_outcomes(record: TruthRecord) -> Table:
     """All ends a simultaneous contact may have; none of them is the truth."""
     found = outcomes(record)
     table = Table(
-        "outcome", "velocities, m/s", "one order of collisions", title=f"{len(found)} outcomes; none is the truth"
+        "outcome",
+        "velocities, m/s",
+        "one order of collisions",
+        title=f"{len(found)} outcomes; none is the truth",
     )
     for k, end in enumerate(found, 1):
-        velocities = (f"{disk}: ({vx:.6g}, {vy:.6g})" for disk, (vx, vy) in end["velocities_m_s"].items())
-        table.add_row(str(k), "\n".join(velocities), ", ".join(f"{i} on {name(j)}" for i, j in end["order"]))
+        velocities = (
+            f"{disk}: ({vx:.6g}, {vy:.6g})" for disk, (vx, vy) in end["velocities_m_s"].items()
+        )
+        table.add_row(
+            str(k), "\n".join(velocities), ", ".join(f"{i} on {name(j)}" for i, j in end["order"])
+        )
     return table
 
 

@@ -1,4 +1,5 @@
-"""The metrics of collisions: restitution, and which collisions an engine found, missed, spurious, and how late.
+"""The metrics of collisions: restitution, and which collisions an engine found, missed, spurious,
+and how late.
 
 Each is a row of `METRICS` (metrics.py).
 """
@@ -14,7 +15,8 @@ from reports.compare.view import LEAST_SHARE, Value, View, not_judged
 
 
 def restitution(view: View) -> Value | None:
-    """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the samples."""
+    """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the
+    samples."""
     read = view.restitutions
     return _read(float(np.median(read.values)), read) if len(read.values) else _unread(read)
 
@@ -30,16 +32,19 @@ def restitution_error(view: View) -> Value | None:
 
 
 def collision_count_error(view: View) -> Value | None:
-    """Collisions of the engine less collisions of the other, whenever they come; pairs at rest from the start are not
-    counted."""
+    """Collisions of the engine less collisions of the other, whenever they come; pairs at rest from
+    the start are not counted."""
     resting = pair_keys(view.collisions[1])[view.collisions[1].impulse == 0]
-    counted = (by_pair(collisions, resting, view.end - SAME * view.dt) for collisions in view.collisions)
+    counted = (
+        by_pair(collisions, resting, view.end - SAME * view.dt) for collisions in view.collisions
+    )
     played, true = (len(collisions.t) for collisions in counted)
     return Value(played - true, note=f"{played} of {true}")
 
 
 def collisions_missed(view: View) -> Value | None:
-    """Collisions of the other, of those that a step can tell apart, that the engine does not have at their time."""
+    """Collisions of the other, of those that a step can tell apart, that the engine does not have
+    at their time."""
     if not view.collisions[1].t.size:
         return not_judged("no collision to miss")
     return _unjudged(view) or Value(len(view.matched.missed), note=_carried(view))
@@ -59,15 +64,24 @@ def first_wrong_collision_s(view: View) -> Value | None:
 
 
 def collision_delay_dt(view: View) -> Value | None:
-    """Median over the collisions of played time less true time, in dt; a collision is dated to the end of its step."""
+    """Median over the collisions of played time less true time, in dt; a collision is dated to the
+    end of its step."""
     delay = view.matched.delay
-    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} collisions") if len(delay) else None
+    return (
+        Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} collisions")
+        if len(delay)
+        else None
+    )
 
 
 def collision_delay_max_dt(view: View) -> Value | None:
     """Largest difference in time of any collision from the true one, in dt."""
     delay = view.matched.delay
-    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} collisions") if len(delay) else None
+    return (
+        Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} collisions")
+        if len(delay)
+        else None
+    )
 
 
 def _read(value: float, read: Restitutions) -> Value:
@@ -76,7 +90,11 @@ def _read(value: float, read: Restitutions) -> Value:
 
 def _unread(read: Restitutions) -> Value | None:
     """None where no collision could be read for other reasons than these."""
-    return not_judged(f"no collision read{_unread_ones(read)}") if read.below or read.unfinished else None
+    return (
+        not_judged(f"no collision read{_unread_ones(read)}")
+        if read.below or read.unfinished
+        else None
+    )
 
 
 def _unread_ones(read: Restitutions) -> str:
@@ -86,16 +104,17 @@ def _unread_ones(read: Restitutions) -> str:
 
 
 def _carried(view: View) -> str:
-    """Of how many of the other's collisions an engine can be reported that it has missed them (collisions.py:
-    `match`)."""
+    """Of how many of the other's collisions an engine can be reported that it has missed them
+    (collisions.py: `match`)."""
     return f"{view.matched.judged} of {len(view.collisions[1])} collisions judged"
 
 
 def _unjudged(view: View) -> Value | None:
-    """None where enough is judged, or where the other has no collision: then every collision of an engine is spurious.
+    """None where enough is judged, or where the other has no collision: then every collision of an
+    engine is spurious.
 
-    Where most collisions are too close together for a step, or lie on contacts that rest, most of what an engine
-    reports is excused: that it misses and invents nothing says nothing.
+    Where most collisions are too close together for a step, or lie on contacts that rest, most of
+    what an engine reports is excused: that it misses and invents nothing says nothing.
     """
     few = view.matched.judged < LEAST_SHARE * len(view.collisions[1])
     return not_judged(f"only {_carried(view)}") if few else None

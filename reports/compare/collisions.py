@@ -1,4 +1,5 @@
-"""Which collisions of the truth an engine found, which it missed, which are spurious, and how late it was."""
+"""Which collisions of the truth an engine found, which it missed, which are spurious, and how late
+it was."""
 
 from __future__ import annotations
 
@@ -12,9 +13,10 @@ from reports.compare.delays import WINDOW
 from reports.compare.faces import SAME
 from scenarios.model import Array, Collisions
 
-# Collisions and steps lie on one grid, and so do halves of the time between collisions. No bound is one of it, where
-# rounding would decide: all are roots of numbers that have none.
-CROWDED = 5**0.5  # dt; true collisions of a pair that are closer cannot be distinguished by any step
+# Collisions and steps lie on one grid, and so do halves of the time between collisions. No bound is
+# one of it, where rounding would decide: all are roots of numbers that have none.
+# dt; true collisions of a pair that are closer cannot be distinguished by any step
+CROWDED = 5**0.5
 FAR = 401**0.5  # dt; so late, or early, a match may always be
 ROUNDING = 1e-12  # of a sum of thousands of times
 HALF = 0.26**0.5  # of the time to the nearest other true collision: so late it may be too
@@ -52,15 +54,15 @@ def who(i: int, j: int) -> str:
 def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matched:
     """Match collisions pair by pair, in order, up to `end` s, for an engine with steps of `dt` s.
 
-    Where a pair has struck more often on one side, those collisions are left over whose absence brings the others
-    closest in time; the earlier if two are as close. A match is no match if it is further off than `HALF` the time to
-    the nearest other true collision of the pair (or to the start), and than `FAR` dt: then one collision is missed and
-    one spurious.
+    Where a pair has struck more often on one side, those collisions are left over whose absence
+    brings the others closest in time; the earlier if two are as close. A match is no match if it is
+    further off than `HALF` the time to the nearest other true collision of the pair (or to the
+    start), and than `FAR` dt: then one collision is missed and one spurious.
 
-    Three kinds of collisions are not judged: of a pair at rest against each other from the start (a true collision
-    without impulse), as what an engine reports there is weight; true collisions of a pair closer together than
-    `CROWDED` dt, as no step can tell them apart, with all that an engine makes of them; and collisions within `WINDOW`
-    dt of `end`, which may be cut off.
+    Three kinds of collisions are not judged: of a pair at rest against each other from the start (a
+    true collision without impulse), as what an engine reports there is weight; true collisions of a
+    pair closer together than `CROWDED` dt, as no step can tell them apart, with all that an engine
+    makes of them; and collisions within `WINDOW` dt of `end`, which may be cut off.
     """
     resting = pair_keys(true)[true.impulse == 0]
     mine, its = (by_pair(collisions, resting, end - SAME * dt) for collisions in (played, true))
@@ -71,13 +73,16 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
     return Matched(
         delay=mine.t[found] - its.t[partner[found]],
         missed=[(float(its.t[k]), int(its.i[k]), int(its.j[k])) for k in np.flatnonzero(lost)],
-        spurious=[(float(mine.t[k]), int(mine.i[k]), int(mine.j[k])) for k in np.flatnonzero(extra)],
+        spurious=[
+            (float(mine.t[k]), int(mine.i[k]), int(mine.j[k])) for k in np.flatnonzero(extra)
+        ],
         judged=int(judged),
     )
 
 
 class ByPair(NamedTuple):
-    """Collisions sorted by pair and then by time: one number that stands for the pair, the time in s, the pair."""
+    """Collisions sorted by pair and then by time: one number that stands for the pair, the time in
+    s, the pair."""
 
     key: np.ndarray
     t: Array
@@ -102,8 +107,8 @@ def by_pair(collisions: Collisions, resting: np.ndarray, end: float) -> ByPair:
 
 @njit(cache=True)
 def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no-untyped-def]
-    """Pair by pair: (partner of each played collision or -1, true collisions that are missed, played collisions that
-    are spurious, how many true collisions are judged)."""
+    """Pair by pair: (partner of each played collision or -1, true collisions that are missed,
+    played collisions that are spurious, how many true collisions are judged)."""
     judged = 0
     partner = np.full(len(played), -1)
     lost, extra = np.zeros(len(true), dtype=np.bool_), np.zeros(len(played), dtype=np.bool_)
@@ -146,7 +151,8 @@ def gap_to_nearest(t):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def among_crowded(t, times, gap, dt):  # type: ignore[no-untyped-def]
-    """Whether `t` is within `WINDOW` dt of one of `times` that no step of dt can tell from its neighbour."""
+    """Whether `t` is within `WINDOW` dt of one of `times` that no step of dt can tell from its
+    neighbour."""
     for k in range(len(times)):
         if gap[k] < CROWDED * dt and abs(times[k] - t) <= WINDOW * dt:
             return True
@@ -155,11 +161,12 @@ def among_crowded(t, times, gap, dt):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def closest_in_order(few, many, same):  # type: ignore[no-untyped-def]
-    """(len(few),) indices into `many`, increasing, with the least sum of |few - many[index]|; both sorted, in s.
+    """(len(few),) indices into `many`, increasing, with the least sum of |few - many[index]|; both
+    sorted, in s.
 
-    Of sums that differ by less than `same` s the one that skips later, as a collision between two true ones on one grid
-    may be as far from both. Dynamic programming over how many of `many` have been skipped so far, one row per element
-    of `few`.
+    Of sums that differ by less than `same` s the one that skips later, as a collision between two
+    true ones on one grid may be as far from both. Dynamic programming over how many of `many` have
+    been skipped so far, one row per element of `few`.
     """
     spare = len(many) - len(few)
     cost = np.zeros(spare + 1)

@@ -19,8 +19,18 @@ from scenarios.model import Collisions, Scenario, Trajectory
 from scenarios.no_truth import NoTruth
 
 COLUMNS = (
-    "scenario", "engine", "profile", "dt_s", "metric", "disk", "value", "unit", "versus", "at_s", "note",
-)  # fmt: skip
+    "scenario",
+    "engine",
+    "profile",
+    "dt_s",
+    "metric",
+    "disk",
+    "value",
+    "unit",
+    "versus",
+    "at_s",
+    "note",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +51,8 @@ class Comparison:
 
     @property
     def middle_dt(self) -> float:
-        """s, the step size in the middle of the ladder: where a scenario is read when one must be chosen."""
+        """s, the step size in the middle of the ladder: where a scenario is read when one must be
+        chosen."""
         return self.scenario.dt(self.scenario.substeps[len(self.scenario.substeps) // 2])
 
     @property
@@ -51,13 +62,17 @@ class Comparison:
 
 
 def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
-    """Every metric of every run against the laws, the truth and every other engine at the same dt."""
+    """Every metric of every run against the laws, the truth and every other engine at the same
+    dt."""
     scenario, truth = answered(scenario)
     jumps = None if truth is None else jumps_of(truth, scenario)
     rows: list[tuple] = []
     for run in runs:
-        if run.status != "ok":  # what it played before it failed is kept in its file, but earns no score
-            rows.append(_row(run, "status", Value(np.nan, note=f"{run.status}: {run.reason}"), "", "itself"))
+        # what it played before it failed is kept in its file, but earns no score
+        if run.status != "ok":
+            rows.append(
+                _row(run, "status", Value(np.nan, note=f"{run.status}: {run.reason}"), "", "itself")
+            )
             continue
         for versus, other in _opponents(run, runs, truth):
             rows += _measure(scenario, run, versus, other, jumps if versus == "truth" else None)
@@ -74,8 +89,11 @@ def answered(scenario: Scenario) -> tuple[Scenario, Trajectory | None]:
         return replace(scenario, truth=None, without_truth=str(refusal)), None
 
 
-def _opponents(run: Run, runs: Sequence[Run], truth: Trajectory | None) -> Iterator[tuple[str, Trajectory | None]]:
-    """What a run is set against: the laws, the truth, and each engine that stands after it in the list."""
+def _opponents(
+    run: Run, runs: Sequence[Run], truth: Trajectory | None
+) -> Iterator[tuple[str, Trajectory | None]]:
+    """What a run is set against: the laws, the truth, and each engine that stands after it in the
+    list."""
     yield "itself", None
     if truth is not None:
         yield "truth", truth
@@ -84,17 +102,36 @@ def _opponents(run: Run, runs: Sequence[Run], truth: Trajectory | None) -> Itera
             yield other.name, other.trajectory
 
 
-def _measure(scenario: Scenario, run: Run, versus: str, other: Trajectory | None, jumps: Jumps | None) -> list[tuple]:
+def _measure(
+    scenario: Scenario, run: Run, versus: str, other: Trajectory | None, jumps: Jumps | None
+) -> list[tuple]:
     assert run.trajectory is not None
     kind = versus if versus in ("itself", "truth") else "engine"
     k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
-    rounding = ENGINES[run.name].rounding if run.name in ENGINES else FLOAT64  # a solver's file keeps float64
-    view = View(scenario, run.dt, cut(run.trajectory, k), None if other is None else cut(other, k), jumps, rounding)
+    # a solver's file keeps float64
+    rounding = ENGINES[run.name].rounding if run.name in ENGINES else FLOAT64
+    view = View(
+        scenario,
+        run.dt,
+        cut(run.trajectory, k),
+        None if other is None else cut(other, k),
+        jumps,
+        rounding,
+    )
     rows = []
-    with np.errstate(over="ignore", invalid="ignore"):  # what was thrown far enough overflows; the value says so
+    # what was thrown far enough overflows; the value says so
+    with np.errstate(over="ignore", invalid="ignore"):
         for name, metric in METRICS.items():
             if kind in metric.against and (value := metric.of(view)) is not None:
-                rows.append(_row(run, name, value if k > 1 else not_judged("the start alone"), metric.unit, versus))
+                rows.append(
+                    _row(
+                        run,
+                        name,
+                        value if k > 1 else not_judged("the start alone"),
+                        metric.unit,
+                        versus,
+                    )
+                )
     return rows
 
 
@@ -104,11 +141,15 @@ def cut(trajectory: Trajectory, k: int) -> Trajectory:
         return trajectory
     names = ("t", "position", "velocity", "angle", "angular_velocity")
     collisions = trajectory.collisions
-    # Steps, and so collisions, lie on the grid of the samples: a collision at the last of them is kept, however it
-    # rounds.
+    # Steps, and so collisions, lie on the grid of the samples: a collision at the last of them is
+    # kept, however it rounds.
     early = collisions.t <= trajectory.t[k - 1] + SAME * interval(trajectory)
-    kept = Collisions(collisions.t[early], collisions.i[early], collisions.j[early], collisions.impulse[early])
-    return replace(trajectory, **{name: getattr(trajectory, name)[:k] for name in names}, collisions=kept)
+    kept = Collisions(
+        collisions.t[early], collisions.i[early], collisions.j[early], collisions.impulse[early]
+    )
+    return replace(
+        trajectory, **{name: getattr(trajectory, name)[:k] for name in names}, collisions=kept
+    )
 
 
 def _row(run: Run, metric: str, value: Value, unit: str, versus: str) -> tuple:

@@ -1,8 +1,10 @@
-"""The truth within the detection delay: what an engine is held to that finds every collision, a little late or early.
+"""The truth within the detection delay: what an engine is held to that finds every collision, a
+little late or early.
 
-An engine that steps finds a collision at the end of a step: for as long its velocities are those before it when the
-truth's are those after. This delay is measured by itself (`collision_delay_dt`) and costs nothing here. All else does,
-at every sample: gravity and thrust act on what an engine is held to as on the truth at that instant.
+An engine that steps finds a collision at the end of a step: for as long its velocities are those
+before it when the truth's are those after. This delay is measured by itself (`collision_delay_dt`)
+and costs nothing here. All else does, at every sample: gravity and thrust act on what an engine is
+held to as on the truth at that instant.
 """
 
 from __future__ import annotations
@@ -17,17 +19,21 @@ from reports.compare.faces import SAME
 from scenarios.model import Array, Scenario, Scene, Trajectory
 
 WINDOW = 10**0.5
-"""dt by which a collision may be late or early: three steps. Irrational, as collisions and samples often lie on one
-grid with the steps: no multiple of dt, nor of a fraction of it, lies on the edge, where rounding would decide."""
-SWEEPS = 100  # of `distance_to_range`; where all impulses lie along two axes, as in a box, one is exact
+"""dt by which a collision may be late or early: three steps. Irrational, as collisions and samples
+often lie on one grid with the steps: no multiple of dt, nor of a fraction of it, lies on the edge,
+where rounding would decide."""
+# of `distance_to_range`; where all impulses lie along two axes, as in a box, one is exact
+SWEEPS = 100
 
 
 class Jumps(NamedTuple):
-    """What the h collisions of a truth change, in order of time; those that change nothing are left out.
+    """What the h collisions of a truth change, in order of time; those that change nothing are left
+    out.
 
     Attributes:
         t: (h,) s.
-        impulse: (h, 2) N s on all disks together: of walls and static disks; between two others nothing.
+        impulse: (h, 2) N s on all disks together: of walls and static disks; between two others
+            nothing.
         energy: (h,) J that is lost.
         limits: (n + 1,) where the rows of each disk stand in the next two.
         when: (d,) s, disk by disk, in order of time.
@@ -46,8 +52,9 @@ class Jumps(NamedTuple):
 def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
     """The jumps of the truth of a scenario, which is asked where the disks are when they collide.
 
-    The impulse acts along the normal; at restitution e an impulse J between two disks of the reduced mass m takes
-    J2 (1 - e) / (1 + e) / 2 m from the energy (J = (1 + e) m v, and m v2 (1 - e2) / 2; any textbook of mechanics).
+    The impulse acts along the normal; at restitution e an impulse J between two disks of the
+    reduced mass m takes J2 (1 - e) / (1 + e) / 2 m from the energy (J = (1 + e) m v, and m v2 (1 -
+    e2) / 2; any textbook of mechanics).
     """
     assert scenario.truth is not None
     scene, collisions = scenario.scene, truth.collisions
@@ -55,7 +62,9 @@ def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
     at = scenario.truth(collisions.t) if len(collisions) else truth
     rows: list[tuple[float, ...]] = []
     disks: list[tuple[float, ...]] = []
-    for x, t, i, j, size in zip(at.position, collisions.t, collisions.i, collisions.j, collisions.impulse):
+    for x, t, i, j, size in zip(
+        at.position, collisions.t, collisions.i, collisions.j, collisions.impulse
+    ):
         if not size:  # a contact at rest
             continue
         other = x[j] if j >= 0 else laws.nearest_on_segment(x[i : i + 1], *scene.walls[-1 - j])[0]
@@ -73,15 +82,20 @@ def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
 
 
 def nearest_velocity(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: float) -> Array:
-    """(k, n, 2) m/s: of the velocities that each disk has in the truth within `WINDOW` dt of a sample, the nearest.
+    """(k, n, 2) m/s: of the velocities that each disk has in the truth within `WINDOW` dt of a
+    sample, the nearest.
 
-    They are the truth's at that instant, less the disk's own collisions just before, one after the other, or with
-    those just after. Of two at one instant either may come first. A disk that lay on a floor when it was struck counts
-    before that as falling, not as carried: it may read g `WINDOW` dt too much. Of a collision at the instant of a
-    sample the truth has the velocity before it or that after it, as its numbers round: both are tried.
+    They are the truth's at that instant, less the disk's own collisions just before, one after the
+    other, or with those just after. Of two at one instant either may come first. A disk that lay on
+    a floor when it was struck counts before that as falling, not as carried: it may read g `WINDOW`
+    dt too much. Of a collision at the instant of a sample the truth has the velocity before it or
+    that after it, as its numbers
+    round: both are tried.
     """
     window = WINDOW * dt
-    return nearest(played.t, played.velocity, truth.velocity, jumps.limits, jumps.when, jumps.change, window)
+    return nearest(
+        played.t, played.velocity, truth.velocity, jumps.limits, jumps.when, jumps.change, window
+    )
 
 
 @njit(cache=True)
@@ -102,12 +116,14 @@ def nearest(t, played, true, limits, when, change, window):  # type: ignore[no-u
                 last += 1
             least = np.hypot(true[k, i, 0] - played[k, i, 0], true[k, i, 1] - played[k, i, 1])
             for start in range(past, now + 1):
-                for way in (-1, 1):  # undo those up to now, the latest first; do those to come, the next first
+                # undo those up to now, the latest first; do those to come, the next first
+                for way in (-1, 1):
                     v = true[k, i].copy()
                     stop = first - 1 if way < 0 else last
                     for h in range(start - 1 if way < 0 else start, stop, way):
                         beside = h + way != stop and abs(when[h + way] - when[h]) < SAME * window
-                        for turn in range(1 - beside, 2):  # of two at one instant the second only, then the first
+                        # of two at one instant the second only, then the first
+                        for turn in range(1 - beside, 2):
                             u = v + way * change[h + way if turn == 0 else h]
                             off = np.hypot(u[0] - played[k, i, 0], u[1] - played[k, i, 1])
                             if off < least:
@@ -117,24 +133,30 @@ def nearest(t, played, true, limits, when, change, window):  # type: ignore[no-u
     return found
 
 
-def momentum_outside(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: float, scene: Scene) -> Array:
-    """(k,) kg m/s of the played momentum from the range of the truth's within `WINDOW` dt of a sample.
+def momentum_outside(
+    played: Trajectory, truth: Trajectory, jumps: Jumps, dt: float, scene: Scene
+) -> Array:
+    """(k,) kg m/s of the played momentum from the range of the truth's within `WINDOW` dt of a
+    sample.
 
-    The range: the truth's at that instant, less any part of each impulse from outside just before, and with any part
-    of each just after.
+    The range: the truth's at that instant, less any part of each impulse from outside just before,
+    and with any part of each just after.
     """
     apart = laws.momentum(played, scene) - laws.momentum(truth, scene)
     first, past, now, last = windows(played, jumps, dt)
     off = laws.lengths(apart)
     for k in np.flatnonzero(first < last):
-        impulses = np.concatenate([-jumps.impulse[first[k] : now[k]], jumps.impulse[past[k] : last[k]]])
+        impulses = np.concatenate(
+            [-jumps.impulse[first[k] : now[k]], jumps.impulse[past[k] : last[k]]]
+        )
         off[k] = distance_to_range(apart[k], impulses)
     return off
 
 
 @njit(cache=True)
 def distance_to_range(point, parts):  # type: ignore[no-untyped-def]
-    """From a point (2,) to the nearest sum of shares, 0 to 1, of `parts` (m, 2), found one share after the other."""
+    """From a point (2,) to the nearest sum of shares, 0 to 1, of `parts` (m, 2), found one share
+    after the other."""
     rest, shares = point.copy(), np.zeros(len(parts))
     for _ in range(SWEEPS):
         moved = False
@@ -151,10 +173,14 @@ def distance_to_range(point, parts):  # type: ignore[no-untyped-def]
     return np.hypot(rest[0], rest[1])
 
 
-def energy_range(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: float, scene: Scene) -> tuple[Array, Array]:
-    """(k,) J, the least and the largest energy that collisions within `WINDOW` dt of a sample, late or early, explain.
+def energy_range(
+    played: Trajectory, truth: Trajectory, jumps: Jumps, dt: float, scene: Scene
+) -> tuple[Array, Array]:
+    """(k,) J, the least and the largest energy that collisions within `WINDOW` dt of a sample, late
+    or early, explain.
 
-    The truth's at that instant, less what those just after take; and with what those just before have taken.
+    The truth's at that instant, less what those just after take; and with what those just before
+    have taken.
     """
     true, (first, past, now, last) = laws.energy(truth, scene), windows(played, jumps, dt)
     lost = np.concatenate([[0.0], np.cumsum(jumps.energy)])
@@ -162,11 +188,16 @@ def energy_range(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: float,
 
 
 def windows(played: Trajectory, jumps: Jumps, dt: float) -> tuple[np.ndarray, ...]:
-    """(k,) indices of collisions: the first within `WINDOW` dt of a sample, the first not before it, the first after
-    it, the first beyond."""
+    """(k,) indices of collisions: the first within `WINDOW` dt of a sample, the first not before
+    it, the first after it, the first beyond."""
     t, window = played.t, WINDOW * dt
     not_before, after = (np.searchsorted(jumps.t, t + shift * SAME * window) for shift in (-1, 1))
-    return np.searchsorted(jumps.t, t - window), not_before, after, np.searchsorted(jumps.t, t + window)
+    return (
+        np.searchsorted(jumps.t, t - window),
+        not_before,
+        after,
+        np.searchsorted(jumps.t, t + window),
+    )
 
 
 @laws.once

@@ -1,4 +1,5 @@
-"""Collisions by what a disk can tell apart: walls along one line are one, however many segments they are made of."""
+"""Collisions by what a disk can tell apart: walls along one line are one, however many segments
+they are made of."""
 
 from __future__ import annotations
 
@@ -10,11 +11,11 @@ from reports.compare import laws
 from scenarios.model import Array, Collisions, Scene, Trajectory, frozen
 
 ALONG = 1e-12
-"""Of the largest coordinate: an end of a wall that is no further from the line of another lies on it. A few thousand
-roundings: a wall that is cut in two at any point of it stays on its line."""
+"""Of the largest coordinate: an end of a wall that is no further from the line of another lies on
+it. A few thousand roundings: a wall that is cut in two at any point of it stays on its line."""
 SAME = 1e-9
-"""Of a sample interval, or a step: what is closer in time is at one instant, but for rounding of the grid of samples
-and steps."""
+"""Of a sample interval, or a step: what is closer in time is at one instant, but for rounding of
+the grid of samples and steps."""
 
 
 def first_on_line(walls: Array, one: int) -> int:
@@ -26,12 +27,16 @@ def first_on_line(walls: Array, one: int) -> int:
 
 @laws.once
 def on_faces(trajectory: Trajectory, scene: Scene) -> Collisions:
-    """The collisions of a trajectory, each wall named by the first on its line; of those of a pair at one instant one.
+    """The collisions of a trajectory, each wall named by the first on its line; of those of a pair
+    at one instant one.
 
-    So a floor of one segment, of two end to end, or of two on top of each other gives the same pairs.
+    So a floor of one segment, of two end to end, or of two on top of each other gives the same
+    pairs.
     """
     collisions, walls = trajectory.collisions, np.unique(trajectory.collisions.j)
-    firsts = np.array([-1 - first_on_line(scene.walls, -1 - j) if j < 0 else j for j in walls], np.int64)
+    firsts = np.array(
+        [-1 - first_on_line(scene.walls, -1 - j) if j < 0 else j for j in walls], np.int64
+    )
     if np.array_equal(firsts, walls):
         return collisions
     j = firsts[np.searchsorted(walls, collisions.j)]
@@ -42,7 +47,9 @@ def on_faces(trajectory: Trajectory, scene: Scene) -> Collisions:
     kept[order[1:][again]] = False
     columns = {"t": collisions.t[kept], "impulse": collisions.impulse[kept]}
     whole = {"i": frozen(collisions.i[kept], np.int64), "j": frozen(j[kept], np.int64)}
-    return replace(collisions, **{name: frozen(column) for name, column in columns.items()}, **whole)
+    return replace(
+        collisions, **{name: frozen(column) for name, column in columns.items()}, **whole
+    )
 
 
 def interval(trajectory: Trajectory) -> float:

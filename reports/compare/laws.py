@@ -18,9 +18,11 @@ Law = TypeVar("Law", bound=Callable[..., Any])
 
 
 def once(law: Law) -> Law:
-    """The law, worked out once for the same objects (or equal floats) and forgotten with the first of them.
+    """The law, worked out once for the same objects (or equal floats) and forgotten with the first
+    of them.
 
-    A run is set against each other engine at its dt: without this its energy would be added up some forty times.
+    A run is set against each other engine at its dt: without this its energy would be added up some
+    forty times.
     """
     known: WeakKeyDictionary[Any, dict[tuple[float, ...], tuple[Any, Any]]] = WeakKeyDictionary()
 
@@ -77,7 +79,8 @@ def centre(scene: Scene) -> Array:
 
 
 def angular_momentum(trajectory: Trajectory, scene: Scene) -> Array:
-    """(k,) kg m2/s about the centre of mass of the scene, where it is at the start: sum of m x cross v + I w."""
+    """(k,) kg m2/s about the centre of mass of the scene, where it is at the start: sum of m x
+    cross v + I w."""
     orbital = cross(trajectory.position - centre(scene), trajectory.velocity) @ moving_mass(scene)
     return orbital + trajectory.angular_velocity @ moving_inertia(scene)
 
@@ -92,11 +95,14 @@ def kinetic_energy(trajectory: Trajectory, scene: Scene) -> Array:
 @once
 def energy(trajectory: Trajectory, scene: Scene) -> Array:
     """(k,) J: kinetic energy less sum of m g.x (zero at the origin)."""
-    return kinetic_energy(trajectory, scene) - (trajectory.position @ scene.gravity) @ moving_mass(scene)
+    return kinetic_energy(trajectory, scene) - (trajectory.position @ scene.gravity) @ moving_mass(
+        scene
+    )
 
 
 def penetration(trajectory: Trajectory, scene: Scene) -> Array:
-    """(k,) largest overlap of two disks, or of a disk and a wall, in radii of the smaller disk; 0 without overlap."""
+    """(k,) largest overlap of two disks, or of a disk and a wall, in radii of the smaller disk; 0
+    without overlap."""
     x, r = trajectory.position, scene.radius
     worst = np.zeros(len(trajectory))
     for i in range(scene.n):
@@ -123,7 +129,8 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
 
 
 def through_walls(trajectory: Trajectory, scene: Scene) -> np.ndarray:
-    """(n,) True for disks whose centre has crossed a wall between two samples, on a straight line."""
+    """(n,) True for disks whose centre has crossed a wall between two samples, on a straight
+    line."""
     through = np.zeros(scene.n, dtype=bool)
     start, end = trajectory.position[:-1], trajectory.position[1:]
     for a, b in scene.walls:
@@ -139,7 +146,8 @@ def cross(u: Array, v: Array) -> Array:
 
 
 def deviation(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
-    """(k, n) m between the positions in the samples both have; across the nearer edge where the scene wraps."""
+    """(k, n) m between the positions in the samples both have; across the nearer edge where the
+    scene wraps."""
     return lengths(difference(a, b, scene))
 
 
@@ -158,5 +166,6 @@ def nearer_way(way: Array, scene: Scene) -> Array:
 
 
 def lengths(vectors: Array) -> Array:
-    """(...) of (..., 2) vectors: the bits of `np.linalg.norm` over the last axis, in a quarter of its time."""
+    """(...) of (..., 2) vectors: the bits of `np.linalg.norm` over the last axis, in a quarter of
+    its time."""
     return np.sqrt(vectors[..., 0] ** 2 + vectors[..., 1] ** 2)

@@ -1,6 +1,7 @@
 """Every number of the report: a function, what it means, its unit, and what it is measured against.
 
-To add one: write `def name(view) -> Value | None` and its row in `METRICS`. None: it does not apply here.
+To add one: write `def name(view) -> Value | None` and its row in `METRICS`. None: it does not apply
+here.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ Measure = Callable[[View], Value | None]
 
 
 def over_judged(measure: Measure) -> Measure:
-    """The metric, that says how many samples carry it, and nothing where they are too few (view.py: LEAST_SHARE)."""
+    """The metric, that says how many samples carry it, and nothing where they are too few (view.py:
+    LEAST_SHARE)."""
 
     @wraps(measure)
     def carried(view: View) -> Value | None:
@@ -35,47 +37,61 @@ def over_judged(measure: Measure) -> Measure:
 
 
 def momentum_error(view: View) -> Value | None:
-    """Largest |P(t) - P(0) - impulse from outside|, where that is known, over all m|v| that flight can bring."""
+    """Largest |P(t) - P(0) - impulse from outside|, where that is known, over all m|v| that flight
+    can bring."""
     return _largest(violations.momentum(view), view)
 
 
 def angular_momentum_error(view: View) -> Value | None:
-    """Largest |L(t) - L(0) - outer angular impulse|, about the scene's centre of mass, over all m|x||v| + I|w|."""
+    """Largest |L(t) - L(0) - outer angular impulse|, about the scene's centre of mass, over all
+    m|x||v| + I|w|."""
     return _largest(violations.angular_momentum(view), view)
 
 
 @over_judged
 def energy_error(view: View) -> Value | None:
-    """Largest |E(t) - E(0)| at e = 1, else distance from the truth's range within three steps; over that at hand."""
+    """Largest |E(t) - E(0)| at e = 1, else distance from the truth's range within three steps; over
+    that at hand."""
     return _largest(violations.energy(view), view)
 
 
 def energy_created(view: View) -> Value | None:
-    """Largest rise of the energy above an earlier sample, over the energy at hand; no collision can give any."""
+    """Largest rise of the energy above an earlier sample, over the energy at hand; no collision can
+    give any."""
     return _largest(violations.energy_rise(view), view)
 
 
 @over_judged
 def energy_deviation(view: View) -> Value | None:
-    """Root mean square distance of the energy from the truth's range within three steps, over the energy at hand.
+    """Root mean square distance of the energy from the truth's range within three steps, over the
+    energy at hand.
 
-    Beside an engine: difference of the energies of all disks that are away from their collisions in both (view.py).
+    Beside an engine: difference of the energies of all disks that are away from their collisions in
+    both (view.py).
     """
-    return Value(_rms(view.energy_deviation[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0))
+    return Value(
+        _rms(view.energy_deviation[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0)
+    )
 
 
 @over_judged
 def momentum_deviation(view: View) -> Value | None:
-    """Root mean square distance of the momentum from the truth's range within three steps, over the sum of m|v|.
+    """Root mean square distance of the momentum from the truth's range within three steps, over the
+    sum of m|v|.
 
-    Beside an engine: distance of the momenta of all disks that are away from their collisions in both (view.py).
+    Beside an engine: distance of the momenta of all disks that are away from their collisions in
+    both (view.py).
     """
-    return Value(_rms(view.momentum_deviation[view.judged.any(axis=1)]) / (scales.momentum(view.scenario) or 1.0))
+    return Value(
+        _rms(view.momentum_deviation[view.judged.any(axis=1)])
+        / (scales.momentum(view.scenario) or 1.0)
+    )
 
 
 @over_judged
 def energy_loss_error(view: View) -> Value | None:
-    """Energy lost by the last judged sample, less what the truth loses by three steps around it; over that at hand."""
+    """Energy lost by the last judged sample, less what the truth loses by three steps around it;
+    over that at hand."""
     scenario = view.scenario
     if violations.keeps_energy(scenario) or scenario.thrusts or violations.lifts(scenario):
         return None
@@ -83,11 +99,21 @@ def energy_loss_error(view: View) -> Value | None:
         return None
     if not view.judged.any():
         return Value(np.nan)
-    last, scale = int(np.flatnonzero(view.judged.any(axis=1))[-1]), scales.energy(scenario, view.other) or 1.0
+    last, scale = (
+        int(np.flatnonzero(view.judged.any(axis=1))[-1]),
+        scales.energy(scenario, view.other) or 1.0,
+    )
     low, high = view.energy_range
     start = laws.energy(view.played, scenario.scene)[0] - laws.energy(view.other, scenario.scene)[0]
-    excess, width = float(start - view.energy_deviation[last]) / scale, (high[last] - low[last]) / scale
-    return Value(excess, at=float(view.played.t[last]), note=f"the delay explains {width:.2g}" if width else "")
+    excess, width = (
+        float(start - view.energy_deviation[last]) / scale,
+        (high[last] - low[last]) / scale,
+    )
+    return Value(
+        excess,
+        at=float(view.played.t[last]),
+        note=f"the delay explains {width:.2g}" if width else "",
+    )
 
 
 def penetration_radii(view: View) -> Value | None:
@@ -98,7 +124,8 @@ def penetration_radii(view: View) -> Value | None:
 
 
 def disks_through_walls(view: View) -> Value | None:
-    """Disks whose centre has crossed a wall: they are where no collision can bring them back from."""
+    """Disks whose centre has crossed a wall: they are where no collision can bring them back
+    from."""
     if not len(view.scenario.scene.walls):
         return None
     through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))
@@ -121,7 +148,8 @@ def position_max(view: View) -> Value | None:
 
 
 def position_max_radii(view: View) -> Value | None:
-    """Largest distance of any disk in any sample, in radii of that disk; over an edge of the wrap if that is nearer."""
+    """Largest distance of any disk in any sample, in radii of that disk; over an edge of the wrap
+    if that is nearer."""
     return _largest_of_disks(view.deviation / view.scenario.scene.radius, view)
 
 
@@ -133,16 +161,19 @@ def velocity_rms(view: View) -> Value | None:
 
 @over_judged
 def velocity_max(view: View) -> Value | None:
-    """Largest difference of a disk's velocity from the nearest that it has in the truth within three steps.
+    """Largest difference of a disk's velocity from the nearest that it has in the truth within
+    three steps.
 
-    Beside an engine: from the other's, where the disk has no collision within three steps in either (view.py).
+    Beside an engine: from the other's, where the disk has no collision within three steps in either
+    (view.py).
     """
     return _largest_of_disks(np.where(view.judged, view.velocity_deviation, 0.0), view)
 
 
 @over_judged
 def angular_velocity_max(view: View) -> Value | None:
-    """Largest difference of angular velocity of any disk in any sample that `velocity_max` is judged in."""
+    """Largest difference of angular velocity of any disk in any sample that `velocity_max` is
+    judged in."""
     return _largest_of_disks(np.where(view.judged, view.angular_velocity_deviation, 0.0), view)
 
 
@@ -157,7 +188,8 @@ def angle_max(view: View) -> Value | None:
 
 
 def time_to_1pct_s(view: View) -> Value | None:
-    """First sample at which some disk is off by more than 1 % of its radius; `inf` if none ever is."""
+    """First sample at which some disk is off by more than 1 % of its radius; `inf` if none ever
+    is."""
     off = view.deviation / view.scenario.scene.radius > 0.01
     if not off.any():
         return Value(np.inf, note=f"never within {view.played.t[-1]:g} s")
@@ -190,7 +222,8 @@ class Metric:
     Attributes:
         of: the function.
         unit: of the value, "1" for a ratio.
-        against: what it is measured against: "itself" (laws of physics and the start), "truth", "engine".
+        against: what it is measured against: "itself" (laws of physics and the start), "truth",
+            "engine".
         better: "lower", "higher", "zero" or "as stated" (the best value).
     """
 
@@ -228,10 +261,14 @@ METRICS: dict[str, Metric] = {
     "restitution_error": Metric(collisions.restitution_error, "1", (ITSELF,)),
     "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,)),
     "disks_through_walls": Metric(disks_through_walls, "disks", (ITSELF,)),
-    "collision_count_error": Metric(collisions.collision_count_error, "collisions", (TRUTH, ENGINE), "zero"),
+    "collision_count_error": Metric(
+        collisions.collision_count_error, "collisions", (TRUTH, ENGINE), "zero"
+    ),
     "collisions_missed": Metric(collisions.collisions_missed, "collisions", (TRUTH, ENGINE)),
     "collisions_spurious": Metric(collisions.collisions_spurious, "collisions", (TRUTH, ENGINE)),
-    "first_wrong_collision_s": Metric(collisions.first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"),
+    "first_wrong_collision_s": Metric(
+        collisions.first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"
+    ),
     "collision_delay_dt": Metric(collisions.collision_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
     "collision_delay_max_dt": Metric(collisions.collision_delay_max_dt, "dt", (TRUTH, ENGINE)),
 }

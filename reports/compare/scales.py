@@ -1,4 +1,5 @@
-"""What errors of momentum and energy are relative to: what a scenario has at hand, before anybody has played it.
+"""What errors of momentum and energy are relative to: what a scenario has at hand, before anybody
+has played it.
 
 Not taken from what was played: an explosion must not make itself look small.
 """
@@ -18,7 +19,8 @@ def momentum(scenario: Scenario) -> float:
 
 
 def angular_momentum(scenario: Scenario) -> float:
-    """kg m2/s about the centre of mass: sum of m |x||v| + I |w|, each as far and as fast as flight can bring it."""
+    """kg m2/s about the centre of mass: sum of m |x||v| + I |w|, each as far and as fast as flight
+    can bring it."""
     scene, t = scenario.scene, scenario.duration
     reach = laws.lengths(scene.position - laws.centre(scene)) + top_speed(scenario) * t
     spin = np.abs(scene.angular_velocity) @ laws.moving_inertia(scene)
@@ -27,9 +29,11 @@ def angular_momentum(scenario: Scenario) -> float:
 
 @laws.once
 def energy(scenario: Scenario, truth: Trajectory | None = None) -> float:
-    """J: the energy at hand: kinetic, and what each disk can gain by falling, and by one radius further.
+    """J: the energy at hand: kinetic, and what each disk can gain by falling, and by one radius
+    further.
 
-    The largest in the truth where that is given; else what the start has, down to the lowest wall or disk.
+    The largest in the truth where that is given; else what the start has, down to the lowest wall
+    or disk.
     """
     scene = scenario.scene
     g, m = float(np.linalg.norm(scene.gravity)), laws.moving_mass(scene)
@@ -51,7 +55,9 @@ def energy(scenario: Scenario, truth: Trajectory | None = None) -> float:
 def top_speed(scenario: Scenario) -> Array:
     """(n,) m/s, of each disk in free flight under gravity and its thrusts, all along one line."""
     scene = scenario.scene
-    speed = np.linalg.norm(scene.velocity, axis=1) + np.linalg.norm(scene.gravity) * scenario.duration
+    speed = (
+        np.linalg.norm(scene.velocity, axis=1) + np.linalg.norm(scene.gravity) * scenario.duration
+    )
     for thrust in scenario.thrusts:
         burns = min(thrust.stop, scenario.duration) - min(thrust.start, scenario.duration)
         speed[thrust.disk] += np.linalg.norm(thrust.force) * burns / scene.mass[thrust.disk]

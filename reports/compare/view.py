@@ -11,17 +11,27 @@ import numpy as np
 from adapters.engine import FLOAT64
 from reports.compare import laws
 from reports.compare.collisions import Matched, match
-from reports.compare.delays import WINDOW, Jumps, collision_free, energy_range, momentum_outside, nearest_velocity
+from reports.compare.delays import (
+    WINDOW,
+    Jumps,
+    collision_free,
+    energy_range,
+    momentum_outside,
+    nearest_velocity,
+)
 from reports.compare.faces import on_faces
 from reports.compare.restitution import Restitutions, effective_restitution
 from scenarios.model import Array, Collisions, Scenario, Trajectory
 
-SLOWEST = 401**0.5  # sample intervals of falling; irrational, as of a threshold that speeds may be equal to
+# sample intervals of falling; irrational, as of a threshold that speeds may be equal to
+SLOWEST = 401**0.5
 LEAST_SHARE = 0.1
-"""Of the samples after the start, or of the true collisions, that must carry a number for it to be judged by. An engine
-errs in collisions: what is left of a run in less than a tenth of its samples is mostly the flight before the first of
-them, where nobody errs; and those of the collisions that a step can tell apart are the easiest."""
-NOT_JUDGED = "not judged"  # how the note of a number begins that too little carries; its value is NaN
+"""Of the samples after the start, or of the true collisions, that must carry a number for it to be
+judged by. An engine errs in collisions: what is left of a run in less than a tenth of its samples
+is mostly the flight before the first of them, where nobody errs; and those of the collisions that a
+step can tell apart are the easiest."""
+# how the note of a number begins that too little carries; its value is NaN
+NOT_JUDGED = "not judged"
 
 
 class Value(NamedTuple):
@@ -66,11 +76,12 @@ class View:
 
     @cached_property
     def judged(self) -> np.ndarray:
-        """(k, n) where the velocity of a disk is compared; never at the start, which is given to all.
+        """(k, n) where the velocity of a disk is compared; never at the start, which is given to
+        all.
 
-        With the truth: everywhere but within `WINDOW` dt of its end, as of a collision after it nobody knows that may
-        come early. With an engine, where nobody knows who is late: where neither has a collision of that disk within
-        `WINDOW` dt.
+        With the truth: everywhere but within `WINDOW` dt of its end, as of a collision after it
+        nobody knows that may come early. With an engine, where nobody knows who is late: where
+        neither has a collision of that disk within `WINDOW` dt.
         """
         assert self.other is not None
         played, moving = self.played, ~self.scenario.scene.static
@@ -93,11 +104,15 @@ class View:
         samples = len(self.played) - 1
         if self.jumps is not None:
             return f"{self.judged.any(axis=1).sum()} of {samples} samples"
-        return f"{self.judged.sum()} of {samples * (~self.scenario.scene.static).sum()} samples of a disk"
+        return (
+            f"{self.judged.sum()} of {samples * (~self.scenario.scene.static).sum()} samples of a"
+            " disk"
+        )
 
     @cached_property
     def velocity_deviation(self) -> Array:
-        """(k, n) m/s between the two, of the truth within the detection delay; nan where it is not judged."""
+        """(k, n) m/s between the two, of the truth within the detection delay; nan where it is not
+        judged."""
         assert self.other is not None
         expected = self.other.velocity
         if self.jumps is not None:
@@ -106,19 +121,23 @@ class View:
 
     @cached_property
     def angular_velocity_deviation(self) -> Array:
-        """(k, n) rad/s between the two; no collision changes a spin, so that none is late or early."""
+        """(k, n) rad/s between the two; no collision changes a spin, so that none is late or
+        early."""
         assert self.other is not None
         return np.abs(self.played.angular_velocity - self.other.angular_velocity)
 
     @cached_property
     def momentum_deviation(self) -> Array:
-        """(k,) kg m/s between the momenta of the two, of the truth within the detection delay; nan if not judged.
+        """(k,) kg m/s between the momenta of the two, of the truth within the detection delay; nan
+        if not judged.
 
         Beside an engine only those of the disks that are judged are added up.
         """
         assert self.other is not None
         if self.jumps is not None:
-            off = momentum_outside(self.played, self.other, self.jumps, self.dt, self.scenario.scene)
+            off = momentum_outside(
+                self.played, self.other, self.jumps, self.dt, self.scenario.scene
+            )
             return np.where(self.judged.any(axis=1), off, np.nan)
         momenta = (laws.momenta(one, self.scenario.scene) for one in (self.played, self.other))
         return laws.lengths(self._summed(next(momenta) - next(momenta)))
@@ -153,9 +172,11 @@ class View:
 
     @cached_property
     def collision_free_samples(self) -> np.ndarray:
-        """(k,) False at samples within `WINDOW` dt of a collision of the other; sample 0 always counts.
+        """(k,) False at samples within `WINDOW` dt of a collision of the other; sample 0 always
+        counts.
 
-        For the error budget, which takes runs from each other: no metric, as in a crowd nothing but the start is left.
+        For the error budget, which takes runs from each other: no metric, as in a crowd nothing but
+        the start is left.
         """
         free = np.ones(len(self.played), bool)
         if self.other is not None and len(collisions := self.other.collisions.t):
@@ -170,7 +191,8 @@ class View:
     def restitutions(self) -> Restitutions:
         """What can be read off the samples; nothing under thrust.
 
-        Slow collisions are left out under gravity, which is taken out of the samples to first order only.
+        Slow collisions are left out under gravity, which is taken out of the samples to first order
+        only.
         """
         if self.scenario.thrusts:
             return Restitutions(np.zeros(0), np.zeros(0), 0, 0)

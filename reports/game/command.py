@@ -27,18 +27,21 @@ FIRST = ("reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:
 
 
 def game_of(flight: Path | None, engines: Sequence[str]) -> Game:
-    """The game, or a saved flight, through these engines; exits 2 if the file or an engine is none."""
+    """The game, or a saved flight, through these engines; exits 2 if the file or an engine is
+    none."""
     chosen = checked_engines(engines) if engines else list(FIRST)
     if len(chosen) > MOST_ENGINES:
         refuse([f"--engine: {len(chosen)} engines; at most {MOST_ENGINES} fly at once: name fewer"])
     file = read_flight(flight) if flight else None
-    # A solver's file is a row like any other while it flies; one that cannot fly at all is reported before.
+    # A solver's file is a row like any other while it flies; one that cannot fly at all is reported
+    # before.
     ENGINES.update(own_rows([name for name in chosen if name.endswith(OWN)]))
     return Game(chosen, file)
 
 
 def own_rows(names: Sequence[str]) -> dict[str, EngineRow]:
-    """The rows of solvers' files, `PATH:own`, each tried on a lone ship; exits 2 with a line for each that fails."""
+    """The rows of solvers' files, `PATH:own`, each tried on a lone ship; exits 2 with a line for
+    each that fails."""
     rows, faults = {}, []
     for name in names:
         path = Path(name.removesuffix(OWN))

@@ -1,4 +1,5 @@
-"""Finds the collision at which two engines part: the first after which a disk moves on differently in the two."""
+"""Finds the collision at which two engines part: the first after which a disk moves on differently
+in the two."""
 
 from __future__ import annotations
 
@@ -10,12 +11,17 @@ import numpy as np
 from adapters.engine import ContactImpulse
 from scenarios.model import Array, Scene, State
 
-DIVERGED = 0.01  # m/s: disks that move on differently by less have not diverged, they were found a step early or late
-WAIT = 6  # frames without a collision of a disk before its velocities are compared: engines find a collision some steps apart
+# m/s: disks that move on differently by less have not diverged, they were found a step early or
+# late
+DIVERGED = 0.01
+# frames without a collision of a disk before its velocities are compared: engines find a collision
+# some steps apart
+WAIT = 6
 
 
 class LastCollision(NamedTuple):
-    """A disk's latest collision: frame, its disks (wall w as -1 - w), and where the two touched, (x, y) m."""
+    """A disk's latest collision: frame, its disks (wall w as -1 - w), and where the two touched,
+    (x, y) m."""
 
     frame: int
     i: int
@@ -33,7 +39,8 @@ class Divergence(NamedTuple):
 
 
 class Touches:
-    """The latest collision of every disk in one engine. scene: whose radii tell where two disks touch."""
+    """The latest collision of every disk in one engine. scene: whose radii tell where two disks
+    touch."""
 
     def __init__(self, scene: Scene) -> None:
         self.radius = scene.radius
@@ -58,8 +65,11 @@ def contact(position: Array, radius: Array, i: int, j: int) -> tuple[float, floa
     return float(x), float(y)
 
 
-def divergence(solid: Touches, ghost: Touches, velocity: Array, other: Array, frame: int) -> Divergence | None:
-    """The collision after which the velocities (n, 2) m/s of solid and ghost differ, if they do by frame `frame`."""
+def divergence(
+    solid: Touches, ghost: Touches, velocity: Array, other: Array, frame: int
+) -> Divergence | None:
+    """The collision after which the velocities (n, 2) m/s of solid and ghost differ, if they do by
+    frame `frame`."""
     latest = np.maximum(solid.frame, ghost.frame)
     apart = np.hypot(*(velocity - other).T) > DIVERGED
     found = np.flatnonzero(apart & (latest >= 0) & (frame - latest >= WAIT))
@@ -67,7 +77,9 @@ def divergence(solid: Touches, ghost: Touches, velocity: Array, other: Array, fr
         return None
     disk = int(found[np.argmin(latest[found])])
     mine, theirs = solid.last.get(disk), ghost.last.get(disk)
-    both = bool(mine and theirs and {*mine[1:3]} == {*theirs[1:3]} and abs(mine.frame - theirs.frame) < WAIT)
+    both = bool(
+        mine and theirs and {*mine[1:3]} == {*theirs[1:3]} and abs(mine.frame - theirs.frame) < WAIT
+    )
     solid_later = mine is not None and (theirs is None or mine.frame >= theirs.frame)
     collision = mine if both or solid_later else theirs
     assert collision is not None

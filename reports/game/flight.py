@@ -1,4 +1,5 @@
-"""One flight of the exercise's game: the same thrusts through several engines, frame by frame; no server in here."""
+"""One flight of the exercise's game: the same thrusts through several engines, frame by frame; no
+server in here."""
 
 from __future__ import annotations
 
@@ -16,15 +17,21 @@ from reports.game.pilot import SHIP, Pilot
 from scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
 from scenarios.model import Array, Scenario, State
 
-FRAME = 1 / 64  # s; a power of two, so that every instant of a saved flight is a whole number of steps without rounding
+# s; a power of two, so that every instant of a saved flight is a whole number of steps without
+# rounding
+FRAME = 1 / 64
 SUBSTEPS = (2, 4, 8, 16, 32)  # steps in a frame; 16 is the nearest to the exercise's 0.001 s
 LONGEST = 600.0  # s, of a flight
 EARTH, EARTH_SIZE = (3.5, 1.5), 0.5
-SLOW, SLOW_SPIN = 0.1, 0.1  # squared speed and angular velocity below which the exercise says "You won"
+# squared speed and angular velocity below which the exercise says "You won"
+SLOW, SLOW_SPIN = 0.1, 0.1
 
 
-def field_scenario(seed: int = 0, asteroids: int = 20, restitution: float = 0.9, substeps: int = 16) -> Scenario:
-    """A field that nobody has flown yet, as a scenario of the longest flight, its step in the middle of the ladder."""
+def field_scenario(
+    seed: int = 0, asteroids: int = 20, restitution: float = 0.9, substeps: int = 16
+) -> Scenario:
+    """A field that nobody has flown yet, as a scenario of the longest flight, its step in the
+    middle of the ladder."""
     return Scenario(
         name=f"flight-{seed}",
         asks=f"Do the engines carry a ship through {asteroids} asteroids as its pilot flew it?",
@@ -66,11 +73,12 @@ class Flyer:
 
 
 class Flight:
-    """A scenario flown by the engines `names`, of which the first is the solid one; keys steer unless it is a replay.
+    """A scenario flown by the engines `names`, of which the first is the solid one; keys steer
+    unless it is a replay.
 
-    The ship that leaves the exercise's field is set back to its start, at rest, at the end of that step, as in the
-    exercise, and in each engine by itself: the engine is loaded anew with all else as it is. In any other scene with a
-    wrap disk 0 wraps like the rest, as it does in `play`.
+    The ship that leaves the exercise's field is set back to its start, at rest, at the end of that
+    step, as in the exercise, and in each engine by itself: the engine is loaded anew with all else
+    as it is. In any other scene with a wrap disk 0 wraps like the rest, as it does in `play`.
     """
 
     def __init__(self, scenario: Scenario, names: Sequence[str], replayed: bool = False) -> None:
@@ -116,7 +124,9 @@ class Flight:
         for _ in range(count):
             if self.over:
                 return
-            steered = self.scenario if self.replayed else replace(self.scenario, thrusts=self.pilot.now)
+            steered = (
+                self.scenario if self.replayed else replace(self.scenario, thrusts=self.pilot.now)
+            )
             for flyer in self.flyers:
                 if not flyer.left:
                     self.fly(flyer, steered)
@@ -124,7 +134,8 @@ class Flight:
             self.compare()
 
     def fly(self, flyer: Flyer, steered: Scenario) -> None:
-        """One frame of one engine, by the same steps as `play` makes them, looked at once or, near an edge, at each."""
+        """One frame of one engine, by the same steps as `play` makes them, looked at once or, near
+        an edge, at each."""
         stride = 1 if self.may_leave(flyer.state) else self.substeps
         first = self.frame * self.substeps
         for step in range(first, first + self.substeps, stride):
@@ -136,11 +147,17 @@ class Flight:
         if not self.is_game:
             return False
         low, high = np.array([LOW, HIGH])
-        room = self.scenario.scene.radius[SHIP] + 2 * np.abs(state.velocity[SHIP]) * self.scenario.sample_interval
-        return bool(((state.position[SHIP] < low + room) | (state.position[SHIP] > high - room)).any())
+        room = (
+            self.scenario.scene.radius[SHIP]
+            + 2 * np.abs(state.velocity[SHIP]) * self.scenario.sample_interval
+        )
+        return bool(
+            ((state.position[SHIP] < low + room) | (state.position[SHIP] > high - room)).any()
+        )
 
     def fly_on(self, flyer: Flyer, steered: Scenario, step: int, count: int) -> None:
-        """`count` steps of one engine from step number `step` on; what it raises or does wrong makes it leave."""
+        """`count` steps of one engine from step number `step` on; what it raises or does wrong
+        makes it leave."""
         before = flyer.state
         try:
             advance(flyer.engine, steered, step, count, self.dt)
@@ -155,7 +172,9 @@ class Flight:
         if len(collisions) > flyer.seen:
             flyer.touches.note(collisions[flyer.seen :], self.frame, flyer.state)
             flyer.seen = len(collisions)
-            flyer.collisions = len(first_collisions(collisions, self.dt, weight_impulse(self.scenario.scene, self.dt)))
+            flyer.collisions = len(
+                first_collisions(collisions, self.dt, weight_impulse(self.scenario.scene, self.dt))
+            )
         if self.ship_left(before, flyer.state):
             self.set_back(flyer)
 
@@ -168,7 +187,9 @@ class Flight:
         """The ship to its start, all else as it is."""
         if flyer is self.solid and self.left_at < 0:
             self.left_at = self.frame
-        arrays: dict[str, Any] = {name: np.array(array) for name, array in vars(flyer.state).items()}
+        arrays: dict[str, Any] = {
+            name: np.array(array) for name, array in vars(flyer.state).items()
+        }
         for name, array in arrays.items():
             array[SHIP] = getattr(self.scenario.scene, name)[SHIP]
         flyer.earlier, flyer.collisions, flyer.seen = flyer.earlier + flyer.collisions, 0, 0
@@ -180,10 +201,17 @@ class Flight:
             flyer.left = f"the ship cannot be set back: {error}"
 
     def compare(self) -> None:
-        """Note who parts from the solid one at the end of this frame, and whether the game is won."""
+        """Note who parts from the solid one at the end of this frame, and whether the game is
+        won."""
         solid = self.solid
         for ghost in self.flyers:
-            watched = not (ghost is solid or ghost.left or ghost.divergence or solid.set_backs or ghost.set_backs)
+            watched = not (
+                ghost is solid
+                or ghost.left
+                or ghost.divergence
+                or solid.set_backs
+                or ghost.set_backs
+            )
             if watched:
                 velocities = solid.state.velocity, ghost.state.velocity
                 ghost.divergence = divergence(solid.touches, ghost.touches, *velocities, self.frame)
@@ -192,15 +220,16 @@ class Flight:
 
     @property
     def won(self) -> bool:
-        """The exercise's rule as written: a squared distance below a size, no absolute value of the spin."""
+        """The exercise's rule as written: a squared distance below a size, no absolute value of the
+        spin."""
         ship = self.solid.state
         apart, speed = ship.position[SHIP] - np.array(EARTH), ship.velocity[SHIP]
         near = float(apart @ apart) < EARTH_SIZE and float(speed @ speed) < SLOW
         return self.is_game and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
 
     def measures(self, flyer: Flyer) -> dict[str, Any]:
-        """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid one's m,
-        collisions."""
+        """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid
+        one's m, collisions."""
         scene, state = self.scenario.scene, flyer.state
         apart = self.distances(self.solid.state.position, state.position)
         moving = ~scene.static
@@ -223,7 +252,8 @@ class Flight:
         return np.hypot(*gap.T)
 
     def saved(self) -> Scenario:
-        """The flight so far as a scenario, up to the frame before the ship first left: a scene has no way back.
+        """The flight so far as a scenario, up to the frame before the ship first left: a scene has
+        no way back.
 
         Raises:
             ValueError: if there is no frame to save.

@@ -30,7 +30,9 @@ class Fly(_Message):
     """Begin a flight: through a new field, or, where there is a file, that flight again."""
 
     do: Literal["fly"]
-    engines: list[Annotated[str, AfterValidator(known)]] = Field(min_length=1, max_length=MOST_ENGINES)
+    engines: list[Annotated[str, AfterValidator(known)]] = Field(
+        min_length=1, max_length=MOST_ENGINES
+    )
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     asteroids: Annotated[int, Field(ge=0, le=40)] = 20
     restitution: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.9
@@ -73,5 +75,8 @@ def read_message(text: str | bytes) -> Message:
     try:
         return _ANY.validate_json(text)
     except ValidationError as error:
-        faults = (f"{'.'.join(map(str, fault['loc'])) or 'message'}: {fault['msg']}" for fault in error.errors())
+        faults = (
+            f"{'.'.join(map(str, fault['loc'])) or 'message'}: {fault['msg']}"
+            for fault in error.errors()
+        )
         raise ValueError("; ".join(faults)[:500]) from error

@@ -1,4 +1,5 @@
-"""What the keys of the exercise's game do to the ship: one force and one torque at a time, kept as thrusts."""
+"""What the keys of the exercise's game do to the ship: one force and one torque at a time, kept as
+thrusts."""
 
 from __future__ import annotations
 
@@ -33,8 +34,8 @@ class Held:
 class Pilot:
     """Keys in, thrusts out. `interval`: s, of a frame; keys act at the start of one.
 
-    W and S accelerate along the ship's heading as it is when the key event comes (a repeated event aims anew), A and D
-    turn; releasing either key of a pair ends its thrust, as in the exercise.
+    W and S accelerate along the ship's heading as it is when the key event comes (a repeated event
+    aims anew), A and D turn; releasing either key of a pair ends its thrust, as in the exercise.
     """
 
     scene: Scene
@@ -43,15 +44,27 @@ class Pilot:
     past: list[Thrust] = field(default_factory=list)
 
     def key(self, key: str, down: bool, frame: int, angle: float) -> None:
-        """Key `key` of `KEYS` goes down (again) or up at the start of frame `frame`, the ship's heading `angle` rad."""
+        """Key `key` of `KEYS` goes down (again) or up at the start of frame `frame`, the ship's
+        heading `angle` rad."""
         if key in FORWARD:
             force = FORWARD[key] * THRUST * float(self.scene.mass[SHIP])
-            self.change("force", frame, force * np.array([cos(angle), sin(angle)]) if down else np.zeros(2), 0.0)
+            self.change(
+                "force",
+                frame,
+                force * np.array([cos(angle), sin(angle)]) if down else np.zeros(2),
+                0.0,
+            )
         else:
-            self.change("torque", frame, np.zeros(2), down * LEFT[key] * TURN * float(self.scene.inertia[SHIP]))
+            self.change(
+                "torque",
+                frame,
+                np.zeros(2),
+                down * LEFT[key] * TURN * float(self.scene.inertia[SHIP]),
+            )
 
     def change(self, kind: str, frame: int, force: Array, torque: float) -> None:
-        """From frame `frame` on the force or the torque is this; a repeated key that aims as before changes nothing."""
+        """From frame `frame` on the force or the torque is this; a repeated key that aims as before
+        changes nothing."""
         before = self.held.get(kind)
         if before and np.array_equal(before.force, force) and before.torque == torque:
             return
@@ -68,5 +81,7 @@ class Pilot:
 
     def thrusts(self, frames: int) -> list[Thrust]:
         """All thrusts of the first `frames` frames, those still on cut there, in order of time."""
-        ends = [held.thrust(self.interval, frames) for held in self.held.values() if held.since < frames]
+        ends = [
+            held.thrust(self.interval, frames) for held in self.held.values() if held.since < frames
+        ]
         return sorted(self.past + ends, key=lambda thrust: thrust.start)

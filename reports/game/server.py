@@ -20,7 +20,8 @@ from reports.game.session import Session, as_json
 from reports.page.server import MOST_TABS, NAMES, in_thread
 from scenarios.model import Scenario
 
-MOST_A_SECOND, MOST_FAULTS = 240, 50  # messages: a page sends 60 a second and the keys; and faulty ones in all
+# messages: a page sends 60 a second and the keys; and faulty ones in all
+MOST_A_SECOND, MOST_FAULTS = 240, 50
 POLICY, LATER = 1008, 1013  # WebSocket close codes: it breaks the rules; try again later
 
 
@@ -45,7 +46,8 @@ class Allowance:
 
 @dataclass
 class Game:
-    """What every tab begins with, how many are open, and by what a page knows its own server from a later one."""
+    """What every tab begins with, how many are open, and by what a page knows its own server from a
+    later one."""
 
     engines: Sequence[str]
     file: Scenario | None = None
@@ -81,14 +83,17 @@ class Game:
 def same_origin(socket: WebSocket) -> bool:
     """Whether the page that opens the socket comes from this very server: no other may drive it."""
     host = socket.headers.get("host", "")
-    return urlsplit(f"//{host}").hostname in NAMES and socket.headers.get("origin") == f"http://{host}"
+    return (
+        urlsplit(f"//{host}").hostname in NAMES and socket.headers.get("origin") == f"http://{host}"
+    )
 
 
 async def converse(socket: WebSocket, session: Session) -> None:
-    """Answer message by message; the page asks for every frame, so that a slow one is never ahead of itself.
+    """Answer message by message; the page asks for every frame, so that a slow one is never ahead
+    of itself.
 
-    The engines of a tab work in a thread, one message at a time: a solver that hangs, or is compiled for the first
-    time, keeps its own tab waiting and no other.
+    The engines of a tab work in a thread, one message at a time: a solver that hangs, or is
+    compiled for the first time, keeps its own tab waiting and no other.
     """
     allowance, faults = Allowance(MOST_A_SECOND), 0
     while True:

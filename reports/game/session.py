@@ -18,7 +18,8 @@ from scenarios.model import Array, Scenario
 
 
 class Session:
-    """A page and its flight. `file`: the flight that is flown again, instead of one that is steered.
+    """A page and its flight. `file`: the flight that is flown again, instead of one that is
+    steered.
 
     Attributes:
         given_up: nobody waits for its answer any more, and it may still be at it.
@@ -36,7 +37,8 @@ class Session:
         return Flight(scenario, wish.engines)
 
     def answer(self, text: str | bytes) -> dict[str, Any] | None:
-        """The answer to a message, for JSON; None where there is nothing to say. Raises ValueError if it is faulty."""
+        """The answer to a message, for JSON; None where there is nothing to say. Raises ValueError
+        if it is faulty."""
         message: Message = read_message(text)
         if isinstance(message, Fly):
             self.flight.close()
@@ -51,43 +53,68 @@ class Session:
             return None
         scenario = self.flight.saved()
         return {
-            "kind": "file", "name": f"{scenario.name}.toml", "text": scene_text(scenario),
-            "seconds": scenario.duration, "cut": self.flight.left_at >= 0,
-        }  # fmt: skip
+            "kind": "file",
+            "name": f"{scenario.name}.toml",
+            "text": scene_text(scenario),
+            "seconds": scenario.duration,
+            "cut": self.flight.left_at >= 0,
+        }
 
     def field(self) -> dict[str, Any]:
         """What stays as it is during a flight, and its first frame."""
         flight = self.flight
         scene = flight.scenario.scene
         return {
-            "kind": "field", "name": flight.scenario.name, "radius": scene.radius.tolist(),
+            "kind": "field",
+            "name": flight.scenario.name,
+            "radius": scene.radius.tolist(),
             "wrap": scene.wrap.ravel().tolist() if scene.wrap is not None else None,
-            "walls": scene.walls.reshape(-1, 4).tolist(), "earth": [*EARTH, EARTH_SIZE] if flight.is_game else None,
-            "interval": flight.scenario.sample_interval, "dt": flight.dt, "replayed": flight.replayed,
-            "engines": [flyer.name for flyer in flight.flyers], "duration": flight.scenario.duration,
+            "walls": scene.walls.reshape(-1, 4).tolist(),
+            "earth": [*EARTH, EARTH_SIZE] if flight.is_game else None,
+            "interval": flight.scenario.sample_interval,
+            "dt": flight.dt,
+            "replayed": flight.replayed,
+            "engines": [flyer.name for flyer in flight.flyers],
+            "duration": flight.scenario.duration,
             "first": self.now(),
-        }  # fmt: skip
+        }
 
     def now(self) -> dict[str, Any]:
         """Where everything is at the end of the last frame."""
         flight = self.flight
         ship = flight.solid.state
         return {
-            "kind": "frame", "frame": flight.frame, "t": flight.frame * flight.scenario.sample_interval,
-            "solid": flight.flyers.index(flight.solid), "flyers": [self.to_json(flyer) for flyer in flight.flyers],
-            "ship": [*ship.position[SHIP].tolist(), *ship.velocity[SHIP].tolist(),
-                     float(ship.angle[SHIP]), float(ship.angular_velocity[SHIP])],
-            "force": self.force(), "won": flight.won, "over": flight.over, "left_at": flight.left_at,
-        }  # fmt: skip
+            "kind": "frame",
+            "frame": flight.frame,
+            "t": flight.frame * flight.scenario.sample_interval,
+            "solid": flight.flyers.index(flight.solid),
+            "flyers": [self.to_json(flyer) for flyer in flight.flyers],
+            "ship": [
+                *ship.position[SHIP].tolist(),
+                *ship.velocity[SHIP].tolist(),
+                float(ship.angle[SHIP]),
+                float(ship.angular_velocity[SHIP]),
+            ],
+            "force": self.force(),
+            "won": flight.won,
+            "over": flight.over,
+            "left_at": flight.left_at,
+        }
 
     def force(self) -> list[float]:
         """What drives the ship: force N in the world frame, torque N m."""
         flight = self.flight
         time = flight.frame * flight.scenario.sample_interval
         thrusts = flight.scenario.thrusts if flight.replayed else flight.pilot.now
-        on = [thrust for thrust in thrusts if thrust.disk == SHIP and thrust.start <= time < thrust.stop]
+        on = [
+            thrust
+            for thrust in thrusts
+            if thrust.disk == SHIP and thrust.start <= time < thrust.stop
+        ]
         angle = float(flight.solid.state.angle[SHIP])
-        forces = [turned(thrust.force, angle) if thrust.frame == "body" else thrust.force for thrust in on]
+        forces = [
+            turned(thrust.force, angle) if thrust.frame == "body" else thrust.force for thrust in on
+        ]
         force = sum(forces, np.zeros(2))
         return [*force.tolist(), float(sum(thrust.torque for thrust in on))]
 
@@ -98,12 +125,16 @@ class Session:
             collision = flyer.divergence.collision
             diverged = collision._asdict() | {
                 "t": (collision.frame + 1) * self.flight.scenario.sample_interval,
-                "shared": flyer.divergence.shared, "solid_only": flyer.divergence.solid_only,
-            }  # fmt: skip
+                "shared": flyer.divergence.shared,
+                "solid_only": flyer.divergence.solid_only,
+            }
         return self.flight.measures(flyer) | {
-            "x": rounded(flyer.state.position.ravel()), "angle": rounded(flyer.state.angle),
-            "left": flyer.left, "diverged": diverged, "set_backs": flyer.set_backs,
-        }  # fmt: skip
+            "x": rounded(flyer.state.position.ravel()),
+            "angle": rounded(flyer.state.angle),
+            "left": flyer.left,
+            "diverged": diverged,
+            "set_backs": flyer.set_backs,
+        }
 
     def close(self) -> None:
         """Give the engines back."""

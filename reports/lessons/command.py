@@ -28,19 +28,28 @@ from reports.terminal.progress import Progress
 MARK = b'<meta name="generator" content="crosscheck lesson">'
 ALL = Kind("crosscheck lesson")  # the folder of all of them
 
-SHOWING = 300.0  # s that one setting of the sliders may take: the slowest needs some 5, once its engines are compiled
+# s that one setting of the sliders may take: the slowest needs some 5, once its engines are
+# compiled
+SHOWING = 300.0
 INDEX, CONVENTIONS = "index.html", "the conventions of the engines"
 
 
 def checked_lesson(name: str) -> str:
     """The name; exits 2 if there is no such lesson."""
     if name and name not in LESSONS:
-        refuse([unknown("lesson", name, LESSONS).replace("see: crosscheck list", f"there are {', '.join(LESSONS)}")])
+        refuse(
+            [
+                unknown("lesson", name, LESSONS).replace(
+                    "see: crosscheck list", f"there are {', '.join(LESSONS)}"
+                )
+            ]
+        )
     return name
 
 
 def write_lessons(name: str, place: Path) -> None:
-    """Write the lesson of that name to a file, or with "" all of them to a folder; exits 2 if that cannot be."""
+    """Write the lesson of that name to a file, or with "" all of them to a folder; exits 2 if that
+    cannot be."""
     if checked_lesson(name):
         write_one(name, place)
     else:
@@ -50,10 +59,16 @@ def write_lessons(name: str, place: Path) -> None:
 def write_one(name: str, path: Path) -> None:
     """One self-contained page."""
     if path.is_dir():
-        refuse([f"--export {path}: is a folder; name a file, or leave out {name} to write all lessons there"])
+        refuse(
+            [
+                f"--export {path}: is a folder; name a file, or leave out {name} to write all"
+                " lessons there"
+            ]
+        )
     with exporting(path):
         may_overwrite(path, MARK, "page of a lesson", "--export")
-        with TemporaryFile(dir=path.parent):  # so that it is known before any run whether it can be written
+        # so that it is known before any run whether it can be written
+        with TemporaryFile(dir=path.parent):
             pass
         write_pages({path: LESSONS[name]}, ALONE, {})
     print(legible(f"{path}: {path.stat().st_size / 1e6:.1f} MB, opens without a server"))
@@ -66,10 +81,16 @@ def write_all(folder: Path) -> None:
         with made_anew(folder, ALL, "--export") as part:
             pages = {part / f"{name}.html": lesson for name, lesson in LESSONS.items()}
             with writing(part, [*(path.name for path in pages), INDEX]):
-                rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[CONVENTIONS]
+                rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[
+                    CONVENTIONS
+                ]
                 put_text(part / INDEX, index_page(FILES, rows))
     size = sum(path.stat().st_size for path in folder.glob("*.html"))
-    print(legible(f"{folder / INDEX}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server"))
+    print(
+        legible(
+            f"{folder / INDEX}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server"
+        )
+    )
 
 
 @contextmanager
@@ -83,11 +104,14 @@ def exporting(asked: Path) -> Iterator[None]:
         refuse([f"--export {asked}: {fault.strerror or fault}; name another place"])
 
 
-def write_pages(pages: Mapping[Path, Lesson], links: Links, besides: dict[str, Callable[[], Any]]) -> dict[str, Any]:
-    """Each page as soon as all its runs have ended, one for every setting of the sliders; returns what `besides` gave.
+def write_pages(
+    pages: Mapping[Path, Lesson], links: Links, besides: dict[str, Callable[[], Any]]
+) -> dict[str, Any]:
+    """Each page as soon as all its runs have ended, one for every setting of the sliders; returns
+    what `besides` gave.
 
-    They run in a worker, which can be stopped whatever it does, one after the other, as one lesson takes times; exits 1
-    if one of them fails.
+    They run in a worker, which can be stopped whatever it does, one after the other, as one lesson
+    takes times; exits 1 if one of them fails.
     """
     tasks: dict[Hashable, Callable[[], Any]] = {
         (path, places): partial(answer_json, lesson.name, places)
@@ -102,7 +126,11 @@ def write_pages(pages: Mapping[Path, Lesson], links: Links, besides: dict[str, C
         with closing(run_all(tasks, 1, SHOWING)) as results:
             for task, result in results:
                 if isinstance(result, Failure):
-                    what = task if isinstance(task, str) else f"{pages[task[0]].title}, sliders at {task[1]}"
+                    what = (
+                        task
+                        if isinstance(task, str)
+                        else f"{pages[task[0]].title}, sliders at {task[1]}"
+                    )
                     say(f"{what}: {result.status}: {result.reason}")
                     sys.exit(FAILED)
                 if isinstance(task, str):

@@ -1,4 +1,5 @@
-"""The conventions of all engines as the conformance suite measures them: nothing here is typed in."""
+"""The conventions of all engines as the conformance suite measures them: nothing here is typed
+in."""
 
 from __future__ import annotations
 
@@ -10,14 +11,23 @@ from adapters.engine import EngineRow
 from reports.page.style import number
 
 ASKED = (
-    "free_flight", "restitution_0.1", "restitution_2", "restitution_wall", "friction", "slow_flight", "fast_flight",
-    "fast_spin", "spins_freely", "pair_momentum",
-)  # fmt: skip
+    "free_flight",
+    "restitution_0.1",
+    "restitution_2",
+    "restitution_wall",
+    "friction",
+    "slow_flight",
+    "fast_flight",
+    "fast_spin",
+    "spins_freely",
+    "pair_momentum",
+)
 
 
 @dataclass(frozen=True)
 class Convention:
-    """One probe over all engines: the question, what a scene's own physics would give, and what each gave."""
+    """One probe over all engines: the question, what a scene's own physics would give, and what
+    each gave."""
 
     asked: str
     expected: str
@@ -26,19 +36,27 @@ class Convention:
 
 def table(engines: Mapping[str, EngineRow]) -> list[Convention]:
     """The physics probes put to every engine now, in the order of `ASKED`; a few seconds."""
-    findings = {name: {each.probe: each for each in conform(name, row)} for name, row in engines.items()}
+    findings = {
+        name: {each.probe: each for each in conform(name, row)} for name, row in engines.items()
+    }
     rows = []
     for probe in ASKED:
         answers = {name: found[probe] for name, found in findings.items() if probe in found}
-        expected = "by its order" if probe == "free_flight" else number(next(iter(answers.values())).expected)
+        expected = (
+            "by its order"
+            if probe == "free_flight"
+            else number(next(iter(answers.values())).expected)
+        )
         got = {name: (reading(each), each.verdict) for name, each in answers.items()}
         rows.append(Convention(PROBES[probe].asked, expected, got))
     return rows
 
 
 def reading(found: Finding) -> str:
-    """What an engine gave, with as many digits as it takes to see that it departs from what is expected."""
+    """What an engine gave, with as many digits as it takes to see that it departs from what is
+    expected."""
     digits = range(3, 10) if found.verdict == "departs" else [3]
     return next(
-        (text for d in digits if (text := number(found.got, d)) != number(found.expected, d)), number(found.got)
+        (text for d in digits if (text := number(found.got, d)) != number(found.expected, d)),
+        number(found.got),
     )

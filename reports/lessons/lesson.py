@@ -1,4 +1,5 @@
-"""The nouns of a lesson: its sliders, and what it shows for a setting of them: curves, a replay, numbers."""
+"""The nouns of a lesson: its sliders, and what it shows for a setting of them: curves, a replay,
+numbers."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ Settings = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Slider:
-    """One thing that can be changed. values: what it goes through; start: the index it begins with."""
+    """One thing that can be changed. values: what it goes through; start: the index it begins
+    with."""
 
     key: str
     label: str
@@ -37,12 +39,16 @@ class Slider:
     @property
     def shown(self) -> list[str]:
         """The values as they are read."""
-        return [value if isinstance(value, str) else f"{number(value)} {self.unit}".strip() for value in self.values]
+        return [
+            value if isinstance(value, str) else f"{number(value)} {self.unit}".strip()
+            for value in self.values
+        ]
 
 
 @dataclass(frozen=True)
 class Curve:
-    """name: whose (an engine, `truth`, or `reference:ablated` for the reference with a mechanism on); x, y: (k,).
+    """name: whose (an engine, `truth`, or `reference:ablated` for the reference with a mechanism
+    on); x, y: (k,).
 
     dots: whether its points are marked; faint: whether it stands back behind the others.
     """
@@ -58,7 +64,13 @@ class Curve:
         x, y = np.asarray(self.x, float), np.asarray(self.y, float)
         kept = np.linspace(0, len(x) - 1, min(POINTS, len(x))).round().astype(int)
         kept = kept[np.isfinite(x[kept]) & np.isfinite(y[kept])]
-        return {"name": self.name, "x": rounded(x[kept]), "y": rounded(y[kept]), "dots": self.dots, "faint": self.faint}
+        return {
+            "name": self.name,
+            "x": rounded(x[kept]),
+            "y": rounded(y[kept]),
+            "dots": self.dots,
+            "faint": self.faint,
+        }
 
 
 @dataclass(frozen=True)
@@ -83,9 +95,14 @@ class LessonChart:
     def to_json(self) -> dict[str, Any]:
         """For JSON."""
         return {
-            "title": self.title, "x": self.x, "y": self.y, "log": self.log, "guides": list(self.guides),
-            "reverse": self.reverse, "curves": [curve.to_json() for curve in self.curves],
-        }  # fmt: skip
+            "title": self.title,
+            "x": self.x,
+            "y": self.y,
+            "log": self.log,
+            "guides": list(self.guides),
+            "reverse": self.reverse,
+            "curves": [curve.to_json() for curve in self.curves],
+        }
 
 
 @dataclass(frozen=True)
@@ -116,9 +133,12 @@ class Shown:
             pack = pack_layers(self.film.scenario, layers, more=self.opening)
             film = {"pack": pack, "ratio": ratio_of(self.film.scenario, layers)}
         return {
-            "charts": [chart.to_json() for chart in self.charts], "film": film,
-            "facts": list(self.facts), "steps": list(self.steps), "said": dict(self.said),
-        }  # fmt: skip
+            "charts": [chart.to_json() for chart in self.charts],
+            "film": film,
+            "facts": list(self.facts),
+            "steps": list(self.steps),
+            "said": dict(self.said),
+        }
 
 
 @dataclass(frozen=True)
@@ -154,8 +174,12 @@ class Lesson:
             raise ValueError(f"{len(places)} places for {len(self.sliders)} sliders")
         for slider, place in zip(self.sliders, places):
             if not 0 <= place < len(slider.values):
-                raise ValueError(f"{slider.key} = {place}: must be from 0 to {len(slider.values) - 1}")
-        return self.show({slider.key: slider.values[place] for slider, place in zip(self.sliders, places)})
+                raise ValueError(
+                    f"{slider.key} = {place}: must be from 0 to {len(slider.values) - 1}"
+                )
+        return self.show(
+            {slider.key: slider.values[place] for slider, place in zip(self.sliders, places)}
+        )
 
     @property
     def start(self) -> tuple[int, ...]:
@@ -189,8 +213,14 @@ class Simulation:
 
     def curves(self, read: Callable[[Trajectory], Array]) -> list[Curve]:
         """`read` of every trajectory over time; the truth last, so that it lies on top."""
-        found = [Curve(run.name, run.trajectory.t, read(run.trajectory)) for run in self.runs if run.trajectory]
-        return found + ([Curve(TRUTH, self.truth.t, read(self.truth))] if self.truth is not None else [])
+        found = [
+            Curve(run.name, run.trajectory.t, read(run.trajectory))
+            for run in self.runs
+            if run.trajectory
+        ]
+        return found + (
+            [Curve(TRUTH, self.truth.t, read(self.truth))] if self.truth is not None else []
+        )
 
     def errors(self) -> list[Curve]:
         """m, the largest distance of any disk from the truth over time, while there is one."""

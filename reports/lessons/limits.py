@@ -1,5 +1,5 @@
-"""Lesson 8, where methods fail: cases of the stability report, searched when they are asked for, with the run that
-fails."""
+"""Lesson 8, where methods fail: cases of the stability report, searched when they are asked for,
+with the run that fails."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ SECONDS = 4.0  # that a replay lasts
 
 
 class Seen(NamedTuple):
-    """A case of the stability report as the lesson shows it: what is drawn over time, of the first disk; and how harsh
-    it gets."""
+    """A case of the stability report as the lesson shows it: what is drawn over time, of the first
+    disk; and how harsh it gets."""
 
     case: str
     what: str
@@ -67,21 +67,24 @@ SEEN = {
 
 @cache
 def limits_of(name: str) -> list[Limit]:
-    """The limits of a case on every engine, searched now, with their reasons, which engines with one change test."""
+    """The limits of a case on every engine, searched now, with their reasons, which engines with
+    one change test."""
     case = CASES[name]
     searches = [Search(case, engine, QUICK) for engine in engines_of(case)]
     return explained([tried_out(search, search.limit()) for search in searches])
 
 
 def run_at(case: Case, engine: str, value: float) -> tuple[Trial, Scenario, Run]:
-    """All runs of an engine at a value, and of them the first that fails, or the first, which has the worst phase."""
+    """All runs of an engine at a value, and of them the first that fails, or the first, which has
+    the worst phase."""
     search = Search(case, engine, QUICK)
     trial = search.trial(value, to_the_end=True)
     return trial, *(search.seen.get(value) or case.play(VARIANTS[engine], case.scene(value, 0)))
 
 
 def show_limits(settings: Settings) -> Shown:
-    """The run at this value beside the exact answer, and the readings of all engines up to their limits."""
+    """The run at this value beside the exact answer, and the readings of all engines up to their
+    limits."""
     seen, engine = SEEN[settings["case"]], settings["engine"]
     case, value, limits = CASES[seen.case], seen.value(settings["place"]), limits_of(seen.case)
     trial, scenario, run = run_at(case, engine, value)
@@ -91,7 +94,10 @@ def show_limits(settings: Settings) -> Shown:
     curves = [Curve(name, each.t, seen.read(each)) for name, each in drawn if each is not None]
     found = next(limit for limit in limits if limit.engine == engine)
     return Shown(
-        [LessonChart(seen.what, "time in s", seen.unit, curves), readings(case, limits, engine, value)],
+        [
+            LessonChart(seen.what, "time in s", seen.unit, curves),
+            readings(case, limits, engine, value),
+        ],
         Comparison(scenario, truth, [run], pd.DataFrame()),
         [(limit.engine, in_words(limit, case)) for limit in limits if limit.engine in ENGINES],
         in_numbers(case, trial, found),
@@ -102,7 +108,11 @@ def show_limits(settings: Settings) -> Shown:
 
 def event_of(trial: Trial) -> dict[str, Any]:
     """What the replay marks: when and at which disk it fails."""
-    return {} if trial.works or not isfinite(trial.at) else {"event": {"t": trial.at, "disk": trial.disk}}
+    return (
+        {}
+        if trial.works or not isfinite(trial.at)
+        else {"event": {"t": trial.at, "disk": trial.disk}}
+    )
 
 
 def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> LessonChart:
@@ -117,13 +127,27 @@ def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> 
         return abs(trial.worst) if bound else trial.failed / trial.runs
 
     curves = [
-        Curve(each.engine, [t.value for t in each.trials], [read(t) for t in each.trials], mine, not mine)
-        for mine in (False, True) for each in limits if each.engine in ENGINES and mine == (each.engine == engine)
-    ]  # fmt: skip
+        Curve(
+            each.engine,
+            [t.value for t in each.trials],
+            [read(t) for t in each.trials],
+            mine,
+            not mine,
+        )
+        for mine in (False, True)
+        for each in limits
+        if each.engine in ENGINES and mine == (each.engine == engine)
+    ]
     guides = [("x", value, "here"), *([("y", bound, "fails above")] if bound else [])]
     axis = case.parameter if case.unit == "1" else f"{case.parameter} in {case.unit}"
-    what = (case.predicate.name.capitalize(), unit, "xy") if bound else ("Runs that fail", "share", "x")
-    return LessonChart(what[0], axis, what[1], curves, what[2], guides, case.values[0] > case.values[-1])
+    what = (
+        (case.predicate.name.capitalize(), unit, "xy")
+        if bound
+        else ("Runs that fail", "share", "x")
+    )
+    return LessonChart(
+        what[0], axis, what[1], curves, what[2], guides, case.values[0] > case.values[-1]
+    )
 
 
 def with_unit(text: str, case: Case) -> str:
@@ -136,11 +160,14 @@ def in_words(limit: Limit, case: Case) -> str:
     works, fails = bracket(limit)
     if limit.verdict == NEVER_FAILS:
         return f"does not fail up to {with_unit(works, case)}"
-    return f"works {works if works == 'nowhere' else f'at {works}'}, fails at {with_unit(fails, case)}"
+    return (
+        f"works {works if works == 'nowhere' else f'at {works}'}, fails at {with_unit(fails, case)}"
+    )
 
 
 def in_numbers(case: Case, trial: Trial, limit: Limit) -> list[tuple[str, str]]:
-    """What failing means, what these runs do, the engine's bracket and the reason, with how that was tested."""
+    """What failing means, what these runs do, the engine's bracket and the reason, with how that
+    was tested."""
     bound, read = "", trial.event
     if case.predicate.bound:
         bound = f", by more than {measured(case, case.predicate.bound)}"
@@ -161,7 +188,11 @@ def counted(trial: Trial) -> str:
     """How many runs fail."""
     if trial.runs == 1:
         return "it works" if trial.works else "it fails"
-    return f"none of {trial.runs} runs fails" if not trial.failed else f"{trial.failed} of {trial.runs} runs fail"
+    return (
+        f"none of {trial.runs} runs fails"
+        if not trial.failed
+        else f"{trial.failed} of {trial.runs} runs fail"
+    )
 
 
 def measured(case: Case, value: float) -> str:
@@ -170,16 +201,23 @@ def measured(case: Case, value: float) -> str:
 
 
 LIMITS = Lesson(
-    name="limits", number="8", title="Where methods fail",
+    name="limits",
+    number="8",
+    title="Where methods fail",
     asks="How harsh may a scene be before a method breaks?",
     text=(
-        "Every method works in gentle scenes. Make one thing harsher, a speed, a distance, a size, and most have a "
-        "value from which on they <b>fail</b>: a collision is missed, a spin is cut, a place is rounded away. The search "
-        "tries values from gentle to harsh, a collision at several moments of its step, stops at the first that fails, "
-        f"and halves the gap to the last that works until the two are {QUICK.ratio - 1:.0%} apart.",
-        "A reason counts as tested if the limit follows from it, or if an engine that differs in that one thing gets "
-        "farther; else it is called likely. These are the cases that take a second; "
-        "<code>crosscheck stability</code> searches them all.",
+        (
+            "Every method works in gentle scenes. Make one thing harsher, a speed, a distance, a"
+            " size, and most have a value from which on they <b>fail</b>: a collision is missed, a"
+            " spin is cut, a place is rounded away. The search tries values from gentle to harsh,"
+            " a collision at several moments of its step, stops at the first that fails, and"
+            f" halves the gap to the last that works until the two are {QUICK.ratio - 1:.0%} apart."
+        ),
+        (
+            "A reason counts as tested if the limit follows from it, or if an engine that differs"
+            " in that one thing gets farther; else it is called likely. These are the cases that"
+            " take a second; <code>crosscheck stability</code> searches them all."
+        ),
     ),
     sliders=(
         Slider("case", "Case", tuple(SEEN)),
@@ -188,4 +226,4 @@ LIMITS = Lesson(
     ),
     names=(*ENGINES, TRUTH),
     show=show_limits,
-)  # fmt: skip
+)

@@ -27,7 +27,11 @@ from reports.run.cells import versions
 
 GENERATOR = "crosscheck lesson"
 STYLES = ["lessons/lesson.css"]
-GROUPS = {"A solver, piece by piece": "12345", "How engines differ": "6", "What can be compared, and how far": "78"}
+GROUPS = {
+    "A solver, piece by piece": "12345",
+    "How engines differ": "6",
+    "What can be compared, and how far": "78",
+}
 MEASURING = Lock()  # two pages that ask at once get one measurement
 OWN = {  # who plays in lessons only
     ABLATED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
@@ -36,7 +40,8 @@ OWN = {  # who plays in lessons only
 
 
 def looks_of(lesson: Lesson) -> dict[str, Look]:
-    """How each name of a lesson is drawn; what lies on another curve is dashed, so that what it covers shows."""
+    """How each name of a lesson is drawn; what lies on another curve is dashed, so that what it
+    covers shows."""
     return {name: OWN.get(name) or look(*name.split(":", 1)) for name in lesson.names}
 
 
@@ -48,51 +53,82 @@ class Links(NamedTuple):
     game: str
 
 
-LIVE, FILES, ALONE = Links("/lesson/{}", "/lesson", "/"), Links("{}.html", "index.html", ""), Links("", "", "")
+LIVE, FILES, ALONE = (
+    Links("/lesson/{}", "/lesson", "/"),
+    Links("{}.html", "index.html", ""),
+    Links("", "", ""),
+)
 
 
 def about() -> dict[str, str]:
     """When and with what the numbers were made."""
-    return {"made": datetime.now(UTC).isoformat(timespec="seconds")[:16].replace("T", " ") + " UTC"} | versions()
+    return {
+        "made": datetime.now(UTC).isoformat(timespec="seconds")[:16].replace("T", " ") + " UTC"
+    } | versions()
 
 
 def answer_json(name: str, places: Sequence[int]) -> dict[str, Any]:
-    """What the lesson of that name shows with its sliders at these indices, for JSON; as what a worker does."""
+    """What the lesson of that name shows with its sliders at these indices, for JSON; as what a
+    worker does."""
     return LESSONS[name].at(places).to_json()
 
 
-def lesson_page(lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, grid: str = "") -> str:
-    """The page, which shows `first`; `grid`: every setting's answer, packed, for a page without a server."""
+def lesson_page(
+    lesson: Lesson, first: Mapping[str, Any], links: Links = LIVE, grid: str = ""
+) -> str:
+    """The page, which shows `first`; `grid`: every setting's answer, packed, for a page without a
+    server."""
     names = list(LESSONS)
     k = names.index(lesson.name)
     around = [LESSONS[names[each]] if 0 <= each < len(names) else None for each in (k - 1, k + 1)]
     return render(
-        "lessons/lesson.html.j2", generator=GENERATOR, scripts=[*ENGINE, "lessons/chart.js", "lessons/lesson.js"],
-        styles=STYLES, looks=looks_of(lesson), connects=not grid,
-        lesson=lesson, text=[Markup(paragraph) for paragraph in lesson.text], grid=grid, around=around,
-        links=links, about=about(), first=first,
-    )  # fmt: skip
+        "lessons/lesson.html.j2",
+        generator=GENERATOR,
+        scripts=[*ENGINE, "lessons/chart.js", "lessons/lesson.js"],
+        styles=STYLES,
+        looks=looks_of(lesson),
+        connects=not grid,
+        lesson=lesson,
+        text=[Markup(paragraph) for paragraph in lesson.text],
+        grid=grid,
+        around=around,
+        links=links,
+        about=about(),
+        first=first,
+    )
 
 
 def offline(lesson: Lesson, answers: Mapping[tuple[int, ...], Any], links: Links = ALONE) -> str:
     """One page with the answer, as of `answer_json`, to every setting of the sliders."""
     grid = {",".join(map(str, places)): answers[places] for places in lesson.grid}
-    return lesson_page(lesson, answers[lesson.start], links, deflated(json.dumps(grid, separators=(",", ":"))))
+    return lesson_page(
+        lesson, answers[lesson.start], links, deflated(json.dumps(grid, separators=(",", ":")))
+    )
 
 
 def index_page(links: Links = LIVE, rows: Sequence[Convention] = ()) -> str:
-    """The list of lessons; below it the conventions of the engines: `rows`; a live page asks for them later."""
+    """The list of lessons; below it the conventions of the engines: `rows`; a live page asks for
+    them later."""
     live = links is LIVE
-    groups = {heading: [LESSONS[name] for name in LESSONS if LESSONS[name].number[0] in numbers]
-              for heading, numbers in GROUPS.items()}  # fmt: skip
+    groups = {
+        heading: [LESSONS[name] for name in LESSONS if LESSONS[name].number[0] in numbers]
+        for heading, numbers in GROUPS.items()
+    }
     return render(
-        "lessons/index.html.j2", generator=GENERATOR, scripts=["lessons/index.js"] if live else [], styles=STYLES,
-        connects=live, groups=groups, links=links, table=None if live else Markup(conventions_page(rows, about())),
-    )  # fmt: skip
+        "lessons/index.html.j2",
+        generator=GENERATOR,
+        scripts=["lessons/index.js"] if live else [],
+        styles=STYLES,
+        connects=live,
+        groups=groups,
+        links=links,
+        table=None if live else Markup(conventions_page(rows, about())),
+    )
 
 
 def conventions_table() -> str:
-    """What the probes find in every engine, when and with which versions: measured once, when it is first asked for."""
+    """What the probes find in every engine, when and with which versions: measured once, when it is
+    first asked for."""
     with MEASURING:
         return conventions_page(*measured())
 
@@ -123,7 +159,9 @@ async def page(request: Request) -> Response:
     lesson = LESSONS.get(request.path_params["name"])
     if lesson is None:
         return PlainTextResponse(f"There is no such lesson; there are {', '.join(LESSONS)}.", 404)
-    return HTMLResponse(await in_thread(lambda: lesson_page(lesson, answer_json(lesson.name, lesson.start))))
+    return HTMLResponse(
+        await in_thread(lambda: lesson_page(lesson, answer_json(lesson.name, lesson.start)))
+    )
 
 
 async def shown(request: Request) -> Response:
@@ -140,6 +178,8 @@ async def shown(request: Request) -> Response:
 
 
 ROUTES: list[BaseRoute] = [
-    Route("/lesson", index), Route("/lesson/conventions", conventions),
-    Route("/lesson/{name}", page), Route("/lesson/{name}/shown", shown),
-]  # fmt: skip
+    Route("/lesson", index),
+    Route("/lesson/conventions", conventions),
+    Route("/lesson/{name}", page),
+    Route("/lesson/{name}/shown", shown),
+]

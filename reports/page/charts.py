@@ -1,4 +1,5 @@
-"""The charts of a comparison: what went off, when, and how it shrinks with the step size. A row in `CHARTS` each."""
+"""The charts of a comparison: what went off, when, and how it shrinks with the step size. A row in
+`CHARTS` each."""
 
 from __future__ import annotations
 
@@ -20,14 +21,17 @@ from reports.page.documents import deflated
 from scenarios.model import Array, Trajectory
 
 ZERO = 1e-17
-"""Where 0, and what is smaller than this, is drawn on a log axis: below the rounding of any number compared."""
+"""Where 0, and what is smaller than this, is drawn on a log axis: below the rounding of any number
+compared."""
 POINTS = 300
 TIME = "time (s)"
-BASELINE = "reference:exercise"  # drawn as the zero line where there is no truth; it is no truth itself
+# drawn as the zero line where there is no truth; it is no truth itself
+BASELINE = "reference:exercise"
 
 
 class Drawing(NamedTuple):
-    """A heading, how to read it in a sentence or two, and the figure; None where the caption says why."""
+    """A heading, how to read it in a sentence or two, and the figure; None where the caption says
+    why."""
 
     title: str
     caption: str
@@ -44,7 +48,8 @@ class ChartLine(NamedTuple):
 
 @dataclass(frozen=True)
 class Chart:
-    """A row of `CHARTS`: what it shows in a line, and the function that draws it for one comparison."""
+    """A row of `CHARTS`: what it shows in a line, and the function that draws it for one
+    comparison."""
 
     summary: str
     draw: Callable[[Comparison], Drawing]
@@ -58,40 +63,55 @@ def views(comparison: Comparison, other: Trajectory | None) -> list[tuple[Run, V
         if run.trajectory is not None and len(run.trajectory) > 1:
             k = min(len(run.trajectory), len(other) if other is not None else len(run.trajectory))
             mine = cut(run.trajectory, k)
-            played.append((run, View(scenario, run.dt, mine, cut(other, k) if other else None, jumps)))
+            played.append(
+                (run, View(scenario, run.dt, mine, cut(other, k) if other else None, jumps))
+            )
     return played
 
 
 def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None]) -> list[ChartLine]:
     """A line a run of what `series` gives for it, over time."""
-    return [ChartLine(run, view.played.t, y) for run, view in played if (y := series(view)) is not None]
+    return [
+        ChartLine(run, view.played.t, y) for run, view in played if (y := series(view)) is not None
+    ]
 
 
 def momentum(comparison: Comparison) -> Drawing:
-    """Momentum that should not be there; where walls take some up, the deviation of the momentum from the truth's."""
+    """Momentum that should not be there; where walls take some up, the deviation of the momentum
+    from the truth's."""
     if violations.knows_impulses(comparison.scenario):
         caption = (
-            "Distance of the momentum from P(0) and what weight and thrusts have added since, over the Σ m|v| at hand. "
-            "Lower is better."
+            "Distance of the momentum from P(0) and what weight and thrusts have added since, over"
+            " the Σ m|v| at hand. Lower is better."
         )
         lines = over(views(comparison, None), violations.momentum)
-        return Drawing("Momentum error", caption, over_time(comparison, lines, "error / Σ m|v| at hand"))
+        return Drawing(
+            "Momentum error", caption, over_time(comparison, lines, "error / Σ m|v| at hand")
+        )
     if comparison.truth is None:
-        why = "Walls, static disks or turning thrusts take up momentum, and no exact answer says how much."
+        why = (
+            "Walls, static disks or turning thrusts take up momentum, and no exact answer says how"
+            " much."
+        )
         return Drawing("Momentum", why, None)
     scale, lines = scales.momentum(comparison.scenario) or 1.0, []
     for run, view in views(comparison, comparison.truth):
         lines.append(ChartLine(run, view.played.t, view.momentum_deviation / scale))
     caption = (
-        "Walls and static disks take up momentum, so no law is broken here: how far the momentum is from the truth's, "
-        f"over the Σ m|v| at hand{DELAY}."
+        "Walls and static disks take up momentum, so no law is broken here: how far the momentum"
+        f" is from the truth's, over the Σ m|v| at hand{DELAY}."
     )
     return Drawing(
-        "Momentum deviation from the truth", caption, over_time(comparison, lines, "deviation / Σ m|v| at hand")
+        "Momentum deviation from the truth",
+        caption,
+        over_time(comparison, lines, "deviation / Σ m|v| at hand"),
     )
 
 
-DELAY = ", where a collision up to three steps late or early costs nothing; its delay is a metric of its own"
+DELAY = (
+    ", where a collision up to three steps late or early costs nothing; its delay is a metric of"
+    " its own"
+)
 
 
 def energy(comparison: Comparison) -> Drawing:
@@ -100,9 +120,14 @@ def energy(comparison: Comparison) -> Drawing:
     if not conserved and comparison.truth is None:
         return energy_course(comparison)
     lines = over(views(comparison, None if conserved else comparison.truth), violations.energy)
-    against = "what it was at the start, as no collision takes any (e = 1)," if conserved else "the truth's,"
+    against = (
+        "what it was at the start, as no collision takes any (e = 1),"
+        if conserved
+        else "the truth's,"
+    )
     caption = (
-        f"Distance of the energy from {against} over the energy at hand{'' if conserved else DELAY}. Lower is better."
+        f"Distance of the energy from {against} over the energy at"
+        f" hand{'' if conserved else DELAY}. Lower is better."
     )
     return Drawing("Energy error", caption, over_time(comparison, lines, "error / energy at hand"))
 
@@ -115,10 +140,12 @@ def energy_course(comparison: Comparison) -> Drawing:
         scale = scales.energy(comparison.scenario) or 1.0
         lines.append(ChartLine(run, view.played.t, laws.energy(view.played, scene) / scale))
     caption = (
-        "No exact answer says how much energy the collisions should take, so this is no error: the energy over that "
-        "at hand. Without thrusts it must never rise."
+        "No exact answer says how much energy the collisions should take, so this is no error: the"
+        " energy over that at hand. Without thrusts it must never rise."
     )
-    return Drawing("Energy", caption, over_time(comparison, lines, "energy / energy at hand", log=False))
+    return Drawing(
+        "Energy", caption, over_time(comparison, lines, "energy / energy at hand", log=False)
+    )
 
 
 def deviation(comparison: Comparison) -> Drawing:
@@ -136,11 +163,21 @@ def deviation(comparison: Comparison) -> Drawing:
         if run is not held
     ]
     if held is None:
-        caption = "Largest distance of any disk from where it truly is, in radii of that disk. Lower is better."
-        return Drawing("Trajectory deviation", caption, over_time(comparison, lines, "off the truth (radii)"))
-    caption = f"No truth to be off from: how far the disks are from those of {held.name}; neither is the right one."
+        caption = (
+            "Largest distance of any disk from where it truly is, in radii of that disk. Lower is"
+            " better."
+        )
+        return Drawing(
+            "Trajectory deviation", caption, over_time(comparison, lines, "off the truth (radii)")
+        )
+    caption = (
+        f"No truth to be off from: how far the disks are from those of {held.name}; neither is the"
+        " right one."
+    )
     deviation = f"deviation from {held.name}"
-    return Drawing(deviation.capitalize(), caption, over_time(comparison, lines, f"{deviation} (radii)"))
+    return Drawing(
+        deviation.capitalize(), caption, over_time(comparison, lines, f"{deviation} (radii)")
+    )
 
 
 def convergence(comparison: Comparison) -> Drawing:
@@ -163,14 +200,15 @@ def convergence(comparison: Comparison) -> Drawing:
     guide = first_order(lines, steps)
     figure = figure_of(lines, dt_axis, "position error (radii)", guide=guide, markers=len(steps))
     caption = (
-        "Largest position error at every step size. The dotted line falls as dt does (first order): a steeper run "
-        "is of higher order, a flat one has an error that no smaller step removes."
+        "Largest position error at every step size. The dotted line falls as dt does (first order):"
+        " a steeper run is of higher order, a flat one has an error that no smaller step removes."
     )
     return Drawing(title, caption, figure)
 
 
 def first_order(lines: Iterable[ChartLine], steps: list[float]) -> list[dict[str, Any]]:
-    """A guide with slope 1 through the middle of what is shown; none where there is nothing to guide."""
+    """A guide with slope 1 through the middle of what is shown; none where there is nothing to
+    guide."""
     shown = np.concatenate([line.y for line in lines])
     shown = shown[np.isfinite(shown) & (shown > ZERO)]
     if not len(shown) or len(steps) < 2:
@@ -181,7 +219,9 @@ def first_order(lines: Iterable[ChartLine], steps: list[float]) -> list[dict[str
     return [{"type": "scatter", "x": steps, "y": shortened(y)} | look]
 
 
-def over_time(comparison: Comparison, lines: list[ChartLine], title: str, log: bool = True) -> go.Figure | None:
+def over_time(
+    comparison: Comparison, lines: list[ChartLine], title: str, log: bool = True
+) -> go.Figure | None:
     """A figure of lines over time, with a mark where the truth ends; None if there is no line."""
     if not lines:
         return None
@@ -189,12 +229,23 @@ def over_time(comparison: Comparison, lines: list[ChartLine], title: str, log: b
     marks: dict[str, Any] = {}
     if truth is not None and truth.horizon < duration:
         ink = {"dash": "dot", "width": 1, "color": style.look(style.TRUTH).light}
-        at = {"x": truth.horizon, "y": 1, "yref": "paper", "showarrow": False, "xanchor": "left", "yanchor": "top"}
-        marks["shapes"] = [{"x0": at["x"], "x1": at["x"], "y0": 0, "y1": 1, "yref": "paper", "line": ink}]
+        at = {
+            "x": truth.horizon,
+            "y": 1,
+            "yref": "paper",
+            "showarrow": False,
+            "xanchor": "left",
+            "yanchor": "top",
+        }
+        marks["shapes"] = [
+            {"x0": at["x"], "x1": at["x"], "y0": 0, "y1": 1, "yref": "paper", "line": ink}
+        ]
         marks["annotations"] = [at | {"text": "truth ends"}]
     if log:  # the start is given to all: its 0 would take up half of the axis and say nothing
         lines = [ChartLine(run, x[1:], y[1:]) for run, x, y in lines]
-    figure = figure_of([thinned(line) for line in lines], {"title": TIME, "range": [0, duration]}, title, log=log)
+    figure = figure_of(
+        [thinned(line) for line in lines], {"title": TIME, "range": [0, duration]}, title, log=log
+    )
     return figure.update_layout(marks)
 
 
@@ -206,25 +257,38 @@ def figure_of(
     markers: int = 7,
     guide: Sequence[dict[str, Any]] = (),
 ) -> go.Figure:
-    """A figure with a trace a line, each in its engine's look, `markers` marks on each, and `guide` behind them."""
+    """A figure with a trace a line, each in its engine's look, `markers` marks on each, and `guide`
+    behind them."""
     traces = list(guide)
     for line in lines:
         look = style.look(line.run.engine, line.run.profile)
         y = np.where(line.y < ZERO, ZERO, line.y) if log else line.y
-        traces.append({
-            "type": "scatter", "x": shortened(line.x, 5), "y": shortened(y, 4 if log else 5), "name": line.run.name,
-            "mode": "lines+markers", "connectgaps": True,
-            "line": {"color": look.light, "dash": look.plotly_dash, "width": 1.7},
-            "marker": {"symbol": look.symbol, "size": 8, "color": look.light, "maxdisplayed": markers},
-            "hovertemplate": "%{y:.3g} at %{x:.4g} s",
-        })  # fmt: skip
+        traces.append(
+            {
+                "type": "scatter",
+                "x": shortened(line.x, 5),
+                "y": shortened(y, 4 if log else 5),
+                "name": line.run.name,
+                "mode": "lines+markers",
+                "connectgaps": True,
+                "line": {"color": look.light, "dash": look.plotly_dash, "width": 1.7},
+                "marker": {
+                    "symbol": look.symbol,
+                    "size": 8,
+                    "color": look.light,
+                    "maxdisplayed": markers,
+                },
+                "hovertemplate": "%{y:.3g} at %{x:.4g} s",
+            }
+        )
     y_axis = {"title": title} | (decades(np.concatenate([line.y for line in lines])) if log else {})
     # Built in one go: adding traces one by one copies and checks every number three times.
     return go.Figure(traces, {"hovermode": "closest", "xaxis": x_axis, "yaxis": y_axis})
 
 
 def decades(values: Array) -> dict[str, object]:
-    """Range and ticks of a log axis for `values` >= 0, with a tick "0" at `ZERO` if any is drawn there."""
+    """Range and ticks of a log axis for `values` >= 0, with a tick "0" at `ZERO` if any is drawn
+    there."""
     values = values[np.isfinite(values)]
     real = values[values >= ZERO]
     low = int(np.floor(np.log10(real.min()))) if len(real) else -16
@@ -236,11 +300,17 @@ def decades(values: Array) -> dict[str, object]:
     text = [f"10<sup>{k}</sup>".replace("-", "−") if k not in (0, 1) else str(10**k) for k in ticks]
     if zero:
         ticks, text = [*ticks, low], [*text, "0"]
-    return {"type": "log", "range": [low - 0.35, high + 0.25], "tickvals": [10.0**k for k in ticks], "ticktext": text}
+    return {
+        "type": "log",
+        "range": [low - 0.35, high + 0.25],
+        "tickvals": [10.0**k for k in ticks],
+        "ticktext": text,
+    }
 
 
 def thinned(line: ChartLine) -> ChartLine:
-    """At most `POINTS` points of a line: the smallest and the largest of each stretch stay, so no peak is hidden."""
+    """At most `POINTS` points of a line: the smallest and the largest of each stretch stay, so no
+    peak is hidden."""
     k = len(line.y)
     if k <= POINTS:
         return line
@@ -267,7 +337,8 @@ CHARTS: dict[str, Chart] = {
 
 
 def packed_charts(drawings: Mapping[str, Drawing]) -> str:
-    """The figures as JSON, deflated, as base64; what they share with every other figure is left to page.js."""
+    """The figures as JSON, deflated, as base64; what they share with every other figure is left to
+    page.js."""
     figures = {}
     for key, drawing in drawings.items():
         if drawing.figure is not None:

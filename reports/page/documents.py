@@ -1,4 +1,5 @@
-"""Makes a self-contained page: its style, its scripts, and a policy that lets the browser run these only."""
+"""Makes a self-contained page: its style, its scripts, and a policy that lets the browser run these
+only."""
 
 from __future__ import annotations
 
@@ -34,10 +35,12 @@ def render(
     connects: bool = False,
     **fields: Any,
 ) -> str:
-    """The page of `template`, which extends base.html.j2, as text; templates, scripts, styles: paths below `reports`.
+    """The page of `template`, which extends base.html.j2, as text; templates, scripts, styles:
+    paths below `reports`.
 
     Args:
-        generator: the command that makes it, by which a file is known as one that may be written over.
+        generator: the command that makes it, by which a file is known as one that may be written
+            over.
         looks: name -> how it is drawn; `who` and `swatch` of macros.html.j2 show these names.
         plotly: whether its charts need the library, which then stands in the page, deflated.
         connects: whether its scripts may talk to the server the page comes from.
@@ -48,9 +51,16 @@ def render(
     sheet = css() + "".join((REPORTS / sheet).read_text(encoding="utf-8") for sheet in styles)
     policy = content_policy([*library, *sources]) + ("; connect-src 'self'" if connects else "")
     return fragment(
-        template, generator=generator, policy=policy, css=Markup(sheet), looks=looks, looks_json=looks_as_json(looks),
-        scripts=[Markup(source) for source in sources], library="".join(map(deflated, library)), **fields,
-    )  # fmt: skip
+        template,
+        generator=generator,
+        policy=policy,
+        css=Markup(sheet),
+        looks=looks,
+        looks_json=looks_as_json(looks),
+        scripts=[Markup(source) for source in sources],
+        library="".join(map(deflated, library)),
+        **fields,
+    )
 
 
 def fragment(template: str, **fields: Any) -> str:
@@ -81,7 +91,8 @@ def environment() -> Environment:
 
 
 def css() -> str:
-    """The style sheet of all pages with the colours of style.py in front, for light and for dark."""
+    """The style sheet of all pages with the colours of style.py in front, for light and for
+    dark."""
     light, dark = style.css_variables(dark=False), style.css_variables(dark=True)
     return f":root{{{light}}}@media(prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (
         REPORTS / "page" / "page.css"
@@ -99,10 +110,15 @@ def for_script(value: Any) -> Markup:
 
 
 def content_policy(scripts: Sequence[str]) -> str:
-    """A Content-Security-Policy by which the browser runs these scripts only and fetches nothing."""
-    hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
+    """A Content-Security-Policy by which the browser runs these scripts only and fetches
+    nothing."""
+    hashes = (
+        base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts
+    )
     allowed = " ".join(f"'sha256-{digest}'" for digest in hashes)
-    return f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
+    )
 
 
 def deflated(text: str) -> str:

@@ -1,4 +1,5 @@
-"""The finding in three sentences, computed from the table: nothing here is written by hand but the grammar."""
+"""The finding in three sentences, computed from the table: nothing here is written by hand but the
+grammar."""
 
 from __future__ import annotations
 
@@ -14,25 +15,37 @@ FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
-    """Three sentences: who is closest, what settings are worth, where each fails; a fourth on who is not counted."""
+    """Three sentences: who is closest, what settings are worth, where each fails; a fourth on who
+    is not counted."""
     off = position_errors(comparisons).drop(columns=list(untrusted), errors="ignore")
     statuses = [run.status for comparison in comparisons for run in comparison.runs]
     sentences = [closest(off), worth_of_settings(off), where_it_fails(off, statuses)]
     if untrusted:
-        sentences.append(f"Not counted, as it broke the protocol of the harness: {', '.join(sorted(untrusted))}.")
+        sentences.append(
+            f"Not counted, as it broke the protocol of the harness: {', '.join(sorted(untrusted))}."
+        )
     return sentences
 
 
 def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """Largest deviation from the truth in radii at the middle dt: a row a scenario, a column an `engine:profile`.
+    """Largest deviation from the truth in radii at the middle dt: a row a scenario, a column an
+    `engine:profile`.
 
     `inf` for who was asked and has no result, so that to refuse a hard scene does not help.
     """
     # A truth that is lost before its second sample has only the start, which is given to all.
-    scored = [comparison for comparison in comparisons if comparison.truth is not None and len(comparison.truth) > 1]
+    scored = [
+        comparison
+        for comparison in comparisons
+        if comparison.truth is not None and len(comparison.truth) > 1
+    ]
     rows = []
     for comparison in scored:
-        found = {name: one.value for (name, metric), one in values(comparison).items() if metric == MAPPED}
+        found = {
+            name: one.value
+            for (name, metric), one in values(comparison).items()
+            if metric == MAPPED
+        }
         rows.append({run.name: found.get(run.name, np.inf) for run in comparison.middle_runs})
     return pd.DataFrame(rows, index=[comparison.scenario.name for comparison in scored])
 
@@ -40,18 +53,32 @@ def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
 def closest(off: pd.DataFrame) -> str:
     """Who comes closest to the exact answers."""
     if off.columns.empty and len(off):
-        return "No engine that counts was played to its end in a scene with an exact answer, so nobody is scored."
+        return (
+            "No engine that counts was played to its end in a scene with an exact answer, so nobody"
+            " is scored."
+        )
     if off.empty:
-        return "No scene here has an exact answer, so no engine is scored. The page shows violations of the laws of physics and differences between engines."
+        return (
+            "No scene here has an exact answer, so no engine is scored. The page shows violations"
+            " of the laws of physics and differences between engines."
+        )
     medians = off.median().sort_values()
     if np.isinf(medians.iloc[0]):
-        return "No engine was played to its end in half of the scenes with an exact answer, so engines are not ranked."
+        return (
+            "No engine was played to its end in half of the scenes with an exact answer, so engines"
+            " are not ranked."
+        )
     best, *others = (f"{name} ({value:.2g})" for name, value in medians.items())
-    wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())  # within 1 % counts as equal
-    ranking = f", then {', '.join(others[:2])}" + (f", last {others[-1]}" if len(others) > 2 else "") if others else ""
+    # within 1 % counts as equal
+    wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())
+    ranking = (
+        f", then {', '.join(others[:2])}" + (f", last {others[-1]}" if len(others) > 2 else "")
+        if others
+        else ""
+    )
     return (
-        f"Closest to the exact answers, by the largest deviation in radii, median of {len(off)} scenes: {best}, "
-        f"unbeaten in {wins}{ranking}."
+        f"Closest to the exact answers, by the largest deviation in radii, median of {len(off)}"
+        f" scenes: {best}, unbeaten in {wins}{ranking}."
     )
 
 
@@ -67,7 +94,10 @@ def worth_of_settings(off: pd.DataFrame) -> str:
             farther = int((off[matched] > 1.01 * off[shipped]).sum())
             parts.append(f"{engine} closer in {closer} (farther in {farther})")
     if not parts:
-        return "No engine was played in both profiles, so the worth of settings is not known from this run."
+        return (
+            "No engine was played in both profiles, so the worth of settings is not known from this"
+            " run."
+        )
     return f"Matching an engine to the scene brings {', '.join(parts)} of {len(off)} scenes."
 
 
@@ -82,6 +112,7 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
     return (
-        f"More than a whole radius off, or without a result: {who} of {len(off)} scenes; the hardest is "
-        f"{defeated.idxmax()}, too much for {defeated.max()} of {lost.shape[1]}; {cells}"
+        f"More than a whole radius off, or without a result: {who} of {len(off)} scenes; the"
+        f" hardest is {defeated.idxmax()}, too much for {defeated.max()} of {lost.shape[1]};"
+        f" {cells}"
     )

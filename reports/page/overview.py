@@ -1,4 +1,5 @@
-"""Reads the numbers that the page shows out of the comparisons' tables: the summary, the map, a scenario's table."""
+"""Reads the numbers that the page shows out of the comparisons' tables: the summary, the map, a
+scenario's table."""
 
 from __future__ import annotations
 
@@ -13,13 +14,18 @@ from reports.compare.view import NOT_JUDGED
 from reports.page.style import TRUTH, heat, number
 
 OUTCOMES = {
-    "unsupported": "refused", "diverged": "diverged", "error": "error", "crashed": "crashed", "timeout": "time-out",
-}  # fmt: skip
+    "unsupported": "refused",
+    "diverged": "diverged",
+    "error": "error",
+    "crashed": "crashed",
+    "timeout": "time-out",
+}
 MAPPED = "position_max_radii"
 
 
 class OverviewCell(NamedTuple):
-    """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none), failed, the best."""
+    """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none),
+    failed, the best."""
 
     text: str
     remark: str = ""
@@ -29,7 +35,8 @@ class OverviewCell(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """A number of the tables: value, a remark on it, and whether enough carries it; else the remark says why not."""
+    """A number of the tables: value, a remark on it, and whether enough carries it; else the remark
+    says why not."""
 
     value: float
     remark: str
@@ -64,11 +71,17 @@ class Failure(NamedTuple):
 SUMMARY: dict[str, Column] = {
     MAPPED: Column("Position", "radii", "largest distance of any disk from where it truly is"),
     "momentum_error": Column("Momentum", "of Σ m|v|", "largest momentum that came or went unasked"),
-    "energy_error": Column("Energy", "of the energy at hand", "largest energy that came or went unasked"),
-    "restitution_error": Column("Restitution", "no unit", "largest |e measured − e asked for| of any collision"),
-    "wrong_collisions": Column("Wrong collisions", "collisions in all", "missed and spurious collisions, added up"),
+    "energy_error": Column(
+        "Energy", "of the energy at hand", "largest energy that came or went unasked"
+    ),
+    "restitution_error": Column(
+        "Restitution", "no unit", "largest |e measured − e asked for| of any collision"
+    ),
+    "wrong_collisions": Column(
+        "Wrong collisions", "collisions in all", "missed and spurious collisions, added up"
+    ),
     "failed": Column("Not played", "scenarios", "refused, crashed, diverged or timed out"),
-}  # fmt: skip
+}
 
 
 def names_of(comparisons: Iterable[Comparison]) -> list[str]:
@@ -84,11 +97,17 @@ def values(comparison: Comparison) -> Found:
     for versus in ("itself", TRUTH):  # the truth comes last and wins
         rows = table[near & (table.versus == versus) & table.metric.isin(list(METRICS))]
         for row in rows.to_dict("records"):
-            where = f"disk {row['disk']}" if row["disk"] >= 0 and comparison.scenario.scene.n > 1 else ""
+            where = (
+                f"disk {row['disk']}"
+                if row["disk"] >= 0 and comparison.scenario.scene.n > 1
+                else ""
+            )
             when = f"at {row['at_s']:.4g} s" if np.isfinite(row["at_s"]) else ""
             remark = ", ".join(filter(None, (where, when, str(row["note"]))))
             judged = not str(row["note"]).startswith(NOT_JUDGED)
-            found[f"{row['engine']}:{row['profile']}", str(row["metric"])] = Measured(row["value"], remark, judged)
+            found[f"{row['engine']}:{row['profile']}", str(row["metric"])] = Measured(
+                row["value"], remark, judged
+            )
     return found
 
 
@@ -103,7 +122,8 @@ def failures(comparison: Comparison) -> list[Failure]:
 
 
 def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
-    """`engine:profile` -> (what happened, reason) of the runs at the middle dt that are not "ok"."""
+    """`engine:profile` -> (what happened, reason) of the runs at the middle dt that are not
+    "ok"."""
     return {
         run.name: (OUTCOMES.get(run.status, run.status), run.reason)
         for run in comparison.middle_runs
@@ -114,15 +134,19 @@ def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
 def summary(
     comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]
 ) -> dict[str, list[OverviewCell]]:
-    """`engine:profile` -> a cell for each of `SUMMARY`: medians over the scenarios, sums where the unit says so.
+    """`engine:profile` -> a cell for each of `SUMMARY`: medians over the scenarios, sums where the
+    unit says so.
 
-    Who is `untrusted` broke the protocol of the harness and is not scored; who failed somewhere is never the best.
+    Who is `untrusted` broke the protocol of the harness and is not scored; who failed somewhere is
+    never the best.
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
     rows: dict[str, list[OverviewCell]] = {name: [] for name in names}
     for name in untrusted & set(names):
-        rows[name] = [OverviewCell("breaks", "breaks the protocol: not scored", failed=True)] * (len(SUMMARY) - 1)
+        rows[name] = [OverviewCell("breaks", "breaks the protocol: not scored", failed=True)] * (
+            len(SUMMARY) - 1
+        )
     for metric in SUMMARY:
         if metric == "failed":
             for name in names:
@@ -130,7 +154,11 @@ def summary(
                 rows[name].append(OverviewCell(f"{count} of {len(comparisons)}", failed=count > 0))
             continue
         pooled = {name: pool(metric, name, found) for name in names if name not in untrusted}
-        whole = {name: value for name, (value, _) in pooled.items() if not any(name in each for each in failed)}
+        whole = {
+            name: value
+            for name, (value, _) in pooled.items()
+            if not any(name in each for each in failed)
+        }
         best = min((value for value in whole.values() if not np.isnan(value)), default=np.nan)
         for name, (value, remark) in pooled.items():
             rows[name].append(OverviewCell(number(value), remark, best=whole.get(name) == best))
@@ -138,12 +166,14 @@ def summary(
 
 
 def pool(metric: str, name: str, found: Sequence[Found]) -> tuple[float, str]:
-    """The median, for collisions the sum, of a metric over the scenarios in which it is judged; in how many it is, or
-    not.
+    """The median, for collisions the sum, of a metric over the scenarios in which it is judged; in
+    how many it is, or not.
 
     Where nobody can miss a collision, as there is none, those that are spurious count alone.
     """
-    kinds = ("collisions_missed", "collisions_spurious") if metric == "wrong_collisions" else (metric,)
+    kinds = (
+        ("collisions_missed", "collisions_spurious") if metric == "wrong_collisions" else (metric,)
+    )
     known = [[each[name, kind] for kind in kinds if (name, kind) in each] for each in found]
     judged = [[one.value for one in each if one.judged] for each in known]
     totals = [sum(each) for each in judged if each]
@@ -154,8 +184,11 @@ def pool(metric: str, name: str, found: Sequence[Found]) -> tuple[float, str]:
     return float(np.sum(totals) if metric == "wrong_collisions" else np.median(totals)), remark
 
 
-def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[str, list[OverviewCell]]:
-    """scenario -> a cell for each name: the largest position error in radii, or why there is none."""
+def heat_map(
+    comparisons: Sequence[Comparison], names: Sequence[str]
+) -> dict[str, list[OverviewCell]]:
+    """scenario -> a cell for each name: the largest position error in radii, or why there is
+    none."""
     rows = {}
     for comparison in comparisons:
         found, failed = values(comparison), outcome_at_middle_dt(comparison)
@@ -167,7 +200,9 @@ def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[st
             elif (name, MAPPED) in found:
                 value, remark, judged = found[name, MAPPED]
                 cells.append(
-                    OverviewCell(number(value, 2), remark, heat(value)) if judged else OverviewCell(NOT_JUDGED, remark)
+                    OverviewCell(number(value, 2), remark, heat(value))
+                    if judged
+                    else OverviewCell(NOT_JUDGED, remark)
                 )
             elif name in played:
                 cells.append(OverviewCell("no truth", comparison.scenario.without_truth))
@@ -177,8 +212,11 @@ def heat_map(comparisons: Sequence[Comparison], names: Sequence[str]) -> dict[st
     return rows
 
 
-def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[str, str, str, list[OverviewCell]]]:
-    """(metric, unit, which way is better, a cell for each name) of every metric that this scenario has."""
+def scenario_table(
+    comparison: Comparison, names: Sequence[str]
+) -> list[tuple[str, str, str, list[OverviewCell]]]:
+    """(metric, unit, which way is better, a cell for each name) of every metric that this scenario
+    has."""
     found, failed = values(comparison), outcome_at_middle_dt(comparison)
     rows = []
     for key, metric in METRICS.items():
@@ -190,7 +228,9 @@ def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[s
                 cells.append(OverviewCell(found[name, key].text, found[name, key].remark))
             else:
                 cells.append(
-                    OverviewCell(failed[name][0], failed[name][1], failed=True) if name in failed else OverviewCell("–")
+                    OverviewCell(failed[name][0], failed[name][1], failed=True)
+                    if name in failed
+                    else OverviewCell("–")
                 )
         unit = "" if metric.unit == "1" else metric.unit
         better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[metric.better]
@@ -199,18 +239,25 @@ def scenario_table(comparison: Comparison, names: Sequence[str]) -> list[tuple[s
 
 
 def between_engines(comparison: Comparison, names: Sequence[str]) -> dict[str, list[OverviewCell]]:
-    """name -> the deviation of its trajectory from each other name's, at most, in radii; {} if there is no pair."""
+    """name -> the deviation of its trajectory from each other name's, at most, in radii; {} if
+    there is no pair."""
     table = comparison.table
     near = table.dt_s == comparison.middle_dt
     deviations: dict[frozenset[str], float] = {}
-    for row in table[near & (table.metric == MAPPED) & table.versus.isin(list(names))].to_dict("records"):
-        deviations[frozenset((f"{row['engine']}:{row['profile']}", str(row["versus"])))] = float(row["value"])
+    for row in table[near & (table.metric == MAPPED) & table.versus.isin(list(names))].to_dict(
+        "records"
+    ):
+        deviations[frozenset((f"{row['engine']}:{row['profile']}", str(row["versus"])))] = float(
+            row["value"]
+        )
     if not deviations:
         return {}
 
     def cell(one: str, other: str) -> OverviewCell:
         value = deviations.get(frozenset((one, other)))
-        return OverviewCell("–") if value is None else OverviewCell(number(value, 2), "", heat(value))
+        return (
+            OverviewCell("–") if value is None else OverviewCell(number(value, 2), "", heat(value))
+        )
 
     return {one: [cell(one, other) for other in names[:k]] for k, one in enumerate(names)}
 
@@ -219,7 +266,8 @@ Settings = dict[tuple[str, str], tuple[str, str]]
 
 
 def settings(comparison: Comparison) -> Settings:
-    """(`engine:profile`, setting) -> (asked, used) at the middle dt; asked "–" where it is the engine's own."""
+    """(`engine:profile`, setting) -> (asked, used) at the middle dt; asked "–" where it is the
+    engine's own."""
     return {
         (run.name, setting): (number(asked, 6), number(used, 6))
         for run in comparison.middle_runs

@@ -70,29 +70,51 @@ def write_page(
 ) -> None:
     """Write the page of `comparisons`, in reading order, to `path`.
 
-    `findings` are the sentences on top; who is in `untrusted` is not scored; `conformance` and `known_answers` are
-    the tables below them; `about` holds command, seed, machine, versions, started and seconds;
-    `lessons` name -> what has its number, title and question.
+    `findings` are the sentences on top; who is in `untrusted` is not scored; `conformance` and
+    `known_answers` are the tables below them; `about` holds command, seed, machine, versions,
+    started and seconds; `lessons` name -> what has its number, title and question.
     """
     names = overview.names_of(comparisons)
     common = overview.common_settings(comparisons)
     sections = [section_of(comparison, names, common) for comparison in comparisons]
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
     html = render(
-        "page/page.html.j2", generator=GENERATOR, scripts=CHARTED, looks=looks, plotly=True,
-        names=names, sections=sections, families=by_family(sections), findings=findings, about=about, points=POINTS,
-        engines=versions_of(comparisons), steps=step_range(comparisons), columns=overview.SUMMARY,
-        summary=overview.summary(comparisons, names, untrusted), heat_map=overview.heat_map(comparisons, names),
-        conformance=conformance_matrix(conformance), departures=departures(conformance), probes=records(conformance),
-        known_answers=records(known_answers), known_answers_text=about.get("known_answers_text", MEANING),
-        heat_bounds=style.HEAT_BOUNDS, metrics=METRICS, lessons=lessons, truth_of=truth_of,
+        "page/page.html.j2",
+        generator=GENERATOR,
+        scripts=CHARTED,
+        looks=looks,
+        plotly=True,
+        names=names,
+        sections=sections,
+        families=by_family(sections),
+        findings=findings,
+        about=about,
+        points=POINTS,
+        engines=versions_of(comparisons),
+        steps=step_range(comparisons),
+        columns=overview.SUMMARY,
+        summary=overview.summary(comparisons, names, untrusted),
+        heat_map=overview.heat_map(comparisons, names),
+        conformance=conformance_matrix(conformance),
+        departures=departures(conformance),
+        probes=records(conformance),
+        known_answers=records(known_answers),
+        known_answers_text=about.get("known_answers_text", MEANING),
+        heat_bounds=style.HEAT_BOUNDS,
+        metrics=METRICS,
+        lessons=lessons,
+        truth_of=truth_of,
         off_grid_note=off_grid_note,
-        common=by_name(common), trust=how_far_to_trust(comparisons), searched=by_engine(searched()),
-    )  # fmt: skip
+        common=by_name(common),
+        trust=how_far_to_trust(comparisons),
+        searched=by_engine(searched()),
+    )
     put_text(path, html)
 
 
-def section_of(comparison: Comparison, names: Sequence[str], common: overview.Settings) -> ScenarioSection:
+def section_of(
+    comparison: Comparison, names: Sequence[str], common: overview.Settings
+) -> ScenarioSection:
     """All that the page shows of one scenario; of its settings those that are not `common`."""
     own = {key: pair for key, pair in overview.settings(comparison).items() if key not in common}
     drawings = {key: chart.draw(comparison) for key, chart in CHARTS.items()}
@@ -145,7 +167,8 @@ def step_range(comparisons: Sequence[Comparison]) -> tuple[float, float]:
 def by_engine(rows: Sequence[dict[str, str]]) -> dict[str, list[dict[str, str]]]:
     """Engine -> its rows of the table of what was searched."""
     return {
-        engine: [row for row in rows if row["engine"] == engine] for engine in dict.fromkeys(r["engine"] for r in rows)
+        engine: [row for row in rows if row["engine"] == engine]
+        for engine in dict.fromkeys(r["engine"] for r in rows)
     }
 
 
@@ -166,7 +189,9 @@ def truth_of(comparison: Comparison) -> str:
     if truth.horizon < scenario.duration:
         ends = f"up to its horizon at {style.number(truth.horizon)} s, and no further"
         ends += f": {truth.reason}" if truth.reason else ""
-    return f"exact {ends}" + (f"; off by at most {style.number(truth.error_bound)} m" if truth.error_bound else "")
+    return f"exact {ends}" + (
+        f"; off by at most {style.number(truth.error_bound)} m" if truth.error_bound else ""
+    )
 
 
 def records(table: pd.DataFrame | None) -> list[dict[str, Any]]:

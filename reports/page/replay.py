@@ -1,8 +1,9 @@
 """Packs the trajectories of a comparison into the few kilobytes that the page's player draws from.
 
-A pack is, deflated: uint32 length of a JSON head, the head, then for every layer the numbers the head announces, all
-little-endian uint16: positions on a grid over the layer's bounding box (second differences in time, zigzag, high bytes
-before low bytes: steady motion becomes zeros), angles on a grid over a turn if anything turns, and the collisions.
+A pack is, deflated: uint32 length of a JSON head, the head, then for every layer the numbers the
+head announces, all little-endian uint16: positions on a grid over the layer's bounding box (second
+differences in time, zigzag, high bytes before low bytes: steady motion becomes zeros), angles on a
+grid over a turn if anything turns, and the collisions.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
     from reports.compare.comparison import Comparison
 
 FRAMES = 240
-NUMBERS = 10_000  # positions of disks a layer, so that a crowd of 100 takes no more room than the page has
+# positions of disks a layer, so that a crowd of 100 takes no more room than the page has
+NUMBERS = 10_000
 COLLISIONS = 300  # more marks than this a layer hide the disks
 STEPS = 65535  # of the position grid
 
@@ -41,23 +43,28 @@ def pack_layers(
     shown: NDArray[np.int64] | None = None,
     more: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
-    """The layers at the samples `shown` (all that are worth it), packed, as base64; "" if there are none.
+    """The layers at the samples `shown` (all that are worth it), packed, as base64; "" if there are
+    none.
 
-    more: goes into the head: `opens` s, where the engine starts; `pace`, seconds in one at speed 1; `event`, what to
+    more: goes into the head: `opens` s, where the engine starts; `pace`, seconds in one at speed 1;
+        `event`, what to
     mark: t s, disk.
     """
     if not layers:
         return ""
     shown = frames(scenario, layers) if shown is None else shown
     heads, bodies = zip(*(layer(run, trajectory, shown, scenario) for run, trajectory in layers))
-    head = json.dumps({**head_of(scenario, shown, layers), **more, "layers": heads}, separators=(",", ":")).encode()
+    head = json.dumps(
+        {**head_of(scenario, shown, layers), **more, "layers": heads}, separators=(",", ":")
+    ).encode()
     head += b" " * (-len(head) % 4)
     whole = len(head).to_bytes(4, "little") + head + b"".join(bodies)
     return base64.b64encode(zlib.compress(whole, 9)).decode()
 
 
 def played(comparison: Comparison) -> list[tuple[Run | None, Trajectory]]:
-    """What can be drawn: (run, trajectory) at the middle dt, and (None, truth) last, so that it lies on top."""
+    """What can be drawn: (run, trajectory) at the middle dt, and (None, truth) last, so that it
+    lies on top."""
     layers: list[tuple[Run | None, Trajectory]] = [
         (run, run.trajectory) for run in comparison.middle_runs if run.trajectory is not None
     ]
@@ -72,9 +79,12 @@ def name_of(run: Run | None) -> str:
 
 
 def frames(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> NDArray[np.int64]:
-    """The samples that are drawn: spread evenly, and those nearest to the last layer's collisions, if these are few."""
+    """The samples that are drawn: spread evenly, and those nearest to the last layer's collisions,
+    if these are few."""
     count = int(min(FRAMES, max(60, NUMBERS // scenario.scene.n), scenario.samples + 1))
-    collisions = np.unique(np.rint(layers[-1][1].collisions.t / scenario.sample_interval).astype(int))
+    collisions = np.unique(
+        np.rint(layers[-1][1].collisions.t / scenario.sample_interval).astype(int)
+    )
     collisions = collisions[(collisions > 0) & (collisions < scenario.samples)]
     collisions = collisions if len(collisions) < count // 4 else collisions[:0]
     even = np.rint(np.linspace(0, scenario.samples, count - len(collisions))).astype(int)
@@ -98,16 +108,24 @@ def head_of(
 
 
 def view_of(scenario: Scenario, trajectories: list[Trajectory]) -> Array:
-    """(4,) m, left, bottom, right, top: all of the last trajectory, and of the others what is not thrown far away."""
+    """(4,) m, left, bottom, right, top: all of the last trajectory, and of the others what is not
+    thrown far away."""
     scene = scenario.scene
     r = scene.radius[:, None]
-    boxes = np.array([
-        [(t.position - r).min(axis=(0, 1)), (t.position + r).max(axis=(0, 1))]
-        for t in trajectories if len(t) and np.isfinite(t.position).all()
-    ] or [[[-1.0, -1.0], [1.0, 1.0]]])  # fmt: skip
+    boxes = np.array(
+        [
+            [(t.position - r).min(axis=(0, 1)), (t.position + r).max(axis=(0, 1))]
+            for t in trajectories
+            if len(t) and np.isfinite(t.position).all()
+        ]
+        or [[[-1.0, -1.0], [1.0, 1.0]]]
+    )
     base = boxes[-1] if len(boxes) else boxes[0]
     room = 0.5 * np.maximum(base[1] - base[0], 2 * scene.radius.max())
-    low, high = np.maximum(boxes[:, 0].min(axis=0), base[0] - room), np.minimum(boxes[:, 1].max(axis=0), base[1] + room)
+    low, high = (
+        np.maximum(boxes[:, 0].min(axis=0), base[0] - room),
+        np.minimum(boxes[:, 1].max(axis=0), base[1] + room),
+    )
     if scene.wrap is not None:
         low, high = np.minimum(low, scene.wrap[0]), np.maximum(high, scene.wrap[1])
     if len(scene.walls):
@@ -119,7 +137,8 @@ def view_of(scenario: Scenario, trajectories: list[Trajectory]) -> Array:
 
 
 def ratio_of(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> float:
-    """Height over width of what is shown, so that the page keeps room for it before it is unpacked."""
+    """Height over width of what is shown, so that the page keeps room for it before it is
+    unpacked."""
     left, bottom, right, top = view_of(scenario, [trajectory for _, trajectory in layers])
     return round((top - bottom) / (right - left), 4)
 
@@ -127,7 +146,8 @@ def ratio_of(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) ->
 def layer(
     run: Run | None, trajectory: Trajectory, shown: NDArray[np.int64], scenario: Scenario
 ) -> tuple[dict[str, Any], bytes]:
-    """The head and the numbers of one layer; it ends where its trajectory ends, of which it may be a part."""
+    """The head and the numbers of one layer; it ends where its trajectory ends, of which it may be
+    a part."""
     first = round(trajectory.t[0] / scenario.sample_interval)
     mine = shown[shown < first + len(trajectory)] - first
     position = trajectory.position[mine].reshape(len(mine), -1, 2)
@@ -151,9 +171,15 @@ def layer(
         )
     ends = "" if len(mine) == len(shown) else f"{trajectory.t[-1]:.4g}"
     head = {
-        "name": name_of(run), "frames": len(mine), "low": [float(x) for x in low], "span": [float(x) for x in span],
-        "turns": turns, "marks": marks, "collisions": len(collisions), "ends": ends,
-    }  # fmt: skip
+        "name": name_of(run),
+        "frames": len(mine),
+        "low": [float(x) for x in low],
+        "span": [float(x) for x in span],
+        "turns": turns,
+        "marks": marks,
+        "collisions": len(collisions),
+        "ends": ends,
+    }
     return head, body
 
 

@@ -28,8 +28,10 @@ class Report:
         comparisons: one a scenario, in reading order.
         runs: runs.csv.
         findings: the sentences on top.
-        untrusted: the engines that broke the protocol: their rows are kept, but nothing is concluded from them.
-        unjudged: name of a scene -> why it is not held to its answer, or not compared at all, though it should be.
+        untrusted: the engines that broke the protocol: their rows are kept, but nothing is
+            concluded from them.
+        unjudged: name of a scene -> why it is not held to its answer, or not compared at all,
+            though it should be.
     """
 
     archive: Archive
@@ -41,7 +43,8 @@ class Report:
 
 
 def make_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, Any]) -> Report:
-    """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what is being done.
+    """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what
+    is being done.
 
     `lessons`: name -> a lesson, for the page's list of them.
 
@@ -60,7 +63,8 @@ def made_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, 
     tables = make_tables(archive, say)
     say("writing the page")
     comparisons = comparisons_of(archive, tables)
-    began = {run.name for comparison in comparisons for run in comparison.runs}  # an interrupt may come before
+    # an interrupt may come before
+    began = {run.name for comparison in comparisons for run in comparison.runs}
     engines = [name for name in header["engines"] if name in began and name in archive.conformance]
     asked = [archive.conformance[name]["conformance"] for name in engines]
     known = sorted(
@@ -68,7 +72,12 @@ def made_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, 
         key=lambda row: (row["column"], row["dt_s"], row["made_by"]),
         reverse=True,
     )
-    untrusted = {f"{row['engine']}:{row['profile']}" for rows in asked for row in rows if row["verdict"] == "breaks"}
+    untrusted = {
+        f"{row['engine']}:{row['profile']}"
+        for rows in asked
+        for row in rows
+        if row["verdict"] == "breaks"
+    }
     sentences = findings(comparisons, untrusted)
     write_page(
         folder / PAGE,

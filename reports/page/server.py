@@ -25,7 +25,8 @@ HOST, NAMES = "127.0.0.1", ("127.0.0.1", "localhost")
 PORTS = 20  # tried in a row
 MOST_TABS = 16
 MOST_BYTES = 4096  # of a message that a page sends
-THREADS = ThreadPoolExecutor(MOST_TABS + 8)  # one a tab, and some for the pages; not the loop's, for which it waits
+# one a tab, and some for the pages; not the loop's, for which it waits
+THREADS = ThreadPoolExecutor(MOST_TABS + 8)
 
 
 async def in_thread(do: Callable[..., T], *arguments: Any) -> T:
@@ -55,12 +56,15 @@ def taken_socket(port: int) -> socket.socket:
         except OSError as fault:
             taken.close()
             if isinstance(fault, PermissionError):
-                raise OSError("the system keeps it for administrators, as it does ports below 1024") from None
+                raise OSError(
+                    "the system keeps it for administrators, as it does ports below 1024"
+                ) from None
     raise OSError(f"none of the ports {port} to {min(port + PORTS, 65536) - 1} is free")
 
 
 def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
-    """Serve until Ctrl-C; say where, and open a browser there if asked; exits 2 if there is no port, 143 on SIGTERM."""
+    """Serve until Ctrl-C; say where, and open a browser there if asked; exits 2 if there is no
+    port, 143 on SIGTERM."""
     try:
         listening = taken_socket(port)
     except OSError as fault:
@@ -76,7 +80,9 @@ def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
     logging.getLogger("uvicorn.error").addFilter(is_news)
     try:
         server.run(sockets=[listening])
-    except KeyboardInterrupt as stopped:  # which the server hands on when it has ended; Ctrl-C is how it ought to end
+    except (
+        KeyboardInterrupt
+    ) as stopped:  # which the server hands on when it has ended; Ctrl-C is how it ought to end
         if isinstance(stopped, Stopped) and stopped.status == TERMINATED:
             raise
     finally:
@@ -84,12 +90,19 @@ def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
 
 
 def is_news(record: logging.LogRecord) -> bool:
-    """Whether the server's complaint is about more than work that was cut off because the server stops."""
+    """Whether the server's complaint is about more than work that was cut off because the server
+    stops."""
     cut_off = record.exc_info and isinstance(record.exc_info[1], CancelledError)
     return not (cut_off or record.getMessage().startswith("Cancel "))
 
 
 config_of = partial(
-    uvicorn.Config, log_level="warning", ws="websockets-sansio", ws_max_size=MOST_BYTES,
-    ws_ping_interval=10, ws_ping_timeout=10, timeout_graceful_shutdown=1, lifespan="off",
-)  # fmt: skip
+    uvicorn.Config,
+    log_level="warning",
+    ws="websockets-sansio",
+    ws_max_size=MOST_BYTES,
+    ws_ping_interval=10,
+    ws_ping_timeout=10,
+    timeout_graceful_shutdown=1,
+    lifespan="off",
+)

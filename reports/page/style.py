@@ -1,4 +1,5 @@
-"""How things look: one colour an engine, one dash and fill a profile, one ramp for size, one way to write a number."""
+"""How things look: one colour an engine, one dash and fill a profile, one ramp for size, one way to
+write a number."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ TRUTH = "truth"
 
 
 class Look(NamedTuple):
-    """How an engine and profile are drawn; the shape shows the engine and the dash the profile without colour.
+    """How an engine and profile are drawn; the shape shows the engine and the dash the profile
+    without colour.
 
     Attributes:
         light, dark: hex colour on a light and on a dark page.
@@ -60,21 +62,42 @@ PATHS = {
     "star": "M0,-5L1.3,-1.7L4.8,-1.5L2.1,0.7L2.9,4L0,2.2L-2.9,4L-2.1,0.7L-4.8,-1.5L-1.3,-1.7Z",
 }
 PALETTE = (
-    Mark("#5b6b7a", "#9fb0c0", "cross"), Mark("#a3123a", "#ff7a93", "triangle-down"),
-    Mark("#5a3d9e", "#b7a1ff", "hexagon"), Mark("#3d6b1f", "#a4d67a", "pentagon"),
+    Mark("#5b6b7a", "#9fb0c0", "cross"),
+    Mark("#a3123a", "#ff7a93", "triangle-down"),
+    Mark("#5a3d9e", "#b7a1ff", "hexagon"),
+    Mark("#3d6b1f", "#a4d67a", "pentagon"),
     Mark("#7a4a21", "#e0a878", "bowtie"),
-)  # fmt: skip
+)
 DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3)}
 CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
 
-# Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep to pale on dark.
+# Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep
+# to pale on dark.
 HEAT_BOUNDS = (1e-12, 1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
 HEAT_LIGHT = (
-    "#f7f9f3", "#eaf3e3", "#d7ebd9", "#bfe0d3", "#9ccfcd", "#74b9c6", "#4c9bbb", "#2f78a8", "#24558c", "#1d3468",
-)  # fmt: skip
+    "#f7f9f3",
+    "#eaf3e3",
+    "#d7ebd9",
+    "#bfe0d3",
+    "#9ccfcd",
+    "#74b9c6",
+    "#4c9bbb",
+    "#2f78a8",
+    "#24558c",
+    "#1d3468",
+)
 HEAT_DARK = (
-    "#191d22", "#1a252e", "#1a303e", "#1a3d50", "#1b4d64", "#1f6078", "#31778b", "#53939b", "#8ab5a9", "#d3ddb8",
-)  # fmt: skip
+    "#191d22",
+    "#1a252e",
+    "#1a303e",
+    "#1a3d50",
+    "#1b4d64",
+    "#1f6078",
+    "#31778b",
+    "#53939b",
+    "#8ab5a9",
+    "#d3ddb8",
+)
 
 
 def look(engine: str, profile: str = "") -> Look:
@@ -85,9 +108,11 @@ def look(engine: str, profile: str = "") -> Look:
 
 
 def mark_of(engine: str) -> Mark:
-    """What its row of `ENGINES` says; of those whose rows say nothing the first has the first of `PALETTE`, and so on.
+    """What its row of `ENGINES` says; of those whose rows say nothing the first has the first of
+    `PALETTE`, and so on.
 
-    An engine without a row, such as a solver's file, has one of `PALETTE` by its name, in every run the same.
+    An engine without a row, such as a solver's file, has one of `PALETTE` by its name, in every run
+    the same.
     """
     marks: dict[str, Mark | None] = {}
     for name, row in ENGINES.items():
@@ -104,7 +129,8 @@ def heat(value: float) -> int:
 
 
 def readable_on(colour: str) -> str:
-    """Near-black or white, whichever has more contrast on `colour` (relative luminance of WCAG 2)."""
+    """Near-black or white, whichever has more contrast on `colour` (relative luminance of WCAG
+    2)."""
     channels = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
     luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
@@ -133,7 +159,9 @@ def number(value: object, digits: int = 3) -> str:
     mantissa, _, exponent = f"{x:.{digits - 1}e}".partition("e")
     power = int(exponent)
     if x == 0 or -4 < power < 6:
-        text = f"{float(f'{x:.{digits}g}'):f}".rstrip("0").rstrip(".") if abs(x) < 1e15 else f"{x:g}"
+        text = (
+            f"{float(f'{x:.{digits}g}'):f}".rstrip("0").rstrip(".") if abs(x) < 1e15 else f"{x:g}"
+        )
     else:
         short = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
         text = ("" if short == "1" else f"{short}×") + f"10{str(power).translate(SUPERSCRIPT)}"

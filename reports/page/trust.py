@@ -1,4 +1,5 @@
-"""How far to trust a report: what is proven, what is measured, what others can repeat, where we judge our own."""
+"""How far to trust a report: what is proven, what is measured, what others can repeat, where we
+judge our own."""
 
 from __future__ import annotations
 
@@ -16,19 +17,22 @@ def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
         "Exact answers": exact_answers(comparisons),
         "How far they hold": how_far_they_hold(comparisons),
         "Measured": (
-            "Everything else is measured in this run: each engine is played with the settings that are shown, and what "
-            "failed stays in the tables. A number that too few samples carry is not judged, and says so."
+            "Everything else is measured in this run: each engine is played with the settings that"
+            " are shown, and what failed stays in the tables. A number that too few samples carry"
+            " is not judged, and says so."
         ),
         "Checked from outside": (
-            "A simulation of all pairs in 420 bits, plain scripts for each engine, and metrics computed again from the "
-            "trajectories share no code with what they check: uv run pytest -m independent repeats them, and "
-            "tests/independent/README.md lists what has not been checked."
+            "A simulation of all pairs in 420 bits, plain scripts for each engine, and metrics"
+            " computed again from the trajectories share no code with what they check: uv run"
+            " pytest -m independent repeats them, and tests/independent/README.md lists what has"
+            " not been checked."
         ),
         "Our own engines": (
-            "reference and event_driven are this project's, and it also judges them. So the exact answers import none "
-            "of their code, which a test keeps so; the settings of every engine are searched by the same command, on "
-            "scenes that are not scored; and solvers that stand still, gain energy or double their speed must be "
-            "caught in every scene in which something moves."
+            "reference and event_driven are this project's, and it also judges them. So the exact"
+            " answers import none of their code, which a test keeps so; the settings of every"
+            " engine are searched by the same command, on scenes that are not scored; and solvers"
+            " that stand still, gain energy or double their speed must be caught in every scene in"
+            " which something moves."
         ),
     }
 
@@ -36,19 +40,31 @@ def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
 def exact_answers(comparisons: Sequence[Comparison]) -> str:
     """How the exact answers of these scenes were found, and how far off they may be."""
     models = [answered_by(each.scenario) if each.truth is not None else "" for each in comparisons]
-    closed, event_driven, none = models.count(CLOSED_FORM), models.count(EVENT_DRIVEN), models.count("")
+    closed, event_driven, none = (
+        models.count(CLOSED_FORM),
+        models.count(EVENT_DRIVEN),
+        models.count(""),
+    )
     parts = [f"{closed} of {len(models)} scenes have a closed form"] if closed else []
     if event_driven:
         bound = max(
-            c.truth.error_bound for c, m in zip(comparisons, models) if m == EVENT_DRIVEN and c.truth is not None
+            c.truth.error_bound
+            for c, m in zip(comparisons, models)
+            if m == EVENT_DRIVEN and c.truth is not None
         )
-        how = "proven by interval arithmetic" if has_balls() else "computed at two precisions that agree"
+        how = (
+            "proven by interval arithmetic"
+            if has_balls()
+            else "computed at two precisions that agree"
+        )
         parts.append(
-            f"{event_driven} are computed event by event in many digits, {how}, and off by at most {number(bound)} m"
+            f"{event_driven} are computed event by event in many digits, {how}, and off by at most"
+            f" {number(bound)} m"
         )
     if none:
         parts.append(
-            f"{none} have no exact answer and no score: engines are checked there against the laws of physics only"
+            f"{none} have no exact answer and no score: engines are checked there against the laws"
+            " of physics only"
         )
     return "; ".join(parts) + "."
 
@@ -62,8 +78,11 @@ def how_far_they_hold(comparisons: Sequence[Comparison]) -> str:
     }
     if not ends:
         return "Every exact answer holds to the end of its scene."
-    listed = ", ".join(f"{name} to {number(until)} s of {number(whole)} s" for name, (until, whole) in ends.items())
+    listed = ", ".join(
+        f"{name} to {number(until)} s of {number(whole)} s" for name, (until, whole) in ends.items()
+    )
     return (
-        f"{listed}: later samples have no score. There a rounding of the start has grown to a billionth of a "
-        "radius, or the motion has no single answer; the scene says which. All others hold to their end."
+        f"{listed}: later samples have no score. There a rounding of the start has grown to a"
+        " billionth of a radius, or the motion has no single answer; the scene says which. All"
+        " others hold to their end."
     )

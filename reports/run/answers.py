@@ -1,4 +1,5 @@
-"""The exact answer to a scene, had in a worker within a time, and kept in a file beside what is compared with it."""
+"""The exact answer to a scene, had in a worker within a time, and kept in a file beside what is
+compared with it."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ from scenarios.truth.exact import CLOSED_FORM, OracleTruth, TruthRecord
 from scenarios.truth.oracle.work import Clock
 
 OK, NONE = "ok", "none"
-FOR_EVENTS = 0.5  # of the time for an answer: its horizon takes up to three quarters as long as its events
+# of the time for an answer: its horizon takes up to three quarters as long as its events
+FOR_EVENTS = 0.5
 SAID = "answer.json"  # in the file of an answer, beside the arrays of its record
 
 
@@ -33,7 +35,8 @@ class Answer(NamedTuple):
 
     Attributes:
         record: of the oracle; None where a closed form answers, or nothing.
-        status: "ok"; "none", where the scene has no exact answer; "timeout", "crashed" or "error" as of a `Failure`.
+        status: "ok"; "none", where the scene has no exact answer; "timeout", "crashed" or "error"
+            as of a `Failure`.
         reason: why there is none, or "".
         timeout_s: that it had.
     """
@@ -49,14 +52,20 @@ class Answer(NamedTuple):
         return "" if self.status in (OK, NONE) else self.reason
 
     def may_be_had(self, timeout: float) -> bool:
-        """Whether to try again: it was not had, and had less time than `timeout` s, or failed otherwise."""
+        """Whether to try again: it was not had, and had less time than `timeout` s, or failed
+        otherwise."""
         return bool(self.lost) and (self.status != "timeout" or self.timeout_s < timeout)
 
     def given_to(self, scenario: Scenario) -> Scenario:
-        """The scenario with this for its answer, so that asking for it computes nothing that takes long."""
+        """The scenario with this for its answer, so that asking for it computes nothing that takes
+        long."""
         if self.status != OK:
             return replace(scenario, truth=None, without_truth=self.reason)
-        return scenario if self.record is None else replace(scenario, truth=OracleTruth(scenario, self.record))
+        return (
+            scenario
+            if self.record is None
+            else replace(scenario, truth=OracleTruth(scenario, self.record))
+        )
 
 
 def answer_of(scenario: Scenario) -> Answer:
@@ -64,13 +73,20 @@ def answer_of(scenario: Scenario) -> Answer:
     scenario, truth = answered(scenario)
     if truth is None:
         return Answer(None, NONE, scenario.without_truth)
-    return Answer(scenario.truth.record() if isinstance(scenario.truth, OracleTruth) else None, OK, "")
+    return Answer(
+        scenario.truth.record() if isinstance(scenario.truth, OracleTruth) else None, OK, ""
+    )
 
 
 def no_answer(failure: Failure, timeout: float) -> Answer:
     """What a worker leaves that was to have it within `timeout` s and could not."""
     if failure.status == "timeout":
-        return Answer(None, failure.status, f"the exact answer took longer than {timeout:g} s (--timeout)", timeout)
+        return Answer(
+            None,
+            failure.status,
+            f"the exact answer took longer than {timeout:g} s (--timeout)",
+            timeout,
+        )
     reason = f"the exact answer could not be computed: {failure.status}: {failure.reason}"
     return Answer(None, failure.status, reason, timeout)
 
@@ -85,13 +101,15 @@ def put_answer(path: Path, answer: Answer) -> None:
 
 
 def digest_of(file: ZipFile, name: str, said: list[Any]) -> str:
-    """16 hex digits over all that is in the file of an answer, and what it is called: by that it is of its scene."""
+    """16 hex digits over all that is in the file of an answer, and what it is called: by that it is
+    of its scene."""
     inside = sorted(set(file.namelist()) - {SAID})
     return digest(b"\0".join([json.dumps([name, said, inside]).encode(), *map(file.read, inside)]))
 
 
 def read_answer(path: Path) -> Answer | None:
-    """What `put_answer` wrote; None if it is not there or not that any more, as the digest in the file reports."""
+    """What `put_answer` wrote; None if it is not there or not that any more, as the digest in the
+    file reports."""
     try:
         with opened(path) as there, ZipFile(there) as file:
             *said, written = json.loads(file.read(SAID))
@@ -99,7 +117,11 @@ def read_answer(path: Path) -> Answer | None:
                 return None
             whole = len(file.namelist()) > 1
         fields = unpacked(path) if whole else None
-        return None if whole and fields is None else Answer(TruthRecord(**fields) if fields else None, *said)
+        return (
+            None
+            if whole and fields is None
+            else Answer(TruthRecord(**fields) if fields else None, *said)
+        )
     except UNREADABLE:
         return None
 
@@ -107,7 +129,8 @@ def read_answer(path: Path) -> Answer | None:
 def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
     """In the worker: the record of a scene by catalogue name or file, or why there is none.
 
-    Before `timeout` s are over, after which the worker is stopped, it is that of what was found until then.
+    Before `timeout` s are over, after which the worker is stopped, it is that of what was found
+    until then.
     """
     reason = f"the limit of {timeout:g} s was reached (a longer --timeout gives more)"
     try:
@@ -117,7 +140,8 @@ def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
 
 
 def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
-    """The oracle's record, as far as a `clock` lets it, or a record of what a closed form says. Raises `NoTruth`."""
+    """The oracle's record, as far as a `clock` lets it, or a record of what a closed form says.
+    Raises `NoTruth`."""
     if isinstance(scenario.truth, OracleTruth):
         record = scenario.truth.record(clock)
         if record.horizon < scenario.sample_interval:
@@ -130,7 +154,9 @@ def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
     angles = np.full(len(collisions), np.nan)  # a closed form does not need them
     return TruthRecord(
         legs=np.zeros((0, 12)),
-        events=np.stack([collisions.t, collisions.i, collisions.j, collisions.impulse, angles], axis=-1),
+        events=np.stack(
+            [collisions.t, collisions.i, collisions.j, collisions.impulse, angles], axis=-1
+        ),
         horizon=truth.horizon,
         error_bound=truth.error_bound,
         bits=53,

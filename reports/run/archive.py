@@ -1,14 +1,15 @@
 """The files of a run, read back; everything is made from the journal and the trajectories.
 
-journal.jsonl   a header, a line a cell as it ends, a footer; after a run was resumed, another header and footer; what
-                a line holds is said in run_lines.py
-trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to its last good state;
-                the line of the cell has the file's digest, and what does not match it is as good as none
+journal.jsonl   a header, a line a cell as it ends, a footer; after a run was resumed, another
+                header and footer; what a line holds is said in run_lines.py
+trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to
+                its last good state; the line of the cell has the file's digest, and what does not
+                match it is as good as none
 scenes/         copies of the scene files
 machine.json    machine, versions, command, seed
 made.json       what of all this was written by whom, so that nothing else is ever replaced
-compared/       the scenarios' exact answers and shares of deviations.csv, so that a report does not measure again
-deviations.csv, runs.csv, report.html
+compared/       the scenarios' exact answers and shares of deviations.csv, so that a report does not
+measure again deviations.csv, runs.csv, report.html
 """
 
 from __future__ import annotations
@@ -31,9 +32,15 @@ from reports.run.run_lines import KINDS
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 from scenarios.regular import all_of, opened
 
-Numbered = dict[Hashable, tuple[int, dict[str, Any]]]  # what a line is of -> its number, and the line
+# what a line is of -> its number, and the line
+Numbered = dict[Hashable, tuple[int, dict[str, Any]]]
 STATE = ("position", "velocity", "angle", "angular_velocity")
-COLLISIONS = {"t": "collision_t", "i": "collision_i", "j": "collision_j", "impulse": "collision_impulse"}
+COLLISIONS = {
+    "t": "collision_t",
+    "i": "collision_i",
+    "j": "collision_j",
+    "impulse": "collision_impulse",
+}
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,8 @@ class Archive:
 
     @staticmethod
     def read(folder: Path) -> Archive:
-        """Read the journal of a folder, once; raises `ValueError`, naming the line, if it cannot be used."""
+        """Read the journal of a folder, once; raises `ValueError`, naming the line, if it cannot be
+        used."""
         header: dict[str, Any] = {}
         last: dict[str, Numbered] = {"cell": {}, "conformance": {}, "known_answer": {}}
         timings: dict[str, list[float]] = {}
@@ -86,7 +94,14 @@ class Archive:
         records = [as_found(folder, record) for record in records]
         by_engine = {line["of"]: line for line in conformance}
         return Archive(
-            folder, header, records, by_engine, known, timings, seconds if complete else float("nan"), complete
+            folder,
+            header,
+            records,
+            by_engine,
+            known,
+            timings,
+            seconds if complete else float("nan"),
+            complete,
         )
 
 
@@ -102,11 +117,16 @@ def stranger(record: dict[str, Any], header: dict[str, Any]) -> str:
         return f"scene = {record['scene']!r}: must be one of the scenes of the header"
     if name not in header["engines"]:
         return f"engine = {name!r}: must be one of the engines of the header"
-    return "" if record["seed"] == header["seed"] else f"seed = {record['seed']}: must be that of the header"
+    return (
+        ""
+        if record["seed"] == header["seed"]
+        else f"seed = {record['seed']}: must be that of the header"
+    )
 
 
 def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
-    """The line of a cell with `damage`, why its trajectory cannot be used, or ""; a played one is then an error.
+    """The line of a cell with `damage`, why its trajectory cannot be used, or ""; a played one is
+    then an error.
 
     A sum over a file is not made again while the file is the same to the system.
     """
@@ -115,7 +135,10 @@ def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
     if record["file"]:
         try:
             found = path.stat()
-            same = digest_of_file(path, found.st_ino, found.st_size, found.st_mtime_ns) == record["file"]
+            same = (
+                digest_of_file(path, found.st_ino, found.st_size, found.st_mtime_ns)
+                == record["file"]
+            )
             why = "" if same else f"{path.name} is not what was written"
         except OSError as fault:
             gone = isinstance(fault, FileNotFoundError)
@@ -154,7 +177,8 @@ def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -
 
 
 def stored_trajectory(folder: Path, record: dict[str, Any]) -> Trajectory | None:
-    """The samples that the run has of a cell, by its line `as_found`; None if it has none, or not what was written."""
+    """The samples that the run has of a cell, by its line `as_found`; None if it has none, or not
+    what was written."""
     whole = record["file"] and not record["damage"]
     return load_trajectory(trajectory_file(folder, record["cell"])) if whole else None
 
@@ -170,8 +194,8 @@ def stored_scene(folder: Path, name: str) -> Path:
 
 
 def packed(trajectory: Trajectory, small: bool = False) -> bytes:
-    """An .npz with the arrays of `Trajectory`; its collisions as collision_t, _i, _j, _impulse. A small one takes
-    longer."""
+    """An .npz with the arrays of `Trajectory`; its collisions as collision_t, _i, _j, _impulse. A
+    small one takes longer."""
     arrays = {name: getattr(trajectory, name) for name in ("t", *STATE)}
     collisions = {key: getattr(trajectory.collisions, name) for name, key in COLLISIONS.items()}
     file = io.BytesIO()
@@ -181,9 +205,16 @@ def packed(trajectory: Trajectory, small: bool = False) -> bytes:
 
 def load_trajectory(file: Path | BinaryIO) -> Trajectory:
     """What `packed` put into a file."""
-    with nullcontext(file) if not isinstance(file, Path) else opened(file) as there, np.load(there) as saved:
-        collisions = Collisions(**{name: frozen(saved[key], saved[key].dtype) for name, key in COLLISIONS.items()})
-        t, position, velocity, angle, angular_velocity = (frozen(saved[name]) for name in ("t", *STATE))
+    with (
+        nullcontext(file) if not isinstance(file, Path) else opened(file) as there,
+        np.load(there) as saved,
+    ):
+        collisions = Collisions(
+            **{name: frozen(saved[key], saved[key].dtype) for name, key in COLLISIONS.items()}
+        )
+        t, position, velocity, angle, angular_velocity = (
+            frozen(saved[name]) for name in ("t", *STATE)
+        )
         return Trajectory(t, position, velocity, angle, angular_velocity, collisions)
 
 
@@ -193,7 +224,8 @@ def parts_of(state: State) -> list[np.ndarray]:
 
 
 def from_trail(trail: bytes, scenario: Scenario) -> Trajectory | None:
-    """The samples whose `parts_of` a trail holds, without collisions; None if it holds not even the start."""
+    """The samples whose `parts_of` a trail holds, without collisions; None if it holds not even the
+    start."""
     n = scenario.scene.n
     k = len(trail) // (6 * n * 8)
     if not k:

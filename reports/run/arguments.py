@@ -1,4 +1,5 @@
-"""What commands are asked for, checked: scenes, engines, folders. Bad input is one clear message and exit 2."""
+"""What commands are asked for, checked: scenes, engines, folders. Bad input is one clear message
+and exit 2."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ from scenarios.files.scene_file import SceneFileError
 
 @contextmanager
 def opening(out: Path) -> Iterator[None]:
-    """What opens the folder that a command makes: exits 2 if it may not, or cannot, be written or gone on with."""
+    """What opens the folder that a command makes: exits 2 if it may not, or cannot, be written or
+    gone on with."""
     try:
         yield
     except FolderTaken as fault:
@@ -32,7 +34,8 @@ def opening(out: Path) -> Iterator[None]:
 
 @contextmanager
 def refusing(named: str) -> Iterator[None]:
-    """What reads the folder of a run: exits 2 with one line that begins with `named` if it cannot be used."""
+    """What reads the folder of a run: exits 2 with one line that begins with `named` if it cannot
+    be used."""
     try:
         yield
     except FolderTaken as fault:
@@ -44,7 +47,11 @@ def refusing(named: str) -> Iterator[None]:
 
 
 def checked_scenes(
-    scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int, files: Mapping[str, Path] | None = None
+    scenes: Sequence[str],
+    dts: Sequence[float],
+    full: bool,
+    seed: int,
+    files: Mapping[str, Path] | None = None,
 ) -> list[str]:
     """The scenes asked for, once each; exits 2 with every fault of every scene, one line each.
 
@@ -58,14 +65,19 @@ def checked_scenes(
             faults.append(unknown("scenario", scene, SCENARIOS) + " (a scene file ends in .toml)")
             continue
         try:
-            name = with_steps(open_scene(str((files or {}).get(scene, scene)), seed), dts, full).name
+            name = with_steps(
+                open_scene(str((files or {}).get(scene, scene)), seed), dts, full
+            ).name
         except SceneFileError as error:
             faults += error.faults
         except ValueError as error:
             faults.append(str(error))
         else:
             if name in names or (scene.endswith(".toml") and name in SCENARIOS):
-                faults.append(f"{scene}: name = {name!r}: taken by {names.get(name, 'a scenario of the catalogue')}")
+                faults.append(
+                    f"{scene}: name = {name!r}: taken by"
+                    f" {names.get(name, 'a scenario of the catalogue')}"
+                )
             names[name] = scene
     if faults:
         refuse(faults)
@@ -73,7 +85,8 @@ def checked_scenes(
 
 
 def checked_engines(asked: Sequence[str]) -> list[str]:
-    """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; if none is asked all."""
+    """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; if none
+    is asked all."""
     chosen, own, faults = set(), [], []
     for name in asked:
         if (file := Path(name.removesuffix(OWN))).suffix.lower() in KINDS:
@@ -82,7 +95,9 @@ def checked_engines(asked: Sequence[str]) -> list[str]:
             continue
         matching = {row for row in ENGINES if name in (row, row.split(":")[0])}
         if not matching:
-            faults.append(unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)}))
+            faults.append(
+                unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)})
+            )
         chosen |= matching
     if faults:
         refuse(faults)
@@ -90,7 +105,8 @@ def checked_engines(asked: Sequence[str]) -> list[str]:
 
 
 def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> None:
-    """Go to the folder where a run was begun, if the file of one of its solvers is meant from there.
+    """Go to the folder where a run was begun, if the file of one of its solvers is meant from
+    there.
 
     Raises:
         FolderTaken: that folder is gone: a file of that name elsewhere is another one.
@@ -100,7 +116,9 @@ def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> Non
     near = [name for name in meant if not Path(name).is_absolute()]
     if near and "folder" in header:
         if not Path(header["folder"]).is_dir():
-            raise FolderTaken(f"{near[0]}: was in {header['folder']}, which is gone; put it there again")
+            raise FolderTaken(
+                f"{near[0]}: was in {header['folder']}, which is gone; put it there again"
+            )
         os.chdir(header["folder"])
 
 

@@ -14,9 +14,11 @@ import numpy as np
 from adapters.engines import ENGINES
 from scenarios.model import Scenario
 
-SOURCES = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")  # wherever in these folders a file lies
+# wherever in these folders a file lies
+SOURCES = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")
 ROOT = Path(__file__).parents[2]
-DECIDING = ("mini-racer", "numba", "numpy", "crosscheck2d")  # besides the distributions of the engines
+# besides the distributions of the engines
+DECIDING = ("mini-racer", "numba", "numpy", "crosscheck2d")
 
 
 @dataclass(frozen=True)
@@ -42,23 +44,36 @@ class Cell:
         return name, profile
 
     def key(self, scene: str, source: str) -> str:
-        """Its `content_key`: `scene` is the `scene_hash` of what is played, `source` that of the engine's row."""
+        """Its `content_key`: `scene` is the `scene_hash` of what is played, `source` that of the
+        engine's row."""
         return content_key(scene, self.engine, source, self.substeps)
 
 
 def content_key(*what: Hashable) -> str:
-    """16 hex digits of a hash over what decides a result: `what`, the versions, the engines' source.
+    """16 hex digits of a hash over what decides a result: `what`, the versions, the engines'
+    source.
 
-    No file but of this program is read here: what was read when the command began is in `what`, as `Row.source`.
+    No file but of this program is read here: what was read when the command began is in `what`, as
+    `Row.source`.
     """
     return hashlib.sha256(repr((*what, versions(), source_hash())).encode()).hexdigest()[:16]
 
 
 def scene_hash(scenario: Scenario) -> str:
-    """16 hex digits of a hash over what is played: the scene, its thrusts, duration and sampling."""
-    digest = hashlib.sha256(repr((scenario.name, scenario.duration, scenario.sample_interval)).encode())
+    """16 hex digits of a hash over what is played: the scene, its thrusts, duration and
+    sampling."""
+    digest = hashlib.sha256(
+        repr((scenario.name, scenario.duration, scenario.sample_interval)).encode()
+    )
     scene = scenario.scene
-    arrays = [scene.position, scene.velocity, scene.radius, scene.mass, scene.angle, scene.angular_velocity]
+    arrays = [
+        scene.position,
+        scene.velocity,
+        scene.radius,
+        scene.mass,
+        scene.angle,
+        scene.angular_velocity,
+    ]
     arrays += [scene.inertia, scene.walls, scene.gravity, np.array(scene.restitution)]
     arrays += [scene.wrap] if scene.wrap is not None else []
     for array in arrays:
@@ -72,7 +87,9 @@ def scene_hash(scenario: Scenario) -> str:
 def versions() -> dict[str, str]:
     """Package -> version of all that decides a number; "missing" if it is not installed."""
     found = {}
-    for package in dict.fromkeys((*(each for row in ENGINES.values() for each in row.distributions), *DECIDING)):
+    for package in dict.fromkeys(
+        (*(each for row in ENGINES.values() for each in row.distributions), *DECIDING)
+    ):
         try:
             found[package] = version(package)
         except PackageNotFoundError:

@@ -19,11 +19,12 @@ from reports.run.archive import Archive
 from reports.run.tables import is_sealed
 from reports.terminal.foreign_text import encoded
 
-# Measured on two cores under a load of 15 to 20 (no idler machine could be had), 3 scenes and --timings 5. 8 runs of
-# one build set against each other, 280 verdicts from 4200 ratios of rounds: "worse" 4 times, as often with a factor of
-# 1.1 as with 1.35; 8 times when the factor was the median of the ratios, for other work lengthens a round, but seldom
-# all of them. Every engine made half as slow again, 240 verdicts: the factor is above 1.25 in 227, but found are 118:
-# what fails under such a load is to be sure, which more rounds and more scenes mend.
+# Measured on two cores under a load of 15 to 20 (no idler machine could be had), 3 scenes and
+# --timings 5. 8 runs of one build set against each other, 280 verdicts from 4200 ratios of rounds:
+# "worse" 4 times, as often with a factor of 1.1 as with 1.35; 8 times when the factor was the
+# median of the ratios, for other work lengthens a round, but seldom all of them. Every engine made
+# half as slow again, 240 verdicts: the factor is above 1.25 in 227, but found are 118: what fails
+# under such a load is to be sure, which more rounds and more scenes mend.
 FACTOR = 1.25
 CONFIDENCE = 0.99
 WHOSE = ["scenario", "engine", "profile", "dt_s", "metric", "versus"]
@@ -31,7 +32,8 @@ MACHINE = ("system", "architecture", "processor", "cores")
 
 
 class Change(NamedTuple):
-    """One thing that is not as it was: of which engine, what, before and after, and "better", "worse" or "other"."""
+    """One thing that is not as it was: of which engine, what, before and after, and "better",
+    "worse" or "other"."""
 
     engine: str
     what: str
@@ -58,7 +60,8 @@ class Timing(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """ "worse" or "better" if it is both sure (the interval leaves out 1) and large (by `FACTOR`), else "same"."""
+        """ "worse" or "better" if it is both sure (the interval leaves out 1) and large (by
+        `FACTOR`), else "same"."""
         if self.low > 1 and self.factor > FACTOR:
             return "worse"
         return "better" if self.high < 1 and self.factor < 1 / FACTOR else "same"
@@ -84,7 +87,9 @@ class Difference:
     @property
     def worse(self) -> int:
         """How many things got worse."""
-        verdicts = [one.verdict for one in (*self.statuses, *self.numbers)] + [one.verdict for one in self.timings]
+        verdicts = [one.verdict for one in (*self.statuses, *self.numbers)] + [
+            one.verdict for one in self.timings
+        ]
         return verdicts.count("worse")
 
 
@@ -99,15 +104,22 @@ def difference(before: Path, after: Path) -> Difference:
     cells = by_name(one), by_name(other)
     tables = table_of(before), table_of(after)
     numbers, same = changed_numbers(*tables, equal_keys(*cells) if like else set())
-    statuses = changed_statuses(*cells) + changed_judgement(*tables, cells[0].keys() & cells[1].keys())
-    return Difference(warnings, statuses, numbers, same, timings_of(one, other, *cells) if like else [])
+    statuses = changed_statuses(*cells) + changed_judgement(
+        *tables, cells[0].keys() & cells[1].keys()
+    )
+    return Difference(
+        warnings, statuses, numbers, same, timings_of(one, other, *cells) if like else []
+    )
 
 
 def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
     """What differs of machines, versions and completeness; and whether the machine is the same."""
     before, after = one.header, other.header
-    said = [f"machine: {key}: {before['machine'][key]} before, {after['machine'][key]} after"
-            for key in MACHINE if before["machine"][key] != after["machine"][key]]  # fmt: skip
+    said = [
+        f"machine: {key}: {before['machine'][key]} before, {after['machine'][key]} after"
+        for key in MACHINE
+        if before["machine"][key] != after["machine"][key]
+    ]
     like = not said
     for name in sorted({*before["versions"], *after["versions"]}):
         versions = before["versions"].get(name, "missing"), after["versions"].get(name, "missing")
@@ -115,39 +127,62 @@ def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
             said.append(f"version: {name}: {versions[0]} before, {versions[1]} after")
     if before["seed"] != after["seed"]:
         said.append(f"seed: {before['seed']} before, {after['seed']} after")
-    said += [f"{archive.folder} is not complete" for archive in (one, other) if not archive.complete]
+    said += [
+        f"{archive.folder} is not complete" for archive in (one, other) if not archive.complete
+    ]
     for archive in (one, other):
         if damaged := [record["damage"] for record in archive.records if record["damage"]]:
             more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
-            said.append(f"{archive.folder}: trajectories/{damaged[0]}{more}; "
-                        f"crosscheck run --resume {archive.folder} plays it again")  # fmt: skip
+            said.append(
+                f"{archive.folder}: trajectories/{damaged[0]}{more}; "
+                f"crosscheck run --resume {archive.folder} plays it again"
+            )
     return said, like
 
 
 def by_name(archive: Archive) -> dict[tuple, dict[str, Any]]:
     """(scenario, `engine:profile` as the table has it, dt in s) -> the line of the cell."""
-    return {(r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r for r in archive.records}
+    return {
+        (r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r
+        for r in archive.records
+    }
 
 
-def equal_keys(before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]) -> set[tuple]:
-    """(scenario, `engine:profile`, dt in s) of the cells whose scene, settings and versions are the same."""
-    return {name for name in before if name in after and before[name]["cell"] == after[name]["cell"]}
+def equal_keys(
+    before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]
+) -> set[tuple]:
+    """(scenario, `engine:profile`, dt in s) of the cells whose scene, settings and versions are the
+    same."""
+    return {
+        name for name in before if name in after and before[name]["cell"] == after[name]["cell"]
+    }
 
 
-def changed_statuses(before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]) -> list[Change]:
+def changed_statuses(
+    before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]
+) -> list[Change]:
     """The cells that ended in another way, or were not played again: that is worse, too."""
     changes = []
     for name, record in before.items():
         scenario, engine, dt = name
         was, now = record["status"], after[name]["status"] if name in after else "not played"
         if was != now:
-            verdict = "worse" if was == "ok" or now == "not played" else "better" if now == "ok" else "other"
+            verdict = (
+                "worse"
+                if was == "ok" or now == "not played"
+                else "better"
+                if now == "ok"
+                else "other"
+            )
             changes.append(Change(engine, f"{scenario}  dt {dt:.4g} s  status", was, now, verdict))
     return changes
 
 
-def changed_judgement(before: pd.DataFrame, after: pd.DataFrame, both: Collection[tuple]) -> list[Change]:
-    """Which cells, of those that `both` have, are not judged any more, or are now: of that only one has numbers."""
+def changed_judgement(
+    before: pd.DataFrame, after: pd.DataFrame, both: Collection[tuple]
+) -> list[Change]:
+    """Which cells, of those that `both` have, are not judged any more, or are now: of that only one
+    has numbers."""
     was, now = reasons(before), reasons(after)
     changes = []
     for cell, versus in sorted(was.keys() ^ now.keys()):
@@ -155,21 +190,28 @@ def changed_judgement(before: pd.DataFrame, after: pd.DataFrame, both: Collectio
             scenario, engine, dt = cell
             what, key = f"{scenario}  dt {dt:.4g} s  against {versus}: status", (cell, versus)
             verdict = "worse" if key in now else "better"
-            changes.append(Change(engine, what, was.get(key, "judged"), now.get(key, "judged"), verdict))
+            changes.append(
+                Change(engine, what, was.get(key, "judged"), now.get(key, "judged"), verdict)
+            )
     return changes
 
 
 def reasons(table: pd.DataFrame) -> dict[tuple[tuple, str], str]:
     """((scenario, `engine:profile`, dt in s), against what) -> why it is not judged."""
-    rows = table[(table.metric == "status") & table.note.str.startswith(NOT_JUDGED)].to_dict("records")
+    rows = table[(table.metric == "status") & table.note.str.startswith(NOT_JUDGED)].to_dict(
+        "records"
+    )
     return {
-        ((r["scenario"], f"{r['engine']}:{r['profile']}", float(r["dt_s"])), str(r["versus"])): str(r["note"])
+        ((r["scenario"], f"{r['engine']}:{r['profile']}", float(r["dt_s"])), str(r["versus"])): str(
+            r["note"]
+        )
         for r in rows
     }
 
 
 def table_of(folder: Path) -> pd.DataFrame:
-    """deviations.csv as text: what is written the same has the same bits; raises `ValueError` if it is another one."""
+    """deviations.csv as text: what is written the same has the same bits; raises `ValueError` if it
+    is another one."""
     path = folder / "deviations.csv"
     try:
         same, table = is_sealed(folder), pd.read_csv(path, dtype=str, keep_default_na=False)
@@ -183,11 +225,14 @@ def table_of(folder: Path) -> pd.DataFrame:
     return table
 
 
-def changed_numbers(before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]) -> tuple[list[Change], Counter[str]]:
+def changed_numbers(
+    before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]
+) -> tuple[list[Change], Counter[str]]:
     """Every number that both tables have and that is not the same, and how many are, by engine.
 
-    The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric says what is better;
-    the deviation of two engines is neither, and so is a number that is judged in one of the two only.
+    The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric
+    says what is better; the deviation of two engines is neither, and so is a number that is judged
+    in one of the two only.
     """
     both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
     both["name"] = both.engine + ":" + both.profile
@@ -197,12 +242,20 @@ def changed_numbers(before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]
         was, now = (float(row[key] or "nan") for key in ("value", "value_after"))
         must = all((row["scenario"], name, float(row["dt_s"])) in equal for name in engines_of(row))
         verdict = "worse" if must else verdict_of(row["metric"], row["versus"], was, now)
-        what = f"{row['scenario']}  dt {float(row['dt_s']):.4g} s  {row['metric']} against {row['versus']}"
+        what = (
+            f"{row['scenario']}  dt {float(row['dt_s']):.4g} s  {row['metric']} against"
+            f" {row['versus']}"
+        )
         note = " (same cell, other bits)" if must else ""
-        was_said, now_said = said_of(row["value"], row["note"]), said_of(row["value_after"], row["note_after"])
+        was_said, now_said = (
+            said_of(row["value"], row["note"]),
+            said_of(row["value_after"], row["note_after"]),
+        )
         if NOT_JUDGED in (was_said, now_said):
             verdict, note = "other", ""
-        changes.append(Change(row["name"], what + note, was_said, now_said, verdict, ratio(was, now)))
+        changes.append(
+            Change(row["name"], what + note, was_said, now_said, verdict, ratio(was, now))
+        )
     return changes, Counter(both[~differs].name)
 
 
@@ -234,22 +287,35 @@ def ratio(was: float, now: float) -> float:
 
 
 def timings_of(
-    one: Archive, other: Archive, before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]
+    one: Archive,
+    other: Archive,
+    before: dict[tuple, dict[str, Any]],
+    after: dict[tuple, dict[str, Any]],
 ) -> list[Timing]:
-    """Of every engine the ratio after : before, over the cells that were timed in both, round by round."""
+    """Of every engine the ratio after : before, over the cells that were timed in both, round by
+    round."""
     ratios: dict[str, list[float]] = {}
     least: dict[str, list[float]] = {}
     for name in before.keys() & after.keys():
-        rounds = [*zip(one.timings.get(before[name]["cell"], []), other.timings.get(after[name]["cell"], []))]
+        rounds = [
+            *zip(
+                one.timings.get(before[name]["cell"], []),
+                other.timings.get(after[name]["cell"], []),
+            )
+        ]
         if rounds and min(min(rounds)) > 0:
             was, now = (min(times) for times in zip(*rounds))
             least.setdefault(name[1], []).append(now / was)
             ratios.setdefault(name[1], []).extend(now / was for was, now in rounds)
-    return [timing(engine, sorted(ratios[engine]), float(np.median(least[engine]))) for engine in sorted(ratios)]
+    return [
+        timing(engine, sorted(ratios[engine]), float(np.median(least[engine])))
+        for engine in sorted(ratios)
+    ]
 
 
 def timing(engine: str, ratios: list[float], factor: float) -> Timing:
-    """The distribution-free interval of the median of sorted ratios, from order statistics (the sign test's)."""
+    """The distribution-free interval of the median of sorted ratios, from order statistics (the
+    sign test's)."""
     n = len(ratios)
     tail, k = 0.5**n, 0
     while 2 * tail <= 1 - CONFIDENCE:

@@ -11,7 +11,16 @@ from pathlib import Path
 
 from reports.run.archive import Archive
 from reports.run.journal import JOURNAL, Busy, Journal
-from reports.run.made import MADE, Kind, Made, may_replace, may_write, put_made, read_made, stranger_in
+from reports.run.made import (
+    MADE,
+    Kind,
+    Made,
+    may_replace,
+    may_write,
+    put_made,
+    read_made,
+    stranger_in,
+)
 from reports.terminal.exits import FolderTaken, unbroken
 
 RUN = Kind(
@@ -33,14 +42,16 @@ def place_of(out: Path, option: str = "--out") -> Path:
         FolderTaken: a link to nothing, that is not what an interrupted command has left of one.
         OSError: there is no current folder any more.
     """
-    place = Path(os.path.realpath(out))  # of a link to itself `resolve` makes an error of another kind
+    # of a link to itself `resolve` makes an error of another kind
+    place = Path(os.path.realpath(out))
     if out.is_symlink() and not out.exists() and not part_of(place).exists():
         raise FolderTaken(f"{option} {out}: is a link to nothing; name a folder")
     return place
 
 
 def open_part(out: Path, kind: Kind) -> Journal:
-    """The journal of what will be `out`, where that is while it is made; raises as `may_replace`, or `OSError`."""
+    """The journal of what will be `out`, where that is while it is made; raises as `may_replace`,
+    or `OSError`."""
     part = part_of(out)
     may_replace(out, kind)
     may_be_part(part, out, kind)
@@ -52,26 +63,30 @@ def open_part(out: Path, kind: Kind) -> Journal:
 
 
 def may_be_part(part: Path, out: Path, kind: Kind, option: str = "--out") -> None:
-    """Raise as `may_write`, and also if `part` is somebody's finished result that is only called so."""
+    """Raise as `may_write`, and also if `part` is somebody's finished result that is only called
+    so."""
     may_write(part, kind, option)
     if not is_interrupted(part, out):
         raise FolderTaken(
-            f"{option} {out}: {part} is needed while it is made, and holds a finished result; move that elsewhere, or "
-            "name another folder"
+            f"{option} {out}: {part} is needed while it is made, and holds a finished result; move"
+            " that elsewhere, or name another folder"
         )
 
 
 def is_interrupted(part: Path, out: Path) -> bool:
-    """Whether the folder may be `out` while that is made, not a finished result: one may have been made by `--out`.
+    """Whether the folder may be `out` while that is made, not a finished result: one may have been
+    made by `--out`.
 
-    What was killed when all was done, a moment before it took the place of `out`, still says that it is to do so.
+    What was killed when all was done, a moment before it took the place of `out`, still says that
+    it is to do so.
     """
     made = read_made(part)
     return made is None or not made.finished or made.out == out.name
 
 
 def begun(part: Path, kind: Kind, out: Path) -> None:
-    """Record in a folder that it is this program's, will be `out`, and is not finished; other records stay."""
+    """Record in a folder that it is this program's, will be `out`, and is not finished; other
+    records stay."""
     made = read_made(part) or Made(kind.command, False, {})
     if (anew := made._replace(finished=False, out=out.name)) != made or not (part / MADE).exists():
         put_made(part, anew)
@@ -88,21 +103,24 @@ def given_back(journal: Journal) -> Iterator[None]:
 
 
 def open_new(out: Path) -> Journal:
-    """The journal of a new run into `out`; raises `FolderTaken`, or `OSError` where nothing can be written."""
+    """The journal of a new run into `out`; raises `FolderTaken`, or `OSError` where nothing can be
+    written."""
     journal = open_part(out, RUN)
     part = journal.path.parent
     with given_back(journal):
         if had := ended_in(journal):
             raise FolderTaken(
-                f"{part} holds an interrupted run, in which {had} cells have ended: to go on with it, crosscheck run "
-                f"--resume {out}; to begin anew, name another --out, or delete it"
+                f"{part} holds an interrupted run, in which {had} cells have ended: to go on with"
+                f" it, crosscheck run --resume {out}; to begin anew, name another --out, or"
+                " delete it"
             )
         os.truncate(journal.path, 0)
     return journal
 
 
 def ended_in(journal: Journal) -> int:
-    """How many cells have ended in an interrupted run; raises `FolderTaken` if it is none, or cannot be read."""
+    """How many cells have ended in an interrupted run; raises `FolderTaken` if it is none, or
+    cannot be read."""
     part = journal.path.parent
     try:
         return len(Archive.read(part).records)
@@ -115,21 +133,24 @@ def ended_in(journal: Journal) -> int:
 
 
 def may_go_on(part: Path, had: int, fits: bool, resume: bool) -> None:
-    """Raise `FolderTaken` where `had` results of an interrupted command would be lost: not asked for, or none fits."""
+    """Raise `FolderTaken` where `had` results of an interrupted command would be lost: not asked
+    for, or none fits."""
     holds = f"{part} holds {had} results of an interrupted run"
     if had and not resume:
         raise FolderTaken(
-            f"{holds}: to go on with it, ask again with --resume; to begin anew, name another --out, or delete it"
+            f"{holds}: to go on with it, ask again with --resume; to begin anew, name another"
+            " --out, or delete it"
         )
     if had and not fits:
         raise FolderTaken(
-            f"{holds} of something else: other scenes or cases, a scene file that has changed, with or without --full, "
-            "or other versions; name another --out, or delete it"
+            f"{holds} of something else: other scenes or cases, a scene file that has changed, with"
+            " or without --full, or other versions; name another --out, or delete it"
         )
 
 
 def open_again(out: Path) -> Journal:
-    """The journal of a run into `out` that is to be completed, locked where it is; nothing is moved yet.
+    """The journal of a run into `out` that is to be completed, locked where it is; nothing is moved
+    yet.
 
     Raises:
         FolderTaken: no run is there, or another process has it, or somebody else's files are there.
@@ -141,12 +162,15 @@ def open_again(out: Path) -> Journal:
     if (part / JOURNAL).is_file():
         return held(part, out)
     if not (out / JOURNAL).is_file():
-        raise FolderTaken(f"--resume {out}: no run is there, neither finished nor interrupted ({part.name})")
+        raise FolderTaken(
+            f"--resume {out}: no run is there, neither finished nor interrupted ({part.name})"
+        )
     return held(out, out)
 
 
 def reopened(journal: Journal, out: Path) -> None:
-    """Move a finished run to where it is while it is written; its journal stays locked meanwhile."""
+    """Move a finished run to where it is while it is written; its journal stays locked
+    meanwhile."""
     part = part_of(out)
     if journal.path.parent == out:
         with unbroken():
@@ -160,11 +184,14 @@ def held(folder: Path, out: Path) -> Journal:
     try:
         return Journal(folder)
     except Busy:
-        raise FolderTaken(f"{out} is being written by another crosscheck; wait for it, or name another --out") from None
+        raise FolderTaken(
+            f"{out} is being written by another crosscheck; wait for it, or name another --out"
+        ) from None
 
 
 def found(out: Path) -> Path:
-    """The folder of a run into `out`: itself, or where it is while it lasts; raises `FolderTaken` if there is none."""
+    """The folder of a run into `out`: itself, or where it is while it lasts; raises `FolderTaken`
+    if there is none."""
     part = part_of(out)
     if (out / JOURNAL).is_file():
         return out
@@ -174,10 +201,12 @@ def found(out: Path) -> Path:
 
 
 def replace_folder(made: Path, target: Path, kind: Kind) -> None:
-    """Put the finished folder `made` in the place of `target`, which is moved aside until that is done.
+    """Put the finished folder `made` in the place of `target`, which is moved aside until that is
+    done.
 
     Raises:
-        FolderTaken: `target` is not what the command made alone, maybe since a moment ago; both stay as they are.
+        FolderTaken: `target` is not what the command made alone, maybe since a moment ago; both
+            stay as they are.
         OSError: it cannot be moved; `target` is where it was.
     """
     may_replace(target, kind)
@@ -185,7 +214,11 @@ def replace_folder(made: Path, target: Path, kind: Kind) -> None:
     assert record is not None
     with unbroken():
         put_made(made, record._replace(finished=True, out=target.name))
-        old = next(old for k in count() if not os.path.lexists(old := target.with_name(f"{target.name}.old{k or ''}")))
+        old = next(
+            old
+            for k in count()
+            if not os.path.lexists(old := target.with_name(f"{target.name}.old{k or ''}"))
+        )
         replaced = target.exists()
         if replaced:
             target.rename(old)
@@ -202,7 +235,8 @@ def replace_folder(made: Path, target: Path, kind: Kind) -> None:
 
 @contextmanager
 def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
-    """A folder beside `target` to write into: it takes the place of that when all is well, and else is gone.
+    """A folder beside `target` to write into: it takes the place of that when all is well, and else
+    is gone.
 
     Raises:
         FolderTaken: as `may_replace`, before and after.

@@ -1,4 +1,5 @@
-"""The journal of a run: a line of JSON for everything that ends, written by one process at a time, read by any."""
+"""The journal of a run: a line of JSON for everything that ends, written by one process at a time,
+read by any."""
 
 from __future__ import annotations
 
@@ -25,16 +26,20 @@ class Busy(Exception):
 class Journal:
     """The journal of a folder, open for writing and locked against every other writer.
 
-    The lock is the kernel's (flock) and ends with the process that holds it, however it ends: none is ever stale.
+    The lock is the kernel's (flock) and ends with the process that holds it, however it ends: none
+    is ever stale.
     """
 
     def __init__(self, folder: Path) -> None:
-        """Open or make it; a last line that was torn is cut off. Raises `Busy`, or `OSError` if it cannot be had."""
+        """Open or make it; a last line that was torn is cut off. Raises `Busy`, or `OSError` if it
+        cannot be had."""
         self.path = folder / JOURNAL
         self.file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         try:
             fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            moved = not self.path.exists() or not os.path.samestat(os.fstat(self.file), self.path.stat())
+            moved = not self.path.exists() or not os.path.samestat(
+                os.fstat(self.file), self.path.stat()
+            )
         except BlockingIOError:
             moved = True
         if moved:  # by the one who held the lock, when it was done
@@ -50,7 +55,8 @@ class Journal:
         os.close(self.file)
 
     def append(self, line: dict[str, Any]) -> None:
-        """Add a line, and hand it to the system; raises `OSError` and leaves no part of it if that cannot be done."""
+        """Add a line, and hand it to the system; raises `OSError` and leaves no part of it if that
+        cannot be done."""
         text = (json.dumps(plain(line), allow_nan=False) + "\n").encode()
         before = os.fstat(self.file).st_size
         try:
@@ -74,11 +80,14 @@ def lines_of(folder: Path, missed: str = "delete that line") -> Iterator[Any]:
                 yield json.loads(line.decode())  # for null bytes are taken for UTF-32 else
             except (ValueError, RecursionError) as error:  # of brackets in brackets in brackets
                 if line.endswith(b"\n"):
-                    raise ValueError(f"{folder / JOURNAL}: line {number}: is not JSON: {error}; {missed}") from error
+                    raise ValueError(
+                        f"{folder / JOURNAL}: line {number}: is not JSON: {error}; {missed}"
+                    ) from error
 
 
 def plain(value: Any) -> Any:
-    """The value as strict JSON can hold it: numpy scalars as Python's, numbers that are not finite as text."""
+    """The value as strict JSON can hold it: numpy scalars as Python's, numbers that are not finite
+    as text."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

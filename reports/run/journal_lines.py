@@ -1,4 +1,5 @@
-"""What a journal's lines are read by: a table of their kinds, each a model, and in a sentence what does not fit."""
+"""What a journal's lines are read by: a table of their kinds, each a model, and in a sentence what
+does not fit."""
 
 from __future__ import annotations
 
@@ -60,7 +61,9 @@ def setting(value: Any) -> Any:
 def finite(value: Any) -> bool:
     """Whether it is a number that float64 can hold."""
     try:
-        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        return (
+            isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        )
     except OverflowError:
         return False
 
@@ -70,7 +73,8 @@ File = Annotated[Words, AfterValidator(path)]
 EngineProfile = Annotated[Words, AfterValidator(engine_profile)]
 Engine = Annotated[Words, AfterValidator(engine)]
 Profile = Annotated[str, Field(pattern=r"\A[A-Za-z0-9_.-]{1,100}\z")]
-Name = Annotated[str, Field(pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z")]  # it becomes the name of a file
+# it becomes the name of a file
+Name = Annotated[str, Field(pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z")]
 Digest = Annotated[str, Field(pattern=r"\A[0-9a-f]{16}\z")]
 Number = Annotated[Any, AfterValidator(number)]
 Said = Annotated[Any, AfterValidator(said)]
@@ -82,7 +86,8 @@ Step = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class Line(BaseModel):
-    """What all lines have in common: types are as they are written; of fields that are not named nothing is asked."""
+    """What all lines have in common: types are as they are written; of fields that are not named
+    nothing is asked."""
 
     model_config = ConfigDict(strict=True)
 
@@ -114,14 +119,17 @@ def checked_lines(folder: Path, kinds: Kinds) -> Iterator[tuple[int, str, dict[s
     """Number, kind and line, for each line of a folder's journal.
 
     Raises:
-        ValueError: naming a line that is no JSON, or does not fit, key and value, what is allowed, and what to do.
+        ValueError: naming a line that is no JSON, or does not fit, key and value, what is allowed,
+            and what to do.
     """
     for number, line in enumerate(lines_of(folder, kinds.missed), 1):
         try:
             kind = kind_of(line, kinds.models)
         except (ValueError, RecursionError) as fault:
             head = isinstance(line, dict) and "header" in line
-            raise ValueError(no_use(folder, number, str(fault), kinds.asked if head else kinds.missed)) from None
+            raise ValueError(
+                no_use(folder, number, str(fault), kinds.asked if head else kinds.missed)
+            ) from None
         yield number, kind, line
 
 
@@ -131,7 +139,8 @@ def no_use(folder: Path, number: int, fault: str, remedy: str) -> str:
 
 
 def kind_of(line: Any, models: Mapping[str, type[Line]]) -> str:
-    """Which of the kinds a line is; raises `ValueError`, as the end of a sentence, if it is none or does not fit."""
+    """Which of the kinds a line is; raises `ValueError`, as the end of a sentence, if it is none or
+    does not fit."""
     kinds = [kind for kind in models if kind in line] if isinstance(line, dict) else []
     if len(kinds) != 1:
         raise ValueError(f"must be one of {', '.join(models)}")
@@ -147,6 +156,12 @@ def sentence(fault: ErrorDetails) -> str:
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"])[1:]
     if fault["type"] == "missing":
         return f"{key}: missing"
-    allowed = re.sub(r"^(Input|String) should", "must", str(fault.get("ctx", {}).get("error", fault["msg"])))
+    allowed = re.sub(
+        r"^(Input|String) should", "must", str(fault.get("ctx", {}).get("error", fault["msg"]))
+    )
     value = repr(fault["input"])
-    return f"{key} = {value if len(value) <= SHOWN else value[:SHOWN] + ' ...'}: {allowed}" if key else allowed
+    return (
+        f"{key} = {value if len(value) <= SHOWN else value[:SHOWN] + ' ...'}: {allowed}"
+        if key
+        else allowed
+    )

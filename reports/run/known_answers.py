@@ -1,4 +1,5 @@
-"""Known answers from outside: SimBenchmark's published bouncing test, made again by adapters and by six lines."""
+"""Known answers from outside: SimBenchmark's published bouncing test, made again by adapters and by
+six lines."""
 
 from __future__ import annotations
 
@@ -54,20 +55,27 @@ KNOWN_ANSWERS = (
     ),
 )
 MEANING = (
-    "49 balls of 10 kg dropped from 5 m on a floor, e = 1, for 20 s: SimBenchmark ranks engines by how well they keep "
-    "the energy. Its ODE column comes out of pymunk, digit for digit, and out of six lines of Python in which a step "
-    "either falls or reflects; its Bullet column comes out of the same lines if a step falls and then reflects the "
-    "velocity that gravity has just changed. So the hundredfold and more between these two columns is the order of "
-    "operations inside a step, not the quality of contacts."
+    "49 balls of 10 kg dropped from 5 m on a floor, e = 1, for 20 s: SimBenchmark ranks engines by"
+    " how well they keep the energy. Its ODE column comes out of pymunk, digit for digit, and out"
+    " of six lines of Python in which a step either falls or reflects; its Bullet column comes out"
+    " of the same lines if a step falls and then reflects the velocity that gravity has just"
+    " changed. So the hundredfold and more between these two columns is the order of operations"
+    " inside a step, not the quality of contacts."
 )
 
 
 def mean_squared_error_of(name: str, dt: float) -> float:
-    """J2 from one disk of an engine times 49: the disks never meet. E is taken before each step, as published."""
+    """J2 from one disk of an engine times 49: the disks never meet. E is taken before each step, as
+    published."""
     scene = lay_out(
-        position=[[0.0, HEIGHT]], velocity=[[0.0, 0.0]], radius=[RADIUS], mass=[MASS], restitution=1.0,
-        gravity=[0.0, -GRAVITY], walls=[[[-1.0, 0.0], [1.0, 0.0]]],
-    )  # fmt: skip
+        position=[[0.0, HEIGHT]],
+        velocity=[[0.0, 0.0]],
+        radius=[RADIUS],
+        mass=[MASS],
+        restitution=1.0,
+        gravity=[0.0, -GRAVITY],
+        walls=[[[-1.0, 0.0], [1.0, 0.0]]],
+    )
     steps = round(DURATION / dt)
     y, v = np.empty(steps), np.empty(steps)
     with closing(ENGINES[name].make()) as engine:
@@ -80,10 +88,11 @@ def mean_squared_error_of(name: str, dt: float) -> float:
 
 
 def six_lines(dt: float, falls_when_it_reflects: bool) -> float:
-    """J2 of a ball that moves by v dt, and in a step that finds it in the floor, coming in, is reflected.
+    """J2 of a ball that moves by v dt, and in a step that finds it in the floor, coming in, is
+    reflected.
 
-    Such a step lets the ball fall first (Bullet), or not at all (ODE, pymunk: the solver aims at e times the
-    velocity before gravity, so that its impulse takes the step's gravity out again).
+    Such a step lets the ball fall first (Bullet), or not at all (ODE, pymunk: the solver aims at e
+    times the velocity before gravity, so that its impulse takes the step's gravity out again).
     """
     steps = round(DURATION / dt)
     ys, vs = np.empty(steps), np.empty(steps)

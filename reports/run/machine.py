@@ -18,7 +18,11 @@ def about(command: str, seed: int) -> dict[str, Any]:
         "command": command,
         "seed": seed,
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": {**versions(), "Python": platform.python_version(), "engines' source": source_hash()},
+        "versions": {
+            **versions(),
+            "Python": platform.python_version(),
+            "engines' source": source_hash(),
+        },
         "machine": {
             "system": f"{platform.system()} {platform.release()}",
             "architecture": platform.machine(),
@@ -29,7 +33,8 @@ def about(command: str, seed: int) -> dict[str, Any]:
 
 
 def busy_cores(seconds: float = 0.5) -> float:
-    """How many cores others keep busy while this process sleeps so long; nan where the system does not tell."""
+    """How many cores others keep busy while this process sleeps so long; nan where the system does
+    not tell."""
     try:
         before = _ticks()
         sleep(seconds)
@@ -41,8 +46,12 @@ def busy_cores(seconds: float = 0.5) -> float:
 
 
 def _ticks() -> tuple[int, int]:
-    """All ticks of all cores since the system began, and those without work (man 5 proc: idle and iowait)."""
-    ticks = [int(field) for field in Path("/proc/stat").read_text(encoding="utf-8").splitlines()[0].split()[1:]]
+    """All ticks of all cores since the system began, and those without work (man 5 proc: idle and
+    iowait)."""
+    ticks = [
+        int(field)
+        for field in Path("/proc/stat").read_text(encoding="utf-8").splitlines()[0].split()[1:]
+    ]
     return sum(ticks[:8]), ticks[3] + ticks[4]
 
 

@@ -1,8 +1,9 @@
-"""What this program wrote: the record in a folder of its making, by which nothing that is somebody else's is replaced.
+"""What this program wrote: the record in a folder of its making, by which nothing that is somebody
+else's is replaced.
 
-A folder that a command makes holds `made.json`: the command, whether it is finished, and of every file but those
-whose name says enough the SHA-256 of what was written, or null while it is being written. Whatever else is in the
-folder, or in a folder inside it, is a stranger.
+A folder that a command makes holds `made.json`: the command, whether it is finished, and of every
+file but those whose name says enough the SHA-256 of what was written, or null while it is being
+written. Whatever else is in the folder, or in a folder inside it, is a stranger.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ class Kind(NamedTuple):
 
     Attributes:
         command: that makes it.
-        named: pattern of the paths, from its folder, of files that nobody else would call so: those are not recorded.
+        named: pattern of the paths, from its folder, of files that nobody else would call so: those
+            are not recorded.
         folders: that are in it.
     """
 
@@ -66,10 +68,17 @@ def read_made(folder: Path) -> Made | None:
         if not stat.S_ISREG(path.lstat().st_mode):
             return None
         made = Made(**json.loads(path.read_bytes()))
-    except (OSError, ValueError, TypeError, RecursionError):  # the last of brackets in brackets in brackets
+    except (
+        OSError,
+        ValueError,
+        TypeError,
+        RecursionError,
+    ):  # the last of brackets in brackets in brackets
         return None
     types = {"command": str, "finished": bool, "files": dict, "out": str}
-    return made if all(isinstance(getattr(made, name), kind) for name, kind in types.items()) else None
+    return (
+        made if all(isinstance(getattr(made, name), kind) for name, kind in types.items()) else None
+    )
 
 
 def put_made(folder: Path, made: Made) -> None:
@@ -78,7 +87,8 @@ def put_made(folder: Path, made: Made) -> None:
 
 
 def stranger_in(folder: Path, kind: Kind) -> str:
-    """What in a folder the command did not make, as the rest of a sentence; "" if there is nothing of the kind.
+    """What in a folder the command did not make, as the rest of a sentence; "" if there is nothing
+    of the kind.
 
     Raises:
         OSError: what cannot be looked into.
@@ -86,13 +96,17 @@ def stranger_in(folder: Path, kind: Kind) -> str:
     made = read_made(folder)
     if made is None:
         inside = sorted(path.name for path in folder.iterdir() if not is_begun(path))
-        return f"holds {inside[0]}, and no {MADE} says that {kind.command} made it" if inside else ""
+        return (
+            f"holds {inside[0]}, and no {MADE} says that {kind.command} made it" if inside else ""
+        )
     if made.command != kind.command:
         return f"was made by {made.command}, not by {kind.command}"
     for path in files_below(folder, kind.folders):
         name = path.relative_to(folder).as_posix()
         mode = path.lstat().st_mode
-        if not stat.S_ISREG(mode) or not (name == MADE or is_part(path) or kind.names(name) or name in made.files):
+        if not stat.S_ISREG(mode) or not (
+            name == MADE or is_part(path) or kind.names(name) or name in made.files
+        ):
             return f"holds {name}, which {kind.command} did not make"
         if not as_written(path, made.files.get(name)):
             return f"holds {name}, which is not as {kind.command} left it"
@@ -100,13 +114,15 @@ def stranger_in(folder: Path, kind: Kind) -> str:
 
 
 def is_begun(path: Path) -> bool:
-    """Whether it is the journal of which not a line is written yet, all that is there before the record."""
+    """Whether it is the journal of which not a line is written yet, all that is there before the
+    record."""
     about = path.lstat()
     return path.name == JOURNAL and stat.S_ISREG(about.st_mode) and not about.st_size
 
 
 def files_below(folder: Path, folders: Sequence[str]) -> Iterator[Path]:
-    """All that is in a folder but `folders`, and in those, in order of their names; no link is followed."""
+    """All that is in a folder but `folders`, and in those, in order of their names; no link is
+    followed."""
     for path in sorted(folder.iterdir()):
         if path.name in folders and stat.S_ISDIR(path.lstat().st_mode):
             yield from files_below(path, ())
@@ -130,7 +146,8 @@ def digest_of(path: str | Path) -> str:
 
 @contextmanager
 def writing(folder: Path, names: Sequence[str]) -> Iterator[None]:
-    """Within it the files of these names are written: they are this program's, also if that is broken off.
+    """Within it the files of these names are written: they are this program's, also if that is
+    broken off.
 
     A folder without a record, made before there was one, gets none.
 
@@ -144,14 +161,20 @@ def writing(folder: Path, names: Sequence[str]) -> Iterator[None]:
     for name in names:
         path = folder / name
         if os.path.lexists(path) and (path.is_symlink() or name not in made.files):
-            raise FolderTaken(f"{folder}: holds {name}, which {made.command} did not make; {MOVE_IT}")
+            raise FolderTaken(
+                f"{folder}: holds {name}, which {made.command} did not make; {MOVE_IT}"
+            )
         if path.exists() and not as_written(path, made.files[name]):
-            raise FolderTaken(f"{folder}: holds {name}, which is not as {made.command} left it; {MOVE_IT}")
+            raise FolderTaken(
+                f"{folder}: holds {name}, which is not as {made.command} left it; {MOVE_IT}"
+            )
     put_made(folder, made._replace(files=made.files | dict.fromkeys(names)))
     try:
         yield
     finally:  # also of what was refused, which has written nothing: the record is then what it was
-        written: dict[str, str | None] = {name: digest_of(folder / name) for name in names if (folder / name).exists()}
+        written: dict[str, str | None] = {
+            name: digest_of(folder / name) for name in names if (folder / name).exists()
+        }
         put_made(folder, made._replace(files=made.files | written))
 
 
@@ -159,12 +182,16 @@ MOVE_IT = "move it to another folder, or delete it"
 
 
 def may_write(target: Path, kind: Kind, option: str = "--out") -> None:
-    """Raise `FolderTaken` unless `target`, named by `option`, is absent, empty, or made by the same command alone.
+    """Raise `FolderTaken` unless `target`, named by `option`, is absent, empty, or made by the same
+    command alone.
 
     `OSError` if it cannot be looked into.
     """
     if target == Path.cwd() or target in Path.cwd().parents:
-        raise FolderTaken(f"{option} {target}: is where you are, or above it; name another folder, or go elsewhere")
+        raise FolderTaken(
+            f"{option} {target}: is where you are, or above it; name another folder, or go"
+            " elsewhere"
+        )
     if not os.path.lexists(target):
         return
     if target.is_symlink():
@@ -172,23 +199,33 @@ def may_write(target: Path, kind: Kind, option: str = "--out") -> None:
     if not target.is_dir():
         raise FolderTaken(f"{option} {target}: is a file; name a folder that does not exist yet")
     if os.path.ismount(target):
-        raise FolderTaken(f"{option} {target}: is where a disk is mounted, and stays there; name a folder in it")
+        raise FolderTaken(
+            f"{option} {target}: is where a disk is mounted, and stays there; name a folder in it"
+        )
     if stranger := stranger_in(target, kind):
-        raise FolderTaken(f"{option} {target}: {stranger}; name another folder, or move it elsewhere")
+        raise FolderTaken(
+            f"{option} {target}: {stranger}; name another folder, or move it elsewhere"
+        )
 
 
 def may_replace(target: Path, kind: Kind, option: str = "--out") -> None:
-    """Raise as `may_write`, and also if `target` holds what was interrupted: nothing that has ended is lost."""
+    """Raise as `may_write`, and also if `target` holds what was interrupted: nothing that has ended
+    is lost."""
     may_write(target, kind, option)
     made = read_made(target)
     if made is not None and not made.finished:
         whose = target.name.removesuffix(".part")
-        hint = f"to go on with it, name {target.with_name(whose)} to --resume" if whose != target.name else "delete it"
+        hint = (
+            f"to go on with it, name {target.with_name(whose)} to --resume"
+            if whose != target.name
+            else "delete it"
+        )
         raise FolderTaken(f"{option} {target}: holds what {kind.command} has not finished; {hint}")
 
 
 def sealed(text: str) -> str:
-    """The text of a page or of XML with a comment at its end by which `may_overwrite` knows that nobody changed it."""
+    """The text of a page or of XML with a comment at its end by which `may_overwrite` knows that
+    nobody changed it."""
     return f"{text}<!-- as it was written: sha256 {hashlib.sha256(encoded(text)).hexdigest()} -->\n"
 
 
@@ -199,7 +236,8 @@ def is_sealed(data: bytes) -> bool:
 
 
 def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
-    """Raise `FolderTaken` unless the file `path` is absent, a pipe or a device, or our own, which nobody has changed.
+    """Raise `FolderTaken` unless the file `path` is absent, a pipe or a device, or our own, which
+    nobody has changed.
 
     `OSError` if it cannot be looked into, or its folder is not there.
     """
@@ -211,5 +249,8 @@ def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
                 raise FolderTaken(f"{option} {path}: is there and no {what}; name another file")
             file.seek(0)
             if not is_sealed(file.read()):
-                raise FolderTaken(f"{option} {path}: is a {what} that was changed since; name another file, or move it")
+                raise FolderTaken(
+                    f"{option} {path}: is a {what} that was changed since; name another file, or"
+                    " move it"
+                )
     path.parent.stat()

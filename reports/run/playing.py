@@ -1,7 +1,9 @@
-"""What a worker does with a cell. It imports little: a worker that has to be replaced is soon there again.
+"""What a worker does with a cell. It imports little: a worker that has to be replaced is soon there
+again.
 
-The clock of a cell (--timeout) starts when its first step is due. Before, the engine is imported, compiled and loaded,
-which on a machine that plays it for the first time, and is busy, takes longer than most cells.
+The clock of a cell (--timeout) starts when its first step is due. Before, the engine is imported,
+compiled and loaded, which on a machine that plays it for the first time, and is busy, takes longer
+than most cells.
 """
 
 from __future__ import annotations
@@ -20,11 +22,13 @@ from reports.run.cells import Cell, source_hash, versions
 from reports.run.worker_process import allow, leave
 from scenarios.model import Scenario, State
 
-LOADING = 300.0  # s to import, compile and load an engine: up to 30 idle, all of them the first time
+# s to import, compile and load an engine: up to 30 idle, all of them the first time
+LOADING = 300.0
 
 
 class CellResult(NamedTuple):
-    """What a worker sends back of a cell: the run, its trajectory packed into a file, and by what it was played."""
+    """What a worker sends back of a cell: the run, its trajectory packed into a file, and by what
+    it was played."""
 
     run: Run
     samples: int
@@ -32,13 +36,16 @@ class CellResult(NamedTuple):
     played_by: str
 
 
-def play_cell(cell: Cell, row: EngineRow, scenario: Scenario, watch: Callable[[State], None] = unwatched) -> Run:
+def play_cell(
+    cell: Cell, row: EngineRow, scenario: Scenario, watch: Callable[[State], None] = unwatched
+) -> Run:
     """Play a cell here and now."""
     return play_once(row.make, cell.engine, scenario, scenario.dt(cell.substeps), watch)
 
 
 class Begun:
-    """What looks on while a cell is played: at the start, when the engine is loaded, the clock of the cell begins."""
+    """What looks on while a cell is played: at the start, when the engine is loaded, the clock of
+    the cell begins."""
 
     def __init__(self, then: Callable[[State], None] = unwatched) -> None:
         self.begun, self.then = False, then
@@ -52,7 +59,8 @@ class Begun:
 
 
 def play_here(cell: Cell, row: EngineRow, scenario: Scenario) -> CellResult:
-    """In the worker: play, leave every good state behind, and send back the run with its trajectory packed."""
+    """In the worker: play, leave every good state behind, and send back the run with its trajectory
+    packed."""
     allow(LOADING)
     run = play_cell(cell, row, scenario, Begun(lambda state: leave(parts_of(state))))
     file, samples = (packed(run.trajectory), len(run.trajectory)) if run.trajectory else (b"", 0)
@@ -66,7 +74,8 @@ def time_here(cell: Cell, row: EngineRow, scenario: Scenario) -> float:
 
 
 def conform_here(name: str, row: EngineRow) -> list[Finding]:
-    """In the worker: what the probes find; before their clock starts the engine is loaded once, and so compiled."""
+    """In the worker: what the probes find; before their clock starts the engine is loaded once, and
+    so compiled."""
     allow(LOADING)
     with suppress(Exception), loaded(row, plain()):  # which the probes will meet again, and say
         pass

@@ -150,9 +150,13 @@ class FooterLine(Line):
 
 KINDS = Kinds(
     {
-        "header": HeaderLine, "cell": CellLine, "conformance": ConformanceLine, "known_answer": KnownAnswerLine,
-        "timing": TimingLine, "footer": FooterLine,
+        "header": HeaderLine,
+        "cell": CellLine,
+        "conformance": ConformanceLine,
+        "known_answer": KnownAnswerLine,
+        "timing": TimingLine,
+        "footer": FooterLine,
     },
     "delete that line, and run --resume plays what it was of",
     "without it the request is not known: play it again into another --out",
-)  # fmt: skip
+)

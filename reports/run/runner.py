@@ -1,4 +1,5 @@
-"""Runs tasks in worker processes, here or on other machines, so that what aborts or hangs takes nothing along."""
+"""Runs tasks in worker processes, here or on other machines, so that what aborts or hangs takes
+nothing along."""
 
 from __future__ import annotations
 
@@ -20,10 +21,13 @@ from reports.run.worker_process import Failure
 from reports.terminal.exits import say
 
 TIMEOUT = 60.0  # s a task may take
-AHEAD = 2  # tasks a worker of this machine has been given at most, so that what is urgent comes soon, and none waits
+# tasks a worker of this machine has been given at most, so that what is urgent comes soon, and none
+# waits
+AHEAD = 2
 
 LEAST_MEMORY = 400  # MB: Python, numba and the engines take 120, compiling a kernel as much again
-LINES, OTHERS = 5, 100  # open files for a worker: what leads to it, twice while it starts; and those of all else
+# open files for a worker: what leads to it, twice while it starts; and those of all else
+LINES, OTHERS = 5, 100
 
 Task = Callable[[], Any]
 
@@ -41,12 +45,14 @@ def run_all(
     alone: Collection[Hashable] = frozenset(),
     urgent: deque[Any] | None = None,
 ) -> Generator[tuple[Any, Any | Failure], None, None]:
-    """Run picklable tasks, `workers` at once; yield (key, result or `Failure`) as each ends, every key once.
+    """Run picklable tasks, `workers` at once; yield (key, result or `Failure`) as each ends, every
+    key once.
 
-    A task may take `timeout` s and `memory` bytes (0: no limit); one that is in `alone` gets a process of its own.
-    With the address of a dask `scheduler` they run on its workers, as many at once as those have threads. What the
-    caller puts into `urgent` meanwhile goes before what is left, and on this machine, whose files it may read.
-    Timings are never taken beside anything else: for them `workers` is 1.
+    A task may take `timeout` s and `memory` bytes (0: no limit); one that is in `alone` gets a
+    process of its own. With the address of a dask `scheduler` they run on its workers, as many at
+    once as those have threads. What the caller puts into `urgent` meanwhile goes before what is
+    left, and on this machine, whose files it may read. Timings are never taken beside anything
+    else: for them `workers` is 1.
 
     Raises:
         NoScheduler: nothing answers at `scheduler`, or not any more.
@@ -59,7 +65,9 @@ def run_all(
         room = math.inf if scheduler else AHEAD * workers
         while urgent or waiting or under_way:
             while urgent or (waiting and len(under_way) < room):
-                executor, (key, task) = (here, urgent.popleft()) if urgent else (anywhere, waiting.popleft())
+                executor, (key, task) = (
+                    (here, urgent.popleft()) if urgent else (anywhere, waiting.popleft())
+                )
                 future = executor.submit(in_worker, task, timeout, memory, key in alone)
                 under_way[future] = key, task
                 future.add_done_callback(ended.put)
@@ -69,22 +77,31 @@ def run_all(
                 outcome = future.result()
             except CancelledError as gone:
                 raise NoScheduler("the scheduler has gone") from gone
-            except Exception as error:  # not the task, whose faults are outcomes, but what carried it
+            except (
+                Exception
+            ) as error:  # not the task, whose faults are outcomes, but what carried it
                 lost[key] += 1
                 if lost[key] < ATTEMPTS:
                     waiting.append((key, task))
                     continue
-                outcome = Failure("crashed", f"no machine could carry it out: {error}", outside=True)
+                outcome = Failure(
+                    "crashed", f"no machine could carry it out: {error}", outside=True
+                )
             yield key, pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
 
 
 def affordable(workers: int) -> int:
-    """As many workers of the `workers` asked for as can start on this machine; says so if those are fewer."""
+    """As many workers of the `workers` asked for as can start on this machine; says so if those are
+    fewer."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 1_000_000
     files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = {
-        f"memory of {memory} MB, of which each takes {LEAST_MEMORY}": max(1, memory // LEAST_MEMORY),
-        f"limit of {files} open files, of which each takes {LINES}": max(1, (files - OTHERS) // LINES),
+        f"memory of {memory} MB, of which each takes {LEAST_MEMORY}": max(
+            1, memory // LEAST_MEMORY
+        ),
+        f"limit of {files} open files, of which each takes {LINES}": max(
+            1, (files - OTHERS) // LINES
+        ),
     }
     why = min(most, key=lambda what: most[what])
     if workers <= most[why]:
@@ -119,24 +136,32 @@ def cluster_or(here: Executor, scheduler: str) -> Iterator[Executor]:
 
 
 def cluster(scheduler: str) -> Any:
-    """A client of a dask scheduler that has workers; raises `NoScheduler` naming what is missing."""
+    """A client of a dask scheduler that has workers; raises `NoScheduler` naming what is
+    missing."""
     if not re.fullmatch(r"(tcp|tls)://.+:\d+", scheduler):
-        raise NoScheduler(f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786")
+        raise NoScheduler(
+            f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786"
+        )
     try:
         from distributed import Client
     except ImportError as missing:
         raise NoScheduler(
-            f"--scheduler {scheduler}: many machines take the package {missing.name}, which is not installed; "
-            "uv sync --extra cluster, or pip install crosscheck2d[cluster]"
+            f"--scheduler {scheduler}: many machines take the package {missing.name}, which is not"
+            " installed; uv sync --extra cluster, or pip install crosscheck2d[cluster]"
         ) from missing
-    for name in logging.root.manager.loggerDict:  # what matters is raised; each of distributed's has its own level
+    # what matters is raised; each of distributed's has its own level
+    for name in logging.root.manager.loggerDict:
         if name.startswith("distributed"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = Client(scheduler, timeout="5s", set_as_default=False)
     except (OSError, ValueError) as fault:
-        raise NoScheduler(f"--scheduler {scheduler}: no scheduler answers there: {fault}") from fault
+        raise NoScheduler(
+            f"--scheduler {scheduler}: no scheduler answers there: {fault}"
+        ) from fault
     if not client.scheduler_info()["workers"]:
         client.close()
-        raise NoScheduler(f"--scheduler {scheduler}: has no workers; start some: dask worker {scheduler}")
+        raise NoScheduler(
+            f"--scheduler {scheduler}: has no workers; start some: dask worker {scheduler}"
+        )
     return client

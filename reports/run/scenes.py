@@ -24,12 +24,18 @@ def open_scene(scene: str, seed: int) -> Scenario:
 
 
 def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
-    """What was played, by the line of a cell in the run of `folder`; raises `Unusable` if it does not fit its scene."""
-    scene = record["scene"] if record["scene"] in SCENARIOS else str(stored_scene(folder, record["scenario"]))
+    """What was played, by the line of a cell in the run of `folder`; raises `Unusable` if it does
+    not fit its scene."""
+    scene = (
+        record["scene"]
+        if record["scene"] in SCENARIOS
+        else str(stored_scene(folder, record["scenario"]))
+    )
     scenario = open_scene(scene, record["seed"])
     if scene_hash(scenario) != record["scene_hash"]:
         raise Unusable(
-            f"{scenario.name} is not the scene any more that was played; crosscheck run --resume plays it again"
+            f"{scenario.name} is not the scene any more that was played; crosscheck run --resume"
+            " plays it again"
         )
     must_fit(folder, scenario, record)
     return scenario
@@ -40,26 +46,32 @@ def must_fit(folder: Path, scenario: Scenario, record: dict[str, Any]) -> None:
     for name, value in {"scenario": scenario.name, "dt_s": scenario.dt(record["substeps"])}.items():
         if record[name] != value:
             raise Unusable(
-                f"{folder / JOURNAL}: the line of the cell {record['cell']}: {name} = {record[name]!r}: must be "
-                f"{value!r}, that of {record['scene']} with {record['substeps']} substeps; delete that line"
+                f"{folder / JOURNAL}: the line of the cell {record['cell']}: {name} ="
+                f" {record[name]!r}: must be {value!r}, that of {record['scene']} with"
+                f" {record['substeps']} substeps; delete that line"
             )
 
 
 def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario:
-    """The scenario with the dt ladder asked for: `dts` in s instead of its own, two finer steps if `full`.
+    """The scenario with the dt ladder asked for: `dts` in s instead of its own, two finer steps if
+    `full`.
 
     Raises:
-        ValueError: naming the scenario and the dt that does not divide its sample interval, or is too small.
+        ValueError: naming the scenario and the dt that does not divide its sample interval, or is
+            too small.
     """
     ladder, interval = tuple(scenario.substeps), scenario.sample_interval
     most = MOST_STEPS // scenario.samples
     for dt in dts:
         if dt > 0 and interval / dt > most + 0.5:  # the nearest whole number is more
-            raise ValueError(f"--dt {dt:g} gives {scenario.name} more than {MOST_STEPS} steps: allowed is "
-                             f"{interval / most:.12g} s or more")  # fmt: skip
+            raise ValueError(
+                f"--dt {dt:g} gives {scenario.name} more than {MOST_STEPS} steps: allowed is "
+                f"{interval / most:.12g} s or more"
+            )
         k = round(interval / dt) if dt > 0 else 0
         if k < 1 or abs(k * dt / interval - 1) > 1e-9:
-            # Twelve digits: fewer may be another step than the one they stand for, and refused as this one is.
+            # Twelve digits: fewer may be another step than the one they stand for, and refused as
+            # this one is.
             raise ValueError(
                 f"--dt {dt:.12g} does not fit {scenario.name}: allowed is its sample interval "
                 f"{interval:.12g} s divided by a whole number, e.g. {scenario.dt(ladder[-1]):.12g}"

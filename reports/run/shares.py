@@ -1,7 +1,9 @@
-"""A scene's share of deviations.csv: made in a worker as soon as the last cell of the scene has ended, and kept.
+"""A scene's share of deviations.csv: made in a worker as soon as the last cell of the scene has
+ended, and kept.
 
-First the scene's exact answer is had, within the time that a cell may take, then all runs are set against it: two tasks
-of a worker. What could not be had in time, or at all, is said in the share, and the other scenes go on.
+First the scene's exact answer is had, within the time that a cell may take, then all runs are set
+against it: two tasks of a worker. What could not be had in time, or at all, is said in the share,
+and the other scenes go on.
 """
 
 from __future__ import annotations
@@ -36,22 +38,29 @@ JUDGES = ("reports/compare/**/*.py", "scenarios/**/*.py")  # wherever in these f
 ROOT = Path(__file__).parents[2]
 ANSWER = ".npz"  # how the file of an answer ends
 NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which nothing means NaN
-PATHS = "surrogateescape"  # so that the path of a solver that is not UTF-8 is the same when it is read back
-COMPARING = 300.0  # s that the comparison of a scene may take: all 38 of the default run take 30, on two cores
+# so that the path of a solver that is not UTF-8 is the same when it is read back
+PATHS = "surrogateescape"
+# s that the comparison of a scene may take: all 38 of the default run take 30, on two cores
+COMPARING = 300.0
 Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order of the tables
 Task = tuple[Path, Callable[[], Any]]  # where its result is kept, and what makes it in a worker
 
 
 class Gathering:
-    """The cells of a run as they come in; of each scene that is whole, the tasks that answer and compare it.
+    """The cells of a run as they come in; of each scene that is whole, the tasks that answer and
+    compare it.
 
     Attributes:
-        unkept: scene -> its share, where that may not be kept, as a file of a trajectory is gone or torn.
+        unkept: scene -> its share, where that may not be kept, as a file of a trajectory is gone or
+            torn.
         failed: scene -> why it could not be compared.
     """
 
-    def __init__(self, archive: Archive, missing: Iterable[Cell], timeout: float, warn: Callable[[str], None]) -> None:
-        """`timeout`: s that an exact answer may take; what has had less is tried again; `warn` hears what is torn."""
+    def __init__(
+        self, archive: Archive, missing: Iterable[Cell], timeout: float, warn: Callable[[str], None]
+    ) -> None:
+        """`timeout`: s that an exact answer may take; what has had less is tried again; `warn`
+        hears what is torn."""
         self.warn = warn
         self.folder, self.engines, self.timeout = archive.folder, archive.header["engines"], timeout
         self.missing = Counter(cell.scene for cell in missing)
@@ -79,7 +88,8 @@ class Gathering:
         yield from self.task_of(record["scene"])
 
     def task_of(self, scene: str) -> Iterator[Task]:
-        """The next task of a scene, if it is whole: its answer, then its share; each is given out once."""
+        """The next task of a scene, if it is whole: its answer, then its share; each is given out
+        once."""
         if self.missing[scene]:
             return
         records = in_order(self.records[scene].values(), self.engines)
@@ -102,7 +112,11 @@ class Gathering:
     @property
     def asked(self) -> list[str]:
         """The scenes whose exact answer is being computed, or is about to be."""
-        return [scene for path, scene in self.scenes.items() if path.suffix == ANSWER and path not in self.had]
+        return [
+            scene
+            for path, scene in self.scenes.items()
+            if path.suffix == ANSWER and path not in self.had
+        ]
 
     def came(self, path: Path, result: Any) -> Iterator[Task]:
         """Keep what came of a task, and give out the next of its scene."""
@@ -110,7 +124,9 @@ class Gathering:
         self.had.add(path)
         if path.suffix == ANSWER:
             away_with_what_is_no_file(path)
-            put_answer(path, no_answer(result, self.timeout) if isinstance(result, Failure) else result)
+            put_answer(
+                path, no_answer(result, self.timeout) if isinstance(result, Failure) else result
+            )
             yield from self.task_of(scene)
         elif isinstance(result, Failure):
             self.failed[scene] = result
@@ -122,7 +138,8 @@ class Gathering:
 
 
 def away_with_what_is_no_file(path: Path) -> None:
-    """Delete a pipe or a link that has the name of an answer or a share: it would be written into."""
+    """Delete a pipe or a link that has the name of an answer or a share: it would be written
+    into."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
         path.unlink()
 
@@ -138,7 +155,8 @@ def name_of(record: dict[str, Any]) -> str:
 
 
 class Share(NamedTuple):
-    """A scene's part of deviations.csv; `damaged`: a file of a trajectory is gone or torn, so that it is not kept."""
+    """A scene's part of deviations.csv; `damaged`: a file of a trajectory is gone or torn, so that
+    it is not kept."""
 
     csv: bytes
     damaged: bool
@@ -174,15 +192,22 @@ def compared(folder: Path, records: Records, answer: Answer) -> Comparison:
 
 
 def not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
-    """A row for each run that was played to its end and is, all the same, not set against `versus`."""
+    """A row for each run that was played to its end and is, all the same, not set against
+    `versus`."""
     rest = ("status", -1, np.nan, "", versus, np.nan, f"{NOT_JUDGED}: {why}")  # as `COLUMNS`
-    rows = [(run.scenario, run.engine, run.profile, run.dt, *rest) for run in runs if run.status == "ok"]
+    rows = [
+        (run.scenario, run.engine, run.profile, run.dt, *rest) for run in runs if run.status == "ok"
+    ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
 def scenario_of(folder: Path, records: Records) -> Scenario:
-    """What was played, with the steps that were played; raises `Unusable` if a line does not fit the scene as it is."""
-    [scenario] = [played_scenario(folder, record) for record in {one["scene_hash"]: one for one in records}.values()]
+    """What was played, with the steps that were played; raises `Unusable` if a line does not fit
+    the scene as it is."""
+    [scenario] = [
+        played_scenario(folder, record)
+        for record in {one["scene_hash"]: one for one in records}.values()
+    ]
     for record in records:
         must_fit(folder, scenario, record)
     return replace(scenario, substeps=tuple(sorted({record["substeps"] for record in records})))
@@ -212,7 +237,9 @@ def is_kept(path: Path) -> bool:
 def read_share(csv: bytes) -> pd.DataFrame:
     """The table, bit for bit as it was written."""
     empty = {column: [""] for column in NUMBERS}
-    return pd.read_csv(io.BytesIO(csv), keep_default_na=False, na_values=empty, encoding_errors=PATHS)
+    return pd.read_csv(
+        io.BytesIO(csv), keep_default_na=False, na_values=empty, encoding_errors=PATHS
+    )
 
 
 def answer_file(folder: Path, records: Records) -> Path:
@@ -221,9 +248,13 @@ def answer_file(folder: Path, records: Records) -> Path:
 
 
 def share_file(folder: Path, records: Records, answer: Answer) -> Path:
-    """Where the share of a scene is kept: named by all that decides it, its answer, the judge and the files too."""
+    """Where the share of a scene is kept: named by all that decides it, its answer, the judge and
+    the files too."""
     found = [as_found(folder, record) for record in records]
-    files = [tuple(record[name] for name in ("cell", "status", "reason", "file", "damage")) for record in found]
+    files = [
+        tuple(record[name] for name in ("cell", "status", "reason", "file", "damage"))
+        for record in found
+    ]
     return named_by(folder, records, (files, judge(), answer.lost), ".csv")
 
 
@@ -235,7 +266,8 @@ def named_by(folder: Path, records: Records, what: tuple, suffix: str) -> Path:
 
 @cache
 def judge(root: Path = ROOT) -> str:
-    """A hash over the source and versions by which runs are compared, so that a changed metric is measured again."""
+    """A hash over the source and versions by which runs are compared, so that a changed metric is
+    measured again."""
     files = sorted(path for pattern in JUDGES for path in root.glob(pattern))
     source = b"".join(path.read_bytes() for path in files)
     return hashlib.sha256(source + repr((versions(), pd.__version__)).encode()).hexdigest()

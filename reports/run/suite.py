@@ -1,4 +1,5 @@
-"""The main job: play scenarios through engines into a folder, each cell once, and keep every result as it comes."""
+"""The main job: play scenarios through engines into a folder, each cell once, and keep every result
+as it comes."""
 
 from __future__ import annotations
 
@@ -61,7 +62,9 @@ class RunPlan:
 
     def scenario(self, scene: str) -> Scenario:
         """The scenario behind one of `scenes`, with the steps asked for."""
-        return with_steps(open_scene(str(self.files.get(scene, scene)), self.seed), self.dts, self.full)
+        return with_steps(
+            open_scene(str(self.files.get(scene, scene)), self.seed), self.dts, self.full
+        )
 
     def header(self) -> dict[str, Any]:
         """What the journal begins with, and `RunPlan` is made from again when a run is resumed."""
@@ -92,7 +95,8 @@ class OtherVersions(Exception):
 
 
 def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress) -> None:
-    """Put the probes to every engine and play every cell that the journal does not have; all goes into its folder."""
+    """Put the probes to every engine and play every cell that the journal does not have; all goes
+    into its folder."""
     folder = journal.path.parent
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
     tasks = tasks_of(plan, scenarios)
@@ -108,7 +112,9 @@ def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress)
     limits = means.timeout, means.memory
     if gathering.asked and not missing:
         progress.say(waiting_for(gathering.asked))
-    with closing(run_all(missing, means.workers, *limits, means.scheduler, alone, comparing)) as results:
+    with closing(
+        run_all(missing, means.workers, *limits, means.scheduler, alone, comparing)
+    ) as results:
         for task, result in results:
             if isinstance(task, Cell):
                 key = task.key(scene_hash(scenarios[task.scene]), plan.engines[task.engine].source)
@@ -125,7 +131,9 @@ def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress)
     archive = Archive.read(folder)
     take_timings(archive, plan, means, journal, scenarios, progress)
     sweep(archive)
-    journal.append({"footer": {"tasks": len(tasks), "played": len(missing), "seconds": progress.seconds}})
+    journal.append(
+        {"footer": {"tasks": len(tasks), "played": len(missing), "seconds": progress.seconds}}
+    )
 
 
 def waiting_for(scenes: Sequence[str]) -> str:
@@ -135,7 +143,8 @@ def waiting_for(scenes: Sequence[str]) -> str:
 
 
 def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
-    """Make the folders, copy the scene files, write the header to the journal and to machine.json."""
+    """Make the folders, copy the scene files, write the header to the journal and to
+    machine.json."""
     folder = journal.path.parent
     for name in ("trajectories", "scenes", "compared"):
         (folder / name).mkdir(exist_ok=True)
@@ -143,7 +152,8 @@ def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], ta
     copies = {
         copy: scene_text(scenarios[scene])
         for scene, name in named.items()
-        if (copy := stored_scene(folder, name)) != plan.files.get(scene)  # else it is what is left of the file
+        # else it is what is left of the file
+        if (copy := stored_scene(folder, name)) != plan.files.get(scene)
     }
     header = plan.header() | {"tasks": tasks, "names": named}
     about_it = folder / "machine.json"
@@ -155,8 +165,11 @@ def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], ta
 
 
 def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
-    """What is to be done, by what it is: an engine's name (its probes), a `KnownAnswer`, or a `Cell`."""
-    tasks: dict[Any, Callable[[], Any]] = {name: partial(conform_here, name, row) for name, row in plan.engines.items()}
+    """What is to be done, by what it is: an engine's name (its probes), a `KnownAnswer`, or a
+    `Cell`."""
+    tasks: dict[Any, Callable[[], Any]] = {
+        name: partial(conform_here, name, row) for name, row in plan.engines.items()
+    }
     if KNOWN_SCENE in plan.scenes:
         tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
     for scene, scenario in scenarios.items():
@@ -167,18 +180,27 @@ def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Call
     return tasks
 
 
-def had(archive: Archive, plan: RunPlan, means: Means, scenarios: Mapping[str, Scenario]) -> set[Any]:
+def had(
+    archive: Archive, plan: RunPlan, means: Means, scenarios: Mapping[str, Scenario]
+) -> set[Any]:
     """The tasks of which the journal has the result, by the same scene, settings and versions.
 
-    What was stopped for time is had only if it would be stopped now; not what has lost its trajectory; and what failed
-    for a reason outside the engine is no result.
+    What was stopped for time is had only if it would be stopped now; not what has lost its
+    trajectory; and what failed for a reason outside the engine is no result.
     """
-    keys = {line["of"]: line["key"] for line in (*archive.conformance.values(), *archive.known_answers)}
+    keys = {
+        line["of"]: line["key"] for line in (*archive.conformance.values(), *archive.known_answers)
+    }
     asked: tuple[KnownAnswer | str, ...] = (*plan.engines, *KNOWN_ANSWERS)
     done: set[Any] = {task for task in asked if keys.get(name_of(task)) == answer_key(plan, task)}
     hashes = {scene: scene_hash(scenario) for scene, scenario in scenarios.items()}
     for record in archive.records:
-        cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", record["substeps"])
+        cell = Cell(
+            record["scene"],
+            record["seed"],
+            f"{record['engine']}:{record['profile']}",
+            record["substeps"],
+        )
         if cell.scene not in hashes or cell.engine not in plan.engines:
             continue
         stopped = record["status"] == "timeout" and record["timeout_s"] < means.timeout
@@ -199,12 +221,17 @@ def answer_key(plan: RunPlan, task: KnownAnswer | str) -> str:
     return content_key(name_of(task), plan.engines[task].source if isinstance(task, str) else "")
 
 
-def keep_answer(journal: Journal, plan: RunPlan, task: KnownAnswer | str, result: Any) -> tuple[str, str, str]:
-    """Write what a known answer, or the probes of an engine, gave; returns what to say of it, its status, and why."""
+def keep_answer(
+    journal: Journal, plan: RunPlan, task: KnownAnswer | str, result: Any
+) -> tuple[str, str, str]:
+    """Write what a known answer, or the probes of an engine, gave; returns what to say of it, its
+    status, and why."""
     failure = result if isinstance(result, Failure) else None
     status, reason = (failure.status, failure.reason) if failure else ("ok", "")
     if isinstance(task, KnownAnswer):
-        line: dict[str, Any] = {"known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}}
+        line: dict[str, Any] = {
+            "known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}
+        }
         said = f"known answer: {task.column} at dt {task.dt_s:g} s"
     else:
         findings = [no_answer(task, status, reason)] if failure else result
@@ -217,13 +244,20 @@ def keep_answer(journal: Journal, plan: RunPlan, task: KnownAnswer | str, result
 
 
 def keep_cell(
-    journal: Journal, scenario: Scenario, means: Means, cell: Cell, key: str, result: CellResult | Failure
+    journal: Journal,
+    scenario: Scenario,
+    means: Means,
+    cell: Cell,
+    key: str,
+    result: CellResult | Failure,
 ) -> dict[str, Any]:
     """Write the trajectory of the cell of that `key`, then its line, which is returned."""
     played = failed(cell, scenario, result) if isinstance(result, Failure) else result
     run, samples = played.run, played.samples
     if played.played_by != engine():
-        raise OtherVersions("a worker has other versions or other source of the engines than this machine")
+        raise OtherVersions(
+            "a worker has other versions or other source of the engines than this machine"
+        )
     path = trajectory_file(journal.path.parent, key)
     if played.file:
         put_bytes(path, played.file)
@@ -257,9 +291,18 @@ def failed(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
     trajectory = from_trail(failure.trail, scenario)
     samples = len(trajectory) if trajectory else 0
     last = (
-        f"; last good state: step {(samples - 1) * cell.substeps}, {scenario.times[samples - 1]:g} s" if samples else ""
+        f"; last good state: step {(samples - 1) * cell.substeps},"
+        f" {scenario.times[samples - 1]:g} s"
+        if samples
+        else ""
     )
-    run = Run(*cell.names, scenario.name, scenario.dt(cell.substeps), failure.status, failure.reason + last)
+    run = Run(
+        *cell.names,
+        scenario.name,
+        scenario.dt(cell.substeps),
+        failure.status,
+        failure.reason + last,
+    )
     return CellResult(run, samples, packed(trajectory) if trajectory else b"", engine())
 
 
@@ -271,7 +314,8 @@ def take_timings(
     scenarios: Mapping[str, Scenario],
     progress: Progress,
 ) -> None:
-    """Time the middle step of every scenario on every engine that played it, round by round, nothing beside it."""
+    """Time the middle step of every scenario on every engine that played it, round by round,
+    nothing beside it."""
     tasks: dict[Any, Callable[[], Any]] = {}
     for turn in range(plan.timings):
         for record in archive.records:

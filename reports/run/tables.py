@@ -1,4 +1,5 @@
-"""The tables of a run, made from its journal scenario by scenario; what has been compared is not compared again."""
+"""The tables of a run, made from its journal scenario by scenario; what has been compared is not
+compared again."""
 
 from __future__ import annotations
 
@@ -49,8 +50,10 @@ class Tables(NamedTuple):
         runs: runs.csv.
         answers: scene -> its exact answer, as it was had or not.
         shares: scene -> where its share of deviations.csv is.
-        unkept: scene -> its comparison, of which no share is kept: it could not be made, or a file is gone or torn.
-        unjudged: name of a scene -> why it is not held to its answer, or not compared at all, though it should be.
+        unkept: scene -> its comparison, of which no share is kept: it could not be made, or a file
+            is gone or torn.
+        unjudged: name of a scene -> why it is not held to its answer, or not compared at all,
+            though it should be.
     """
 
     runs: pd.DataFrame
@@ -61,34 +64,51 @@ class Tables(NamedTuple):
 
 
 def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
-    """Write deviations.csv and runs.csv; what was compared before and has not changed is not compared again.
+    """Write deviations.csv and runs.csv; what was compared before and has not changed is not
+    compared again.
 
     Raises:
         ValueError: no cell has ended, or a scene is not the one that was played.
     """
     by_scene, folder = ordered(archive), archive.folder
     if not by_scene:
-        raise ValueError(f"{folder / JOURNAL}: no cell has ended yet, so there is nothing to report")
+        raise ValueError(
+            f"{folder / JOURNAL}: no cell has ended yet, so there is nothing to report"
+        )
     gathering = compare_missing(archive, by_scene, say)
-    answers = {scene: read_answer(answer_file(folder, records)) for scene, records in by_scene.items()}
+    answers = {
+        scene: read_answer(answer_file(folder, records)) for scene, records in by_scene.items()
+    }
     had = {scene: answer for scene, answer in answers.items() if answer is not None}
     assert len(had) == len(by_scene)
     shares = {scene: share_file(folder, records, had[scene]) for scene, records in by_scene.items()}
-    unkept = {scene: unkept_comparison(folder, by_scene[scene], had[scene], share)
-              for scene, share in (gathering.unkept | gathering.failed).items()}  # fmt: skip
-    unjudged = {by_scene[scene][0]["scenario"]: answer.lost for scene, answer in had.items() if answer.lost}
-    unjudged |= {unkept[scene].scenario.name: not_compared(failure) for scene, failure in gathering.failed.items()}
+    unkept = {
+        scene: unkept_comparison(folder, by_scene[scene], had[scene], share)
+        for scene, share in (gathering.unkept | gathering.failed).items()
+    }
+    unjudged = {
+        by_scene[scene][0]["scenario"]: answer.lost for scene, answer in had.items() if answer.lost
+    }
+    unjudged |= {
+        unkept[scene].scenario.name: not_compared(failure)
+        for scene, failure in gathering.failed.items()
+    }
     say("writing the tables")
     write_deviations(folder, shares, unkept)
     had_from = {answer_file(folder, records) for records in by_scene.values()}
     sweep(folder / "compared", {*shares.values(), *had_from, seal_of(folder)})
-    runs = table_of_runs([record for records in by_scene.values() for record in records], archive, unkept)
+    runs = table_of_runs(
+        [record for records in by_scene.values() for record in records], archive, unkept
+    )
     put_text(folder / "runs.csv", runs.to_csv(index=False))
     return Tables(runs, had, shares, unkept, unjudged)
 
 
-def compare_missing(archive: Archive, by_scene: Mapping[str, Records], say: Callable[[str], None]) -> Gathering:
-    """Have the answers and make the shares that are not kept, in worker processes, each within its time."""
+def compare_missing(
+    archive: Archive, by_scene: Mapping[str, Records], say: Callable[[str], None]
+) -> Gathering:
+    """Have the answers and make the shares that are not kept, in worker processes, each within its
+    time."""
     (archive.folder / "compared").mkdir(exist_ok=True)
     # As much time as the cells had: it is the same option.
     gathering = Gathering(archive, [], max(record["timeout_s"] for record in archive.records), warn)
@@ -110,8 +130,11 @@ def not_compared(failure: Failure) -> str:
     return f"the comparison could not be made: {failure.status}: {failure.reason}"
 
 
-def unkept_comparison(folder: Path, records: Records, answer: Answer, share: bytes | Failure) -> Comparison:
-    """What can be shown of a scene of which no share is kept; what could not be compared is held to no answer."""
+def unkept_comparison(
+    folder: Path, records: Records, answer: Answer, share: bytes | Failure
+) -> Comparison:
+    """What can be shown of a scene of which no share is kept; what could not be compared is held to
+    no answer."""
     runs = [run_of(folder, record) for record in records]
     scenario = scenario_of(folder, records)
     if isinstance(share, bytes):
@@ -123,21 +146,30 @@ def unkept_comparison(folder: Path, records: Records, answer: Answer, share: byt
 
 
 def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
-    """The comparisons in reading order; only the runs at the middle dt hold their trajectories: no other is drawn."""
+    """The comparisons in reading order; only the runs at the middle dt hold their trajectories: no
+    other is drawn."""
     comparisons = []
     for scene, records in ordered(archive).items():
         if scene in tables.unkept:
             comparisons.append(tables.unkept[scene])
             continue
-        scenario, truth = answered(tables.answers[scene].given_to(scenario_of(archive.folder, records)))
+        scenario, truth = answered(
+            tables.answers[scene].given_to(scenario_of(archive.folder, records))
+        )
         middle = scenario.substeps[len(scenario.substeps) // 2]
-        runs = [run_of(archive.folder, record, with_trajectory=record["substeps"] == middle) for record in records]
-        comparisons.append(Comparison(scenario, truth, runs, read_share(kept_share(tables.shares[scene]))))
+        runs = [
+            run_of(archive.folder, record, with_trajectory=record["substeps"] == middle)
+            for record in records
+        ]
+        comparisons.append(
+            Comparison(scenario, truth, runs, read_share(kept_share(tables.shares[scene])))
+        )
     return comparisons
 
 
 def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
-    """Scene -> the lines of its cells, in the order of scenes and engines that was asked for, coarse dt first."""
+    """Scene -> the lines of its cells, in the order of scenes and engines that was asked for,
+    coarse dt first."""
     by_scene: dict[str, list[dict[str, Any]]] = {scene: [] for scene in archive.header["scenes"]}
     for record in archive.records:
         by_scene[record["scene"]].append(record)
@@ -145,8 +177,11 @@ def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
     return {scene: in_order(records, engines) for scene, records in by_scene.items() if records}
 
 
-def write_deviations(folder: Path, shares: Mapping[str, Path], unkept: Mapping[str, Comparison]) -> None:
-    """Put the scenes' shares one after the other into deviations.csv, and its digest beside them."""
+def write_deviations(
+    folder: Path, shares: Mapping[str, Path], unkept: Mapping[str, Comparison]
+) -> None:
+    """Put the scenes' shares one after the other into deviations.csv, and its digest beside
+    them."""
     all_of_it = hashlib.sha256()
     with whole(folder / "deviations.csv") as file:
         for number, (scene, share) in enumerate(shares.items()):
@@ -169,7 +204,8 @@ def is_sealed(folder: Path) -> bool:
 
 
 def sweep(folder: Path, kept: Set[Path]) -> None:
-    """Delete the answers and shares that are of something else, and nothing that is no answer or share."""
+    """Delete the answers and shares that are of something else, and nothing that is no answer or
+    share."""
     for other in set(folder.iterdir()) - kept:
         if is_part(other) or RUN.names(f"{folder.name}/{other.name}"):
             other.unlink()
@@ -184,15 +220,26 @@ def settled(name: str, pair: Sequence[Any]) -> str:
 def table_of_runs(
     records: Sequence[dict[str, Any]], archive: Archive, unkept: Mapping[str, Comparison]
 ) -> pd.DataFrame:
-    """A row a cell: what was played, how it ended, how long the engine took, with which settings and versions."""
+    """A row a cell: what was played, how it ended, how long the engine took, with which settings
+    and versions."""
     found = {
         (run.scenario, run.name, run.dt): {"status": run.status, "reason": run.reason}
         for comparison in unkept.values()
         for run in comparison.runs
     }
     columns = [
-        "scenario", "engine", "profile", "dt_s", "seed", "status", "reason", "step", "until_s", "seconds", "cell",
-    ]  # fmt: skip
+        "scenario",
+        "engine",
+        "profile",
+        "dt_s",
+        "seed",
+        "status",
+        "reason",
+        "step",
+        "until_s",
+        "seconds",
+        "cell",
+    ]
     rows = [
         {name: record[name] for name in columns}
         | found.get((record["scenario"], name_of(record), record["dt_s"]), {})
@@ -200,7 +247,9 @@ def table_of_runs(
             "until_s": float(record["until_s"]),
             "seconds_alone": min(archive.timings.get(record["cell"], [float("nan")])),
             "settings": "; ".join(map(settled, record["settings"], record["settings"].values())),
-            "versions": "; ".join(f"{name} {version}" for name, version in record["versions"].items()),
+            "versions": "; ".join(
+                f"{name} {version}" for name, version in record["versions"].items()
+            ),
         }
         for record in records
     ]

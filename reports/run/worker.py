@@ -1,4 +1,5 @@
-"""A worker as the parent sees it: a process that may abort, hang or eat the memory, and says how it ended."""
+"""A worker as the parent sees it: a process that may abort, hang or eat the memory, and says how it
+ended."""
 
 from __future__ import annotations
 
@@ -21,19 +22,23 @@ from adapters.safe_path import path_of_this, python
 from reports.run.worker_process import CLOCK, Failure
 from reports.terminal.foreign_text import legible
 
-STARTING = 120.0  # s for Python to start and to import what a task is made of, on a machine that is busy
+# s for Python to start and to import what a task is made of, on a machine that is busy
+STARTING = 120.0
 ATTEMPTS = 3  # at a task whose worker was killed from outside
 OUTSIDE = {-signal.SIGKILL, -signal.SIGTERM, 0}  # exits that no engine makes by a fault of its own
-PRINTED = 65536  # bytes of what a task prints that are kept: faulthandler writes up to 100 lines a thread
+# bytes of what a task prints that are kept: faulthandler writes up to 100 lines a thread
+PRINTED = 65536
 WORK = "from reports.run.worker_process import main; main(sys.argv[1:])"
 ASKING = "own_solver/process.py"  # waits for what a solver's file answers
 INNERMOST = re.compile(r'most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)')
 
 
 class Worker:
-    """One process and the three lines to it: tasks and results, what it prints, and the trail of its task.
+    """One process and the three lines to it: tasks and results, what it prints, and the trail of
+    its task.
 
-    The trail is a file without a name that both hold open: what a task leaves there outlives the process.
+    The trail is a file without a name that both hold open: what a task leaves there outlives the
+    process.
     """
 
     def __init__(self, memory: int, show: bool = False) -> None:
@@ -48,9 +53,11 @@ class Worker:
         os.close(printing)
 
     def do(self, task: Callable[[], Any], timeout: float) -> bytes | Failure | None:
-        """What the task gave, pickled, or how it failed; None if it is to be tried again with another worker.
+        """What the task gave, pickled, or how it failed; None if it is to be tried again with
+        another worker.
 
-        The clock of `timeout` starts when the worker has the task, and anew when the task says so (`allow`).
+        The clock of `timeout` starts when the worker has the task, and anew when the task says so
+        (`allow`).
         """
         self.printed = b""
         os.ftruncate(self.trail, 0)
@@ -65,11 +72,16 @@ class Worker:
             return self.death(begun)
         except TimeoutError:
             where = self.abort()
-            said = f"stopped after {limit:g} s{where}" if begun else f"its worker did not start in {limit:g} s{where}"
+            said = (
+                f"stopped after {limit:g} s{where}"
+                if begun
+                else f"its worker did not start in {limit:g} s{where}"
+            )
             return Failure("timeout", said, self.left(), outside=not begun)
 
     def answer(self, timeout: float) -> bytes:
-        """The next message; what is printed meanwhile is kept. Raises `TimeoutError`, or `EOFError` if it died."""
+        """The next message; what is printed meanwhile is kept. Raises `TimeoutError`, or `EOFError`
+        if it died."""
         end = monotonic() + timeout
         lines: list[Any] = [self.connection, self.output]
         while True:
@@ -82,7 +94,8 @@ class Worker:
                 raise TimeoutError
 
     def listen(self) -> int:
-        """Take in what was printed, keep the last of it; returns how many bytes came, 0 at the end."""
+        """Take in what was printed, keep the last of it; returns how many bytes came, 0 at the
+        end."""
         new = os.read(self.output, PRINTED)
         self.printed = (self.printed + new)[-PRINTED:]
         if self.show:
@@ -90,14 +103,17 @@ class Worker:
         return len(new)
 
     def death(self, begun: bool) -> Failure | None:
-        """How a process that hung up has ended, its task `begun` or not; None if it was ended from outside."""
+        """How a process that hung up has ended, its task `begun` or not; None if it was ended from
+        outside."""
         while self.listen():
             pass
         code = self.process.wait()
         if code in OUTSIDE:
             return None
         what = "worker died" if begun else "its worker could not start"
-        return Failure("crashed", f"{what}: {name_of_exit(code)}{self.place()}", self.left(), outside=not begun)
+        return Failure(
+            "crashed", f"{what}: {name_of_exit(code)}{self.place()}", self.left(), outside=not begun
+        )
 
     def abort(self) -> str:
         """Kill a process that hangs; returns where in Python it was."""
@@ -110,13 +126,15 @@ class Worker:
         return self.place()
 
     def place(self) -> str:
-        """Where Python was when faulthandler was called, and the last line printed before, as the end of a sentence."""
+        """Where Python was when faulthandler was called, and the last line printed before, as the
+        end of a sentence."""
         printed = self.printed.decode(errors="replace")
         before, fatal, dump = printed.rpartition("Fatal Python error: ")
         found = INNERMOST.search(dump)
         file = "/".join(Path(found[1]).parts[-2:]) if found else ""
         place = f" in {found[3]}, line {found[2]} of {file}" if found else ""
-        if file == ASKING:  # somebody's solver runs in a process of its own, and where, nobody here can tell
+        # somebody's solver runs in a process of its own, and where, nobody here can tell
+        if file == ASKING:
             place = ", while the solver's file had not come back from a call"
         said = [line for line in (before if fatal else printed).splitlines() if line.strip()]
         return place + (f'; it had printed "{said[-1].strip()[:200]}"' if said else "")
@@ -138,16 +156,21 @@ class Worker:
 
 def start(theirs: Connection, trail: int, printing: int, memory: int) -> subprocess.Popen[bytes]:
     """A fresh interpreter that serves the other end of a worker's lines."""
-    # As here, so that it finds what a task is made of, but nothing that only lies where this command was started.
+    # As here, so that it finds what a task is made of, but nothing that only lies where this
+    # command was started.
     return subprocess.Popen(
         [*python(WORK), *map(str, (theirs.fileno(), trail, memory))],
-        stdin=subprocess.DEVNULL, stdout=printing, stderr=printing, pass_fds=(theirs.fileno(), trail),
+        stdin=subprocess.DEVNULL,
+        stdout=printing,
+        stderr=printing,
+        pass_fds=(theirs.fileno(), trail),
         env=os.environ | {"PYTHONPATH": path_of_this()},
-    )  # fmt: skip
+    )
 
 
 def nameless_file() -> int:
-    """A file descriptor that nothing but its holders knows: in memory where the system can (Linux)."""
+    """A file descriptor that nothing but its holders knows: in memory where the system can
+    (Linux)."""
     if sys.platform == "linux":
         return os.memfd_create("trail")
     file, path = tempfile.mkstemp()
@@ -156,7 +179,8 @@ def nameless_file() -> int:
 
 
 class Crew:
-    """The workers of this process: one a thread, started when a task comes, replaced when it died."""
+    """The workers of this process: one a thread, started when a task comes, replaced when it
+    died."""
 
     def __init__(self) -> None:
         self.mine = threading.local()
@@ -199,8 +223,8 @@ CREW = Crew()
 def in_worker(task: Callable[[], Any], timeout: float, memory: int, alone: bool) -> bytes | Failure:
     """Carry out a task in the worker of this thread: its result, pickled, or how it failed.
 
-    `alone`: in a process that has seen no other task and will see none. A worker that is killed from outside
-    (out of memory, `kill -9`) is no fault of the task, which is tried again.
+    `alone`: in a process that has seen no other task and will see none. A worker that is killed
+    from outside (out of memory, `kill -9`) is no fault of the task, which is tried again.
     """
     for _ in range(ATTEMPTS):
         if alone:

@@ -1,4 +1,5 @@
-"""What runs in a worker process: it takes tasks from the parent one at a time and sends back what they give."""
+"""What runs in a worker process: it takes tasks from the parent one at a time and sends back what
+they give."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from typing import Any, NamedTuple
 
 CLOCK = b"clock "  # before a number of s; no pickle begins so
 LONGEST = 1e6  # s, for what is stopped only with the run
-IDLE = 60.0  # s without a task after which a process leaves: workers on other machines outlive the run
+# s without a task after which a process leaves: workers on other machines outlive the run
+IDLE = 60.0
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 _trail: int | None = None
@@ -30,8 +32,8 @@ class Failure(NamedTuple):
         status: "crashed", "timeout" or "error", as in `STATUSES` of play.py.
         reason: why.
         trail: what it left.
-        outside: whether it failed for a reason outside what it plays: the machine, the memory, this program. Another
-            time it may not.
+        outside: whether it failed for a reason outside what it plays: the machine, the memory, this
+            program. Another time it may not.
     """
 
     status: str
@@ -41,14 +43,17 @@ class Failure(NamedTuple):
 
 
 def leave(parts: Sequence[Any]) -> None:
-    """Append bytes to the trail of this task, which survives the process; nothing outside a worker."""
+    """Append bytes to the trail of this task, which survives the process; nothing outside a
+    worker."""
     if _trail is not None:
-        with contextlib.suppress(OSError):  # a trail that cannot be kept is no fault of the engine that is played
+        # a trail that cannot be kept is no fault of the engine that is played
+        with contextlib.suppress(OSError):
             os.writev(_trail, list(parts))
 
 
 def allow(seconds: float = 0.0) -> None:
-    """From now on this task may take `seconds`, or its time-out if that is longer; nothing outside a worker."""
+    """From now on this task may take `seconds`, or its time-out if that is longer; nothing outside
+    a worker."""
     if _parent is not None:
         _parent.send_bytes(CLOCK + str(seconds).encode())
 
@@ -71,20 +76,28 @@ def serve(connection: Connection, memory: int) -> None:
             answer = pickle.dumps(task())
         except MemoryError as error:
             error.__traceback__ = None  # lets go of the frames, and so of what they hold
-            limit = f"more than {memory / 1e6:.0f} MB (--memory)" if memory else "more than there is"
-            connection.send_bytes(pickle.dumps(Failure("error", f"MemoryError: took {limit}", outside=True)))
+            limit = (
+                f"more than {memory / 1e6:.0f} MB (--memory)" if memory else "more than there is"
+            )
+            connection.send_bytes(
+                pickle.dumps(Failure("error", f"MemoryError: took {limit}", outside=True))
+            )
             return  # what is not let go of ends with the process
         except Exception as error:  # an engine may raise anything
-            outside = bool(getattr(error, "outside", False))  # of `NotStarted`; an import of it here would take long
-            answer = pickle.dumps(Failure("error", f"{type(error).__name__}: {error}", outside=outside))
+            # of `NotStarted`; an import of it here would take long
+            outside = bool(getattr(error, "outside", False))
+            answer = pickle.dumps(
+                Failure("error", f"{type(error).__name__}: {error}", outside=outside)
+            )
         connection.send_bytes(answer)
 
 
 def prepare(memory: int) -> None:
     """What a process must be before an engine is let in.
 
-    A crash prints where Python was and writes no core; Ctrl-C is left to the parent, who alone decides what it means;
-    data beyond `memory` bytes cannot be had (RLIMIT_DATA; Linux counts private mappings); it dies with its parent.
+    A crash prints where Python was and writes no core; Ctrl-C is left to the parent, who alone
+    decides what it means; data beyond `memory` bytes cannot be had (RLIMIT_DATA; Linux counts
+    private mappings); it dies with its parent.
     """
     faulthandler.enable()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -96,7 +109,8 @@ def prepare(memory: int) -> None:
 
 
 def main(arguments: Sequence[Any]) -> None:
-    """What the process does; its words are CONNECTION TRAIL MEMORY: two file descriptors and a number of bytes."""
+    """What the process does; its words are CONNECTION TRAIL MEMORY: two file descriptors and a
+    number of bytes."""
     global _trail, _parent
     connection, trail, memory = (int(argument) for argument in arguments)
     _trail, _parent = trail, Connection(connection)

@@ -1,7 +1,8 @@
-"""Where an engine's error comes from: its mechanisms switched on in the reference one at a time, and what is left over.
+"""Where an engine's error comes from: its mechanisms switched on in the reference one at a time,
+and what is left over.
 
-As vectors, disk by disk and sample by sample, the contributions close: engine - truth = contributions + interplay +
-residual.
+As vectors, disk by disk and sample by sample, the contributions close: engine - truth =
+contributions + interplay + residual.
 """
 
 from __future__ import annotations
@@ -25,14 +26,36 @@ from reports.speed.ladder import held
 from scenarios.model import Array, Scenario, Trajectory
 
 TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (
-    "time of collisions", "interplay", "sum", "all", "engine", "residual",
-)  # fmt: skip
+    "time of collisions",
+    "interplay",
+    "sum",
+    "all",
+    "engine",
+    "residual",
+)
 TOTALS = (SUM, ALL, TOTAL)
 COLUMNS = [
-    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "contribution", "position_radii",
-    "energy", "share", "off_engine_radii", "off_reference_radii", "off_deviation_radii", "closed_deviation_radii", "note",
-]  # fmt: skip
-LIMIT = 0.5  # radii by which end-of-step detection alone may put a disk off: where all is far off, no contribution adds up to anything
+    "scenario",
+    "seed",
+    "engine",
+    "profile",
+    "dt_s",
+    "until_s",
+    "horizon_s",
+    "duration_s",
+    "contribution",
+    "position_radii",
+    "energy",
+    "share",
+    "off_engine_radii",
+    "off_reference_radii",
+    "off_deviation_radii",
+    "closed_deviation_radii",
+    "note",
+]
+# radii by which end-of-step detection alone may put a disk off: where all is far off, no
+# contribution adds up to anything
+LIMIT = 0.5
 
 
 class NotPlayed(Exception):
@@ -40,7 +63,8 @@ class NotPlayed(Exception):
 
 
 class Offset(NamedTuple):
-    """What one cause changes: of positions (k, m, 2) in radii of the disks that move, of the energy (k,) over all."""
+    """What one cause changes: of positions (k, m, 2) in radii of the disks that move, of the energy
+    (k,) over all."""
 
     position: Array
     energy: Array
@@ -57,7 +81,8 @@ class Offset(NamedTuple):
         return float(np.sqrt((self.position**2).sum(axis=2).mean()))
 
     def share_of(self, total: Offset) -> float:
-        """By how much of the total's position it lies along it: what adds up to the total has 1 in all."""
+        """By how much of the total's position it lies along it: what adds up to the total has 1 in
+        all."""
         size = float((total.position**2).sum())
         return float((self.position * total.position).sum()) / size if size else 0.0
 
@@ -68,40 +93,58 @@ class Offset(NamedTuple):
 
 
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
-    """A row a contribution of what puts engine `name` of `MECHANISMS` off in a scene, at this many steps a sample
-    interval.
+    """A row a contribution of what puts engine `name` of `MECHANISMS` off in a scene, at this many
+    steps a sample interval.
 
-    Of `COLUMNS`: until_s, how far the scene was evaluated, horizon_s, how far its exact answer goes, and duration_s,
-    the scene itself; position_radii and energy, the root mean square of what the
-    contribution changes, the energy in contributions of that at hand; share, by which it makes up the position's total
-    (1 in all;
-    negative: it makes up for others); off_engine_radii, off_reference_radii and off_deviation_radii: what switching it
-    off changes in the engine, in the reference with all the rest, and their deviation; closed_deviation_radii: how
-    far the flight's contribution is from its closed form up to the first collision; note: why there are no numbers.
+    Of `COLUMNS`: until_s, how far the scene was evaluated, horizon_s, how far its exact answer
+    goes, and duration_s, the scene itself; position_radii and energy, the root mean square of what
+    the contribution changes, the energy in contributions of that at hand; share, by which it makes
+    up the position's total (1 in all;
+    negative: it makes up for others); off_engine_radii, off_reference_radii and
+    off_deviation_radii: what switching it off changes in the engine, in the reference with all the
+        rest, and their deviation;
+    closed_deviation_radii: how far the flight's contribution is from its closed form up to the
+    first collision; note: why there are no numbers.
     """
     at = window_of(scene, seed, substeps)
     scenario, dt = at.scenario, at.dt
     engine, profile = name.split(":")
-    known = {"scenario": scenario.name, "seed": seed, "engine": engine, "profile": profile, "dt_s": dt,
-             "until_s": scenario.duration, "horizon_s": held(scene, seed).scenario.duration,
-             "duration_s": open_scene(scene, seed).duration}  # fmt: skip
+    known = {
+        "scenario": scenario.name,
+        "seed": seed,
+        "engine": engine,
+        "profile": profile,
+        "dt_s": dt,
+        "until_s": scenario.duration,
+        "horizon_s": held(scene, seed).scenario.duration,
+        "duration_s": open_scene(scene, seed).duration,
+    }
     try:
         run = at.played(row_of(name).make)
         budget = Budget(at, mechanisms_of(name, run.settings, scenario.scene, dt), at.offset(run))
         contributions, checks = budget.contributions(), budget.ablated_in_both()
     except NotPlayed as failure:
         return [known | {"contribution": TOTAL, "note": str(failure)}]
-    checks[FLIGHT] = {"closed_deviation_radii": at.flight_deviation(contributions[FLIGHT], row_of(name).alpha)}
+    checks[FLIGHT] = {
+        "closed_deviation_radii": at.flight_deviation(contributions[FLIGHT], row_of(name).alpha)
+    }
     shares = {
         contribution: {"share": each.share_of(contributions[TOTAL])}
         for contribution, each in contributions.items()
         if contribution not in TOTALS
     }
     return [
-        known | {"contribution": contribution, "position_radii": each.radii, "energy": each.of_energy, "note": ""}
-        | shares.get(contribution, {}) | checks.get(contribution, {})
+        known
+        | {
+            "contribution": contribution,
+            "position_radii": each.radii,
+            "energy": each.of_energy,
+            "note": "",
+        }
+        | shares.get(contribution, {})
+        | checks.get(contribution, {})
         for contribution, each in contributions.items()
-    ]  # fmt: skip
+    ]
 
 
 def window_of(scene: str, seed: int, substeps: int) -> Window:
@@ -137,54 +180,78 @@ class Window:
         return run
 
     def offset(self, run: Run) -> Offset:
-        """How far it is from the truth; energies where no collision is near, as a step late is a whole collision
-        late."""
+        """How far it is from the truth; energies where no collision is near, as a step late is a
+        whole collision late."""
         scene, truth, played = self.scenario.scene, self.truth, run.trajectory
         assert played is not None
-        position = laws.difference(played, truth, scene)[:, ~scene.static] / scene.radius[~scene.static, None]
+        position = (
+            laws.difference(played, truth, scene)[:, ~scene.static]
+            / scene.radius[~scene.static, None]
+        )
         energy = laws.energy(played, scene) - laws.energy(truth, scene)
         free = View(self.scenario, self.dt, played, truth).collision_free_samples
         return Offset(position, energy[free] / (scales.energy(self.scenario) or 1.0))
 
     def flight_deviation(self, contribution: Offset, alpha: float) -> float:
-        """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first collision; see `Row.alpha` of the
-        engines."""
+        """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first collision; see
+        `Row.alpha` of the engines."""
         truth, scene = self.truth, self.scenario.scene
         free = truth.t < truth.collisions.t.min(initial=np.inf)
-        gained = (truth.velocity - truth.velocity[0])[free][:, ~scene.static] / scene.radius[~scene.static, None]
-        return float(np.abs(contribution.position[free] - (alpha - 0.5) * self.dt * gained).max(initial=0.0))
+        gained = (truth.velocity - truth.velocity[0])[free][:, ~scene.static] / scene.radius[
+            ~scene.static, None
+        ]
+        return float(
+            np.abs(contribution.position[free] - (alpha - 0.5) * self.dt * gained).max(initial=0.0)
+        )
 
 
 class Budget:
-    """The offset of one engine, and its mechanisms, each of which is played once with the same others."""
+    """The offset of one engine, and its mechanisms, each of which is played once with the same
+    others."""
 
     def __init__(self, at: Window, mechanisms: Sequence[Mechanism], total: Offset) -> None:
         self.at, self.mechanisms, self.total = at, mechanisms, total
         self.known: dict[tuple[str, ...], Offset] = {}
 
     def contributions(self) -> dict[str, Offset]:
-        """What each mechanism changes, then interplay, the residual, the sum, all together, and the engine.
+        """What each mechanism changes, then interplay, the residual, the sum, all together, and the
+        engine.
 
-        Each is switched on by itself in the reference with end-of-step detection, or on top of those it acts on; for a
-        mechanism that the reference does not have, the engine is compared with itself without it.
+        Each is switched on by itself in the reference with end-of-step detection, or on top of
+        those it acts on; for a mechanism that the reference does not have, the engine is compared
+        with itself without it.
         """
         contributions = {TIME: self.reference([])}
         for mechanism in self.mechanisms:
             if mechanism.parameters:
                 below = [each for each in self.mechanisms if each.name in mechanism.on_top]
-                contributions[mechanism.name] = self.reference([*below, mechanism]) - self.reference(below)
+                contributions[mechanism.name] = self.reference(
+                    [*below, mechanism]
+                ) - self.reference(below)
             elif mechanism.without is not None:
-                contributions[mechanism.name] = self.total - self.at.offset(self.at.played(mechanism.without))
-        outside = [contributions[mechanism.name] for mechanism in self.mechanisms if not mechanism.parameters]
-        summed, reached = added(contributions.values()), added([self.reference(self.mechanisms), *outside])
+                contributions[mechanism.name] = self.total - self.at.offset(
+                    self.at.played(mechanism.without)
+                )
+        outside = [
+            contributions[mechanism.name]
+            for mechanism in self.mechanisms
+            if not mechanism.parameters
+        ]
+        summed, reached = (
+            added(contributions.values()),
+            added([self.reference(self.mechanisms), *outside]),
+        )
         return contributions | {
-            INTERPLAY: reached - summed, RESIDUAL: self.total - reached, SUM: summed, ALL: reached,
+            INTERPLAY: reached - summed,
+            RESIDUAL: self.total - reached,
+            SUM: summed,
+            ALL: reached,
             TOTAL: self.total,
-        }  # fmt: skip
+        }
 
     def ablated_in_both(self) -> dict[str, dict[str, float]]:
-        """contribution -> what switching it off changes in the engine, and in the reference with all the rest switched
-        on."""
+        """contribution -> what switching it off changes in the engine, and in the reference with
+        all the rest switched on."""
         found = {}
         for mechanism in self.mechanisms:
             if mechanism.parameters and mechanism.without is not None:
@@ -192,9 +259,10 @@ class Budget:
                 in_engine = self.total - self.at.offset(self.at.played(mechanism.without))
                 in_reference = self.reference(self.mechanisms) - self.reference(others)
                 found[mechanism.name] = {
-                    "off_engine_radii": in_engine.radii, "off_reference_radii": in_reference.radii,
+                    "off_engine_radii": in_engine.radii,
+                    "off_reference_radii": in_reference.radii,
                     "off_deviation_radii": (in_engine - in_reference).radii,
-                }  # fmt: skip
+                }
         return found
 
     def reference(self, mechanisms: Sequence[Mechanism]) -> Offset:

@@ -1,5 +1,5 @@
-"""The error budget as tables: in which scenes which contribution is the largest, and all contributions of one scene
-side by side."""
+"""The error budget as tables: in which scenes which contribution is the largest, and all
+contributions of one scene side by side."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ WHO = ["engine", "profile"]
 
 
 class BudgetCell(NamedTuple):
-    """A number, and the length of its bar from 0 to 1; nan, and no bar, where an engine has no such mechanism."""
+    """A number, and the length of its bar from 0 to 1; nan, and no bar, where an engine has no such
+    mechanism."""
 
     value: float
     bar: float
@@ -27,7 +28,8 @@ class BudgetCell(NamedTuple):
 class BudgetTable(NamedTuple):
     """Rows of cells by `engine:profile`, and the notes of those that could not be explained.
 
-    until, horizon, duration: s, up to where the scene was evaluated, its exact answer goes, and it lasts.
+    until, horizon, duration: s, up to where the scene was evaluated, its exact answer goes, and it
+        lasts.
     """
 
     scenario: str
@@ -40,7 +42,8 @@ class BudgetTable(NamedTuple):
 
 
 def of_scene(budget: pd.DataFrame, scenario: str) -> BudgetTable:
-    """Root mean squares in radii, a row an engine: engine, the residual, the contributions, sum and all."""
+    """Root mean squares in radii, a row an engine: engine, the residual, the contributions, sum and
+    all."""
     here = budget[budget.scenario == scenario]
     contributions = [
         contribution
@@ -54,13 +57,18 @@ def of_scene(budget: pd.DataFrame, scenario: str) -> BudgetTable:
         found = group.set_index("contribution").position_radii
         rows[f"{engine}:{profile}"] = [cell(float(found.get(column, np.nan))) for column in columns]
         notes |= {f"{engine}:{profile}": note for note in group.note if note}
-    until, horizon, duration = (float(here[name].iloc[0]) for name in ("until_s", "horizon_s", "duration_s"))
+    until, horizon, duration = (
+        float(here[name].iloc[0]) for name in ("until_s", "horizon_s", "duration_s")
+    )
     return BudgetTable(scenario, until, horizon, duration, columns, rows, notes)
 
 
 def causes(budget: pd.DataFrame) -> list[str]:
     """The contributions that are causes, of any engine."""
-    return [TIME, *(contribution for contribution in NAMES if contribution in set(budget.contribution))]
+    return [
+        TIME,
+        *(contribution for contribution in NAMES if contribution in set(budget.contribution)),
+    ]
 
 
 def cell(value: float) -> BudgetCell:
@@ -71,8 +79,9 @@ def cell(value: float) -> BudgetCell:
 
 
 def overview(budget: pd.DataFrame) -> BudgetTable:
-    """In how many scenes an engine was played, has an error, has it explained but for `EXPLAINED`, and in how many
-    each contribution is the largest; bars of all scenes, and every engine has its row, also one that failed them all.
+    """In how many scenes an engine was played, has an error, has it explained but for `EXPLAINED`,
+    and in how many each contribution is the largest; bars of all scenes, and every engine has its
+    row, also one that failed them all.
     """
     columns = ["played", "errors", "explained", *causes(budget)]
     count = budget.scenario.nunique()
@@ -96,6 +105,7 @@ def overview(budget: pd.DataFrame) -> BudgetTable:
 
 
 def ablated_in_both(budget: pd.DataFrame) -> list[dict[str, Any]]:
-    """Every mechanism that can be switched off in the engine, where that changes anything: the change in both."""
+    """Every mechanism that can be switched off in the engine, where that changes anything: the
+    change in both."""
     rows = budget[budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST]
     return [{str(key): value for key, value in row.items()} for row in rows.to_dict("records")]

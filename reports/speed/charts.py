@@ -1,4 +1,5 @@
-"""The charts: error against cost, cost at matched accuracy, cost against the number of disks, options."""
+"""The charts: error against cost, cost at matched accuracy, cost against the number of disks,
+options."""
 
 from __future__ import annotations
 
@@ -18,24 +19,38 @@ from scenarios.model import Array
 FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"
 COST, ERROR = "engine time (µs per simulated second)", "error (radii)"
 EDGE = 0.55  # decades between the last gridline and what is drawn at the edge
-LOWEST = 1e-7  # radii: what is smaller stands there, as a tenth of the finest accuracy asked for is as good as exact
+# radii: what is smaller stands there, as a tenth of the finest accuracy asked for is as good as
+# exact
+LOWEST = 1e-7
 TALL, TALLEST, PER_ROW = 400, 520, 19  # px
 
 
 def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
-    """Error against cost, a line an engine over its ladder; `points` of one scene, or pooled and then `tall`."""
+    """Error against cost, a line an engine over its ladder; `points` of one scene, or pooled and
+    then `tall`."""
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis(COST, drawn.cost.to_numpy(float))
     y_axis = error_axis(drawn.error.to_numpy(float))
     traces = fronts(drawn, x_axis, y_axis)
     for engine, profile, group in by_engine(points):
         fine = group[group.cost.notna() & np.isfinite(group.error)]
-        spreads = {} if tall else {
-            "error_x": bars(fine.cost, fine.low, fine.high),
-            "error_y": bars(*(fine[name].clip(lower=LOWEST) for name in ("error", "error_low", "error_high"))),
-        }  # fmt: skip
+        spreads = (
+            {}
+            if tall
+            else {
+                "error_x": bars(fine.cost, fine.low, fine.high),
+                "error_y": bars(
+                    *(
+                        fine[name].clip(lower=LOWEST)
+                        for name in ("error", "error_low", "error_high")
+                    )
+                ),
+            }
+        )
         text = [hover_text(row) for row in records(fine)]
-        traces.append(line(engine, profile, fine.cost, fine.error.clip(lower=LOWEST), text, spreads))
+        traces.append(
+            line(engine, profile, fine.cost, fine.error.clip(lower=LOWEST), text, spreads)
+        )
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
     traces += at_the_edge(lost, drawn, x_axis, y_axis)
     return figure(traces, x_axis, y_axis, TALLEST if tall else TALL)
@@ -44,8 +59,8 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
 def at_the_edge(
     lost: pd.DataFrame, drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any]
 ) -> list[dict[str, Any]]:
-    """What failed, on the upper edge, and what was not timed, at its error; at the cost it has or would have by its
-    other dts, else at the right edge.
+    """What failed, on the upper edge, and what was not timed, at its error; at the cost it has or
+    would have by its other dts, else at the right edge.
     """
     if lost.empty:
         return []
@@ -53,7 +68,9 @@ def at_the_edge(
     traces = []
     for engine, profile, group in by_engine(lost):
         others = drawn[(drawn.engine == engine) & (drawn.profile == profile)]
-        per_step_size = float((others.cost / 2.0**others.step_size).median()) if len(others) else np.nan
+        per_step_size = (
+            float((others.cost / 2.0**others.step_size).median()) if len(others) else np.nan
+        )
         cost = group.cost.where(group.cost.notna(), per_step_size * 2.0**group.step_size)
         corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside: what is outside is not drawn
         x = cost.fillna(corner).clip(upper=corner)
@@ -63,14 +80,23 @@ def at_the_edge(
     return traces
 
 
-def fronts(drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any]) -> list[dict[str, Any]]:
-    """Behind everybody, the front of all and, narrow, that of those who take steps; together where they are one."""
+def fronts(
+    drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any]
+) -> list[dict[str, Any]]:
+    """Behind everybody, the front of all and, narrow, that of those who take steps; together where
+    they are one."""
     steps = drawn[~drawn.engine.isin(KINDS)]
-    return [front_of(drawn, FRONT, 9, x_axis, y_axis), front_of(steps, FRONT_OF_STEPS, 3, x_axis, y_axis)]
+    return [
+        front_of(drawn, FRONT, 9, x_axis, y_axis),
+        front_of(steps, FRONT_OF_STEPS, 3, x_axis, y_axis),
+    ]
 
 
-def front_of(drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any], y_axis: dict[str, Any]) -> dict:
-    """The edge of what the points that nobody beats beat: all above and right of it is slower or worse than one.
+def front_of(
+    drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any], y_axis: dict[str, Any]
+) -> dict:
+    """The edge of what the points that nobody beats beat: all above and right of it is slower or
+    worse than one.
 
     What stands at `LOWEST` counts as equal.
     """
@@ -82,21 +108,37 @@ def front_of(drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any],
         x, y = np.array([x[0], *x, right]), np.array([top, *y, y[-1]])
     colour = style.look(style.TRUTH).light
     return {
-        "type": "scatter", "x": shortened(x), "y": shortened(y), "name": name, "mode": "lines+markers",
-        "line": {"color": colour, "width": width, "shape": "hv"}, "opacity": 0.16, "hoverinfo": "skip",
-        "marker": {"color": colour, "size": [0, *[20] * len(best), 0], "symbol": "circle", "line": {"width": 0}},
-    }  # fmt: skip
+        "type": "scatter",
+        "x": shortened(x),
+        "y": shortened(y),
+        "name": name,
+        "mode": "lines+markers",
+        "line": {"color": colour, "width": width, "shape": "hv"},
+        "opacity": 0.16,
+        "hoverinfo": "skip",
+        "marker": {
+            "color": colour,
+            "size": [0, *[20] * len(best), 0],
+            "symbol": "circle",
+            "line": {"width": 0},
+        },
+    }
 
 
 def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
-    """Error against cost, a line for each sweep over its values, and one its engine over a ladder of dt.
+    """Error against cost, a line for each sweep over its values, and one its engine over a ladder
+    of dt.
 
-    relative: both are over those of the engine as it is matched, at the dt at which the parameter is swept.
+    relative: both are over those of the engine as it is matched, at the dt at which the parameter
+        is swept.
     """
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis("time / time as matched" if relative else COST, drawn.cost.to_numpy(float))
-    y_axis = (log_axis("error / error as matched", drawn.error.to_numpy(float)) if relative
-              else error_axis(drawn.error.to_numpy(float)))  # fmt: skip
+    y_axis = (
+        log_axis("error / error as matched", drawn.error.to_numpy(float))
+        if relative
+        else error_axis(drawn.error.to_numpy(float))
+    )
     traces = []
     for engine, profile, group in by_engine(drawn):
         what = profile.partition("+")[2]
@@ -106,7 +148,11 @@ def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
         if what:  # the first and the last are named
             values = group.change.tolist()
             named = [value if k in (0, len(values) - 1) else "" for k, value in enumerate(values)]
-            trace |= {"mode": "lines+markers+text", "texttemplate": named, "textposition": "top center"}
+            trace |= {
+                "mode": "lines+markers+text",
+                "texttemplate": named,
+                "textposition": "top center",
+            }
             trace["textfont"] = {"color": trace["line"]["color"], "size": 11}
         traces.append(trace)
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
@@ -116,10 +162,18 @@ def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
 
 def turned(what: str, row: dict[str, Any], relative: bool) -> str:
     """What hovering over a point of a sweep says."""
-    value = f"{what} {row['change']}<br>" if what else f"dt / {2.0 ** (row['step_size'] - 2):g}<br>" if relative else ""
+    value = (
+        f"{what} {row['change']}<br>"
+        if what
+        else f"dt / {2.0 ** (row['step_size'] - 2):g}<br>"
+        if relative
+        else ""
+    )
     if not relative:
         return value + hover_text(row)
-    return f"{value}{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
+    return (
+        f"{value}{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
+    )
 
 
 def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
@@ -135,14 +189,20 @@ def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
         y = group.cost.where(group.cost.notna(), np.where(group.lost, never, not_down))
         text = [
             f"{row['accuracy']} of a radius: "
-            + (row["why"] if np.isnan(row["cost"]) else f"{style.number(row['cost'])} µs/s {at(row)}{row['why']}")
+            + (
+                row["why"]
+                if np.isnan(row["cost"])
+                else f"{style.number(row['cost'])} µs/s {at(row)}{row['why']}"
+            )
             for row in records(group)
         ]
         traces.append(line(engine, profile, x, y, text) | {"mode": "markers"})
     x_axis = {
-        "title": "accuracy (of a radius)", "tickvals": list(range(len(ACCURACIES))), "ticktext": list(ACCURACIES),
+        "title": "accuracy (of a radius)",
+        "tickvals": list(range(len(ACCURACIES))),
+        "ticktext": list(ACCURACIES),
         "range": [-0.5, len(ACCURACIES) - 0.5],
-    }  # fmt: skip
+    }
     return figure(traces, x_axis, y_axis, TALL if tall else None)
 
 
@@ -159,9 +219,18 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
     stopped = edge(y_axis, "stopped") if (growth.stopped != "").any() else 0.0
     for engine, profile, group in by_engine(costs):
         text = [f"{row['n']:.0f} disks: {spread(row)} µs a step" for row in records(group)]
-        traces.append(line(engine, profile, group.n, group.cost, text, {
-            "error_y": bars(group.cost, group.low, group.high),
-        }))  # fmt: skip
+        traces.append(
+            line(
+                engine,
+                profile,
+                group.n,
+                group.cost,
+                text,
+                {
+                    "error_y": bars(group.cost, group.low, group.high),
+                },
+            )
+        )
     for row in records(growth[growth.stopped != ""]):
         n, why = row["stopped"].split(": ", 1)
         cross = line(row["engine"], row["profile"], [float(n)], [stopped], [f"{n} disks: {why}"])
@@ -170,8 +239,8 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
 
 
 def options(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
-    """A row a change, a mark a scene: `ratio` ("cost_ratio", "error_ratio") to the unchanged engine, 1: the same; a
-    change that failed the scene stands at the right edge.
+    """A row a change, a mark a scene: `ratio` ("cost_ratio", "error_ratio") to the unchanged
+    engine, 1: the same; a change that failed the scene stands at the right edge.
     """
     rows = list(dict.fromkeys(zip(table.engine, table.profile, table.change)))[::-1]
     values = table[ratio].to_numpy(float)
@@ -179,26 +248,39 @@ def options(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
     low, high = np.log10(known.min()) - 0.1, np.log10(known.max()) + 0.1
     ticks = TICKS if high - low < 2 else TICKS[::3]  # on a phone there is no room for more
     x_axis: dict[str, Any] = {
-        "title": title, "type": "log", "range": [low, high],
-        "tickvals": ticks, "ticktext": [style.number(tick) for tick in ticks],
-    }  # fmt: skip
+        "title": title,
+        "type": "log",
+        "range": [low, high],
+        "tickvals": ticks,
+        "ticktext": [style.number(tick) for tick in ticks],
+    }
     failed = edge(x_axis, FAILED) if np.isinf(table.error_radii).any() else np.nan
     y_axis = {
-        "title": "", "tickvals": list(range(len(rows))), "range": [-0.7, len(rows) - 0.3],
+        "title": "",
+        "tickvals": list(range(len(rows))),
+        "range": [-0.7, len(rows) - 0.3],
         "ticktext": [f"{engine}: {change}" for engine, _, change in rows],
-    }  # fmt: skip
-    traces: list[dict[str, Any]] = [{
-        "type": "scatter", "x": [1, 1], "y": [-1, len(rows)], "mode": "lines", "hoverinfo": "skip", "name": "no change",
-        "line": {"color": style.look(style.TRUTH).light, "width": 1.2, "dash": "dot"},
-    }]  # fmt: skip
+    }
+    traces: list[dict[str, Any]] = [
+        {
+            "type": "scatter",
+            "x": [1, 1],
+            "y": [-1, len(rows)],
+            "mode": "lines",
+            "hoverinfo": "skip",
+            "name": "no change",
+            "line": {"color": style.look(style.TRUTH).light, "width": 1.2, "dash": "dot"},
+        }
+    ]
     for engine, profile, group in by_engine(table):
         y = [rows.index((engine, profile, change)) for change in group.change]
         x = group[ratio].where(np.isfinite(group[ratio]) & (group[ratio] > 0))
         x = x.where(np.isfinite(group.error_radii), failed)
         text = [
-            f"{row['change']}, {row['scenario']}: ×{style.number(row[ratio])}<br>"
-            f"error {style.number(row['error_radii'])} radii, unchanged {style.number(row['error_radii_plain'])}<br>"
-            f"{spread(row)} µs/s, unchanged {style.number(row['cost_plain'])}"
+            f"{row['change']}, {row['scenario']}: ×{style.number(row[ratio])}<br>error"
+            f" {style.number(row['error_radii'])} radii, unchanged"
+            f" {style.number(row['error_radii_plain'])}<br>{spread(row)} µs/s, unchanged"
+            f" {style.number(row['cost_plain'])}"
             for row in records(group)
         ]
         traces.append(line(engine, profile, x, y, text) | {"mode": "markers"})
@@ -208,16 +290,27 @@ def options(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
 TICKS = [a * 10.0**b for b in range(-8, 9) for a in (1, 2, 5)]
 
 
-def line(engine: str, profile: str, x: Any, y: Any, text: Sequence[str], more: dict[str, Any] | None = None) -> dict:
+def line(
+    engine: str,
+    profile: str,
+    x: Any,
+    y: Any,
+    text: Sequence[str],
+    more: dict[str, Any] | None = None,
+) -> dict:
     """A trace in the look of its engine, with what is said of each point."""
     look = style.look(engine, profile)
     return {
-        "type": "scatter", "x": shortened(np.asarray(x, float), 5),
+        "type": "scatter",
+        "x": shortened(np.asarray(x, float), 5),
         "y": shortened(np.maximum(np.asarray(y, float), ZERO) if np.size(y) else [], 4),
-        "name": f"{engine}:{profile}", "mode": "lines+markers", "text": list(text), "hovertemplate": "%{text}",
+        "name": f"{engine}:{profile}",
+        "mode": "lines+markers",
+        "text": list(text),
+        "hovertemplate": "%{text}",
         "line": {"color": look.light, "dash": look.plotly_dash, "width": 1.7},
         "marker": {"symbol": look.symbol, "size": 9, "color": look.light},
-    } | (more or {})  # fmt: skip
+    } | (more or {})
 
 
 def by_engine(table: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
@@ -232,9 +325,13 @@ def bars(middle: Any, low: Any, high: Any) -> dict[str, Any]:
     up = np.where(np.isfinite(high), high, middle) - middle
     down = middle - np.where(np.isfinite(low), low, middle)
     return {
-        "type": "data", "symmetric": False, "array": shortened(np.maximum(up, 0), 3),
-        "arrayminus": shortened(np.maximum(down, 0), 3), "thickness": 0.8, "width": 0,
-    }  # fmt: skip
+        "type": "data",
+        "symmetric": False,
+        "array": shortened(np.maximum(up, 0), 3),
+        "arrayminus": shortened(np.maximum(down, 0), 3),
+        "thickness": 0.8,
+        "width": 0,
+    }
 
 
 def hover_text(row: dict[str, Any]) -> str:
@@ -244,7 +341,10 @@ def hover_text(row: dict[str, Any]) -> str:
         return f"{at(row)}failed in {row['failed']} of {row['seeds']}{why}"
     error = style.number(row["error"])
     if row["error_high"] != row["error_low"]:
-        error += f" ({style.number(row['error_low'])} to {style.number(row['error_high'])}, {row['seeds']} seeds)"
+        error += (
+            f" ({style.number(row['error_low'])} to {style.number(row['error_high'])},"
+            f" {row['seeds']} seeds)"
+        )
     lines = [f"{at(row)}error {error} radii".strip()]
     lines.append(f"{spread(row)} µs/s" if np.isfinite(row["cost"]) else "not timed")
     if np.isfinite(row["idle"]):
@@ -257,7 +357,10 @@ def hover_text(row: dict[str, Any]) -> str:
 def spread(row: dict[str, Any]) -> str:
     """Median, quartiles and, of one scene's samples, the fastest of a cost."""
     fastest = f", fastest {style.number(row['best'])}" if np.isfinite(row["best"]) else ""
-    return f"{style.number(row['cost'])} ({style.number(row['low'])} to {style.number(row['high'])}{fastest})"
+    return (
+        f"{style.number(row['cost'])} ({style.number(row['low'])} to"
+        f" {style.number(row['high'])}{fastest})"
+    )
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
@@ -277,11 +380,15 @@ def error_axis(errors: Array) -> dict[str, Any]:
         return axis
     ticks = [(at, text) for at, text in zip(axis["tickvals"], axis["ticktext"]) if at > 9 * LOWEST]
     lowest = f"≤ 10<sup>{np.log10(LOWEST):.0f}</sup>".replace("-", "−")
-    return axis | {"tickvals": [*(at for at, _ in ticks), LOWEST], "ticktext": [*(text for _, text in ticks), lowest]}
+    return axis | {
+        "tickvals": [*(at for at, _ in ticks), LOWEST],
+        "ticktext": [*(text for _, text in ticks), lowest],
+    }
 
 
 def edge(axis: dict[str, Any], label: str) -> float:
-    """Make room beyond the upper end of a log axis, with a tick `label`, and return the value there."""
+    """Make room beyond the upper end of a log axis, with a tick `label`, and return the value
+    there."""
     level = axis["range"][1] + EDGE / 2
     axis["range"] = [axis["range"][0], level + EDGE / 2]
     axis["tickvals"] = [*axis["tickvals"], 10**level]
@@ -289,7 +396,9 @@ def edge(axis: dict[str, Any], label: str) -> float:
     return float(10**level)
 
 
-def figure(traces: list[dict[str, Any]], x_axis: dict, y_axis: dict, height: int | None) -> go.Figure:
+def figure(
+    traces: list[dict[str, Any]], x_axis: dict, y_axis: dict, height: int | None
+) -> go.Figure:
     """The figure; page.js adds what all share."""
     layout: dict[str, Any] = {"hovermode": "closest", "xaxis": x_axis, "yaxis": y_axis}
     return go.Figure(traces, layout | ({"height": height} if height else {}))

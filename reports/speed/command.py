@@ -40,13 +40,23 @@ SPEED = Kind("crosscheck speed", r"journal\.jsonl")
 
 
 def run_speed(
-    scenes: Sequence[str], engines: Sequence[str], full: bool, resume: bool, seed: int, out: Path, command: str
+    scenes: Sequence[str],
+    engines: Sequence[str],
+    full: bool,
+    resume: bool,
+    seed: int,
+    out: Path,
+    command: str,
 ) -> NoReturn:
-    """Measure and report into `out`, or go on with what was interrupted there; exits 0, 1 (no result), 2 or 130."""
+    """Measure and report into `out`, or go on with what was interrupted there; exits 0, 1 (no
+    result), 2 or 130."""
     effort = FULL if full else QUICK
-    named = checked_scenes(scenes, [], False, seed)  # none named: all that the effort has, sizes and options besides
+    # none named: all that the effort has, sizes and options besides
+    named = checked_scenes(scenes, [], False, seed)
     effort = replace(effort, scenes=tuple(named)) if named else effort
-    plan = SpeedPlan(effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named)
+    plan = SpeedPlan(
+        effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named
+    )
     header = about(command, seed)
     with opening(out):
         out = place_of(out)
@@ -54,7 +64,10 @@ def run_speed(
         with given_back(journal):
             kept = kept_of(plan, header, journal, resume)
     part = kept.journal.path.parent
-    with broken_off(part, lambda: f"What has ended is kept in {part}: ask again with --resume"), kept.journal:
+    with (
+        broken_off(part, lambda: f"What has ended is kept in {part}: ask again with --resume"),
+        kept.journal,
+    ):
         results, header = carry_out(plan, header, kept, resume)
         if not results.measured.errors.size:
             nothing_measured(part, results)
@@ -74,18 +87,29 @@ def nothing_measured(part: Path, results: Results) -> NoReturn:
 
 
 def kept_of(plan: SpeedPlan, header: Mapping[str, Any], journal: Journal, resume: bool) -> Kept:
-    """What is kept of an interrupted measurement of this plan, by the same versions on the same machine."""
+    """What is kept of an interrupted measurement of this plan, by the same versions on the same
+    machine."""
     files = {scene: digest_of(scene) for scene in plan.scenes if scene.endswith(".toml")}
     files |= {name: row_of(name).source for name in plan.engines if name.endswith(OWN)}
     asked = {
-        "scenes": plan.scenes, "files": files, "engines": plan.engines, "effort": asdict(plan.effort),
+        "scenes": plan.scenes,
+        "files": files,
+        "engines": plan.engines,
+        "effort": asdict(plan.effort),
         "whole": plan.whole,
-    }  # fmt: skip
+    }
     scenarios = {scene: ladder.open_scene(scene, seed) for scene, seed in plan.seeded_scenes}
-    return Kept(journal, asked | {key: header[key] for key in ("seed", "versions", "machine")}, resume, scenarios)
+    return Kept(
+        journal,
+        asked | {key: header[key] for key in ("seed", "versions", "machine")},
+        resume,
+        scenarios,
+    )
 
 
-def carry_out(plan: SpeedPlan, header: dict[str, Any], kept: Kept, resume: bool) -> tuple[Results, dict[str, Any]]:
+def carry_out(
+    plan: SpeedPlan, header: dict[str, Any], kept: Kept, resume: bool
+) -> tuple[Results, dict[str, Any]]:
     """All that was measured, and the header that tables and page carry."""
     with Progress() as progress:
         if resume:
@@ -96,7 +120,8 @@ def carry_out(plan: SpeedPlan, header: dict[str, Any], kept: Kept, resume: bool)
 
 
 def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:
-    """Tables first, then the page, so that what was measured is kept whatever happens to the page."""
+    """Tables first, then the page, so that what was measured is kept whatever happens to the
+    page."""
     with writing(folder, (MACHINE, *results.files, FIGURES, PAGE)):
         put_text(folder / MACHINE, json.dumps(header, indent=1) + "\n")
         results.write(folder)
@@ -108,19 +133,29 @@ def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None
 def print_summary(results: Results, page: str) -> None:
     """What each accuracy costs, pooled, the noise floor, and where the page is."""
     console = Console()
-    title = f"µs per simulated second for so small an error, of a radius; median of {len(results.scenes)} scenes"
-    title += "\n(k of n: so accurate in k scenes only; never: at no dt, or failed, in half of them or more)"
+    title = (
+        "µs per simulated second for so small an error, of a radius; median of"
+        f" {len(results.scenes)} scenes"
+    )
+    title += (
+        "\n(k of n: so accurate in k scenes only; never: at no dt, or failed, in half of them or"
+        " more)"
+    )
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine", no_wrap=True)
     for accuracy in ACCURACIES:
         table.add_column(accuracy, justify="right", no_wrap=True)
-    for (engine, profile), group in results.pooled_reached.groupby(["engine", "profile"], sort=False):
+    for (engine, profile), group in results.pooled_reached.groupby(
+        ["engine", "profile"], sort=False
+    ):
         cells = (
-            style.number(row["cost"])
-            if isfinite(row["cost"])
-            else "never"
-            if row["lost"]
-            else f"{row['got']} of {row['of']}"
+            (
+                style.number(row["cost"])
+                if isfinite(row["cost"])
+                else "never"
+                if row["lost"]
+                else f"{row['got']} of {row['of']}"
+            )
             for row in group.to_dict("records")
         )
         table.add_row(f"{engine}:{profile}", *cells)
@@ -140,9 +175,12 @@ def said_of_noise(results: Results) -> str:
     if not noise["pairs"]:
         return "Nobody was timed against itself, so the noise floor is not known."
     said = (
-        f"Noise floor: an engine against itself reads {noise['median']:.3f}, half of {noise['pairs']} pairs from "
-        f"{noise['low']:.3f} to {noise['high']:.3f}."
+        f"Noise floor: an engine against itself reads {noise['median']:.3f}, half of"
+        f" {noise['pairs']} pairs from {noise['low']:.3f} to {noise['high']:.3f}."
     )
     if noise["quiet"]:
         return said
-    return f"{said} That is too loud: it must stay within 0.95 and 1.05. Measure alone on the machine to quote a time."
+    return (
+        f"{said} That is too loud: it must stay within 0.95 and 1.05. Measure alone on the machine"
+        " to quote a time."
+    )

@@ -15,18 +15,20 @@ class Effort:
     """How much.
 
     Attributes:
-        scenes: what is measured if nothing is asked for; in the quick form one of each kind, so that no one of them
-            is the pooled curve: flight, collisions head-on, oblique and below thresholds, walls, static disks,
-            sliding, a stack, rows, a force and a torque, and crowds (a test leaves out one after the other).
+        scenes: what is measured if nothing is asked for; in the quick form one of each kind, so
+            that no one of them is the pooled curve: flight, collisions head-on, oblique and below
+            thresholds, walls, static disks, sliding, a stack, rows, a force and a torque, and
+            crowds (a test leaves out one after the other).
         seeds: how many seeds of a random scene.
         most_steps: of the finest dt of a ladder.
         rounds: of timing, warm-up not counted.
         budget: s of timing for one engine at one dt in one scene, beyond the first rounds.
         sizes: numbers of disks.
         patience: s a step may take before an engine drops out of the sizes.
-        sweep_scenes: what iterations and substeps are turned up in: a stack, a crowd, a slide, and collisions in a row.
-        option_scenes: what changed engines are measured in: three disks, a collision that thresholds matter to, one
-            disk under gravity, many collisions, and a stack at rest.
+        sweep_scenes: what iterations and substeps are turned up in: a stack, a crowd, a slide, and
+            collisions in a row.
+        option_scenes: what changed engines are measured in: three disks, a collision that
+            thresholds matter to, one disk under gravity, many collisions, and a stack at rest.
         budget_scenes: those in which it is asked what the errors are made of.
     """
 
@@ -40,8 +42,12 @@ class Effort:
     sweep_scenes: tuple[str, ...]
     budget_scenes: tuple[str, ...]
     option_scenes: tuple[str, ...] = (
-        "disk_between_static_disks", "slow_collision", "bouncing_ball_e1", "line_gas", "column_of_ten",
-    )  # fmt: skip
+        "disk_between_static_disks",
+        "slow_collision",
+        "bouncing_ball_e1",
+        "line_gas",
+        "column_of_ten",
+    )
 
     def seeds_of(self, scene: str, seed: int) -> list[int]:
         """The seeds of a random scene; one of another."""
@@ -52,26 +58,60 @@ class Effort:
         first = scenario.substeps[0]
         step_sizes = [first * 2**k for k in range(MOST_STEP_SIZES)]
         return tuple(
-            k for n, k in enumerate(step_sizes) if n < FEWEST_STEP_SIZES or k * scenario.samples <= self.most_steps
+            k
+            for n, k in enumerate(step_sizes)
+            if n < FEWEST_STEP_SIZES or k * scenario.samples <= self.most_steps
         )
 
 
 QUICK = Effort(
     scenes=(
-        "free_fall", "head_on_unequal_e09", "oblique_e09", "slow_collision", "bouncing_ball_e09", "box_billiard",
-        "disk_between_static_disks", "slide_on_incline", "column_of_ten", "line_gas", "cradle_with_gaps",
-        "body_frame_thrust", "asteroids", "gas_of_100",
+        "free_fall",
+        "head_on_unequal_e09",
+        "oblique_e09",
+        "slow_collision",
+        "bouncing_ball_e09",
+        "box_billiard",
+        "disk_between_static_disks",
+        "slide_on_incline",
+        "column_of_ten",
+        "line_gas",
+        "cradle_with_gaps",
+        "body_frame_thrust",
+        "asteroids",
+        "gas_of_100",
     ),
-    seeds=6, most_steps=4_000, rounds=4, budget=0.05, sizes=(3, 10, 30, 100, 300, 1000, 3000), patience=0.1,
+    seeds=6,
+    most_steps=4_000,
+    rounds=4,
+    budget=0.05,
+    sizes=(3, 10, 30, 100, 300, 1000, 3000),
+    patience=0.1,
     sweep_scenes=("column_of_ten", "falling_box", "slide_on_incline"),
     budget_scenes=(
-        "free_fall", "head_on_equal_e09", "oblique_e1", "slow_collision", "mass_ratios", "wall_to_wall", "bouncing_ball_e1",
-        "disk_between_static_disks", "line_gas", "cradle_with_gaps", "column_of_ten", "asteroids", "gas_of_100",
+        "free_fall",
+        "head_on_equal_e09",
+        "oblique_e1",
+        "slow_collision",
+        "mass_ratios",
+        "wall_to_wall",
+        "bouncing_ball_e1",
+        "disk_between_static_disks",
+        "line_gas",
+        "cradle_with_gaps",
+        "column_of_ten",
+        "asteroids",
+        "gas_of_100",
     ),
-)  # fmt: skip
+)
 FULL = Effort(
-    scenes=tuple(SCENARIOS), seeds=16, most_steps=16_000, rounds=15, budget=0.5,
-    sizes=(3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000), patience=1.0,
+    scenes=tuple(SCENARIOS),
+    seeds=16,
+    most_steps=16_000,
+    rounds=15,
+    budget=0.5,
+    sizes=(3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000),
+    patience=1.0,
     sweep_scenes=("column_of_ten", "cradle_touching", "line_gas", "gas_of_100", "slide_on_incline"),
     budget_scenes=tuple(SCENARIOS),
-)  # fmt: skip
+)

@@ -1,4 +1,5 @@
-"""How long a measurement will take where nothing else runs: a rough sum over the steps of everybody."""
+"""How long a measurement will take where nothing else runs: a rough sum over the steps of
+everybody."""
 
 from __future__ import annotations
 
@@ -13,9 +14,9 @@ from reports.speed.plan import SCENE, Measurement, Reach, SpeedPlan
 from reports.speed.timing import FEWEST_ROUNDS, LEAST, WARM_UP
 from scenarios.model import Scenario
 
-# s, means over the measurements: of a step, of each disk in it, of applying forces in Python, of wrapping each disk
-# there; of reading all and each disk once; of making ready for a sample. On the machine of `figures.csv`; elsewhere
-# half or twice as much.
+# s, means over the measurements: of a step, of each disk in it, of applying forces in Python, of
+# wrapping each disk there; of reading all and each disk once; of making ready for a sample. On the
+# machine of `figures.csv`; elsewhere half or twice as much.
 STEP, STEP_DISK, FORCE, WRAP_DISK = 1.0e-6, 0.17e-6, 16e-6, 0.75e-6
 READ, READ_DISK, READY = 20e-6, 1.5e-6, 1.5e-3
 LISTENING = 1.5  # times a step where collisions are heard of, too
@@ -27,14 +28,17 @@ PAGE = 8.0  # s
 def estimate(plan: SpeedPlan, measurements: Sequence[Measurement], reach: Reach) -> str:
     """A sentence on how much there is to do and about how long it takes on an idle machine."""
     budgets = BUDGET * len(plan.budget_scenes) * len(set(plan.engines) & set(MECHANISMS))
-    playing = (budgets + sum(seconds_to_play(measurement, reach) for measurement in measurements)) / plan.workers
+    playing = (
+        budgets + sum(seconds_to_play(measurement, reach) for measurement in measurements)
+    ) / plan.workers
     timed = [measurement for measurement in measurements if measurement.seed == plan.seed]
     timing = sum(seconds_to_time(measurement, reach, plan.effort) for measurement in timed)
     timing += seconds_of_sizes(plan.effort) * plan.whole
     whole = STARTING + playing + timing + PAGE
     length = f"{ceil(whole / 60)} minutes" if whole > 90 else f"{ceil(whole / 10) * 10} s"
     return (
-        f"{len(measurements)} ladders of steps to play and {len(timed)} to time: about {length} where nothing else runs"
+        f"{len(measurements)} ladders of steps to play and {len(timed)} to time: about {length}"
+        " where nothing else runs"
     )
 
 
@@ -61,18 +65,26 @@ def seconds_to_time(measurement: Measurement, reach: Reach, effort: Effort) -> f
         ladder.open_scene(measurement.scene, measurement.seed),
         reach[measurement.scene, measurement.seed],
     )
-    step_sizes = [all_rounds(samples * k * step_of(scenario), effort) for k in measurement.step_sizes]
-    return sum(step_sizes) + (step_sizes[len(step_sizes) // 2] if measurement.kind == SCENE else 0.0)
+    step_sizes = [
+        all_rounds(samples * k * step_of(scenario), effort) for k in measurement.step_sizes
+    ]
+    return sum(step_sizes) + (
+        step_sizes[len(step_sizes) // 2] if measurement.kind == SCENE else 0.0
+    )
 
 
 def all_rounds(run: float, effort: Effort) -> float:
-    """s, of samples of one run of so many s, or more to fill them, as `timing.interleaved` takes them."""
+    """s, of samples of one run of so many s, or more to fill them, as `timing.interleaved` takes
+    them."""
     sample = max(run, LEAST)
-    rounds = min(effort.rounds - WARM_UP, max(FEWEST_ROUNDS - WARM_UP, ceil(effort.budget / sample)))
+    rounds = min(
+        effort.rounds - WARM_UP, max(FEWEST_ROUNDS - WARM_UP, ceil(effort.budget / sample))
+    )
     return rounds * (sample + READY)
 
 
 def seconds_of_sizes(effort: Effort) -> float:
-    """s, for the numbers of disks; who is slow drops out. Making ready takes as long as some twenty steps."""
+    """s, for the numbers of disks; who is slow drops out. Making ready takes as long as some twenty
+    steps."""
     steps = [STEP + n * STEP_DISK for n in effort.sizes]
     return len(ENGINES) * sum(all_rounds(step, effort) + 20 * step for step in steps)

@@ -1,4 +1,5 @@
-"""How much of the errors the budget explains, and over how much of the scenes: what is cut is part of the answer."""
+"""How much of the errors the budget explains, and over how much of the scenes: what is cut is part
+of the answer."""
 
 from __future__ import annotations
 
@@ -11,9 +12,18 @@ from reports.speed.budget import LIMIT, RESIDUAL, TOTAL
 LEAST = 1e-9  # radii: a smaller error is rounding, and nothing to explain
 TO = (0.01, 0.001)  # of an error: what may be left over
 COLUMNS = [
-    "scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s", "error_radii",
-    "residual_radii", "note",
-]  # fmt: skip
+    "scenario",
+    "seed",
+    "engine",
+    "profile",
+    "dt_s",
+    "until_s",
+    "horizon_s",
+    "duration_s",
+    "error_radii",
+    "residual_radii",
+    "note",
+]
 
 
 class Cut(NamedTuple):
@@ -30,7 +40,8 @@ class Cut(NamedTuple):
 
 
 class Extent(NamedTuple):
-    """How many scenes, the simulated seconds evaluated and of their exact answers, and those that are cut."""
+    """How many scenes, the simulated seconds evaluated and of their exact answers, and those that
+    are cut."""
 
     scenes: int
     evaluated: float
@@ -39,10 +50,12 @@ class Extent(NamedTuple):
 
 
 class Share(NamedTuple):
-    """How many errors there are, how many leave less than each of `TO` over, and what is not among them.
+    """How many errors there are, how many leave less than each of `TO` over, and what is not among
+    them.
 
-    exact: of engines right to `LEAST`, where nothing is to be explained; failed: not played, so not explained.
-    whole and whole_within: errors of scenes that are not cut, and how many of them leave less than the first of `TO`.
+    exact: of engines right to `LEAST`, where nothing is to be explained; failed: not played, so not
+    explained. whole and whole_within: errors of scenes that are not cut, and how many of them leave
+    less than the first of `TO`.
     """
 
     errors: int
@@ -55,10 +68,13 @@ class Share(NamedTuple):
 
 def explained(budget: pd.DataFrame) -> pd.DataFrame:
     """A row a scene and engine, of `COLUMNS`: its error, its residual (root mean squares), and how
-    far the scene was evaluated, its exact answer goes, and the scene goes; note: why the engine has no error.
+    far the scene was evaluated, its exact answer goes, and the scene goes; note: why the engine has
+    no error.
     """
     keys = COLUMNS[: COLUMNS.index("error_radii")]
-    wide = budget.pivot(index=keys, columns="contribution", values="position_radii").reindex(columns=[TOTAL, RESIDUAL])
+    wide = budget.pivot(index=keys, columns="contribution", values="position_radii").reindex(
+        columns=[TOTAL, RESIDUAL]
+    )
     notes = budget[budget.contribution == TOTAL].set_index(keys).note
     table = wide.set_axis(["error_radii", "residual_radii"], axis=1).join(notes)
     order = budget[keys].drop_duplicates()
@@ -80,9 +96,13 @@ def share(table: pd.DataFrame) -> Share:
     left = errors.residual_radii / errors.error_radii
     whole = ~errors.scenario.isin([cut.scenario for cut in extent(table).cuts])
     return Share(
-        len(errors), tuple(int((left <= bound).sum()) for bound in TO), len(played) - len(errors),
-        len(table) - len(played), int(whole.sum()), int((left[whole] <= TO[0]).sum()),
-    )  # fmt: skip
+        len(errors),
+        tuple(int((left <= bound).sum()) for bound in TO),
+        len(played) - len(errors),
+        len(table) - len(played),
+        int(whole.sum()),
+        int((left[whole] <= TO[0]).sum()),
+    )
 
 
 def sentence(table: pd.DataFrame) -> str:
@@ -98,8 +118,11 @@ def sentence(table: pd.DataFrame) -> str:
     )
     if not over.cuts:
         return f"{said}: every scene as far as its exact answer goes"
-    cuts = ", ".join(f"{cut.scenario} at {cut.until:.2g} of {cut.horizon:.2g} s" for cut in over.cuts)
+    cuts = ", ".join(
+        f"{cut.scenario} at {cut.until:.2g} of {cut.horizon:.2g} s" for cut in over.cuts
+    )
     return (
-        f"{said}: {len(over.cuts)} scenes are cut where end-of-step detection alone puts a disk {LIMIT:g} radii off "
-        f"({cuts}). Of the {known.whole} errors in scenes that are not cut, {known.whole_within} are explained to 1 %"
+        f"{said}: {len(over.cuts)} scenes are cut where end-of-step detection alone puts a disk"
+        f" {LIMIT:g} radii off ({cuts}). Of the {known.whole} errors in scenes that are not cut,"
+        f" {known.whole_within} are explained to 1 %"
     )

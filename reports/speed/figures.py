@@ -1,4 +1,5 @@
-"""The few figures that are kept in the repository, with machine and versions, and whether a new measurement agrees."""
+"""The few figures that are kept in the repository, with machine and versions, and whether a new
+measurement agrees."""
 
 from __future__ import annotations
 
@@ -14,61 +15,108 @@ from reports.speed.results import Results
 from reports.terminal.foreign_text import put_text
 
 KEPT = Path(__file__).parent / "figures.csv"
-ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")  # of the same run: errors alone
+# of the same run: errors alone
+ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")
 COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
 YARDSTICK = ("reference", "exercise")
 AGAINST, AGAINST_BARE = "cost over reference:exercise", "the same less idle steps"
 GATED = (10, 100, 1000)  # disks
-LOOSE = 3.0  # times as dear or as cheap as kept: compilers and processors differ by less, a lost optimisation by more
+# times as dear or as cheap as kept: compilers and processors differ by less, a lost optimisation by
+# more
+LOOSE = 3.0
 
 
 def figures(results: Results) -> pd.DataFrame:
-    """Columns `COLUMNS`: pooled points, cost at matched accuracy, cost by number of disks and its exponent, driving."""
+    """Columns `COLUMNS`: pooled points, cost at matched accuracy, cost by number of disks and its
+    exponent, driving."""
     failed = results.pooled.failed
     parts = [
-        results.pooled.assign(figure="pooled error", at=results.pooled.step_size, value=results.pooled.error,
-                              low=results.pooled.error_low, high=results.pooled.error_high, unit="radii",
-                              note=failed.map("failed in {}".format) + results.pooled.of.map(" of {}".format)),
-        results.pooled.assign(figure="pooled cost", at=results.pooled.step_size, value=results.pooled.cost, unit="us/s"),
-        results.pooled.assign(figure="pooled cost less idle steps", at=results.pooled.step_size, value=results.pooled.bare,
-                              low=np.nan, high=np.nan, unit="us/s"),
-        results.pooled_reached.assign(figure="cost at accuracy", at=results.pooled_reached.accuracy,
-                                      value=results.pooled_reached.cost, note=results.pooled_reached.why, unit="us/s"),
-        results.sizes.assign(figure="cost of a step", at=results.sizes.n, value=results.sizes.cost, unit="us"),
-        results.growth.assign(figure="exponent", at=results.growth.most, value=results.growth.exponent,
-                              note=results.growth.stopped, unit="1"),
+        results.pooled.assign(
+            figure="pooled error",
+            at=results.pooled.step_size,
+            value=results.pooled.error,
+            low=results.pooled.error_low,
+            high=results.pooled.error_high,
+            unit="radii",
+            note=failed.map("failed in {}".format) + results.pooled.of.map(" of {}".format),
+        ),
+        results.pooled.assign(
+            figure="pooled cost",
+            at=results.pooled.step_size,
+            value=results.pooled.cost,
+            unit="us/s",
+        ),
+        results.pooled.assign(
+            figure="pooled cost less idle steps",
+            at=results.pooled.step_size,
+            value=results.pooled.bare,
+            low=np.nan,
+            high=np.nan,
+            unit="us/s",
+        ),
+        results.pooled_reached.assign(
+            figure="cost at accuracy",
+            at=results.pooled_reached.accuracy,
+            value=results.pooled_reached.cost,
+            note=results.pooled_reached.why,
+            unit="us/s",
+        ),
+        results.sizes.assign(
+            figure="cost of a step", at=results.sizes.n, value=results.sizes.cost, unit="us"
+        ),
+        results.growth.assign(
+            figure="exponent",
+            at=results.growth.most,
+            value=results.growth.exponent,
+            note=results.growth.stopped,
+            unit="1",
+        ),
         results.driving.assign(figure="idle step", value=results.driving.step_us, unit="us"),
         results.driving.assign(figure="idle call", value=results.driving.call_us, unit="us"),
-        cheaper(results.versus, AGAINST, "cheaper", "ratio"), cheaper(results.versus, AGAINST_BARE, "bare_cheaper", ""),
-    ]  # fmt: skip
+        cheaper(results.versus, AGAINST, "cheaper", "ratio"),
+        cheaper(results.versus, AGAINST_BARE, "bare_cheaper", ""),
+    ]
     return pd.concat([part.reindex(columns=COLUMNS) for part in parts], ignore_index=True)
 
 
 def cheaper(versus: pd.DataFrame, figure: str, count: str, value: str) -> pd.DataFrame:
-    """A row an engine and change of `versus`: in which scenes it costs less than `YARDSTICK`; value: the ratio."""
+    """A row an engine and change of `versus`: in which scenes it costs less than `YARDSTICK`;
+    value: the ratio."""
     rows = versus[versus[count].notna()]
-    numbers = {name: rows[column] if value else np.nan for name, column in
-               (("value", "ratio"), ("low", "low"), ("high", "high"))}  # fmt: skip
-    said = rows[count].map("{:.0f}".format) + rows.scenes.map(" of {}: ".format) + rows[f"{count}_in"]
+    numbers = {
+        name: rows[column] if value else np.nan
+        for name, column in (("value", "ratio"), ("low", "low"), ("high", "high"))
+    }
+    said = (
+        rows[count].map("{:.0f}".format) + rows.scenes.map(" of {}: ".format) + rows[f"{count}_in"]
+    )
     return rows.assign(figure=figure, at=rows.change, note=said, unit="1", **numbers)
 
 
 def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
-    """The figures as CSV below comment lines that say on what machine, with what versions and how quietly."""
+    """The figures as CSV below comment lines that say on what machine, with what versions and how
+    quietly."""
     noise = results.noise_summary()
     about = {
-        "command": header["command"], "seed": header["seed"], "started": header["started"],
-        **header["machine"], **header["versions"], "busy cores": f"{header['load']:.2f}",
-        "an engine against itself": f"{noise['median']:.3f} ({noise['low']:.3f} to {noise['high']:.3f})",
+        "command": header["command"],
+        "seed": header["seed"],
+        "started": header["started"],
+        **header["machine"],
+        **header["versions"],
+        "busy cores": f"{header['load']:.2f}",
+        "an engine against itself": (
+            f"{noise['median']:.3f} ({noise['low']:.3f} to {noise['high']:.3f})"
+        ),
         "scenes": len(results.scenes),
-    }  # fmt: skip
+    }
     lines = "".join(f"# {key}: {value}\n" for key, value in about.items())
     table = figures(results).to_csv(index=False, float_format="%.4g")
     put_text(path, lines + table)
 
 
 def keep(folder: Path) -> None:
-    """Keep figures, orders of convergence, and how much of the errors is explained, of a measurement in `folder`.
+    """Keep figures, orders of convergence, and how much of the errors is explained, of a
+    measurement in `folder`.
 
     The latter two hold no times: the same versions give the same rows on any machine of a kind.
     """
@@ -78,14 +126,18 @@ def keep(folder: Path) -> None:
 
 
 def read(path: Path = KEPT) -> pd.DataFrame:
-    """A table without its header; what is empty in a column of words is "", in one of numbers nan."""
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    """A table without its header; what is empty in a column of words is "", in one of numbers
+    nan."""
+    lines = [
+        line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")
+    ]
     table = pd.read_csv(io.StringIO("\n".join(lines)), dtype={"at": str, "note": str})
     return table.fillna({word: "" for word in ("at", "note") if word in table})
 
 
 def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:
-    """(`engine:profile`, disks) -> how many times as dear as `YARDSTICK` a step is, each at its fastest."""
+    """(`engine:profile`, disks) -> how many times as dear as `YARDSTICK` a step is, each at its
+    fastest."""
     rows = kept[kept.figure == "cost of a step"]
     best = {
         (f"{row['engine']}:{row['profile']}", int(float(row["at"]))): float(row["best"])
@@ -99,14 +151,21 @@ def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:
     }
 
 
-def drifted(kept: Mapping[tuple[str, int], float], fresh: Mapping[tuple[str, int], float]) -> list[str]:
-    """A sentence for every ratio that is not within `LOOSE` of the one kept, or that only one of the two has."""
-    said = [f"{name}, {n} disks: only one of the two has it" for name, n in sorted(set(kept) ^ set(fresh))]
+def drifted(
+    kept: Mapping[tuple[str, int], float], fresh: Mapping[tuple[str, int], float]
+) -> list[str]:
+    """A sentence for every ratio that is not within `LOOSE` of the one kept, or that only one of
+    the two has."""
+    said = [
+        f"{name}, {n} disks: only one of the two has it"
+        for name, n in sorted(set(kept) ^ set(fresh))
+    ]
     for name, n in sorted(set(kept) & set(fresh)):
         change = fresh[name, n] / kept[name, n]
         if not 1 / LOOSE <= change <= LOOSE:
             said.append(
-                f"{name}, {n} disks: a step costs {fresh[name, n]:.3g} times that of {':'.join(YARDSTICK)}, "
-                f"kept is {kept[name, n]:.3g}; allowed is a factor of {LOOSE:g}"
+                f"{name}, {n} disks: a step costs {fresh[name, n]:.3g} times that of"
+                f" {':'.join(YARDSTICK)}, kept is {kept[name, n]:.3g}; allowed is a factor of"
+                f" {LOOSE:g}"
             )
     return said

@@ -1,4 +1,5 @@
-"""What a measurement has got so far, on disk task by task, so that an interrupt loses nothing that has ended."""
+"""What a measurement has got so far, on disk task by task, so that an interrupt loses nothing that
+has ended."""
 
 from __future__ import annotations
 
@@ -14,20 +15,40 @@ from reports.speed.lines import KINDS, scene_of, stranger
 from scenarios.model import Scenario
 
 TEXT = frozenset(
-    ("kind", "scenario", "engine", "profile", "change", "status", "reason", "part", "note", "truth", "stopped", "task")
+    (
+        "kind",
+        "scenario",
+        "engine",
+        "profile",
+        "change",
+        "status",
+        "reason",
+        "part",
+        "note",
+        "truth",
+        "stopped",
+        "task",
+    )
 )  # columns of results that hold words
 
 
 class Kept:
-    """The results of tasks: those of an interrupted measurement of the same, and those of this one as they come.
+    """The results of tasks: those of an interrupted measurement of the same, and those of this one
+    as they come.
 
-    A task is a tuple of strings and whole numbers, a result what JSON can hold, numbers that are not finite included.
+    A task is a tuple of strings and whole numbers, a result what JSON can hold, numbers that are
+    not finite included.
     """
 
     def __init__(
-        self, journal: Journal, header: dict[str, Any], resume: bool, scenarios: Mapping[str, Scenario]
+        self,
+        journal: Journal,
+        header: dict[str, Any],
+        resume: bool,
+        scenarios: Mapping[str, Scenario],
     ) -> None:
-        """Go on, if `resume` and the journal is of a measurement with the very same `header`, of these `scenarios`.
+        """Go on, if `resume` and the journal is of a measurement with the very same `header`, of
+        these `scenarios`.
 
         Raises:
             FolderTaken: as `may_go_on`.
@@ -37,15 +58,23 @@ class Kept:
         lines = []
         for number, kind, line in checked_lines(folder, KINDS):
             if (kind == "header") != (number == 1):
-                what = "only the first line may be the header" if number > 1 else "the first line must be the header"
-                raise ValueError(no_use(folder, number, what, KINDS.asked if number == 1 else KINDS.missed))
+                what = (
+                    "only the first line may be the header"
+                    if number > 1
+                    else "the first line must be the header"
+                )
+                raise ValueError(
+                    no_use(folder, number, what, KINDS.asked if number == 1 else KINDS.missed)
+                )
             lines.append(line)
         same = bool(lines) and lines[0]["header"] == json.loads(json.dumps(plain(header)))
         may_go_on(folder, len(lines[1:]), same, resume)
         for number, line in enumerate(lines[1:] if same else [], start=2):
             if fault := misfit(line, scenarios):
                 raise ValueError(no_use(folder, number, fault, KINDS.missed))
-        self.results = {json.dumps(line["task"]): line["result"] for line in lines[1:]} if same else {}
+        self.results = (
+            {json.dumps(line["task"]): line["result"] for line in lines[1:]} if same else {}
+        )
         if not same:
             os.truncate(journal.path, 0)
             journal.append({"header": header})
@@ -77,7 +106,8 @@ def numbered(value: Any) -> Any:
 
 
 def misfit(line: Mapping[str, Any], scenarios: Mapping[str, Scenario]) -> str:
-    """Why a line is of none of the scenarios by name or file, as the end of a sentence; "" if it is of one."""
+    """Why a line is of none of the scenarios by name or file, as the end of a sentence; "" if it is
+    of one."""
     scene = scene_of(line["task"])
     if not scene:
         return ""

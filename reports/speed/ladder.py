@@ -1,4 +1,5 @@
-"""One engine through one scene over its dt ladder: how far off it is, and what it costs; two separate passes."""
+"""One engine through one scene over its dt ladder: how far off it is, and what it costs; two
+separate passes."""
 
 from __future__ import annotations
 
@@ -52,12 +53,16 @@ def reach_of(scene: str, seed: int) -> tuple[int, str]:
         return 0, str(refusal)
 
 
-def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int]) -> list[dict[str, Any]]:
-    """A row a step size of `ladder` (coarse to fine) of what engine `name` makes of the scene, up to the horizon.
+def errors_of(
+    scene: str, seed: int, name: str, make: Make, ladder: Sequence[int]
+) -> list[dict[str, Any]]:
+    """A row a step size of `ladder` (coarse to fine) of what engine `name` makes of the scene, up
+    to the horizon.
 
-    until_s is how far the exact answer, and so the run, goes of the duration_s of the scene; error_radii the largest
-    distance of any disk from where it truly is, change_radii the largest from where the step size before had it; inf
-    and nan where it failed. An engine that closes in on another motion changes less and less while its error stays.
+    until_s is how far the exact answer, and so the run, goes of the duration_s of the scene;
+    error_radii the largest distance of any disk from where it truly is, change_radii the largest
+    from where the step size before had it; inf and nan where it failed. An engine that closes in on
+    another motion changes less and less while its error stays.
     """
     scenario, truth = held(scene, seed)
     whole = open_scene(scene, seed).duration
@@ -66,15 +71,28 @@ def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int
     for k in ladder:
         run = play_once(make, name, scenario, scenario.dt(k))
         row = {
-            "scenario": scenario.name, "seed": seed, "engine": engine_name, "profile": profile,
-            "dt_s": scenario.dt(k), "substeps": k, "status": run.status, "reason": run.reason,
-            "until_s": scenario.duration, "duration_s": whole, "error_radii": np.inf, "change_radii": np.nan,
-        }  # fmt: skip
+            "scenario": scenario.name,
+            "seed": seed,
+            "engine": engine_name,
+            "profile": profile,
+            "dt_s": scenario.dt(k),
+            "substeps": k,
+            "status": run.status,
+            "reason": run.reason,
+            "until_s": scenario.duration,
+            "duration_s": whole,
+            "error_radii": np.inf,
+            "change_radii": np.nan,
+        }
         played = run.trajectory if run.status == "ok" else None
         if played is not None:
-            row["error_radii"] = float((laws.deviation(played, truth, scenario.scene) / radius).max())
+            row["error_radii"] = float(
+                (laws.deviation(played, truth, scenario.scene) / radius).max()
+            )
             if before is not None:
-                row["change_radii"] = float((laws.deviation(played, before, scenario.scene) / radius).max())
+                row["change_radii"] = float(
+                    (laws.deviation(played, before, scenario.scene) / radius).max()
+                )
         before = played
         rows.append(row)
     return rows
@@ -83,15 +101,20 @@ def errors_of(scene: str, seed: int, name: str, make: Make, ladder: Sequence[int
 def times_of(
     scene: str, seed: int, engines: Mapping[tuple[Any, int, int], Make], rounds: int, budget: float
 ) -> list[Sample]:
-    """Samples, s per simulated second, of engines by (who, substeps, copy) over the whole length of the scene."""
+    """Samples, s per simulated second, of engines by (who, substeps, copy) over the whole length of
+    the scene."""
     scenario = held(scene, seed).scenario
-    what = [Timed(key, Stepping(make, scenario, key[1]), scenario.duration) for key, make in engines.items()]
+    what = [
+        Timed(key, Stepping(make, scenario, key[1]), scenario.duration)
+        for key, make in engines.items()
+    ]
     return interleaved(what, rounds, budget, seed)
 
 
 @dataclass(frozen=True)
 class Stepping:
-    """A run of an engine through a scenario: building it is not timed, and nothing is read or heard of."""
+    """A run of an engine through a scenario: building it is not timed, and nothing is read or heard
+    of."""
 
     make: Make
     scenario: Scenario

@@ -1,4 +1,5 @@
-"""The schema of the journal of `crosscheck speed`: what a line holds, and what of it must be as scene and task say."""
+"""The schema of the journal of `crosscheck speed`: what a line holds, and what of it must be as
+scene and task say."""
 
 from __future__ import annotations
 
@@ -23,14 +24,18 @@ from reports.run.journal_lines import (
     Words,
     number,
     sentence,
-)  # fmt: skip
+)
 from reports.speed.timing import WARM_UP
 from scenarios.model import Scenario
 
 
 def length(value: Any) -> Any:
     """A number that is not negative, or not known; raises `ValueError`."""
-    if isinstance(number(value), str | int | float) and value != "-inf" and (isinstance(value, str) or value >= 0):
+    if (
+        isinstance(number(value), str | int | float)
+        and value != "-inf"
+        and (isinstance(value, str) or value >= 0)
+    ):
         return value
     raise ValueError("must be a number that is not negative")
 
@@ -143,11 +148,22 @@ class Samples(Line):
         """No round is missing, and none is there twice."""
         rounds = defaultdict[tuple, list[int]](list)
         for row in self.result:
-            what = (row.kind, row.scenario, row.name, row.change, str(row.dt_s), row.n, row.copy_of, row.singly)
+            what = (
+                row.kind,
+                row.scenario,
+                row.name,
+                row.change,
+                str(row.dt_s),
+                row.n,
+                row.copy_of,
+                row.singly,
+            )
             rounds[what].append(row.round)
         for what, those in rounds.items():
             if sorted(those) != list(range(WARM_UP, WARM_UP + len(those))):
-                raise ValueError(f"result: must have each round of {what[2]} once, from {WARM_UP} on")
+                raise ValueError(
+                    f"result: must have each round of {what[2]} once, from {WARM_UP} on"
+                )
         if any((*what[:-1], not what[-1]) not in rounds for what in rounds if what[0] == "idle"):
             raise ValueError("result: must have each engine singly and not")
         if any((*what[:-2], 0, what[-1]) not in rounds for what in rounds):
@@ -166,8 +182,15 @@ class SizesOf(Line):
         """As of `Samples`; and each that stopped is an engine, a number of disks and why."""
         Samples(result=self.samples)
         for name, n, why in self.stopped:
-            if not (isinstance(name, str) and name.count(":") == 1 and type(n) is int and isinstance(why, str)):
-                raise ValueError("result.stopped: must be of [ENGINE:PROFILE, number of disks, why]")
+            if not (
+                isinstance(name, str)
+                and name.count(":") == 1
+                and type(n) is int
+                and isinstance(why, str)
+            ):
+                raise ValueError(
+                    "result.stopped: must be of [ENGINE:PROFILE, number of disks, why]"
+                )
         return self
 
 
@@ -192,12 +215,20 @@ class Truth(Line):
 
 
 RESULTS: dict[tuple[str, ...], type[Line]] = {
-    ("error", "scene"): Errors, ("error", "option"): Errors, ("error", "sweep"): Errors, ("budget",): Budget,
-    ("time", "scene"): Samples, ("time", "option"): Samples, ("time", "sweep"): Samples, ("time", "idle"): Samples,
-    ("time", "size"): Sizes, ("time", "truth"): Truth,
-}  # fmt: skip
+    ("error", "scene"): Errors,
+    ("error", "option"): Errors,
+    ("error", "sweep"): Errors,
+    ("budget",): Budget,
+    ("time", "scene"): Samples,
+    ("time", "option"): Samples,
+    ("time", "sweep"): Samples,
+    ("time", "idle"): Samples,
+    ("time", "size"): Sizes,
+    ("time", "truth"): Truth,
+}
 """How a task begins -> what it gives."""
-PARTS = {Errors: (7, 64), Budget: (3, 3), Samples: (2, 3), Sizes: (2, 2), Truth: (3, 3)}  # of its task, from and to
+# of its task, from and to
+PARTS = {Errors: (7, 64), Budget: (3, 3), Samples: (2, 3), Sizes: (2, 2), Truth: (3, 3)}
 
 
 class TaskLine(Line):
@@ -213,10 +244,16 @@ class TaskLine(Line):
         begins = tuple(map(str, task[:2]))
         model = RESULTS.get(begins, RESULTS.get(begins[:1]))
         if model is None:
-            raise ValueError(f"task = {str(task)[:60]}: must begin as one of {', '.join(map(' '.join, RESULTS))}")
+            raise ValueError(
+                f"task = {str(task)[:60]}: must begin as one of {', '.join(map(' '.join, RESULTS))}"
+            )
         low, high = PARTS[model]
-        if not low <= len(task) <= high or (model is Samples and (len(task) == 2) != (begins[1] == "idle")):
-            raise ValueError(f"task = {str(task)[:60]}: must have as many contributions as one of its kind")
+        if not low <= len(task) <= high or (
+            model is Samples and (len(task) == 2) != (begins[1] == "idle")
+        ):
+            raise ValueError(
+                f"task = {str(task)[:60]}: must have as many contributions as one of its kind"
+            )
         try:
             found: Any = model.model_validate({"result": self.result})
         except ValidationError as error:
@@ -224,7 +261,10 @@ class TaskLine(Line):
         if begins[0] == "error":
             here = [(row.seed, row.name, row.substeps) for row in found.result]
             if here != [(task[3], task[4], step_size) for step_size in task[6:]]:
-                raise ValueError("result: must have a row for each step that the task names, of its seed and engine")
+                raise ValueError(
+                    "result: must have a row for each step that the task names, of its seed and"
+                    " engine"
+                )
         if begins[0] == "budget" and any(row.name != task[2] for row in found.result):
             raise ValueError("result: must be of the engine that the task names")
         if model is Samples and any(row.kind != begins[1] for row in found.result):
@@ -255,9 +295,15 @@ def stranger(line: Mapping[str, Any], scenario: Scenario) -> str:
         if "dt_s" in row:
             substeps = row.get("substeps") or round(scenario.sample_interval / row["dt_s"])
             if row["dt_s"] != scenario.dt(max(substeps, 1)):
-                return f"result[{k}].dt_s = {row['dt_s']!r}: must divide the scene's sample interval as the task does"
+                return (
+                    f"result[{k}].dt_s = {row['dt_s']!r}: must divide the scene's sample interval"
+                    " as the task does"
+                )
         if row.get("duration_s", scenario.duration) != scenario.duration:
             return f"result[{k}].duration_s = {row['duration_s']!r}: must be {scenario.duration!r}"
-        if row.get("until_s", 0.0) > scenario.duration * (1 + 1e-9):  # a rounding of samples times interval
-            return f"result[{k}].until_s = {row['until_s']!r}: must be at most {scenario.duration!r}"
+        # a rounding of samples times interval
+        if row.get("until_s", 0.0) > scenario.duration * (1 + 1e-9):
+            return (
+                f"result[{k}].until_s = {row['until_s']!r}: must be at most {scenario.duration!r}"
+            )
     return ""

@@ -1,4 +1,5 @@
-"""The two passes: first how far off everybody is, in parallel; then, alone on the machine, what it costs."""
+"""The two passes: first how far off everybody is, in parallel; then, alone on the machine, what it
+costs."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, midd
 from reports.speed.timing import Sample
 from reports.terminal.progress import Progress
 
-HANGS, ALL_ROUNDS = 600.0, 3600.0  # s a ladder and a timing may take: against what hangs, no limit of what is measured
+# s a ladder and a timing may take: against what hangs, no limit of what is measured
+HANGS, ALL_ROUNDS = 600.0, 3600.0
 SIZE, IDLE, TRUTH = "size", "idle", "truth"
 
 
@@ -33,8 +35,9 @@ class Measured:
     Attributes:
         errors: kind, change, and the columns of `ladder.errors_of`.
         budget: the columns of `budget.budget_of`.
-        samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, singly, round, place, cost, wrapping, runs;
-            cost in s per simulated second in a scene, in s a step for sizes and idle worlds.
+        samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, singly, round, place,
+            cost, wrapping, runs; cost in s per simulated second in a scene, in s a step for sizes
+            and idle worlds.
         truths: as `models.closed_form` gives them.
         left_out: (what, reason) of what could not be measured.
         busy: cores that others kept busy when the timing began.
@@ -51,7 +54,8 @@ class Measured:
 
 
 def measure(plan: SpeedPlan, progress: Progress, kept: Kept | None = None) -> Measured:
-    """Both passes of all that is planned; what is `kept` of an interrupted measurement is not done again."""
+    """Both passes of all that is planned; what is `kept` of an interrupted measurement is not done
+    again."""
     measured = Measured()
     reach = find_reach(plan, measured, progress)
     measurements = list(plan.measurements(reach))
@@ -64,7 +68,8 @@ def measure(plan: SpeedPlan, progress: Progress, kept: Kept | None = None) -> Me
 
 
 def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach:
-    """(scene, seed) -> how many sample intervals have an exact answer; those that have none are reported."""
+    """(scene, seed) -> how many sample intervals have an exact answer; those that have none are
+    reported."""
     # In workers, which can be stopped whatever they are doing.
     asked = {draw: partial(ladder.reach_of, *draw) for draw in plan.seeded_scenes}
     results = dict(done(asked, plan.workers, progress, "exact answer"))
@@ -77,16 +82,25 @@ def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach
 
 
 def measure_errors(
-    plan: SpeedPlan, measurements: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
+    plan: SpeedPlan,
+    measurements: Sequence[Measurement],
+    measured: Measured,
+    progress: Progress,
+    kept: Kept | None,
 ) -> list[Measurement]:
-    """How far off all engines are; returns those of the first seed, at the steps that they played to their end."""
+    """How far off all engines are; returns those of the first seed, at the steps that they played
+    to their end."""
     tasks = {measurement.task: measurement.errors for measurement in measurements}
     results = dict(done(tasks, plan.workers, progress, "error", kept=kept))
     rows: list[dict[str, Any]] = []
     played = []
     for measurement in measurements:
         result = results[measurement.task]
-        found = one_step_size_at_a_time(measurement, plan.workers) if isinstance(result, Failure) else result
+        found = (
+            one_step_size_at_a_time(measurement, plan.workers)
+            if isinstance(result, Failure)
+            else result
+        )
         rows += ({"kind": measurement.kind, "change": measurement.change} | row for row in found)
         if measurement.seed == plan.seed:
             well = tuple(row["substeps"] for row in found if row["status"] == "ok")
@@ -96,40 +110,65 @@ def measure_errors(
 
 
 def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict]:
-    """A ladder whose worker died or hung once more, each step size by itself, so that the others are kept."""
+    """A ladder whose worker died or hung once more, each step size by itself, so that the others
+    are kept."""
     rows: list[dict[str, Any]] = []
     for k, result in run_all(
-        {k: measurement._replace(step_sizes=(k,)).errors for k in measurement.step_sizes}, workers, HANGS
+        {k: measurement._replace(step_sizes=(k,)).errors for k in measurement.step_sizes},
+        workers,
+        HANGS,
     ):
         if isinstance(result, Failure):
             engine, profile = measurement.name.split(":")
             scenario = ladder.open_scene(measurement.scene, measurement.seed)
-            result = [{
-                "scenario": scenario.name, "seed": measurement.seed, "engine": engine, "profile": profile,
-                "dt_s": scenario.dt(k), "substeps": k, "status": result.status, "reason": result.reason,
-                "until_s": ladder.held(measurement.scene, measurement.seed).scenario.duration, "duration_s": scenario.duration,
-                "error_radii": float("inf"), "change_radii": float("nan"),
-            }]  # fmt: skip
+            result = [
+                {
+                    "scenario": scenario.name,
+                    "seed": measurement.seed,
+                    "engine": engine,
+                    "profile": profile,
+                    "dt_s": scenario.dt(k),
+                    "substeps": k,
+                    "status": result.status,
+                    "reason": result.reason,
+                    "until_s": ladder.held(measurement.scene, measurement.seed).scenario.duration,
+                    "duration_s": scenario.duration,
+                    "error_radii": float("inf"),
+                    "change_radii": float("nan"),
+                }
+            ]
         rows += result
     return sorted(rows, key=lambda row: row["substeps"])
 
 
-def measure_budget(plan: SpeedPlan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None) -> None:
+def measure_budget(
+    plan: SpeedPlan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None
+) -> None:
     """What the errors are made of, of the engines whose mechanisms are known, at the middle dt."""
     tasks = {
         ("budget", scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
-        for scene in plan.budget_scenes for name in plan.engines if name in MECHANISMS and reach[scene, plan.seed]
-    }  # fmt: skip
+        for scene in plan.budget_scenes
+        for name in plan.engines
+        if name in MECHANISMS and reach[scene, plan.seed]
+    }
     results = dict(done(tasks, plan.workers, progress, "parts of the error", kept=kept))
     for task, result in results.items():
         if isinstance(result, Failure):
-            measured.left_out.append((f"error budget of {' '.join(task[1:])}", f"{result.status}: {result.reason}"))
-    rows = [row for task in tasks if not isinstance(results[task], Failure) for row in results[task]]
+            measured.left_out.append(
+                (f"error budget of {' '.join(task[1:])}", f"{result.status}: {result.reason}")
+            )
+    rows = [
+        row for task in tasks if not isinstance(results[task], Failure) for row in results[task]
+    ]
     measured.budget = pd.DataFrame(rows, columns=budget.COLUMNS)
 
 
 def measure_times(
-    plan: SpeedPlan, played: Sequence[Measurement], measured: Measured, progress: Progress, kept: Kept | None
+    plan: SpeedPlan,
+    played: Sequence[Measurement],
+    measured: Measured,
+    progress: Progress,
+    kept: Kept | None,
 ) -> None:
     """What everything costs that was played to its end: one process, one thing at a time."""
     measured.busy = busy_cores()
@@ -138,7 +177,9 @@ def measure_times(
     for task, result in done(timings(plan, played), 1, progress, "time", ALL_ROUNDS, kept):
         kind = task[1]
         if isinstance(result, Failure):
-            measured.left_out.append((f"timing of {' '.join(task[1:])}", f"{result.status}: {result.reason}"))
+            measured.left_out.append(
+                (f"timing of {' '.join(task[1:])}", f"{result.status}: {result.reason}")
+            )
         elif kind == TRUTH:
             truths.append(result)
         elif kind == SIZE:
@@ -150,12 +191,15 @@ def measure_times(
 
 
 def timings(plan: SpeedPlan, played: Sequence[Measurement]) -> dict[tuple, Callable[[], Any]]:
-    """The tasks of the second pass: all measurements of a kind in a scene in one, as they are compared."""
+    """The tasks of the second pass: all measurements of a kind in a scene in one, as they are
+    compared."""
     often: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
     makes = {name: row_of(name).make for name in plan.engines}
     tasks: dict[tuple, Callable[[], Any]] = {}
     for (kind, scene), group in groupby(played, key=lambda one: one[:2]):
-        tasks["time", kind, scene] = partial(scene_rows, kind, scene, plan.seed, in_turns(list(group)), often)
+        tasks["time", kind, scene] = partial(
+            scene_rows, kind, scene, plan.seed, in_turns(list(group)), often
+        )
         if kind == SCENE:
             tasks["time", TRUTH, scene] = partial(models.closed_form, scene, plan.seed)
     if plan.whole:
@@ -164,7 +208,9 @@ def timings(plan: SpeedPlan, played: Sequence[Measurement]) -> dict[tuple, Calla
     return tasks
 
 
-def in_turns(measurements: Sequence[Measurement]) -> dict[tuple[tuple[str, str], int, int], Callable]:
+def in_turns(
+    measurements: Sequence[Measurement],
+) -> dict[tuple[tuple[str, str], int, int], Callable]:
     """((name, change), substeps, copy) -> engine.
 
     On a ladder of a scene each takes part twice at its middle dt, which gives the noise floor.
@@ -172,7 +218,10 @@ def in_turns(measurements: Sequence[Measurement]) -> dict[tuple[tuple[str, str],
     all_of_them = {}
     for measurement in measurements:
         for k in measurement.step_sizes:
-            twice = measurement.kind == SCENE and k == measurement.step_sizes[len(measurement.step_sizes) // 2]
+            twice = (
+                measurement.kind == SCENE
+                and k == measurement.step_sizes[len(measurement.step_sizes) // 2]
+            )
             for copy in (0, 1) if twice else (0,):
                 all_of_them[(measurement.name, measurement.change), k, copy] = measurement.make
     return all_of_them
@@ -185,19 +234,31 @@ def scene_rows(
     scenario, rows = ladder.open_scene(scene, seed), []
     for sample in ladder.times_of(scene, seed, measurements, **often):
         (name, change), k, copy = sample.key
-        identity = {"scenario": scenario.name, "change": change, "dt_s": scenario.dt(k), "copy_of": copy}
+        identity = {
+            "scenario": scenario.name,
+            "change": change,
+            "dt_s": scenario.dt(k),
+            "copy_of": copy,
+        }
         rows.append(sample_row(kind, name, sample, **identity))
     return rows
 
 
-def size_rows(makes: Mapping[str, Callable], plan: SpeedPlan, often: Mapping[str, Any]) -> dict[str, list]:
-    """samples: rows of `Measured.samples` for every number of disks; stopped: (name, disks, why)."""
-    found, stopped = sizes.costs(makes, plan.effort.sizes, patience=plan.effort.patience, seed=plan.seed, **often)
+def size_rows(
+    makes: Mapping[str, Callable], plan: SpeedPlan, often: Mapping[str, Any]
+) -> dict[str, list]:
+    """samples: rows of `Measured.samples` for every number of disks; stopped: (name, disks,
+    why)."""
+    found, stopped = sizes.costs(
+        makes, plan.effort.sizes, patience=plan.effort.patience, seed=plan.seed, **often
+    )
     rows = [sample_row(SIZE, sample.key[0], sample, n=sample.key[1]) for sample in found]
     return {"samples": rows, "stopped": [(name, n, why) for (name, n), why in stopped.items()]}
 
 
-def idle_rows(makes: Mapping[str, Callable], seed: int, often: Mapping[str, Any]) -> list[dict[str, Any]]:
+def idle_rows(
+    makes: Mapping[str, Callable], seed: int, often: Mapping[str, Any]
+) -> list[dict[str, Any]]:
     """Rows of `Measured.samples` of worlds without anything to do."""
     found = sizes.driving(makes, seed=seed, **often)
     return [sample_row(IDLE, sample.key[0], sample, singly=sample.key[1]) for sample in found]
@@ -206,15 +267,35 @@ def idle_rows(makes: Mapping[str, Callable], seed: int, often: Mapping[str, Any]
 def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[str, Any]:
     """A sample as a row of `Measured.samples`."""
     engine, profile = name.split(":")
-    unknown = {"scenario": "", "change": PLAIN, "dt_s": float("nan"), "n": 0, "copy_of": 0, "singly": False}
-    return {"kind": kind, "engine": engine, "profile": profile} | unknown | identity | {
-        "round": sample.round, "place": sample.place, "cost": sample.cost, "wrapping": sample.wrapping,
-        "runs": sample.runs,
-    }  # fmt: skip
+    unknown = {
+        "scenario": "",
+        "change": PLAIN,
+        "dt_s": float("nan"),
+        "n": 0,
+        "copy_of": 0,
+        "singly": False,
+    }
+    return (
+        {"kind": kind, "engine": engine, "profile": profile}
+        | unknown
+        | identity
+        | {
+            "round": sample.round,
+            "place": sample.place,
+            "cost": sample.cost,
+            "wrapping": sample.wrapping,
+            "runs": sample.runs,
+        }
+    )
 
 
 def done(
-    tasks: Mapping, workers: int, progress: Progress, what: str, patience: float = HANGS, kept: Kept | None = None
+    tasks: Mapping,
+    workers: int,
+    progress: Progress,
+    what: str,
+    patience: float = HANGS,
+    kept: Kept | None = None,
 ) -> Iterable[tuple[Any, Any]]:
     """Run the tasks and say so; results as they come, first those that are kept already."""
     left = {task: do for task, do in tasks.items() if kept is None or task not in kept}

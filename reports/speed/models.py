@@ -18,9 +18,11 @@ RUNS = 20
 
 
 def closed_form(scene: str, seed: int) -> dict[str, Any]:
-    """scenario, truth: what the harness takes for the truth, closed_us: µs per simulated second of a closed form.
+    """scenario, truth: what the harness takes for the truth, closed_us: µs per simulated second of
+    a closed form.
 
-    One computed in many digits is kept on disk, so what it costs cannot be measured by asking again.
+    One computed in many digits is kept on disk, so what it costs cannot be measured by asking
+    again.
     """
     scenario = held(scene, seed).scenario
     if (model := answered_by(scenario)) != CLOSED_FORM or scenario.truth is None:
@@ -30,13 +32,19 @@ def closed_form(scene: str, seed: int) -> dict[str, Any]:
         started = perf_counter()
         scenario.truth(ends)
         best = min(best, perf_counter() - started)
-    return {"scenario": scenario.name, "truth": CLOSED_FORM, "closed_us": best / scenario.duration * 1e6}
+    return {
+        "scenario": scenario.name,
+        "truth": CLOSED_FORM,
+        "closed_us": best / scenario.duration * 1e6,
+    }
 
 
 def cheapest(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
-    """A row a scenario: truth, closed_us, and the cheapest engine that is right to `FINEST` and to 1 % of a radius.
+    """A row a scenario: truth, closed_us, and the cheapest engine that is right to `FINEST` and to
+    1 % of a radius.
 
-    Columns model, engine, cost_us for the first and loose_engine, loose_us for the second; "" and nan where none is.
+    Columns model, engine, cost_us for the first and loose_engine, loose_us for the second; "" and
+    nan where none is.
     """
     rows = []
     for row in truths.to_dict("records"):
@@ -45,9 +53,16 @@ def cheapest(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
         model = KINDS.get(fine[0].split(":")[0], STEPS) if fine[0] else ""
         if np.isfinite(row["closed_us"]) and not row["closed_us"] > fine[1]:
             model = CLOSED_FORM
-        rows.append(row | {
-            "model": model, "engine": fine[0], "cost_us": fine[1], "loose_engine": loose[0], "loose_us": loose[1],
-        })  # fmt: skip
+        rows.append(
+            row
+            | {
+                "model": model,
+                "engine": fine[0],
+                "cost_us": fine[1],
+                "loose_engine": loose[0],
+                "loose_us": loose[1],
+            }
+        )
     return pd.DataFrame(rows)
 
 

@@ -9,22 +9,31 @@ import numpy as np
 
 from scenarios.model import Array
 
-FINEST = 1e-6  # radii: the finest accuracy asked for; a rise or a rest below it is rounding, and nobody minds
-NEARER = 0.9  # of the error at the coarsest step: who has more than that left at the finest has come no nearer
+# radii: the finest accuracy asked for; a rise or a rest below it is rounding, and nobody minds
+FINEST = 1e-6
+# of the error at the coarsest step: who has more than that left at the finest has come no nearer
+NEARER = 0.9
 RISE = 1.1  # an error that grows by more than this from a step to a finer one is not monotone
-STANDSTILL = 0.25  # of the error that is left: of order p the last halving of dt moves 2^p - 1 times that
+# of the error that is left: of order p the last halving of dt moves 2^p - 1 times that
+STANDSTILL = 0.25
 RESAMPLES = 1000
 
 ORDER, UNCLEAR, EXACT, UNSTEADY, ELSEWHERE, UNKNOWN = (
-    "falls", "no clear order", "exact", "not monotone", "converges to something else", "too few points",
-)  # fmt: skip
+    "falls",
+    "no clear order",
+    "exact",
+    "not monotone",
+    "converges to something else",
+    "too few points",
+)
 
 # Two-sided 95 % of Student's t for 1, 2, 3, ... degrees of freedom; past the end 2.
 STUDENT = (12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23)
 
 
 class Order(NamedTuple):
-    """The slope of log error over log dt with its 95 % interval, and what is to be said of it: a word from above."""
+    """The slope of log error over log dt with its 95 % interval, and what is to be said of it: a
+    word from above."""
 
     slope: float
     low: float
@@ -33,10 +42,12 @@ class Order(NamedTuple):
 
 
 def order_of(dt: Array, errors: Array, changes: Array, seed: int = 0) -> Order:
-    """The order from dt (k,) s, coarse to fine, errors (seeds, k) in radii, and changes (seeds, k), see `ladder`.
+    """The order from dt (k,) s, coarse to fine, errors (seeds, k) in radii, and changes (seeds, k),
+    see `ladder`.
 
-    Points at `FINEST` or below say nothing on the order: they are left out. With many seeds the slope is that of the
-    median error and the interval is bootstrapped over the seeds; with one it is the straight line's own (Student).
+    Points at `FINEST` or below say nothing on the order: they are left out. With many seeds the
+    slope is that of the median error and the interval is bootstrapped over the seeds; with one it
+    is the straight line's own (Student).
     """
     middle = np.median(errors, axis=0)
     verdict = verdict_of(middle, np.median(changes, axis=0))
@@ -58,7 +69,8 @@ def seen(verdict: str, low: float) -> str:
 
 
 def verdict_of(errors: Array, changes: Array) -> str:
-    """What errors (k,) do on the way to finer steps; changes (k,) is how far the answer itself moved at each."""
+    """What errors (k,) do on the way to finer steps; changes (k,) is how far the answer itself
+    moved at each."""
     known = np.isfinite(errors)
     errors, changes = errors[known], changes[known]
     if len(errors) < 3:
@@ -78,7 +90,8 @@ def slope(x: Array, y: Array) -> float:
 
 
 def line_interval(x: Array, y: Array) -> tuple[float, float, float]:
-    """Slope, low and high end of its 95 % interval from the scatter of the points about the line."""
+    """Slope, low and high end of its 95 % interval from the scatter of the points about the
+    line."""
     fitted, free = slope(x, y), len(x) - 2
     rest = y - y.mean() - fitted * (x - x.mean())
     spread = float(np.sqrt(rest @ rest / free / ((x - x.mean()) @ (x - x.mean()))))
@@ -86,8 +99,11 @@ def line_interval(x: Array, y: Array) -> tuple[float, float, float]:
     return fitted, fitted - reach, fitted + reach
 
 
-def bootstrap(values: Array, statistic: Callable[[Array], float], seed: int = 0) -> tuple[float, float]:
-    """The 95 % interval of `statistic` of values (m, ...), drawn again along the first axis (Efron's percentiles)."""
+def bootstrap(
+    values: Array, statistic: Callable[[Array], float], seed: int = 0
+) -> tuple[float, float]:
+    """The 95 % interval of `statistic` of values (m, ...), drawn again along the first axis
+    (Efron's percentiles)."""
     rng = np.random.default_rng(seed)
     drawn = rng.integers(len(values), size=(RESAMPLES, len(values)))
     low, high = np.percentile([statistic(values[pick]) for pick in drawn], [2.5, 97.5])
@@ -95,10 +111,12 @@ def bootstrap(values: Array, statistic: Callable[[Array], float], seed: int = 0)
 
 
 def median_interval(values: Array, seed: int = 0) -> tuple[float, float]:
-    """The bootstrap interval of the median of values (m,); the value twice where there is only one."""
+    """The bootstrap interval of the median of values (m,); the value twice where there is only
+    one."""
     if len(values) == 1:
         return float(values[0]), float(values[0])
     rng = np.random.default_rng(seed)
     drawn = values[rng.integers(len(values), size=(RESAMPLES, len(values)))]
-    low, high = np.percentile(np.median(drawn, axis=1), [2.5, 97.5], method="nearest")  # failed ones are inf
+    # failed ones are inf
+    low, high = np.percentile(np.median(drawn, axis=1), [2.5, 97.5], method="nearest")
     return float(low), float(high)

@@ -38,29 +38,56 @@ class SpeedSection(NamedTuple):
 
 
 def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
-    """Write the page of `results`; `about` holds command, seed, machine, versions, started, seconds, load."""
+    """Write the page of `results`; `about` holds command, seed, machine, versions, started,
+    seconds, load."""
     names = (*results.names, *(sweep.name for sweep in results.plan.sweeps), style.TRUTH)
     looks = {name: style.look(*name.split(":", 1)) for name in names}
     html = render(
-        "speed/speed.html.j2", generator=GENERATOR, scripts=CHARTED, styles=["speed/speed.css"], looks=looks,
-        plotly=True, names=results.names, about=about, pooled=pooled_section(results), sizes=sizes_section(results),
-        options=options_section(results), sweeps=sweep_sections(results), sweep_rows=charts.records(results.sweeps),
+        "speed/speed.html.j2",
+        generator=GENERATOR,
+        scripts=CHARTED,
+        styles=["speed/speed.css"],
+        looks=looks,
+        plotly=True,
+        names=results.names,
+        about=about,
+        pooled=pooled_section(results),
+        sizes=sizes_section(results),
+        options=options_section(results),
+        sweeps=sweep_sections(results),
+        sweep_rows=charts.records(results.sweeps),
         sections=[section_of(results, name) for name in results.scenes],
-        noise=results.noise_summary(), growth=charts.records(results.growth), models=charts.records(results.models),
-        driving=charts.records(results.driving), option_rows=charts.records(results.options), 
-        versus=charts.records(results.versus), own=OWN,
-        left_out=results.left_out, accuracies=list(ACCURACIES), flagged=FLAGGED,
-        option_scenes=results.plan.option_scenes, budget=budget_section(results),
+        noise=results.noise_summary(),
+        growth=charts.records(results.growth),
+        models=charts.records(results.models),
+        driving=charts.records(results.driving),
+        option_rows=charts.records(results.options),
+        versus=charts.records(results.versus),
+        own=OWN,
+        left_out=results.left_out,
+        accuracies=list(ACCURACIES),
+        flagged=FLAGGED,
+        option_scenes=results.plan.option_scenes,
+        budget=budget_section(results),
         totals=(*TOTALS, RESIDUAL),
-    )  # fmt: skip
+    )
     put_text(path, html)
 
 
 def section(
-    key: str, title: str, text: str, drawings: dict[str, Drawing], orders: pd.DataFrame | None = None
+    key: str,
+    title: str,
+    text: str,
+    drawings: dict[str, Drawing],
+    orders: pd.DataFrame | None = None,
 ) -> SpeedSection:
     """A `SpeedSection`, its figures packed."""
-    traces = [trace.name for each in drawings.values() if each.figure is not None for trace in each.figure.data]
+    traces = [
+        trace.name
+        for each in drawings.values()
+        if each.figure is not None
+        for trace in each.figure.data
+    ]
     names = [name for name in dict.fromkeys(traces) if ":" in name]
     rows = [] if orders is None else charts.records(orders)
     return SpeedSection(key, title, text, drawings, packed_charts(drawings), rows, names)
@@ -72,18 +99,21 @@ def pooled_section(results: Results) -> SpeedSection:
     drawings = {
         "speed": Drawing(
             "Error against cost",
-            f"A point is one step size, {steps} that all scenes have, each of its coordinates the geometric mean of "
-            f"the middle half of {count} scenes: {', '.join(results.scenes)}. {said_of_pool(results.pooled)} A scene "
-            "that an engine failed counts as infinitely wrong and infinitely dear. Down and left is better; no engine "
-            "is both faster and better than the broad grey line, and of those who take steps none than the narrow one.",
+            f"A point is one step size, {steps} that all scenes have, each of its coordinates the"
+            f" geometric mean of the middle half of {count} scenes: {', '.join(results.scenes)}."
+            f" {said_of_pool(results.pooled)} A scene that an engine failed counts as infinitely"
+            " wrong and infinitely dear. Down and left is better; no engine is both faster and"
+            " better than the broad grey line, and of those who take steps none than the narrow"
+            " one.",
             charts.speed(results.pooled, tall=True),
         ),
         "matched": Drawing(
             "Cost at matched accuracy",
-            "The median over the scenes of what the cheapest measured dt costs whose error, and that of every finer "
-            "one, is no larger; a scene in which it is not reached counts as infinitely dear. never: half of the "
-            "scenes or more are unreachable at any dt, or failed. not yet: half or more are not reached down to the "
-            "finest dt measured. Hover for how many of each.",
+            "The median over the scenes of what the cheapest measured dt costs whose error, and"
+            " that of every finer one, is no larger; a scene in which it is not reached counts as"
+            " infinitely dear. never: half of the scenes or more are unreachable at any dt, or"
+            " failed. not yet: half or more are not reached down to the finest dt measured. Hover"
+            " for how many of each.",
             charts.matched(results.pooled_reached, tall=True),
         ),
     }
@@ -95,30 +125,42 @@ def section_of(results: Results, scene: str) -> SpeedSection:
     points = results.points[results.points.scenario == scene]
     reached = results.reached[results.reached.scenario == scene]
     seeds = int(points.seeds.max())
-    spread = f" The error is the median over {seeds} seeds, its bar the 95 % bootstrap interval." if seeds > 1 else ""
+    spread = (
+        f" The error is the median over {seeds} seeds, its bar the 95 % bootstrap interval."
+        if seeds > 1
+        else ""
+    )
     noise = results.noise_summary(scene)
     low, high = (style.number(noise.get(end, np.nan)) for end in ("low", "high"))
-    floor = f" Noise floor: half of the engines read {low} to {high} against themselves." if noise["pairs"] else ""
+    floor = (
+        f" Noise floor: half of the engines read {low} to {high} against themselves."
+        if noise["pairs"]
+        else ""
+    )
     until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
-    scored = f" Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends." if until < whole else ""
+    scored = (
+        f" Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends."
+        if until < whole
+        else ""
+    )
     wrapping = (points.wrapping > 0).any()
     budgets = (
-        " Setting disks onto the opposite edge, which an engine without such an edge leaves to Python, is not in it: "
-        "hover."
+        " Setting disks onto the opposite edge, which an engine without such an edge leaves to"
+        " Python, is not in it: hover."
         if wrapping
         else ""
     )
     drawings = {
         "speed": Drawing(
             "Error against cost",
-            f"A point is one dt; halving it goes right.{scored}{spread} Time: median of the rounds, bars the quartiles."
-            f"{floor}{budgets}",
+            f"A point is one dt; halving it goes right.{scored}{spread} Time: median of the rounds,"
+            f" bars the quartiles.{floor}{budgets}",
             charts.speed(points),
         ),
         "matched": Drawing(
             "Cost at matched accuracy",
-            "never: unreachable at any dt, as the answer closes in on another motion, or failed. not yet: not down to "
-            "the finest dt measured.",
+            "never: unreachable at any dt, as the answer closes in on another motion, or failed."
+            " not yet: not down to the finest dt measured.",
             charts.matched(reached),
         ),
     }
@@ -145,12 +187,16 @@ def budget_section(results: Results) -> dict[str, Any] | None:
     table = results.explained
     contributions = set(table.engine + ":" + table.profile)
     return {
-        "sentence": explained.sentence(table), "cuts": explained.extent(table).cuts,
+        "sentence": explained.sentence(table),
+        "cuts": explained.extent(table).cuts,
         "absent": [name for name in results.names if name not in contributions],
         "overview": budget_tables.overview(budget),
-        "scenes": [budget_tables.of_scene(budget, scene) for scene in dict.fromkeys(budget.scenario)],
-        "off": budget_tables.ablated_in_both(budget), "closed": float(budget.closed_deviation_radii.max()),
-    }  # fmt: skip
+        "scenes": [
+            budget_tables.of_scene(budget, scene) for scene in dict.fromkeys(budget.scenario)
+        ],
+        "off": budget_tables.ablated_in_both(budget),
+        "closed": float(budget.closed_deviation_radii.max()),
+    }
 
 
 def options_section(results: Results) -> SpeedSection | None:
@@ -161,14 +207,16 @@ def options_section(results: Results) -> SpeedSection | None:
     many = np.isfinite(table.cost_ratio).any()
     drawings = {
         "cost": Drawing(
-            "What it costs", "Time over that of the matched profile; right of the dotted line it costs more.",
+            "What it costs",
+            "Time over that of the matched profile; right of the dotted line it costs more.",
             charts.options(table, "cost_ratio", "time / time unchanged") if many else None,
         ),
         "error": Drawing(
-            "What it breaks, or mends", "Error over that of the matched profile; right of the dotted line it is worse.",
+            "What it breaks, or mends",
+            "Error over that of the matched profile; right of the dotted line it is worse.",
             charts.options(table, "error_ratio", "error / error unchanged"),
         ),
-    }  # fmt: skip
+    }
     return section("options", "No more than a scene needs", "", drawings)
 
 
@@ -177,12 +225,15 @@ def sweep_sections(results: Results) -> list[SpeedSection]:
     if results.sweeps.empty:
         return []
     count = results.sweeps.scenario.nunique()
-    without = ", ".join(f"{engine} in {scene}" for engine, scene in tables.without_ratio(results.sweeps))
+    without = ", ".join(
+        f"{engine} in {scene}" for engine, scene in tables.without_ratio(results.sweeps)
+    )
     pooled = Drawing(
         "Pooled",
-        "Dotted: one dt, and more iterations or substeps to the right, the first and the last named. Solid: the same "
-        "engine as matched, from 4 times that dt to an eighth of it. Both over what it costs and how far it is off as "
-        f"matched, at that dt, where all lines meet; geometric means of the middle half of {count} scenes."
+        "Dotted: one dt, and more iterations or substeps to the right, the first and the last"
+        " named. Solid: the same engine as matched, from 4 times that dt to an eighth of it. Both"
+        " over what it costs and how far it is off as matched, at that dt, where all lines meet;"
+        f" geometric means of the middle half of {count} scenes."
         + (f" Without a ratio, as there is nothing to divide by: {without}." if without else ""),
         charts.sweeps(results.pooled_sweeps, relative=True),
     )

@@ -17,7 +17,8 @@ FAILED = "failed"
 
 
 class Reached(NamedTuple):
-    """What an accuracy costs: µs per simulated second at dt in s; or nan and why it is not reached."""
+    """What an accuracy costs: µs per simulated second at dt in s; or nan and why it is not
+    reached."""
 
     cost: float
     dt: float
@@ -25,7 +26,8 @@ class Reached(NamedTuple):
 
 
 def front(cost: Array, error: Array) -> list[int]:
-    """Indices, cheapest first, of the points that no other beats in one of the two without being worse in the other."""
+    """Indices, cheapest first, of the points that no other beats in one of the two without being
+    worse in the other."""
     best, kept = np.inf, []
     for k in np.lexsort((error, cost)):
         if np.isfinite(cost[k]) and error[k] < best:
@@ -35,10 +37,12 @@ def front(cost: Array, error: Array) -> list[int]:
 
 
 def cost_to_reach(accuracy: float, dt: Array, cost: Array, error: Array, verdict: str) -> Reached:
-    """The cheapest measured dt whose error, and that of every finer one, is at most `accuracy` radii.
+    """The cheapest measured dt whose error, and that of every finer one, is at most `accuracy`
+    radii.
 
-    dt, cost and error (k,) go from coarse to fine; error is inf where a run failed. Nothing is read between or
-    beyond what was measured; a lucky dt, with a larger error at a finer one, does not count.
+    dt, cost and error (k,) go from coarse to fine; error is inf where a run failed. Nothing is read
+    between or beyond what was measured; a lucky dt, with a larger error at a finer one, does not
+    count.
     """
     if not np.isfinite(error).any():
         return Reached(np.nan, np.nan, FAILED)

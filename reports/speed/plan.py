@@ -15,14 +15,15 @@ from reports.speed.effort import Effort
 
 SCENE, OPTION, SWEEP = "scene", "option", "sweep"
 PLAIN = ""  # the change of an engine that is not changed
-Reach = Mapping[tuple[str, int], int]  # (scene, seed) -> how many sample intervals have an exact answer
+# (scene, seed) -> how many sample intervals have an exact answer
+Reach = Mapping[tuple[str, int], int]
 
 
 class Measurement(NamedTuple):
     """An engine in a scene with a seed at some steps of the sample interval (coarse to fine).
 
-    kind: which question it is for: the ladders of all scenes, the options, or the sweeps. `change` is a row of
-    `OPTIONS`, a value of a sweep, or `PLAIN`.
+    kind: which question it is for: the ladders of all scenes, the options, or the sweeps. `change`
+    is a row of `OPTIONS`, a value of a sweep, or `PLAIN`.
     """
 
     kind: str
@@ -41,12 +42,15 @@ class Measurement(NamedTuple):
     @property
     def errors(self) -> Callable[[], list[dict[str, Any]]]:
         """How to find how far off it is."""
-        return partial(ladder.errors_of, self.scene, self.seed, self.name, self.make, self.step_sizes)
+        return partial(
+            ladder.errors_of, self.scene, self.seed, self.name, self.make, self.step_sizes
+        )
 
 
 @dataclass(frozen=True)
 class SpeedPlan:
-    """What is asked for: scenes and engines by name, how much, from which seed, with how many workers.
+    """What is asked for: scenes and engines by name, how much, from which seed, with how many
+    workers.
 
     whole: not only these scenes, but the changed engines and the numbers of disks, too.
     """
@@ -87,7 +91,9 @@ class SpeedPlan:
     def seeded_scenes(self) -> list[tuple[str, int]]:
         """(scene, seed) of all that an exact answer is needed for."""
         scenes = dict.fromkeys((*self.scenes, *self.option_scenes, *self.sweep_scenes))
-        seeded = [(scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)]
+        seeded = [
+            (scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)
+        ]
         return seeded + [(scene, self.seed) for scene in self.budget_scenes if scene not in scenes]
 
     def measurements(self, reach: Reach) -> Iterator[Measurement]:
@@ -97,7 +103,8 @@ class SpeedPlan:
             if scene in self.scenes:
                 step_sizes = self.effort.ladder(ladder.open_scene(scene, seed))
                 yield from (
-                    Measurement(SCENE, scene, seed, name, PLAIN, row_of(name).make, step_sizes) for name in self.engines
+                    Measurement(SCENE, scene, seed, name, PLAIN, row_of(name).make, step_sizes)
+                    for name in self.engines
                 )
             if scene in self.option_scenes and seed == self.seed:
                 yield from self.changed(scene)
@@ -110,15 +117,22 @@ class SpeedPlan:
         for name in dict.fromkeys(option.engine for option in self.options):
             yield Measurement(OPTION, scene, self.seed, name, PLAIN, row_of(name).make, step_sizes)
         for one in self.options:
-            yield Measurement(OPTION, scene, self.seed, one.engine, one.change, one.make, step_sizes)
+            yield Measurement(
+                OPTION, scene, self.seed, one.engine, one.change, one.make, step_sizes
+            )
 
     def turned(self, scene: str, seed: int) -> Iterator[Measurement]:
-        """Every sweep at every value at the dt the report shows, and its engine over a ladder of dt beside it."""
+        """Every sweep at every value at the dt the report shows, and its engine over a ladder of dt
+        beside it."""
         here = middle(scene)
         for sweep in self.sweeps:
-            yield Measurement(SWEEP, scene, seed, sweep.engine, PLAIN, row_of(sweep.engine).make, around(here))
+            yield Measurement(
+                SWEEP, scene, seed, sweep.engine, PLAIN, row_of(sweep.engine).make, around(here)
+            )
             for value in sweep.values:
-                yield Measurement(SWEEP, scene, seed, sweep.name, str(value), sweep.at(value), (here,))
+                yield Measurement(
+                    SWEEP, scene, seed, sweep.name, str(value), sweep.at(value), (here,)
+                )
 
 
 def around(here: int) -> tuple[int, ...]:

@@ -1,4 +1,5 @@
-"""All scenarios in one number: the geometric mean of the middle half of them, and how much any one of them moves it."""
+"""All scenarios in one number: the geometric mean of the middle half of them, and how much any one
+of them moves it."""
 
 from __future__ import annotations
 
@@ -15,12 +16,13 @@ LEAST = 2.0**-53  # an error of 0 counts as one of rounding: it has no logarithm
 
 
 def middle_half(values: Array) -> float:
-    """The geometric mean of the middle half of values (m,), each an equal share of the whole; nan of none.
+    """The geometric mean of the middle half of values (m,), each an equal share of the whole; nan
+    of none.
 
-    The interquartile mean, here of logarithms: as robust as a median against a quarter of the values at either end,
-    infinite ones among them, but carried by half of the values where a median is carried by one or two. A value that
-    a quartile cuts counts in part. See Agarwal et al., "Deep reinforcement learning at the edge of the statistical
-    precipice", 2021, section 4.3.
+    The interquartile mean, here of logarithms: as robust as a median against a quarter of the
+    values at either end, infinite ones among them, but carried by half of the values where a median
+    is carried by one or two. A value that a quartile cuts counts in part. See Agarwal et al., "Deep
+    reinforcement learning at the edge of the statistical precipice", 2021, section 4.3.
     """
     if not len(values):
         return float("nan")
@@ -32,8 +34,9 @@ def middle_half(values: Array) -> float:
 
 
 def moved(values: Array, floor: float = 0.0) -> Array:
-    """By which factor (m,), 1 or more, `middle_half` changes if each of values (m,) is left out; what is below `floor`
-    counts as equal to it. inf where only one of the two is infinite, 1 where both are.
+    """By which factor (m,), 1 or more, `middle_half` changes if each of values (m,) is left out;
+    what is below `floor` counts as equal to it. inf where only one of the two is infinite, 1 where
+    both are.
     """
     whole = max(middle_half(values), floor)
     others = np.maximum([middle_half(np.delete(values, k)) for k in range(len(values))], floor)
@@ -43,13 +46,15 @@ def moved(values: Array, floor: float = 0.0) -> Array:
 
 
 def pooled(found: pd.DataFrame) -> pd.DataFrame:
-    """A row an engine and step size that all scenarios have: error and cost, each `middle_half` over the scenarios.
+    """A row an engine and step size that all scenarios have: error and cost, each `middle_half`
+    over the scenarios.
 
-    Columns besides: error_low, error_high, low, high (quartiles); bare, of the cost less that of as many idle steps;
-    of (how many scenarios), failed (in how many it did), timed (how many carry the cost); moved and cost_moved (by
-    which factor leaving out one scenario changes error and cost at most), moved_by and cost_moved_by (which one).
-    A scenario that an engine failed counts as infinitely wrong and infinitely dear; one that it played but was not
-    timed in is left out of the cost, and `timed` says so.
+    Columns besides: error_low, error_high, low, high (quartiles); bare, of the cost less that of as
+    many idle steps; of (how many scenarios), failed (in how many it did), timed (how many carry the
+    cost); moved and cost_moved (by which factor leaving out one scenario changes error and cost at
+    most), moved_by and cost_moved_by (which one). A scenario that an engine failed counts as
+    infinitely wrong and infinitely dear; one that it played but was not timed in is left out of the
+    cost, and `timed` says so.
     """
     step_sizes = found.groupby("scenario").step_size.max().min()
     rows = []
@@ -62,16 +67,33 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
         bare = cost - priced.idle.to_numpy(float)
         quartiles = np.percentile(error, [25, 75], method="nearest")
         prices = np.percentile(cost, [25, 75], method="nearest") if len(cost) else [np.nan] * 2
-        rows.append({
-            "scenario": POOLED, "engine": engine, "profile": profile, "step_size": step_size, "dt_s": np.nan,
-            "error": middle_half(error), "error_low": quartiles[0], "error_high": quartiles[1],
-            "cost": finite(middle_half(cost)), "low": finite(prices[0]), "high": finite(prices[1]),
-            "bare": finite(middle_half(bare)) if not np.isnan(bare).any() else np.nan,
-            "of": len(group), "seeds": len(group), "failed": int((group.failed > 0).sum()), "timed": len(priced),
-            **most("moved", scenes, moved(error, FINEST)),
-            **most("cost_moved", priced.scenario.to_numpy(str), moved(cost)),
-            "status": "ok", "reason": "", "best": np.nan, "wrapping": np.nan, "idle": np.nan,
-        })  # fmt: skip
+        rows.append(
+            {
+                "scenario": POOLED,
+                "engine": engine,
+                "profile": profile,
+                "step_size": step_size,
+                "dt_s": np.nan,
+                "error": middle_half(error),
+                "error_low": quartiles[0],
+                "error_high": quartiles[1],
+                "cost": finite(middle_half(cost)),
+                "low": finite(prices[0]),
+                "high": finite(prices[1]),
+                "bare": finite(middle_half(bare)) if not np.isnan(bare).any() else np.nan,
+                "of": len(group),
+                "seeds": len(group),
+                "failed": int((group.failed > 0).sum()),
+                "timed": len(priced),
+                **most("moved", scenes, moved(error, FINEST)),
+                **most("cost_moved", priced.scenario.to_numpy(str), moved(cost)),
+                "status": "ok",
+                "reason": "",
+                "best": np.nan,
+                "wrapping": np.nan,
+                "idle": np.nan,
+            }
+        )
     return pd.DataFrame(rows)
 
 
@@ -97,7 +119,10 @@ def said_of_pool(found: pd.DataFrame) -> str:
         return f"One scene, so nothing is pooled. {failures}"
     worst, cost = found.iloc[int(found.moved.to_numpy(float).argmax())], found.cost_moved.max()
     said = (
-        f"Leaving out any one of the {found.of.max()} scenes moves no pooled error by more than a factor of "
-        f"{worst.moved:.2g} ({worst.engine}:{worst.profile} without {worst.moved_by})"
+        f"Leaving out any one of the {found.of.max()} scenes moves no pooled error by more than a"
+        f" factor of {worst.moved:.2g} ({worst.engine}:{worst.profile} without {worst.moved_by})"
     )
-    return f"{said}{f' and no pooled cost by more than {cost:.2g}' if np.isfinite(cost) else ''}. {failures}"
+    return (
+        f"{said}{f' and no pooled cost by more than {cost:.2g}' if np.isfinite(cost) else ''}."
+        f" {failures}"
+    )

@@ -49,7 +49,8 @@ class Results:
 
     @cached_property
     def points(self) -> pd.DataFrame:
-        """See `tables.points`; and idle, what as many steps cost where there is nothing to do, µs per simulated s."""
+        """See `tables.points`; and idle, what as many steps cost where there is nothing to do, µs
+        per simulated s."""
         points = tables.points(self.measured, self.plan.seed)
         each = {(row.engine, row.profile): row.step_us for row in self.driving.itertuples()}
         steps = [each.get(who, np.nan) for who in zip(points.engine, points.profile)]
@@ -82,27 +83,43 @@ class Results:
 
     @cached_property
     def pooled_reached(self) -> pd.DataFrame:
-        """As `reached`: the median over the scenarios where more than half get there, and how many do and do not.
+        """As `reached`: the median over the scenarios where more than half get there, and how many
+        do and do not.
 
-        A scenario in which an engine does not get there is infinitely dear. Columns besides: of, how many scenarios;
-        got, in how many it gets there; never, at no dt; failed; untimed; in the others it does not down to the finest
-        dt. lost: half or more are never or failed.
+        A scenario in which an engine does not get there is infinitely dear. Columns besides: of,
+        how many scenarios; got, in how many it gets there; never, at no dt; failed; untimed; in the
+        others it does not down to the finest dt. lost: half or more are never or failed.
         """
         rows = []
-        for (engine, profile, accuracy), group in self.reached.groupby(["engine", "profile", "accuracy"], sort=False):
+        for (engine, profile, accuracy), group in self.reached.groupby(
+            ["engine", "profile", "accuracy"], sort=False
+        ):
             counts = {
-                "of": len(group), "got": int(group.cost.notna().sum()),
-                "never": int((group.why == UNREACHABLE).sum()), "failed": int((group.why == FAILED).sum()),
+                "of": len(group),
+                "got": int(group.cost.notna().sum()),
+                "never": int((group.why == UNREACHABLE).sum()),
+                "failed": int((group.why == FAILED).sum()),
                 "untimed": int((group.why == NOT_TIMED).sum()),
-            }  # fmt: skip
+            }
             median = float(np.median(group.cost.fillna(np.inf)))
-            others = [f"{what} in {counts[what]}" for what in ("never", "failed", "untimed") if counts[what]]
-            rows.append({
-                "scenario": POOLED, "engine": engine, "profile": profile, "accuracy": accuracy,
-                "cost": median if np.isfinite(median) else np.nan, "dt_s": np.nan,
-                "why": ", ".join([f"{counts['got']} of {len(group)}", *others]),
-                "lost": 2 * int(group.lost.sum()) >= len(group), **counts,
-            })  # fmt: skip
+            others = [
+                f"{what} in {counts[what]}"
+                for what in ("never", "failed", "untimed")
+                if counts[what]
+            ]
+            rows.append(
+                {
+                    "scenario": POOLED,
+                    "engine": engine,
+                    "profile": profile,
+                    "accuracy": accuracy,
+                    "cost": median if np.isfinite(median) else np.nan,
+                    "dt_s": np.nan,
+                    "why": ", ".join([f"{counts['got']} of {len(group)}", *others]),
+                    "lost": 2 * int(group.lost.sum()) >= len(group),
+                    **counts,
+                }
+            )
         return pd.DataFrame(rows)
 
     @cached_property
@@ -111,16 +128,22 @@ class Results:
         return tables.noise(self.measured)
 
     def noise_summary(self, scene: str = "") -> dict[str, float]:
-        """median, low, high (quartiles), least, most and pairs of an engine against itself; quiet: within `QUIET`."""
+        """median, low, high (quartiles), least, most and pairs of an engine against itself; quiet:
+        within `QUIET`."""
         ratios = self.noise[self.noise.scenario == scene].ratio if scene else self.noise.ratio
         if ratios.empty:
             return {"pairs": 0, "quiet": False}
         low, median, high = np.percentile(ratios, [25, 50, 75])
         quiet = max(abs(low - 1), abs(high - 1)) <= QUIET
         return {
-            "median": float(median), "low": float(low), "high": float(high), "least": float(ratios.min()),
-            "most": float(ratios.max()), "pairs": len(ratios), "quiet": bool(quiet),
-        }  # fmt: skip
+            "median": float(median),
+            "low": float(low),
+            "high": float(high),
+            "least": float(ratios.min()),
+            "most": float(ratios.max()),
+            "pairs": len(ratios),
+            "quiet": bool(quiet),
+        }
 
     @cached_property
     def driving(self) -> pd.DataFrame:
@@ -150,7 +173,9 @@ class Results:
     def explained(self) -> pd.DataFrame:
         """See `explained.explained`."""
         budget = self.measured.budget
-        return explained.explained(budget) if len(budget) else pd.DataFrame(columns=explained.COLUMNS)
+        return (
+            explained.explained(budget) if len(budget) else pd.DataFrame(columns=explained.COLUMNS)
+        )
 
     @cached_property
     def versus(self) -> pd.DataFrame:
@@ -163,29 +188,47 @@ class Results:
         return models.cheapest(self.measured.truths, self.points)
 
     def order_table(self, scene: str) -> pd.DataFrame:
-        """A row an engine: order with interval and verdict, and for every accuracy (cost, dt, why) as columns."""
+        """A row an engine: order with interval and verdict, and for every accuracy (cost, dt, why)
+        as columns."""
         orders = self.orders[self.orders.scenario == scene]
         reached = self.reached[self.reached.scenario == scene]
-        wide = orders.assign(**{
-            accuracy: [
-                next(reached[(reached.engine == engine) & (reached.profile == profile) & (reached.accuracy == accuracy)]
-                     [["cost", "dt_s", "why"]].itertuples(index=False, name=None))
-                for engine, profile in zip(orders.engine, orders.profile)
-            ]
-            for accuracy in ACCURACIES
-        })  # fmt: skip
+        wide = orders.assign(
+            **{
+                accuracy: [
+                    next(
+                        reached[
+                            (reached.engine == engine)
+                            & (reached.profile == profile)
+                            & (reached.accuracy == accuracy)
+                        ][["cost", "dt_s", "why"]].itertuples(index=False, name=None)
+                    )
+                    for engine, profile in zip(orders.engine, orders.profile)
+                ]
+                for accuracy in ACCURACIES
+            }
+        )
         return wide.assign(name=wide.engine + ":" + wide.profile)
 
     @cached_property
     def files(self) -> dict[str, pd.DataFrame]:
         """The tables, by the names of their CSV files."""
         tables = {
-            "speed_samples": self.measured.samples, "speed_errors": self.measured.errors, "speed": self.points,
-            "speed_pooled": self.pooled, "speed_orders": self.orders, "speed_reached": self.reached,
-            "speed_sizes": self.sizes, "speed_options": self.options, "speed_driving": self.driving,
-            "speed_noise": self.noise, "speed_models": self.models, "speed_sweeps": self.sweeps,
-            "speed_budget": self.measured.budget, "speed_explained": self.explained, "speed_versus": self.versus,
-        }  # fmt: skip
+            "speed_samples": self.measured.samples,
+            "speed_errors": self.measured.errors,
+            "speed": self.points,
+            "speed_pooled": self.pooled,
+            "speed_orders": self.orders,
+            "speed_reached": self.reached,
+            "speed_sizes": self.sizes,
+            "speed_options": self.options,
+            "speed_driving": self.driving,
+            "speed_noise": self.noise,
+            "speed_models": self.models,
+            "speed_sweeps": self.sweeps,
+            "speed_budget": self.measured.budget,
+            "speed_explained": self.explained,
+            "speed_versus": self.versus,
+        }
         return {f"{name}.csv": table for name, table in tables.items()}
 
     def write(self, folder: Path) -> None:

@@ -1,4 +1,5 @@
-"""What a step costs against the number of disks, in a gas; and what it costs where there is nothing to do."""
+"""What a step costs against the number of disks, in a gas; and what it costs where there is nothing
+to do."""
 
 from __future__ import annotations
 
@@ -16,31 +17,47 @@ from scenarios.model import Array, Scene
 
 Make = Callable[[], Engine]
 DT, RADIUS, COVERED = 1 / 240, 0.5, 0.3
-WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3  # of one sample: as many steps as fill 2 ms, less than a time slice
-FRESH = 400  # steps, after which a gas is begun again: where collisions take energy it falls asleep, and costs nothing
+# of one sample: as many steps as fill 2 ms, less than a time slice
+WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3
+# steps, after which a gas is begun again: where collisions take energy it falls asleep, and costs
+# nothing
+FRESH = 400
 FIT_FROM = 100  # disks: below it the fixed cost of a step hides how it grows
 IDLE_STEPS = 1000
 STOPPED = "stopped: a step would take longer than {:g} s"
 
 
 def gas(n: int, seed: int) -> Scene:
-    """`n` equal disks that cover `COVERED` of a square box, on a lattice, with normal velocities; e = 1."""
+    """`n` equal disks that cover `COVERED` of a square box, on a lattice, with normal velocities; e
+    = 1."""
     across = int(np.ceil(np.sqrt(n)))
-    pitch = RADIUS * np.sqrt(np.pi / COVERED) * np.sqrt(n) / across  # so that an unfilled lattice covers as much
+    # so that an unfilled lattice covers as much
+    pitch = RADIUS * np.sqrt(np.pi / COVERED) * np.sqrt(n) / across
     place = (np.stack(np.divmod(np.arange(n), across), axis=-1) + 0.5) * pitch
     side = across * pitch
     return lay_out(
-        position=place, velocity=np.random.default_rng(seed).normal(size=(n, 2)), radius=np.full(n, RADIUS),
-        mass=np.ones(n), walls=box([0.0, 0.0], [side, side]), restitution=1.0,
-    )  # fmt: skip
+        position=place,
+        velocity=np.random.default_rng(seed).normal(size=(n, 2)),
+        radius=np.full(n, RADIUS),
+        mass=np.ones(n),
+        walls=box([0.0, 0.0], [side, side]),
+        restitution=1.0,
+    )
 
 
-def costs(engines: Mapping[str, Make], sizes: Sequence[int], rounds: int, budget: float, patience: float,
-          seed: int) -> tuple[list[Sample], dict[tuple[str, int], str]]:  # fmt: skip
-    """Samples, s a step, by (name, n), from few disks to many; and who was not measured where, and why.
+def costs(
+    engines: Mapping[str, Make],
+    sizes: Sequence[int],
+    rounds: int,
+    budget: float,
+    patience: float,
+    seed: int,
+) -> tuple[list[Sample], dict[tuple[str, int], str]]:
+    """Samples, s a step, by (name, n), from few disks to many; and who was not measured where, and
+    why.
 
-    An engine that would take longer than `patience` s for a step at the next size, as its last two sizes extend,
-    stops there.
+    An engine that would take longer than `patience` s for a step at the next size, as its last two
+    sizes extend, stops there.
     """
     samples: list[Sample] = []
     left_out: dict[tuple[str, int], str] = {}
@@ -65,7 +82,8 @@ def costs(engines: Mapping[str, Make], sizes: Sequence[int], rounds: int, budget
 
 
 class _Going:
-    """A gas that is already going: every sample goes on where the one before left off, or begins again."""
+    """A gas that is already going: every sample goes on where the one before left off, or begins
+    again."""
 
     def __init__(self, engine: Engine, scene: Scene) -> None:
         """Find out how many steps fill a sample."""
@@ -101,7 +119,8 @@ def foreseen(course: Sequence[tuple[int, float]], n: int) -> float:
 
 
 def exponent(n: Array, cost: Array) -> tuple[float, float, float]:
-    """p of cost ~ n^p from `FIT_FROM` disks on, low and high end of its 95 % interval; nan from fewer than 3 sizes."""
+    """p of cost ~ n^p from `FIT_FROM` disks on, low and high end of its 95 % interval; nan from
+    fewer than 3 sizes."""
     many = n >= FIT_FROM
     if many.sum() < 3:
         return np.nan, np.nan, np.nan
@@ -109,14 +128,20 @@ def exponent(n: Array, cost: Array) -> tuple[float, float, float]:
 
 
 def driving(engines: Mapping[str, Make], rounds: int, budget: float, seed: int) -> list[Sample]:
-    """Samples, s a step, of a world with one static disk: by (name, True) step by step, by (name, False) in one call.
+    """Samples, s a step, of a world with one static disk: by (name, True) step by step, by (name,
+    False) in one call.
 
-    What the second costs is the loop and the engine's own fixed cost of a step; what the first costs more is the call.
+    What the second costs is the loop and the engine's own fixed cost of a step; what the first
+    costs more is the call.
     """
-    idle = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[np.inf], restitution=1.0)
+    idle = lay_out(
+        position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[np.inf], restitution=1.0
+    )
     what: list[Timed] = []
     for name, make in engines.items():
-        what += [Timed((name, singly), _Idle(make, idle, singly), IDLE_STEPS) for singly in (True, False)]
+        what += [
+            Timed((name, singly), _Idle(make, idle, singly), IDLE_STEPS) for singly in (True, False)
+        ]
     return interleaved(what, rounds, budget, seed)
 
 

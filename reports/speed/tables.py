@@ -1,4 +1,5 @@
-"""What the samples and errors come to: points, orders, what an accuracy costs, sizes, options, the noise floor."""
+"""What the samples and errors come to: points, orders, what an accuracy costs, sizes, options, the
+noise floor."""
 
 from __future__ import annotations
 
@@ -26,38 +27,50 @@ def points(measured: Measured, seed: int) -> pd.DataFrame:
 
 
 def sweeps(measured: Measured, seed: int) -> pd.DataFrame:
-    """The columns of `summed`, and step_size: the sweeps over their values, and their engines over a ladder of dt."""
+    """The columns of `summed`, and step_size: the sweeps over their values, and their engines over
+    a ladder of dt."""
     if not (measured.errors.kind == SWEEP).any():
         return pd.DataFrame()
     found = summed(measured, SWEEP, seed)
-    places = {(sweep.name, str(value)): k for sweep in SWEEPS for k, value in enumerate(sweep.values)}
+    places = {
+        (sweep.name, str(value)): k for sweep in SWEEPS for k, value in enumerate(sweep.values)
+    }
     names = found.engine + ":" + found.profile
     turned = [places.get(who, -1) for who in zip(names, found.change)]
-    return found.assign(step_size=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan)
+    return found.assign(
+        step_size=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan
+    )
 
 
 def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
-    """As `pooled`, of cost and error over those of the matched engine at the dt at which its parameter is swept.
+    """As `pooled`, of cost and error over those of the matched engine at the dt at which its
+    parameter is swept.
 
-    change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no part in it.
+    change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no
+    part in it.
     """
     both = found.merge(beside(found), on=["scenario", "engine"], suffixes=("", "_here"))
     both = both[measurable(both)]
     for of in ("cost", "error"):
         both[of] /= both[f"{of}_here"]
-    parts = [pooled(group).assign(change=str(change)) for (_, change), group in both.groupby(["profile", "change"])]
+    parts = [
+        pooled(group).assign(change=str(change))
+        for (_, change), group in both.groupby(["profile", "change"])
+    ]
     return pd.concat(parts).sort_values("step_size", kind="stable") if parts else found.head(0)
 
 
 def without_ratio(found: pd.DataFrame) -> list[tuple[str, str]]:
-    """(engine, scenario) of the sweeps where the matched engine failed, was not timed, or is right to the last bit."""
+    """(engine, scenario) of the sweeps where the matched engine failed, was not timed, or is right
+    to the last bit."""
     here = beside(found)
     lost = here[~measurable(here)]
     return list(zip(lost.engine, lost.scenario))
 
 
 def beside(found: pd.DataFrame) -> pd.DataFrame:
-    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its parameter is swept."""
+    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its
+    parameter is swept."""
     dt = found[found.change != PLAIN].groupby("scenario").dt_s.first()
     here = found[(found.change == PLAIN) & (found.dt_s == found.scenario.map(dt))]
     both = here[["scenario", "engine", "cost", "error"]]
@@ -74,22 +87,33 @@ def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
 
     Columns: scenario, engine, profile, change, dt_s, substeps, until_s and duration_s (of the first
     seed, see `ladder.errors_of`), seeds, failed (how many), status and reason (of the
-    first that failed), error (median over the seeds, radii; inf where it failed) and its 95 % interval error_low,
-    error_high; cost (median, µs per simulated second; nan where not timed), its quartiles low and high, best,
-    wrapping, rounds.
+    first that failed), error (median over the seeds, radii; inf where it failed) and its 95 %
+    interval error_low, error_high; cost (median, µs per simulated second; nan where not timed), its
+    quartiles low and high, best, wrapping, rounds.
     """
     errors = measured.errors[measured.errors.kind == kind]
     keys, rows = ["scenario", *WHO, "change", "dt_s", "substeps"], []
     for key, group in errors.groupby(keys, sort=False):
         values, failed = group.error_radii.to_numpy(float), group[group.status != "ok"]
         low, high = median_interval(values, seed)
-        rows.append(dict(zip(keys, key)) | {
-            "until_s": group.until_s.iloc[0], "duration_s": group.duration_s.iloc[0],
-            "seeds": len(group), "failed": len(failed), "status": "ok" if failed.empty else failed.status.iloc[0],
-            "reason": "" if failed.empty else failed.reason.iloc[0],
-            "error": float(np.percentile(values, 50, method="higher" if np.isinf(values).any() else "linear")),
-            "error_low": low, "error_high": high,
-        })  # fmt: skip
+        rows.append(
+            dict(zip(keys, key))
+            | {
+                "until_s": group.until_s.iloc[0],
+                "duration_s": group.duration_s.iloc[0],
+                "seeds": len(group),
+                "failed": len(failed),
+                "status": "ok" if failed.empty else failed.status.iloc[0],
+                "reason": "" if failed.empty else failed.reason.iloc[0],
+                "error": float(
+                    np.percentile(
+                        values, 50, method="higher" if np.isinf(values).any() else "linear"
+                    )
+                ),
+                "error_low": low,
+                "error_high": high,
+            }
+        )
     return pd.DataFrame(rows).merge(times(measured, kind), on=keys[:-1], how="left")
 
 
@@ -100,7 +124,8 @@ def doublings(found: pd.DataFrame) -> pd.Series:
 
 
 def times(measured: Measured, kind: str) -> pd.DataFrame:
-    """scenario, engine, profile, change, dt_s, cost, low, high, best, wrapping (µs per simulated second), rounds."""
+    """scenario, engine, profile, change, dt_s, cost, low, high, best, wrapping (µs per simulated
+    second), rounds."""
     samples = measured.samples
     first = samples[(samples.kind == kind) & (samples.copy_of == 0)]
     return in_us(summed_up(first, ["scenario", *WHO, "change", "dt_s"]))
@@ -113,27 +138,44 @@ def in_us(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario and engine: slope, low, high, verdict, see `order.Order`; coarsest_error and finest_error in
-    radii (medians over the seeds), the latter at finest_dt_s; steps, how many were played, and failed, at how many of
-    them a draw failed: what failed has no part in slope and verdict.
+    """A row a scenario and engine: slope, low, high, verdict, see `order.Order`; coarsest_error and
+    finest_error in radii (medians over the seeds), the latter at finest_dt_s; steps, how many were
+    played, and failed, at how many of them a draw failed: what failed has no part in slope and
+    verdict.
     """
     rows = []
     for keys, dt, errors, changes in ladders(measured):
-        found = order_of(dt, errors, changes, seed) if errors.shape[1] >= 2 else Order(np.nan, np.nan, np.nan, "")
+        found = (
+            order_of(dt, errors, changes, seed)
+            if errors.shape[1] >= 2
+            else Order(np.nan, np.nan, np.nan, "")
+        )
         if not np.isfinite(errors).any():
             found = Order(np.nan, np.nan, np.nan, FAILED)
-        rows.append(dict(zip(["scenario", *WHO], keys)) | found._asdict() | {
-            "finest_dt_s": dt[-1], "steps": len(dt),
-            **dict(zip(("coarsest_error", "finest_error"), np.median(errors[:, [0, -1]], axis=0).tolist())),
-            "failed": int((~np.isfinite(errors)).any(axis=0).sum()),
-        })  # fmt: skip
+        rows.append(
+            dict(zip(["scenario", *WHO], keys))
+            | found._asdict()
+            | {
+                "finest_dt_s": dt[-1],
+                "steps": len(dt),
+                **dict(
+                    zip(
+                        ("coarsest_error", "finest_error"),
+                        np.median(errors[:, [0, -1]], axis=0).tolist(),
+                    )
+                ),
+                "failed": int((~np.isfinite(errors)).any(axis=0).sum()),
+            }
+        )
     return pd.DataFrame(rows)
 
 
 def no_nearer(fitted: pd.DataFrame) -> pd.Series:
-    """Of the rows of `orders`: whether from the coarsest to the finest step the error falls by less than a tenth.
+    """Of the rows of `orders`: whether from the coarsest to the finest step the error falls by less
+    than a tenth.
 
-    Not so where all steps failed, or where the finest is right to `FINEST`; a failed finest step is no nearer.
+    Not so where all steps failed, or where the finest is right to `FINEST`; a failed finest step is
+    no nearer.
     """
     falls = fitted.finest_error < NEARER * fitted.coarsest_error
     return ~falls & (fitted.finest_error > FINEST) & (fitted.failed < fitted.steps)
@@ -143,31 +185,45 @@ def ladders(measured: Measured) -> Iterator[tuple[tuple, np.ndarray, np.ndarray,
     """(scenario, engine, profile), dt (k,), errors and changes (seeds, k), coarse to fine."""
     errors = measured.errors[measured.errors.kind == SCENE]
     for keys, group in errors.groupby(["scenario", *WHO], sort=False):
-        wide = [group.pivot(index="seed", columns="substeps", values=value) for value in
-                ("error_radii", "change_radii")]  # fmt: skip
+        wide = [
+            group.pivot(index="seed", columns="substeps", values=value)
+            for value in ("error_radii", "change_radii")
+        ]
         dt = np.sort(group.dt_s.unique())[::-1]
         yield tuple(keys), dt, wide[0].to_numpy(float), wide[1].to_numpy(float)
 
 
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
-    """A row a scenario, engine and accuracy: accuracy (radii), cost (µs per simulated second), dt_s, why it is not, and
-    lost: it is not at any dt, or failed."""
-    verdicts: dict[tuple, str] = dict(zip(zip(fitted.scenario, fitted.engine, fitted.profile), fitted.verdict))
+    """A row a scenario, engine and accuracy: accuracy (radii), cost (µs per simulated second),
+    dt_s, why it is not, and lost: it is not at any dt, or failed."""
+    verdicts: dict[tuple, str] = dict(
+        zip(zip(fitted.scenario, fitted.engine, fitted.profile), fitted.verdict)
+    )
     rows = []
     for keys, group in found.groupby(["scenario", *WHO], sort=False):
         for name, accuracy in ACCURACIES.items():
-            dts, costs, errors = (group[column].to_numpy(float) for column in ("dt_s", "cost", "error"))
+            dts, costs, errors = (
+                group[column].to_numpy(float) for column in ("dt_s", "cost", "error")
+            )
             cost, dt, why = cost_to_reach(accuracy, dts, costs, errors, verdicts[tuple(keys)])
             if why == NOT_REACHED:
                 why = f"not down to dt {group.dt_s.min():.2g} s"
-            rows.append(dict(zip(["scenario", *WHO], keys)) | {
-                "accuracy": name, "cost": cost, "dt_s": dt, "why": why, "lost": why in (UNREACHABLE, FAILED),
-            })  # fmt: skip
+            rows.append(
+                dict(zip(["scenario", *WHO], keys))
+                | {
+                    "accuracy": name,
+                    "cost": cost,
+                    "dt_s": dt,
+                    "why": why,
+                    "lost": why in (UNREACHABLE, FAILED),
+                }
+            )
     return pd.DataFrame(rows)
 
 
 def noise(measured: Measured) -> pd.DataFrame:
-    """A row a scenario and engine: ratio of the median costs of an engine and its copy in the same rounds."""
+    """A row a scenario and engine: ratio of the median costs of an engine and its copy in the same
+    rounds."""
     samples = measured.samples[measured.samples.kind == SCENE]
     both = (
         summed_up(samples, ["scenario", *WHO, "dt_s", "copy_of"])
@@ -178,13 +234,18 @@ def noise(measured: Measured) -> pd.DataFrame:
 
 
 def driving(measured: Measured) -> pd.DataFrame:
-    """engine, profile, step_us and call_us: what a step and a call cost where there is nothing to do."""
+    """engine, profile, step_us and call_us: what a step and a call cost where there is nothing to
+    do."""
     idle = measured.samples[measured.samples.kind == IDLE]
     if idle.empty:
         return pd.DataFrame(columns=[*WHO, "step_us", "call_us"])
     # The fastest: a difference of medians of a busy machine may be of either sign.
-    wide = in_us(summed_up(idle, [*WHO, "singly"])).pivot(index=WHO, columns="singly", values="best")
-    return in_order(pd.DataFrame({"step_us": wide[False], "call_us": wide[True] - wide[False]}).reset_index())
+    wide = in_us(summed_up(idle, [*WHO, "singly"])).pivot(
+        index=WHO, columns="singly", values="best"
+    )
+    return in_order(
+        pd.DataFrame({"step_us": wide[False], "call_us": wide[True] - wide[False]}).reset_index()
+    )
 
 
 def in_order(table: pd.DataFrame) -> pd.DataFrame:
@@ -195,25 +256,33 @@ def in_order(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """(engine, profile, n, cost in µs a step and so on) and (engine, profile, exponent, low, high, stopped)."""
+    """(engine, profile, n, cost in µs a step and so on) and (engine, profile, exponent, low, high,
+    stopped)."""
     samples = measured.samples[measured.samples.kind == SIZE]
     costs = in_us(summed_up(samples, [*WHO, "n"])).sort_values("n", kind="stable")
     costs = in_order(costs.reset_index(drop=True))
     rows = []
     timed = (costs.engine + ":" + costs.profile).tolist()
-    for name in dict.fromkeys([*timed, *(name for name, _ in measured.stopped)]):  # some have not even the fewest disks
+    # some have not even the fewest disks
+    for name in dict.fromkeys([*timed, *(name for name, _ in measured.stopped)]):
         engine, profile = name.split(":")
         group = costs[(costs.engine == engine) & (costs.profile == profile)]
         fitted = exponent(group.n.to_numpy(float), group.cost.to_numpy(float))
         ends = [f"{n}: {why}" for (who, n), why in measured.stopped.items() if who == name]
-        rows.append({"engine": engine, "profile": profile} | dict(zip(("exponent", "low", "high"), fitted)) | {
-            "most": int(group.n.max()) if len(group) else 0, "stopped": ends[0] if ends else "",
-        })  # fmt: skip
+        rows.append(
+            {"engine": engine, "profile": profile}
+            | dict(zip(("exponent", "low", "high"), fitted))
+            | {
+                "most": int(group.n.max()) if len(group) else 0,
+                "stopped": ends[0] if ends else "",
+            }
+        )
     return costs, pd.DataFrame(rows)
 
 
 def options(measured: Measured) -> pd.DataFrame:
-    """A row a scenario, engine and change: cost and error, each over the unchanged engine's; and both errors."""
+    """A row a scenario, engine and change: cost and error, each over the unchanged engine's; and
+    both errors."""
     samples = measured.samples[measured.samples.kind == OPTION]
     errors = measured.errors[measured.errors.kind == OPTION]
     if samples.empty or errors.empty:
@@ -225,7 +294,9 @@ def options(measured: Measured) -> pd.DataFrame:
     plain = table[table.change == PLAIN][["scenario", *WHO, "error_radii", "cost"]]
     both = table[table.change != PLAIN].merge(plain, on=["scenario", *WHO], suffixes=("", "_plain"))
     both["cost_ratio"] = both.cost / both.cost_plain
-    both["error_ratio"] = both.error_radii / both.error_radii_plain.where(both.error_radii_plain > 0)
+    both["error_ratio"] = both.error_radii / both.error_radii_plain.where(
+        both.error_radii_plain > 0
+    )
     return both
 
 

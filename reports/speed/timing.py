@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-LEAST = 1e-3  # s a sample lasts at least: some 10 000 ticks of the clock, so that reading it weighs nothing
+# s a sample lasts at least: some 10 000 ticks of the clock, so that reading it weighs nothing
+LEAST = 1e-3
 MOST_RUNS = 20  # in one sample, as making ready takes time, too
 FEWEST_ROUNDS = 3  # of a run so long that its time is used up earlier
 WARM_UP = -1  # the round that is stored, but not counted
@@ -23,7 +24,8 @@ class Spent(NamedTuple):
 
 
 class Timed(NamedTuple):
-    """One thing to be timed: `run` makes ready, runs once, and returns what it spent; one run is `amount` of something.
+    """One thing to be timed: `run` makes ready, runs once, and returns what it spent; one run is
+    `amount` of something.
 
     `amount` is in the unit in which the cost is given: simulated seconds, or steps.
     """
@@ -34,7 +36,8 @@ class Timed(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """One measurement: whose, in which round and place of it, s per unit of amount, and over how many runs."""
+    """One measurement: whose, in which round and place of it, s per unit of amount, and over how
+    many runs."""
 
     key: Any
     round: int
@@ -45,11 +48,12 @@ class Sample(NamedTuple):
 
 
 def interleaved(what: Sequence[Timed], rounds: int, budget: float, seed: int) -> list[Sample]:
-    """Samples of all of `what`, warm-up round first; each round visits all of it, in an order drawn anew.
+    """Samples of all of `what`, warm-up round first; each round visits all of it, in an order drawn
+    anew.
 
-    What has spent `budget` s of its own sits out the rounds left, but never the first `FEWEST_ROUNDS`. Slow change
-    of the machine (heat, clock, neighbours) thus meets all alike. The garbage collector is off meanwhile, as in
-    `timeit`.
+    What has spent `budget` s of its own sits out the rounds left, but never the first
+    `FEWEST_ROUNDS`. Slow change of the machine (heat, clock, neighbours) thus meets all alike. The
+    garbage collector is off meanwhile, as in `timeit`.
     """
     rng = np.random.default_rng(seed)
     spent = {one.key: 0.0 for one in what}
@@ -82,11 +86,18 @@ def sampled(one: Timed, k: int, place: int) -> Sample:
 
 
 def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Columns `by`, then cost (the median), low, high (quartiles), best (the minimum), wrapping, rounds; no warm-up."""
+    """Columns `by`, then cost (the median), low, high (quartiles), best (the minimum), wrapping,
+    rounds; no warm-up."""
     counted = samples[samples["round"] != WARM_UP].groupby(list(by), sort=False)
     cost = counted["cost"]
-    table = pd.DataFrame({
-        "cost": cost.median(), "low": cost.quantile(0.25), "high": cost.quantile(0.75), "best": cost.min(),
-        "wrapping": counted["wrapping"].median(), "rounds": cost.size(),
-    })  # fmt: skip
+    table = pd.DataFrame(
+        {
+            "cost": cost.median(),
+            "low": cost.quantile(0.25),
+            "high": cost.quantile(0.75),
+            "best": cost.min(),
+            "wrapping": counted["wrapping"].median(),
+            "rounds": cost.size(),
+        }
+    )
     return table.reset_index()

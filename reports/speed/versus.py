@@ -1,7 +1,9 @@
-"""What every engine with end-of-step detection costs over this project's own solver, scene by scene, at its cheapest.
+"""What every engine with end-of-step detection costs over this project's own solver, scene by
+scene, at its cheapest.
 
-Our own solver must not be called the cheapest by a pooled number alone: here is every scene in which it is not, with
-and without what an idle step costs (the binding and the engine's fixed cost), and for every changed setting measured.
+Our own solver must not be called the cheapest by a pooled number alone: here is every scene in
+which it is not, with and without what an idle step costs (the binding and the engine's fixed cost),
+and for every changed setting measured.
 """
 
 from __future__ import annotations
@@ -15,22 +17,37 @@ from reports.speed.plan import PLAIN
 OWN = "reference:exercise"
 COMPARED = tuple(name for name in MECHANISMS if name != OWN)
 COLUMNS = [
-    "engine", "profile", "change", "scenes", "ratio", "low", "high", "cheaper", "cheaper_in", "bare_cheaper",
-    "bare_cheaper_in", "not_timed_in",
-]  # fmt: skip
+    "engine",
+    "profile",
+    "change",
+    "scenes",
+    "ratio",
+    "low",
+    "high",
+    "cheaper",
+    "cheaper_in",
+    "bare_cheaper",
+    "bare_cheaper_in",
+    "not_timed_in",
+]
 KEYS = ["engine", "profile", "change"]
 
 
 def against_own(points: pd.DataFrame, options: pd.DataFrame) -> pd.DataFrame:
-    """A row an engine with end-of-step detection, and one each of its changed settings, of `COLUMNS`.
+    """A row an engine with end-of-step detection, and one each of its changed settings, of
+    `COLUMNS`.
 
-    ratio, low, high: its cost over that of `OWN` at the same steps, geometric mean, least and most over the scenes;
-    cheaper: in how many scenes it costs less, and bare_cheaper: less where an idle step is taken off both (nan where
-    that is not known); scenes: in how many both were timed, and not_timed_in those in which one was not.
+    ratio, low, high: its cost over that of `OWN` at the same steps, geometric mean, least and most
+        over the scenes;
+    cheaper: in how many scenes it costs less, and bare_cheaper: less where an idle step is taken
+    off both (nan where that is not known); scenes: in how many both were timed, and not_timed_in
+    those in which one was not.
     """
     plain = points.assign(change=PLAIN, name=points.engine + ":" + points.profile)
     at = ["scenario", "dt_s"]
-    own = plain[plain.name == OWN][[*at, "cost", "idle"]].rename(columns={"cost": "own", "idle": "own_idle"})
+    own = plain[plain.name == OWN][[*at, "cost", "idle"]].rename(
+        columns={"cost": "own", "idle": "own_idle"}
+    )
     both = plain[plain.name.isin(COMPARED)].merge(own, on=at, how="left")
     if own.empty or both.empty:
         return pd.DataFrame(columns=COLUMNS)
@@ -40,8 +57,8 @@ def against_own(points: pd.DataFrame, options: pd.DataFrame) -> pd.DataFrame:
 
 
 def options_over_own(options: pd.DataFrame) -> pd.DataFrame:
-    """scenario, engine, profile, change, cost and own of every changed setting of `COMPARED`, timed in the same
-    rounds."""
+    """scenario, engine, profile, change, cost and own of every changed setting of `COMPARED`, timed
+    in the same rounds."""
     names = options.engine + ":" + options.profile
     own = options[names == OWN].groupby("scenario").cost_plain.first()
     changed = options[names.isin(COMPARED)]
@@ -58,8 +75,13 @@ def row_of(group: pd.DataFrame) -> dict[str, object]:
     bare = bare.groupby(group.scenario, sort=False).mean().dropna()
     cheaper, bare_cheaper = timed[timed < 1].index, bare[bare < 0].index
     return known | {
-        "scenes": len(timed), "ratio": np.exp(np.log(timed).mean()), "low": timed.min(), "high": timed.max(),
-        "cheaper": len(cheaper), "cheaper_in": " ".join(cheaper),
-        "bare_cheaper": len(bare_cheaper) if len(bare) else np.nan, "bare_cheaper_in": " ".join(bare_cheaper),
+        "scenes": len(timed),
+        "ratio": np.exp(np.log(timed).mean()),
+        "low": timed.min(),
+        "high": timed.max(),
+        "cheaper": len(cheaper),
+        "cheaper_in": " ".join(cheaper),
+        "bare_cheaper": len(bare_cheaper) if len(bare) else np.nan,
+        "bare_cheaper_in": " ".join(bare_cheaper),
         "not_timed_in": " ".join(ratios[ratios.isna()].index),
-    }  # fmt: skip
+    }

@@ -1,9 +1,10 @@
-"""Which mechanisms of an engine suffice for its limit: the reference with these alone works and fails where the engine
-does.
+"""Which mechanisms of an engine suffice for its limit: the reference with these alone works and
+fails where the engine does.
 
 What an engine does otherwise than exact flight with end-of-step detection is a table of mechanisms
-(`adapters.mechanisms.table`), each of them to be switched on in `adapters.mechanisms.ablated_reference`.
-An ablation is the reference with some; one that has the engine's limit shows the cause.
+(`adapters.mechanisms.table`), each of them to be switched on in
+`adapters.mechanisms.ablated_reference`. An ablation is the reference with some; one that has the
+engine's limit shows the cause.
 """
 
 from __future__ import annotations
@@ -36,11 +37,15 @@ from scenarios.model import Scenario
 END_OF_STEP = "end-of-step detection"  # the ablation without any mechanism
 ACTS_AT_END = "a collision takes effect at the end of the step in which it is found"
 MOST = 300  # disks: the ablated reference asks all pairs
-NEAR = 2.0  # where an engine works nowhere, its ablation must read as much as it does, to this factor
+# where an engine works nowhere, its ablation must read as much as it does, to this factor
+NEAR = 2.0
 
 B2_SETTINGS, B2_TYPES = "Box2D 2.3 Common/b2Settings.h: ", "Box2D 3.1 src/types.c: "
 THRESHOLD = "collisions that close at less than 1 m/s are played as inelastic"
-THRESHOLDS = {"box2d": B2_SETTINGS + "b2_velocityThreshold", "box2d_v3": B2_TYPES + "restitutionThreshold"}
+THRESHOLDS = {
+    "box2d": B2_SETTINGS + "b2_velocityThreshold",
+    "box2d_v3": B2_TYPES + "restitutionThreshold",
+}
 PRODUCT = "the elasticities of the two shapes are multiplied: e on every shape gives e²"
 OF_PYMUNK = "Munk2D src/cpArbiter.c, cpArbiterUpdate"
 TOGETHER = "the contacts of a step get their impulses together, in the engine's own order of stages"
@@ -48,14 +53,24 @@ OWN_ORDER = "adapters/mechanisms/ablated.py, from the engine's own step"
 AT_ONCE = "an overlap is undone at once, so that disks move that have struck nothing yet"
 SENTENCES = (
     (END_OF_STEP, "*", ACTS_AT_END, "contacts are detected once per step"),
-    (FLIGHT, "*", "under a force a step moves a disk by other than v dt + a dt² / 2", "alpha of ENGINES"),
+    (
+        FLIGHT,
+        "*",
+        "under a force a step moves a disk by other than v dt + a dt² / 2",
+        "alpha of ENGINES",
+    ),
     (RESTITUTION, "pymunk:*", PRODUCT, OF_PYMUNK),
     (RESTITUTION, "box2d:*", THRESHOLD, THRESHOLDS["box2d"]),
     (RESTITUTION, "box2d_v3:*", THRESHOLD, THRESHOLDS["box2d_v3"]),
     (IMPULSE, "reference:*", "walls come first, then pairs", "reference_impl/lesson.py"),
     (IMPULSE, "*", TOGETHER, OWN_ORDER),
     (POSITION_CORRECTION, "reference:*", AT_ONCE, "exercise 11, task 2"),
-    (POSITION_CORRECTION, "*", "overlaps are corrected gradually, apart from the motion", OWN_ORDER),
+    (
+        POSITION_CORRECTION,
+        "*",
+        "overlaps are corrected gradually, apart from the motion",
+        OWN_ORDER,
+    ),
     (FRICTION, "*", "friction takes speed along the contact", "the engine's default"),
     (SKIN, "*", "walls are thicker than they are drawn", B2_SETTINGS + "b2_polygonRadius"),
     (DIGITS, "*", "numbers are float32", "IEEE 754"),
@@ -64,11 +79,11 @@ SENTENCES = (
 
 
 def sufficient_mechanisms(search: Search, limit: Limit) -> str:
-    """The fewest mechanisms with which the reference has the limit, as text; `END_OF_STEP` for none of them; "" if
-    there are none, or no ablation can be played.
+    """The fewest mechanisms with which the reference has the limit, as text; `END_OF_STEP` for none
+    of them; "" if there are none, or no ablation can be played.
 
-    First end-of-step detection alone, then every mechanism by itself (with those it acts on), then all less what is not
-    needed.
+    First end-of-step detection alone, then every mechanism by itself (with those it acts on), then
+    all less what is not needed.
     """
     ablations = Ablations.of(search, limit)
     if ablations is None:
@@ -83,8 +98,8 @@ def sufficient_mechanisms(search: Search, limit: Limit) -> str:
 
 @dataclass(frozen=True)
 class Ablations:
-    """A case with the scenarios that fail and work next to a limit, the engine's mechanisms, and what is read off its
-    run.
+    """A case with the scenarios that fail and work next to a limit, the engine's mechanisms, and
+    what is read off its run.
 
     Attributes:
         bad: the first run that failed.
@@ -100,7 +115,11 @@ class Ablations:
     @staticmethod
     def of(search: Search, limit: Limit) -> Ablations | None:
         """None where nothing failed or was played at all, or nothing is known of the engine."""
-        seen, failing, (name, *changed) = search.failure(limit), limit.failing, search.engine.split("+")
+        seen, failing, (name, *changed) = (
+            search.failure(limit),
+            limit.failing,
+            search.engine.split("+"),
+        )
         if seen is None or failing is None or seen[1].trajectory is None or name not in MECHANISMS:
             return None
         judged, run = seen
@@ -109,9 +128,13 @@ class Ablations:
         good = [] if isnan(limit.works_at) else [scene(limit.works_at, run) for run in range(runs)]
         if bad.scene.n > MOST:
             return None
-        known = [] if changed else mechanisms_of(name, run.settings, bad.scene, bad.dt(bad.substeps[0]))
+        known = (
+            [] if changed else mechanisms_of(name, run.settings, bad.scene, bad.dt(bad.substeps[0]))
+        )
         mechanisms = [mechanism for mechanism in known if mechanism.parameters]
-        return Ablations(search.case, bad, good, mechanisms, judge(search.case.predicate, judged, run))
+        return Ablations(
+            search.case, bad, good, mechanisms, judge(search.case.predicate, judged, run)
+        )
 
     def simple(self) -> Iterator[list[Mechanism]]:
         """None, then each with those it acts on."""
@@ -120,16 +143,20 @@ class Ablations:
             yield [*(each for each in self.mechanisms if each.name in mechanism.on_top), mechanism]
 
     def needed(self) -> Sequence[Mechanism]:
-        """All mechanisms less those without which, one after the other, the ablation still has the limit."""
+        """All mechanisms less those without which, one after the other, the ablation still has the
+        limit."""
         left = list(self.mechanisms)
         for mechanism in self.mechanisms:
-            fewer = [each for each in left if each is not mechanism and mechanism.name not in each.on_top]
+            fewer = [
+                each for each in left if each is not mechanism and mechanism.name not in each.on_top
+            ]
             if self.alike(fewer):
                 left = fewer
         return left
 
     def alike(self, mechanisms: Sequence[Mechanism]) -> bool:
-        """Whether the ablation breaks what the engine breaks where that fails, and works where it works."""
+        """Whether the ablation breaks what the engine breaks where that fails, and works where it
+        works."""
         reading = self.read(self.bad, mechanisms)
         if not reading.failed or reading.broken != self.reading.broken:
             return False
@@ -147,11 +174,20 @@ class Ablations:
 def reason_by_ablation(limit: Limit) -> tuple[str, str, str]:
     """The reason that the ablation gives, where it stands, and how it was tested."""
     names = limit.mechanisms.split(", ")
-    rows = [next(row for row in SENTENCES if row[0] == name and fnmatch(limit.engine, row[1])) for name in names]
+    rows = [
+        next(row for row in SENTENCES if row[0] == name and fnmatch(limit.engine, row[1]))
+        for name in names
+    ]
     text, source = ("; ".join(dict.fromkeys(row[k] for row in rows)) for k in (2, 3))
     if limit.mechanisms == END_OF_STEP:
-        return text, source, "the reference with end-of-step detection and nothing else has this limit"
-    tested = f"the reference with end-of-step detection and the engine's {listed(names)} has this limit"
+        return (
+            text,
+            source,
+            "the reference with end-of-step detection and nothing else has this limit",
+        )
+    tested = (
+        f"the reference with end-of-step detection and the engine's {listed(names)} has this limit"
+    )
     return text, source, tested
 
 

@@ -1,4 +1,5 @@
-"""Cases of one disk and what it meets: a floor under gravity, a spring, itself; another size, another place."""
+"""Cases of one disk and what it meets: a floor under gravity, a spring, itself; another size,
+another place."""
 
 from __future__ import annotations
 
@@ -11,7 +12,13 @@ from adapters.engine import Unsupported
 from adapters.play import Run, fault_of, gather
 from reports.stability.limits import Case
 from reports.stability.phases import EDGE, phase, sampled
-from reports.stability.predicates import ANGLE_OFF, BOUNCES_OFF, SCALED_DEVIATION, SPRING_GROWS, STRAYS
+from reports.stability.predicates import (
+    ANGLE_OFF,
+    BOUNCES_OFF,
+    SCALED_DEVIATION,
+    SPRING_GROWS,
+    STRAYS,
+)
 from reports.stability.variants import Variant, with_variant
 from scenarios.families.placing import lay_out
 from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
@@ -25,11 +32,12 @@ OSCILLATION = 400  # steps
 
 
 def ball(x: float, run: int) -> Scenario:
-    """A ball at e = 1 dropped over a floor, seen some two dozen times a flight; x = dt over the time of the fall.
+    """A ball at e = 1 dropped over a floor, seen some two dozen times a flight; x = dt over the
+    time of the fall.
 
-    The runs differ in height, which decides how a step is rounded, and in the phase of the first collision in its step:
-    where a fall lasts a whole number of steps, some methods are flattered. Their dt over the time of the fall is x, or
-    less by up to a step of the fall.
+    The runs differ in height, which decides how a step is rounded, and in the phase of the first
+    collision in its step: where a fall lasts a whole number of steps, some methods are flattered.
+    Their dt over the time of the fall is x, or less by up to a step of the fall.
     """
     height = HEIGHT * (1 + 0.01 * sampled(seed=1)[run])
     fall = sqrt(2 * height / G)
@@ -38,9 +46,14 @@ def ball(x: float, run: int) -> Scenario:
     interval = every * dt
     samples = round(FALLS * fall / interval)
     scene = lay_out(
-        position=[[0, RADIUS + height]], velocity=[[0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0,
-        gravity=[0, -G], walls=[[[-4, 0], [4, 0]]],
-    )  # fmt: skip
+        position=[[0, RADIUS + height]],
+        velocity=[[0, 0]],
+        radius=[RADIUS],
+        mass=[1.0],
+        restitution=1.0,
+        gravity=[0, -G],
+        walls=[[[-4, 0], [4, 0]]],
+    )
 
     def truth(t: Array) -> Trajectory:
         legs = bouncing(height, G, 1.0, t[-1])
@@ -49,30 +62,44 @@ def ball(x: float, run: int) -> Scenario:
         return answer(scene, t, (position, velocity), legs.wall_collisions(0, (0,), 1.0, 1.0))
 
     return Scenario(
-        "ball", "Does it come back?", "the bouncing ball in closed form", scene, samples * interval, interval, (every,),
+        "ball",
+        "Does it come back?",
+        "the bouncing ball in closed form",
+        scene,
+        samples * interval,
+        interval,
+        (every,),
         truth=truth,
-    )  # fmt: skip
+    )
 
 
 def scaled(x: float, _run: int) -> Scenario:
-    """Two disks of x / 2 m meet head-on at 4 x m/s, e = 1: at x = 1 they close at 4 m/s, in 1/60 s by 0.13 radii."""
+    """Two disks of x / 2 m meet head-on at 4 x m/s, e = 1: at x = 1 they close at 4 m/s, in 1/60 s
+    by 0.13 radii."""
     radius, speed = 0.5 * x, 4.0 * x
     scene = lay_out(
-        position=[[-2.2 * x, 0], [0, 0]], velocity=[[speed, 0], [0, 0]], radius=[radius, radius], mass=[1.0, 1.0],
+        position=[[-2.2 * x, 0], [0, 0]],
+        velocity=[[speed, 0], [0, 0]],
+        radius=[radius, radius],
+        mass=[1.0, 1.0],
         restitution=1.0,
-    )  # fmt: skip
+    )
 
     def truth(t: Array) -> Trajectory:
         legs, impulse = pair(scene.position, scene.velocity, scene.radius, scene.mass, 1.0)
         collisions: list[Collision] = [(float(legs.start[1]), 0, 1, float(impulse[0]))]
         return answer(scene, t, legs.at(t), collisions)
 
-    return Scenario("scaled", "Is it the same scene?", "similarity", scene, 1.0, 1 / 60, (1,), truth=truth)
+    return Scenario(
+        "scaled", "Is it the same scene?", "similarity", scene, 1.0, 1 / 60, (1,), truth=truth
+    )
 
 
 def far(x: float, _run: int) -> Scenario:
     """A disk flies x m from the origin at 1 m/s, for 1 s in steps of 1/240 s."""
-    scene = lay_out(position=[[x, 0]], velocity=[[1.0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0)
+    scene = lay_out(
+        position=[[x, 0]], velocity=[[1.0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0
+    )
 
     def truth(t: Array) -> Trajectory:
         return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity))
@@ -84,29 +111,48 @@ def spinning(x: float, _run: int) -> Scenario:
     """A disk turns by x rad a step."""
     dt = 1 / 64
     scene = lay_out(
-        position=[[0, 0]], velocity=[[1.0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0, angular_velocity=[x / dt]
+        position=[[0, 0]],
+        velocity=[[1.0, 0]],
+        radius=[RADIUS],
+        mass=[1.0],
+        restitution=1.0,
+        angular_velocity=[x / dt],
     )
 
     def truth(t: Array) -> Trajectory:
         return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity))
 
-    return Scenario("spinning", "Does it turn as it spins?", "theta + w t", scene, 0.5, dt, (1,), truth=truth)
+    return Scenario(
+        "spinning", "Does it turn as it spins?", "theta + w t", scene, 0.5, dt, (1,), truth=truth
+    )
 
 
 def oscillator(x: float, _run: int) -> Scenario:
     """A disk of 1 kg on a spring of 1 N/m, so that w = 1 rad/s; x = w dt."""
-    scene = lay_out(position=[[1.0, 0]], velocity=[[0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0)
+    scene = lay_out(
+        position=[[1.0, 0]], velocity=[[0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0
+    )
 
     def truth(t: Array) -> Trajectory:
         position, velocity = np.zeros((len(t), 1, 2)), np.zeros((len(t), 1, 2))
         position[:, 0, 0], velocity[:, 0, 0] = np.cos(t), -np.sin(t)
         return answer(scene, t, (position, velocity))
 
-    return Scenario("oscillator", "Does it keep its swing?", "cos w t", scene, OSCILLATION * x, x, (1,), truth=truth)
+    return Scenario(
+        "oscillator",
+        "Does it keep its swing?",
+        "cos w t",
+        scene,
+        OSCILLATION * x,
+        x,
+        (1,),
+        truth=truth,
+    )
 
 
 def on_spring(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
-    """Play a disk whose force -x N is read off its position before every step, as a user of an engine writes it."""
+    """Play a disk whose force -x N is read off its position before every step, as a user of an
+    engine writes it."""
     states: list[State] = []
     status, reason, settings = "ok", "", {}
     with closing(variant.make()) as engine:
@@ -126,7 +172,14 @@ def on_spring(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
     name, profile = variant.name.split(":")
     trajectory = gather(scenario, states, NO_COLLISIONS) if states else None
     return scenario, Run(
-        name, profile, scenario.name, scenario.sample_interval, status, reason, trajectory, settings=settings
+        name,
+        profile,
+        scenario.name,
+        scenario.sample_interval,
+        status,
+        reason,
+        trajectory,
+        settings=settings,
     )
 
 
@@ -134,31 +187,67 @@ DECADES = (1.0, 10.0, 100.0, 1e3, 3e3, 1e4, 3e4, 1e5, 1e6, 1e7, 1e8)
 
 ALONE = (
     Case(
-        "bounce_drift", FAMILY, "Up to which dt does a ball at e = 1 come back to its height?",
-        "dt / fall time", "1", (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2),
-        ball, BOUNCES_OFF, runs=16,
+        "bounce_drift",
+        FAMILY,
+        "Up to which dt does a ball at e = 1 come back to its height?",
+        "dt / fall time",
+        "1",
+        (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2),
+        ball,
+        BOUNCES_OFF,
+        runs=16,
         also=(*with_variant("16_substeps"), *with_variant("position_correction")),
     ),
     Case(
-        "scale_up", FAMILY, "How much larger may a scene be made and stay the same?",
-        "scale", "1", (1.0, 3.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3), scaled, SCALED_DEVIATION,
+        "scale_up",
+        FAMILY,
+        "How much larger may a scene be made and stay the same?",
+        "scale",
+        "1",
+        (1.0, 3.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3),
+        scaled,
+        SCALED_DEVIATION,
     ),
     Case(
-        "scale_down", FAMILY, "How much smaller may a scene be made and stay the same?",
-        "scale", "1", (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3), scaled, SCALED_DEVIATION,
+        "scale_down",
+        FAMILY,
+        "How much smaller may a scene be made and stay the same?",
+        "scale",
+        "1",
+        (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3),
+        scaled,
+        SCALED_DEVIATION,
     ),
     Case(
-        "far_from_origin", FAMILY, "How far from the origin may a disk at 1 m/s be and still fly on?",
-        "offset", "m", DECADES, far, STRAYS,
+        "far_from_origin",
+        FAMILY,
+        "How far from the origin may a disk at 1 m/s be and still fly on?",
+        "offset",
+        "m",
+        DECADES,
+        far,
+        STRAYS,
     ),
     Case(
-        "spin", FAMILY, "How fast may a disk spin?",
-        "w dt", "rad", (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0), spinning, ANGLE_OFF,
+        "spin",
+        FAMILY,
+        "How fast may a disk spin?",
+        "w dt",
+        "rad",
+        (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0),
+        spinning,
+        ANGLE_OFF,
         also=with_variant("16_substeps"),
     ),
     Case(
-        "stiff_force", FAMILY, "How stiff may a spring be whose force is read off the positions before each step?",
-        "w dt", "1", (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0), oscillator, SPRING_GROWS,
+        "stiff_force",
+        FAMILY,
+        "How stiff may a spring be whose force is read off the positions before each step?",
+        "w dt",
+        "1",
+        (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0),
+        oscillator,
+        SPRING_GROWS,
         play=on_spring,
     ),
-)  # fmt: skip
+)

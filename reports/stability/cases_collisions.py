@@ -9,7 +9,12 @@ import numpy as np
 
 from reports.stability.limits import Case
 from reports.stability.phases import phase
-from reports.stability.predicates import COLLISIONS_MISSED, COLLISIONS_SPURIOUS, RESTITUTION_OFF, VELOCITY_OFF
+from reports.stability.predicates import (
+    COLLISIONS_MISSED,
+    COLLISIONS_SPURIOUS,
+    RESTITUTION_OFF,
+    VELOCITY_OFF,
+)
 from reports.stability.variants import with_variant
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
@@ -18,17 +23,28 @@ from scenarios.truth.closed_forms import answer, flight, pair
 FAMILY = "One collision"
 RADIUS, DT = 0.25, 1 / 64
 LEAD, AFTER = 3, 6  # whole steps before the step of the collision, and after it
-PHASES = 32  # runs at a value, each with the collision elsewhere in its step: a run is a millisecond
-SOURCE = "momentum, and Newton's restitution along the line of centres (Landau & Lifshitz, Mechanics, 17)"
+# runs at a value, each with the collision elsewhere in its step: a run is a millisecond
+PHASES = 32
+SOURCE = (
+    "momentum, and Newton's restitution along the line of centres (Landau & Lifshitz,"
+    " Mechanics, 17)"
+)
 FAST = (0.125, 0.25, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0, 5.66, 8.0, 11.3, 16.0, 22.6, 32.0)
 BULLETS = with_variant("bullets")
 
 
 def flyby(
-    speed: float, run: int, *, offset: float = 0.0, e: float = 1.0, mass: float = 1.0,
-    radius: float = RADIUS, dt: float = DT,
-) -> Scenario:  # fmt: skip
-    """Disk 0 flies at disk 1, which rests at the origin, and is there after `LEAD` steps; offset over the reach."""
+    speed: float,
+    run: int,
+    *,
+    offset: float = 0.0,
+    e: float = 1.0,
+    mass: float = 1.0,
+    radius: float = RADIUS,
+    dt: float = DT,
+) -> Scenario:
+    """Disk 0 flies at disk 1, which rests at the origin, and is there after `LEAD` steps; offset
+    over the reach."""
     reach = radius + RADIUS
     touch = -reach * np.sqrt(max(0.0, 1 - offset**2))
     start = touch - speed * dt * (LEAD + phase(run))
@@ -53,9 +69,13 @@ def wall_collision(speed: float, run: int) -> Scenario:
     """A disk flies at a wall, a segment without thickness through the origin."""
     start = -RADIUS - speed * DT * (LEAD + phase(run))
     scene = lay_out(
-        position=[[start, 0]], velocity=[[speed, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0,
+        position=[[start, 0]],
+        velocity=[[speed, 0]],
+        radius=[RADIUS],
+        mass=[1.0],
+        restitution=1.0,
         walls=[[[0, -4], [0, 4]]],
-    )  # fmt: skip
+    )
 
     def truth(t: Array) -> Trajectory:
         x, v = flight(t[:, None, None], scene.position, scene.velocity)
@@ -67,7 +87,9 @@ def wall_collision(speed: float, run: int) -> Scenario:
     return stepped("wall-collision", "Is the wall found?", scene, DT, truth)
 
 
-def stepped(name: str, asks: str, scene: Scene, dt: float, truth: Callable[[Array], Trajectory]) -> Scenario:
+def stepped(
+    name: str, asks: str, scene: Scene, dt: float, truth: Callable[[Array], Trajectory]
+) -> Scenario:
     """A scenario of a few steps, seen at every one."""
     steps = LEAD + 1 + AFTER
     return Scenario(name, asks, SOURCE, scene, steps * dt, dt, (1,), truth=truth)
@@ -115,44 +137,107 @@ def with_restitution(x: float, run: int) -> Scenario:
 
 COLLISIONS = (
     Case(
-        "tunnelling_head_on", FAMILY, "How far may a disk fly in a step without missing a disk head-on?",
-        "v dt / R", "1", FAST, at_speed, COLLISIONS_MISSED, runs=PHASES, also=BULLETS,
+        "tunnelling_head_on",
+        FAMILY,
+        "How far may a disk fly in a step without missing a disk head-on?",
+        "v dt / R",
+        "1",
+        FAST,
+        at_speed,
+        COLLISIONS_MISSED,
+        runs=PHASES,
+        also=BULLETS,
     ),
     Case(
-        "tunnelling_offset", FAMILY, "And off centre, by 0.7 of the sum of the radii?",
-        "v dt / R", "1", FAST, partial(at_speed, offset=0.7), COLLISIONS_MISSED, runs=PHASES, also=BULLETS,
+        "tunnelling_offset",
+        FAMILY,
+        "And off centre, by 0.7 of the sum of the radii?",
+        "v dt / R",
+        "1",
+        FAST,
+        partial(at_speed, offset=0.7),
+        COLLISIONS_MISSED,
+        runs=PHASES,
+        also=BULLETS,
     ),
     Case(
-        "tunnelling_thin_wall", FAMILY, "How far may a disk fly in a step without missing a wall?",
-        "v dt / R", "1", FAST, wall_at_speed, COLLISIONS_MISSED, runs=PHASES, also=BULLETS,
+        "tunnelling_thin_wall",
+        FAMILY,
+        "How far may a disk fly in a step without missing a wall?",
+        "v dt / R",
+        "1",
+        FAST,
+        wall_at_speed,
+        COLLISIONS_MISSED,
+        runs=PHASES,
+        also=BULLETS,
     ),
     Case(
-        "tunnelling_thick_wall", FAMILY, "And if the wall is ten radii thick, a static disk?",
-        "v dt / R", "1", FAST, thick_wall, COLLISIONS_MISSED, runs=PHASES, also=BULLETS,
+        "tunnelling_thick_wall",
+        FAMILY,
+        "And if the wall is ten radii thick, a static disk?",
+        "v dt / R",
+        "1",
+        FAST,
+        thick_wall,
+        COLLISIONS_MISSED,
+        runs=PHASES,
+        also=BULLETS,
     ),
     Case(
-        "grazing", FAMILY, "How near to grazing may a collision at v dt / R = 0.2 be and still be found?",
-        "1 - b / 2R", "1", (0.5, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4), grazing, COLLISIONS_MISSED,
-        runs=PHASES, also=BULLETS,
+        "grazing",
+        FAMILY,
+        "How near to grazing may a collision at v dt / R = 0.2 be and still be found?",
+        "1 - b / 2R",
+        "1",
+        (0.5, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4),
+        grazing,
+        COLLISIONS_MISSED,
+        runs=PHASES,
+        also=BULLETS,
     ),
     Case(
-        "near_miss", FAMILY, "How near may a disk pass at v dt / R = 0.2 without being collision?",
-        "b / 2R - 1", "1", (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
+        "near_miss",
+        FAMILY,
+        "How near may a disk pass at v dt / R = 0.2 without being collision?",
+        "b / 2R - 1",
+        "1",
+        (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
         near_miss,
-        COLLISIONS_SPURIOUS, runs=PHASES,
-    ),
-    Case(
-        "slow_collision", FAMILY, "How slow may a collision at e = 1 be and still be elastic?",
-        "closing speed", "m/s", (8.0, 4.0, 2.0, 1.41, 0.7, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3), slow, RESTITUTION_OFF,
+        COLLISIONS_SPURIOUS,
         runs=PHASES,
     ),
     Case(
-        "restitution", FAMILY, "Is a collision at 4 m/s played with the e that the scene states?",
-        "1 - e", "1", (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0),
-        lambda x, run: with_restitution(1 - x, run), RESTITUTION_OFF, runs=PHASES,
+        "slow_collision",
+        FAMILY,
+        "How slow may a collision at e = 1 be and still be elastic?",
+        "closing speed",
+        "m/s",
+        (8.0, 4.0, 2.0, 1.41, 0.7, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3),
+        slow,
+        RESTITUTION_OFF,
+        runs=PHASES,
     ),
     Case(
-        "mass_ratio", FAMILY, "How unequal may two masses be that meet at e = 1?",
-        "m2 / m1", "1", (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8), unequal, VELOCITY_OFF, runs=PHASES,
+        "restitution",
+        FAMILY,
+        "Is a collision at 4 m/s played with the e that the scene states?",
+        "1 - e",
+        "1",
+        (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0),
+        lambda x, run: with_restitution(1 - x, run),
+        RESTITUTION_OFF,
+        runs=PHASES,
     ),
-)  # fmt: skip
+    Case(
+        "mass_ratio",
+        FAMILY,
+        "How unequal may two masses be that meet at e = 1?",
+        "m2 / m1",
+        "1",
+        (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8),
+        unequal,
+        VELOCITY_OFF,
+        runs=PHASES,
+    ),
+)

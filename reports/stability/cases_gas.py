@@ -1,4 +1,5 @@
-"""Cases of a gas in a box at e = 1: energy, temperature, pressure, collision rate, and what it remembers."""
+"""Cases of a gas in a box at e = 1: energy, temperature, pressure, collision rate, and what it
+remembers."""
 
 from __future__ import annotations
 
@@ -9,7 +10,13 @@ from numpy.random import Generator, default_rng
 
 from adapters.play import Run
 from reports.stability.limits import RARELY, Case
-from reports.stability.predicates_gas import ENERGY_DRIFTS, GAS_PARTS, MOMENTUM_DRIFTS, TEMPERATURES_PART, WRONG_GAS
+from reports.stability.predicates_gas import (
+    ENERGY_DRIFTS,
+    GAS_PARTS,
+    MOMENTUM_DRIFTS,
+    TEMPERATURES_PART,
+    WRONG_GAS,
+)
 from reports.stability.variants import Variant, played, with_variant
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
@@ -21,10 +28,18 @@ STEP = 0.04  # of a radius: how far a disk of mean energy moves in a step
 
 
 def gas(
-    packing: float, seed: int, *, rows: int = 6, columns: int = 6, steps: int = 500, every: int = 10,
-    step: float = STEP, mass: Array | None = None,
-) -> Scenario:  # fmt: skip
-    """Disks of radius 0.25 m on a triangular lattice in a box that they fill to `packing`, with Maxwell's velocities.
+    packing: float,
+    seed: int,
+    *,
+    rows: int = 6,
+    columns: int = 6,
+    steps: int = 500,
+    every: int = 10,
+    step: float = STEP,
+    mass: Array | None = None,
+) -> Scenario:
+    """Disks of radius 0.25 m on a triangular lattice in a box that they fill to `packing`, with
+    Maxwell's velocities.
 
     kT is such that a disk of mass 1 flies `step` radii in a step at its root mean square speed.
     """
@@ -32,18 +47,34 @@ def gas(
     radius = np.full(n, RADIUS)
     mass = np.ones(n) if mass is None else mass
     k = np.arange(n)
-    lattice = np.stack([k % columns + 0.5 * (k // columns % 2) + 0.5, np.sqrt(0.75) * (k // columns) + 0.5], -1)
+    lattice = np.stack(
+        [k % columns + 0.5 * (k // columns % 2) + 0.5, np.sqrt(0.75) * (k // columns) + 0.5], -1
+    )
     size = np.array([columns + 0.5, np.sqrt(0.75) * (rows - 1) + 1])
     spacing = np.sqrt(np.pi * (radius**2).sum() / packing / size.prod())
     scene = lay_out(
-        position=lattice * spacing, velocity=maxwell(rng, mass, step * RADIUS / DT), radius=radius, mass=mass,
-        restitution=1.0, walls=box([0, 0], size * spacing),
-    )  # fmt: skip
-    return Scenario("gas", "Does it keep its energy?", SOURCE, scene, steps * DT, every * DT, (every,), seed=seed)
+        position=lattice * spacing,
+        velocity=maxwell(rng, mass, step * RADIUS / DT),
+        radius=radius,
+        mass=mass,
+        restitution=1.0,
+        walls=box([0, 0], size * spacing),
+    )
+    return Scenario(
+        "gas",
+        "Does it keep its energy?",
+        SOURCE,
+        scene,
+        steps * DT,
+        every * DT,
+        (every,),
+        seed=seed,
+    )
 
 
 def maxwell(rng: Generator, mass: Array, speed: float) -> Array:
-    """(n, 2) m/s, drawn so that disks of each mass have the same temperature exactly, a mass of 1 the rms `speed`."""
+    """(n, 2) m/s, drawn so that disks of each mass have the same temperature exactly, a mass of 1
+    the rms `speed`."""
     velocity = rng.normal(size=(len(mass), 2))
     for kind in np.unique(mass):
         same = mass == kind
@@ -67,7 +98,8 @@ def long_run(x: float, run: int) -> Scenario:
 
 
 def wrapped_run(x: float, run: int) -> Scenario:
-    """The same in the exercise's box: who leaves it comes in opposite, so that there is no wall to take momentum."""
+    """The same in the exercise's box: who leaves it comes in opposite, so that there is no wall to
+    take momentum."""
     one = long_run(x, run)
     scene = one.scene
     corners = np.stack([scene.walls.min(axis=(0, 1)), scene.walls.max(axis=(0, 1))])
@@ -109,7 +141,9 @@ def reversed_order(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]
     """The same gas inserted in the opposite order, beside the gas in its own order."""
     scene = scenario.scene
     names = ("position", "velocity", "radius", "mass", "angle", "angular_velocity", "inertia")
-    turned = replace(scenario, scene=replace(scene, **{name: getattr(scene, name)[::-1] for name in names}))
+    turned = replace(
+        scenario, scene=replace(scene, **{name: getattr(scene, name)[::-1] for name in names})
+    )
     run = played(variant, turned)
     if run.trajectory is not None:
         run = replace(run, trajectory=renumbered(run.trajectory, scene.n))
@@ -123,23 +157,31 @@ def renumbered(played: Trajectory, n: int) -> Trajectory:
     low, high = np.where(j < 0, i, np.minimum(i, j)), np.where(j < 0, j, np.maximum(i, j))
     return replace(
         played,
-        position=played.position[:, ::-1], velocity=played.velocity[:, ::-1], angle=played.angle[:, ::-1],
+        position=played.position[:, ::-1],
+        velocity=played.velocity[:, ::-1],
+        angle=played.angle[:, ::-1],
         angular_velocity=played.angular_velocity[:, ::-1],
-        collisions=Collisions(collisions.t, frozen(low, np.int64), frozen(high, np.int64), collisions.impulse),
-    )  # fmt: skip
+        collisions=Collisions(
+            collisions.t, frozen(low, np.int64), frozen(high, np.int64), collisions.impulse
+        ),
+    )
 
 
 def restarted(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
-    """The gas stopped half way, read, and loaded into a new engine, beside the gas played through."""
+    """The gas stopped half way, read, and loaded into a new engine, beside the gas played
+    through."""
     whole = played(variant, scenario)
     if whole.status != "ok" or whole.trajectory is None:
         return scenario, whole
     half = scenario.samples // 2
     state, scene = whole.trajectory.at(half), scenario.scene
     fresh: Scene = replace(
-        scene, position=state.position, velocity=state.velocity, angle=state.angle,
+        scene,
+        position=state.position,
+        velocity=state.velocity,
+        angle=state.angle,
         angular_velocity=state.angular_velocity,
-    )  # fmt: skip
+    )
     left = (scenario.samples - half) * scenario.sample_interval
     rest = played(variant, replace(scenario, scene=fresh, duration=left))
     if rest.status != "ok" or rest.trajectory is None:
@@ -150,64 +192,153 @@ def restarted(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
         frozen(np.concatenate([getattr(before, name)[:half], getattr(after, name)]))
         for name in ("position", "velocity", "angle", "angular_velocity")
     )
-    collisions = Collisions(frozen(late.t + half * scenario.sample_interval), late.i, late.j, late.impulse)
+    collisions = Collisions(
+        frozen(late.t + half * scenario.sample_interval), late.i, late.j, late.impulse
+    )
     joined = Trajectory(before.t, position, velocity, angle, spin, collisions)
     return against(whole, replace(rest, trajectory=joined), scenario)
 
 
-PACKINGS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85)  # at 0.851 the lattice is jammed: 0.85 takes long
+# at 0.851 the lattice is jammed: 0.85 takes long
+PACKINGS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85)
 COUNTS = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
 FAST = (0.01, 0.02, 0.04, 0.07, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 2.0)
 LONG = (1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6)
-# Where a block error is 2 % an exact gas reads 4 of them and 5 % off once in 6000 times (Student's t, 9 degrees), and
-# 16 runs are 112 readings: that would be a limit of what has none.
+# Where a block error is 2 % an exact gas reads 4 of them and 5 % off once in 6000 times (Student's
+# t, 9 degrees), and 16 runs are 112 readings: that would be a limit of what has none.
 BY_CHANCE = 1 / 16
 SEEDS = 16  # runs at a value
 OTHER = "in its own order of insertion"
 
 GAS = (
     Case(
-        "dense_gas", FAMILY, "Up to which packing does a gas of 100 disks keep its energy over 200 steps?",
-        "packing", "1", PACKINGS, dense, ENERGY_DRIFTS, runs=SEEDS, by_chance=RARELY,
-        also=with_variant("fifty_iterations"), quick_values=PACKINGS[:-1], ratio=1.25,
+        "dense_gas",
+        FAMILY,
+        "Up to which packing does a gas of 100 disks keep its energy over 200 steps?",
+        "packing",
+        "1",
+        PACKINGS,
+        dense,
+        ENERGY_DRIFTS,
+        runs=SEEDS,
+        by_chance=RARELY,
+        also=with_variant("fifty_iterations"),
+        quick_values=PACKINGS[:-1],
+        ratio=1.25,
     ),
     Case(
-        "fast_gas", FAMILY, "How far may the disks of a gas of packing 0.3 fly in a step, over 300 steps?",
-        "v dt / R", "1", FAST, coarse, ENERGY_DRIFTS, runs=SEEDS, by_chance=RARELY, quick_values=FAST[:-2], ratio=1.1,
+        "fast_gas",
+        FAMILY,
+        "How far may the disks of a gas of packing 0.3 fly in a step, over 300 steps?",
+        "v dt / R",
+        "1",
+        FAST,
+        coarse,
+        ENERGY_DRIFTS,
+        runs=SEEDS,
+        by_chance=RARELY,
+        quick_values=FAST[:-2],
+        ratio=1.1,
     ),
     Case(
-        "long_gas", FAMILY, "For how many steps does a gas of 20 disks keep its energy?",
-        "steps", "1", LONG, long_run, ENERGY_DRIFTS, runs=2,
-        whole=True, quick_values=(1e3, 1e4), refines=False, also=with_variant("fifty_iterations"),
+        "long_gas",
+        FAMILY,
+        "For how many steps does a gas of 20 disks keep its energy?",
+        "steps",
+        "1",
+        LONG,
+        long_run,
+        ENERGY_DRIFTS,
+        runs=2,
+        whole=True,
+        quick_values=(1e3, 1e4),
+        refines=False,
+        also=with_variant("fifty_iterations"),
     ),
     Case(
-        "long_wrapped_gas", FAMILY, "For how many steps does a gas without walls keep its momentum?",
-        "steps", "1", LONG, wrapped_run, MOMENTUM_DRIFTS, runs=2, whole=True, quick_values=(1e3, 1e4),
+        "long_wrapped_gas",
+        FAMILY,
+        "For how many steps does a gas without walls keep its momentum?",
+        "steps",
+        "1",
+        LONG,
+        wrapped_run,
+        MOMENTUM_DRIFTS,
+        runs=2,
+        whole=True,
+        quick_values=(1e3, 1e4),
         refines=False,
     ),
     Case(
-        "heavy_in_gas", FAMILY, "How heavy may one disk of a gas be?",
-        "m2 / m1", "1", (1.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8), heavy_one, ENERGY_DRIFTS, runs=SEEDS,
-        by_chance=RARELY, ratio=1.5,
+        "heavy_in_gas",
+        FAMILY,
+        "How heavy may one disk of a gas be?",
+        "m2 / m1",
+        "1",
+        (1.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8),
+        heavy_one,
+        ENERGY_DRIFTS,
+        runs=SEEDS,
+        by_chance=RARELY,
+        ratio=1.5,
     ),
     Case(
-        "equipartition", FAMILY, "Do light and heavy disks of a gas keep the same temperature?",
-        "m2 / m1", "1", (1.5, 3.0, 10.0, 30.0, 100.0, 1e3, 1e4), mixture, TEMPERATURES_PART, runs=SEEDS, refines=False,
+        "equipartition",
+        FAMILY,
+        "Do light and heavy disks of a gas keep the same temperature?",
+        "m2 / m1",
+        "1",
+        (1.5, 3.0, 10.0, 30.0, 100.0, 1e3, 1e4),
+        mixture,
+        TEMPERATURES_PART,
+        runs=SEEDS,
+        refines=False,
         by_chance=BY_CHANCE,
     ),
     Case(
-        "thermometer", FAMILY, "Has a gas the speeds, the rate of collisions and the wall pressure of the literature?",
-        "packing", "1", (0.2, 0.3, 0.4, 0.5, 0.6), thermometer, WRONG_GAS, runs=SEEDS, refines=False,
-        by_chance=BY_CHANCE, quick_values=(0.2, 0.6),
+        "thermometer",
+        FAMILY,
+        "Has a gas the speeds, the rate of collisions and the wall pressure of the literature?",
+        "packing",
+        "1",
+        (0.2, 0.3, 0.4, 0.5, 0.6),
+        thermometer,
+        WRONG_GAS,
+        runs=SEEDS,
+        refines=False,
+        by_chance=BY_CHANCE,
+        quick_values=(0.2, 0.6),
     ),
     Case(
-        "insertion_order", FAMILY, "After how many steps does the order of insertion show?",
-        "steps", "1", COUNTS, steps_of_gas, GAS_PARTS, runs=SEEDS, whole=True, play=reversed_order, beside=OTHER,
-        quick_values=(10.0, 50.0, 200.0, 1000.0), ratio=1.5,
+        "insertion_order",
+        FAMILY,
+        "After how many steps does the order of insertion show?",
+        "steps",
+        "1",
+        COUNTS,
+        steps_of_gas,
+        GAS_PARTS,
+        runs=SEEDS,
+        whole=True,
+        play=reversed_order,
+        beside=OTHER,
+        quick_values=(10.0, 50.0, 200.0, 1000.0),
+        ratio=1.5,
     ),
     Case(
-        "restart", FAMILY, "After how many steps does it show that a gas was read and loaded again half way?",
-        "steps", "1", COUNTS, steps_of_gas, GAS_PARTS, runs=SEEDS, whole=True, play=restarted, beside="played through",
-        quick_values=(10.0, 50.0, 200.0, 1000.0), ratio=1.5,
+        "restart",
+        FAMILY,
+        "After how many steps does it show that a gas was read and loaded again half way?",
+        "steps",
+        "1",
+        COUNTS,
+        steps_of_gas,
+        GAS_PARTS,
+        runs=SEEDS,
+        whole=True,
+        play=restarted,
+        beside="played through",
+        quick_values=(10.0, 50.0, 200.0, 1000.0),
+        ratio=1.5,
     ),
-)  # fmt: skip
+)

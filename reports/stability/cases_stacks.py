@@ -1,4 +1,5 @@
-"""Cases of disks that rest on each other, overlap, or do not fit; and of a ball that should come to rest."""
+"""Cases of disks that rest on each other, overlap, or do not fit; and of a ball that should come to
+rest."""
 
 from __future__ import annotations
 
@@ -24,10 +25,24 @@ def column(count: int, mass: np.ndarray) -> Scenario:
     y = RADIUS + 2 * RADIUS * np.arange(count)
     side, top = 1.05 * RADIUS, y[-1] + 2 * RADIUS
     scene = lay_out(
-        position=np.stack([0 * y, y], -1), velocity=np.zeros((count, 2)), radius=np.full(count, RADIUS), mass=mass,
-        restitution=0.0, gravity=[0, -G], walls=box([-side, 0], [side, top]),
-    )  # fmt: skip
-    return Scenario("column", "Does it stand?", "equilibrium", scene, 2.0, DT, (1,), truth=lambda t: at_rest(scene, t))
+        position=np.stack([0 * y, y], -1),
+        velocity=np.zeros((count, 2)),
+        radius=np.full(count, RADIUS),
+        mass=mass,
+        restitution=0.0,
+        gravity=[0, -G],
+        walls=box([-side, 0], [side, top]),
+    )
+    return Scenario(
+        "column",
+        "Does it stand?",
+        "equilibrium",
+        scene,
+        2.0,
+        DT,
+        (1,),
+        truth=lambda t: at_rest(scene, t),
+    )
 
 
 def column_of(x: float, _run: int) -> Scenario:
@@ -43,10 +58,15 @@ def heavy_on_light(x: float, _run: int) -> Scenario:
 def overlapping(x: float, _run: int) -> Scenario:
     """Two disks at rest that overlap by x radii, e = 0, 1 s."""
     scene = lay_out(
-        position=[[-(1 - x / 2) * RADIUS, 0], [(1 - x / 2) * RADIUS, 0]], velocity=np.zeros((2, 2)),
-        radius=[RADIUS, RADIUS], mass=[1.0, 1.0], restitution=0.0,
-    )  # fmt: skip
-    return Scenario("overlapping", "Are they separated gently?", "no start of a scene", scene, 1.0, DT, (1,))
+        position=[[-(1 - x / 2) * RADIUS, 0], [(1 - x / 2) * RADIUS, 0]],
+        velocity=np.zeros((2, 2)),
+        radius=[RADIUS, RADIUS],
+        mass=[1.0, 1.0],
+        restitution=0.0,
+    )
+    return Scenario(
+        "overlapping", "Are they separated gently?", "no start of a scene", scene, 1.0, DT, (1,)
+    )
 
 
 def overfull(x: float, _run: int) -> Scenario:
@@ -56,9 +76,13 @@ def overfull(x: float, _run: int) -> Scenario:
     lattice = np.stack([k % 10 + 0.5 * (k // 10 % 2) + 0.5, sqrt(0.75) * (k // 10) + 0.5], -1)
     spacing = RADIUS * np.sqrt(100 * np.pi / x / size.prod())
     scene = lay_out(
-        position=lattice * spacing, velocity=np.zeros((100, 2)), radius=np.full(100, RADIUS), mass=np.ones(100),
-        restitution=0.0, walls=box([0, 0], size * spacing),
-    )  # fmt: skip
+        position=lattice * spacing,
+        velocity=np.zeros((100, 2)),
+        radius=np.full(100, RADIUS),
+        mass=np.ones(100),
+        restitution=0.0,
+        walls=box([0, 0], size * spacing),
+    )
     return Scenario("overfull", "Does it burst?", "no start of a scene", scene, 1.0, DT, (1,))
 
 
@@ -68,31 +92,58 @@ def last_bounce(height: float, e: float) -> float:
 
 
 def dropped(x: float, run: int) -> Scenario:
-    """A ball at e = 1 - x dropped from 1 m and up to 0.1 m more, seen for half as long again as it should bounce."""
+    """A ball at e = 1 - x dropped from 1 m and up to 0.1 m more, seen for half as long again as it
+    should bounce."""
     height = 1.0 + 0.1 * phase(run)
     until = 1.5 * last_bounce(height, 1 - x)
     samples = max(1, int(until / DT / 4))
     scene = lay_out(
-        position=[[0, RADIUS + height]], velocity=[[0, 0]], radius=[RADIUS], mass=[1.0], restitution=1 - x,
-        gravity=[0, -G], walls=FLOOR,
-    )  # fmt: skip
+        position=[[0, RADIUS + height]],
+        velocity=[[0, 0]],
+        radius=[RADIUS],
+        mass=[1.0],
+        restitution=1 - x,
+        gravity=[0, -G],
+        walls=FLOOR,
+    )
     return Scenario(
-        "dropped", "Does it come to rest?", "the bouncing ball in closed form", scene, samples * 4 * DT, 4 * DT, (4,)
+        "dropped",
+        "Does it come to rest?",
+        "the bouncing ball in closed form",
+        scene,
+        samples * 4 * DT,
+        4 * DT,
+        (4,),
     )
 
 
 def pile(x: float, run: int) -> Scenario:
-    """Twelve disks at e = 1 - x fall into a box, seen for four times as long as one of them would bounce alone."""
+    """Twelve disks at e = 1 - x fall into a box, seen for four times as long as one of them would
+    bounce alone."""
     rng = default_rng(run)
     k = np.arange(12)
-    position = np.stack([0.8 * (k % 3) - 0.8, 0.5 + 0.7 * (k // 3)], -1) + rng.uniform(-0.1, 0.1, (12, 2))
+    position = np.stack([0.8 * (k % 3) - 0.8, 0.5 + 0.7 * (k // 3)], -1) + rng.uniform(
+        -0.1, 0.1, (12, 2)
+    )
     samples = int(last_bounce(2.5, 1 - x) / DT)
     scene = lay_out(
-        position=position, velocity=np.zeros((12, 2)), radius=np.full(12, RADIUS), mass=np.ones(12),
-        restitution=1 - x, gravity=[0, -G], walls=box([-1.25, 0], [1.25, 8]),
-    )  # fmt: skip
+        position=position,
+        velocity=np.zeros((12, 2)),
+        radius=np.full(12, RADIUS),
+        mass=np.ones(12),
+        restitution=1 - x,
+        gravity=[0, -G],
+        walls=box([-1.25, 0], [1.25, 8]),
+    )
     return Scenario(
-        "pile", "Does it come to rest?", "energy can only fall", scene, samples * 4 * DT, 4 * DT, (4,), seed=run
+        "pile",
+        "Does it come to rest?",
+        "energy can only fall",
+        scene,
+        samples * 4 * DT,
+        4 * DT,
+        (4,),
+        seed=run,
     )
 
 
@@ -102,33 +153,74 @@ OVERLAPS = ("overlap", "radii", (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9,
 
 STACKS = (
     Case(
-        "column", FAMILY, "How many disks can stand on each other between two walls?",
-        "disks", "1", (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0), column_of, STANDS, whole=True,
+        "column",
+        FAMILY,
+        "How many disks can stand on each other between two walls?",
+        "disks",
+        "1",
+        (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0),
+        column_of,
+        STANDS,
+        whole=True,
     ),
     Case(
-        "heavy_on_light", FAMILY, "How heavy a disk can a disk of mass 1 carry?",
-        "m2 / m1", "1", (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e6, 1e8), heavy_on_light, STANDS,
+        "heavy_on_light",
+        FAMILY,
+        "How heavy a disk can a disk of mass 1 carry?",
+        "m2 / m1",
+        "1",
+        (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e6, 1e8),
+        heavy_on_light,
+        STANDS,
     ),
     Case(
-        "overlap_energy", FAMILY, "From how deep an overlap are two disks at rest thrown apart?",
-        *OVERLAPS, EJECTED,
+        "overlap_energy",
+        FAMILY,
+        "From how deep an overlap are two disks at rest thrown apart?",
+        *OVERLAPS,
+        EJECTED,
     ),
     Case(
-        "overlap_recovery", FAMILY, "From how deep an overlap are two disks separated within a second?",
-        *OVERLAPS, STILL_OVERLAP,
+        "overlap_recovery",
+        FAMILY,
+        "From how deep an overlap are two disks separated within a second?",
+        *OVERLAPS,
+        STILL_OVERLAP,
     ),
     Case(
-        "overfull_box", FAMILY, "How full may a box be before it bursts?",
-        "area fraction", "1", (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.5, 2.0), overfull, BURSTS,
+        "overfull_box",
+        FAMILY,
+        "How full may a box be before it bursts?",
+        "area fraction",
+        "1",
+        (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.5, 2.0),
+        overfull,
+        BURSTS,
         ratio=1.1,
     ),
     Case(
-        "ball_comes_to_rest", FAMILY, "Up to which e does a ball come to rest when it should?",
-        "1 - e", "1", INELASTIC, dropped, NOT_AT_REST, runs=SEEDS,
+        "ball_comes_to_rest",
+        FAMILY,
+        "Up to which e does a ball come to rest when it should?",
+        "1 - e",
+        "1",
+        INELASTIC,
+        dropped,
+        NOT_AT_REST,
+        runs=SEEDS,
     ),
     Case(
-        "pile_comes_to_rest", FAMILY, "Up to which e does a pile of twelve disks come to rest?",
-        "1 - e", "1", INELASTIC, pile, NOT_AT_REST, runs=SEEDS, by_chance=RARELY,
-        quick_values=INELASTIC[:7], ratio=1.1,
+        "pile_comes_to_rest",
+        FAMILY,
+        "Up to which e does a pile of twelve disks come to rest?",
+        "1 - e",
+        "1",
+        INELASTIC,
+        pile,
+        NOT_AT_REST,
+        runs=SEEDS,
+        by_chance=RARELY,
+        quick_values=INELASTIC[:7],
+        ratio=1.1,
     ),
-)  # fmt: skip
+)

@@ -15,7 +15,8 @@ SEEN = 300  # samples at most
 
 
 def in_steps(whole: Scenario, dt: float) -> Scenario:
-    """The scenario in steps as near to `dt` s as its duration allows, seen at `SEEN` instants at most."""
+    """The scenario in steps as near to `dt` s as its duration allows, seen at `SEEN` instants at
+    most."""
     steps = max(1, round(whole.duration / dt))
     every = -(-steps // SEEN)
     samples = -(-steps // every)
@@ -28,17 +29,19 @@ def at_dt(name: str, x: float, run: int) -> Scenario:
 
 
 def ladder(one: Scenario, an_octave: int = 1) -> tuple[float, ...]:
-    """s, so many to a factor of two, from an eighth of the sample interval to a tenth of the duration."""
+    """s, so many to a factor of two, from an eighth of the sample interval to a tenth of the
+    duration."""
     steps = [one.sample_interval * 2.0 ** (k / an_octave - 3) for k in range(23 * an_octave)]
     return tuple(dt for dt in steps if dt <= one.duration / 10)
 
 
 def dense_ladder(one: Scenario) -> tuple[float, ...]:
-    """s, as `ladder`, and from the sample interval on four to a factor of two, or two where a run is long.
+    """s, as `ladder`, and from the sample interval on four to a factor of two, or two where a run
+    is long.
 
-    Where nothing in a scene is drawn, each dt has its collisions elsewhere in their steps: failures begin here and
-    there, and only neighbours close to each other find the first. Finer steps fail seldom and cost most. Both forms
-    scan the same.
+    Where nothing in a scene is drawn, each dt has its collisions elsewhere in their steps: failures
+    begin here and there, and only neighbours close to each other find the first. Finer steps fail
+    seldom and cost most. Both forms scan the same.
     """
     steps = one.duration / one.sample_interval * 8
     close = ladder(one, 2 if one.scene.n * steps > LONG else 4)
@@ -50,8 +53,17 @@ SEEDS = 4  # runs at a value of a random scene
 
 SUITE = tuple(
     Case(
-        f"dt_{name}", FAMILY, build().asks, "dt", "s", dense_ladder(build()), partial(at_dt, name), USABLE,
-        runs=SEEDS if name in RANDOM else 1, ratio=1.2, refines=False,
+        f"dt_{name}",
+        FAMILY,
+        build().asks,
+        "dt",
+        "s",
+        dense_ladder(build()),
+        partial(at_dt, name),
+        USABLE,
+        runs=SEEDS if name in RANDOM else 1,
+        ratio=1.2,
+        refines=False,
     )
     for name, build in SCENARIOS.items()
-)  # fmt: skip
+)

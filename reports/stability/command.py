@@ -1,4 +1,5 @@
-"""`crosscheck stability`: check what is asked for, find the limits, write limits.csv, maps.csv and stability.html."""
+"""`crosscheck stability`: check what is asked for, find the limits, write limits.csv, maps.csv and
+stability.html."""
 
 from __future__ import annotations
 
@@ -41,26 +42,43 @@ from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 from scenarios.files.scene_file import SceneFileError, read_scene_file
 
-SEE = "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for --vary see --help"
+SEE = (
+    "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for"
+    " --vary see --help"
+)
 LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
 PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in ENGINES)
 STABILITY = Kind(
-    "crosscheck stability", rf"journal\.jsonl|trajectories/.+\.({PLAYED_BY})[^/.]*\.npz", ("trajectories",)
+    "crosscheck stability",
+    rf"journal\.jsonl|trajectories/.+\.({PLAYED_BY})[^/.]*\.npz",
+    ("trajectories",),
 )
 
 
 def find_limits(
-    names: Sequence[str], vary: Sequence[str], engines: Sequence[str], full: bool, resume: bool, out: Path,
-    workers: int, command: str,
-) -> NoReturn:  # fmt: skip
-    """Find the limits of `names`, all cases and maps if there are none, into `out`; exits 0, 1, 2 or 130."""
+    names: Sequence[str],
+    vary: Sequence[str],
+    engines: Sequence[str],
+    full: bool,
+    resume: bool,
+    out: Path,
+    workers: int,
+    command: str,
+) -> NoReturn:
+    """Find the limits of `names`, all cases and maps if there are none, into `out`; exits 0, 1, 2
+    or 130."""
     cases, maps, touching = checked(names, vary)
     form = "full" if full else "quick"
     chosen = checked_engines(engines)
     if files := [name.removesuffix(OWN) for name in chosen if name not in ENGINES]:
-        how = "a file is not driven to its limits: crosscheck check judges it, crosscheck run plays it"
+        how = (
+            "a file is not driven to its limits: crosscheck check judges it, crosscheck run"
+            " plays it"
+        )
         refuse([f"--engine {file}: {how}" for file in files])
-    plan = StabilityPlan(cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command)
+    plan = StabilityPlan(
+        cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command
+    )
     with opening(out):
         out = place_of(out)
         journal = open_part(out, STABILITY)
@@ -80,7 +98,8 @@ def find_limits(
 
 
 def gone_on_with(journal: Journal, plan: StabilityPlan, resume: bool) -> set[Task]:
-    """The tasks of the plan that ended well in an interrupted run; raises as `may_go_on`, lest others are lost."""
+    """The tasks of the plan that ended well in an interrupted run; raises as `may_go_on`, lest
+    others are lost."""
     had, done = done_before(journal.path.parent, plan)
     may_go_on(journal.path.parent, had, bool(done), resume)
     if not done:
@@ -104,10 +123,14 @@ def write_files(folder: Path) -> StabilityResults:
 
 
 def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
-    """The cases, the maps and the scenes of touching disks that are meant; exits 2 with every fault, one line each."""
+    """The cases, the maps and the scenes of touching disks that are meant; exits 2 with every
+    fault, one line each."""
     faults = [unknown("--vary", what, VARIES) for what in vary if what not in VARIES]
     cases: list[str] = []
-    maps, touching = [name for name in names if name in MAPS], [name for name in names if name in TOUCHING]
+    maps, touching = (
+        [name for name in names if name in MAPS],
+        [name for name in names if name in TOUCHING],
+    )
     for name in names:
         if name.endswith(".toml"):
             try:
@@ -118,16 +141,23 @@ def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[
         elif name in CASES:
             cases.append(name)
         elif name not in MAPS and name not in TOUCHING:
-            faults.append(unknown("case", name, [*CASES, *MAPS, *TOUCHING]) + " (a scene file ends in .toml)")
+            faults.append(
+                unknown("case", name, [*CASES, *MAPS, *TOUCHING]) + " (a scene file ends in .toml)"
+            )
     if vary and not any(name.endswith(".toml") for name in names):
         faults.append(f"--vary {vary[0]}: varies a scene file, and none is named; name FILE.toml")
     if faults:
         refuse([fault.replace("see: crosscheck list", SEE) for fault in faults])
-    return (list(dict.fromkeys(cases)), maps, touching) if names else (list(CASES), list(MAPS), list(TOUCHING))
+    return (
+        (list(dict.fromkeys(cases)), maps, touching)
+        if names
+        else (list(CASES), list(MAPS), list(TOUCHING))
+    )
 
 
 def varied_of(path: str, vary: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The cases of a scene file, and why what was asked for cannot be varied; what nobody named is left out quietly."""
+    """The cases of a scene file, and why what was asked for cannot be varied; what nobody named is
+    left out quietly."""
     one = read_scene_file(path)
     whys = {what: cannot_vary(one, what) for what in vary or VARIES if what in VARIES}
     faults = [f"{path}: --vary {what}: {why}" for what, why in whys.items() if why and vary]
@@ -136,7 +166,8 @@ def varied_of(path: str, vary: Sequence[str]) -> tuple[list[str], list[str]]:
 
 def finish(results: StabilityResults, out: Path) -> NoReturn:
     """Print a table and where the page is; exit 1 if a task ended without a result."""
-    console = Console(width=max(Console().width, 120))  # a row that is cut off would be no use to anybody
+    # a row that is cut off would be no use to anybody
+    console = Console(width=max(Console().width, 120))
     limits = results.limits
     rows = Table(title="Where they fail", title_justify="left", box=None, padding=(0, 1, 0, 0))
     shown = list(dict.fromkeys(limit.case for limit in limits))
@@ -146,18 +177,26 @@ def finish(results: StabilityResults, out: Path) -> NoReturn:
         rows.add_column(engine.replace(":", "\n"), justify="right", no_wrap=True)
     found = {(limit.case, limit.engine): limit for limit in limits}
     for name in shown:
-        cells = [in_words(found[name, engine]) if (name, engine) in found else "" for engine in engines]
+        cells = [
+            in_words(found[name, engine]) if (name, engine) in found else "" for engine in engines
+        ]
         case, parameter = Path(name).name, case_named(name).parameter
         rows.add_row(case + (", " if len(case + parameter) < 24 else ",\n") + parameter, *cells)
     console.print(rows)
     console.print(
-        "A number: the first failure from gentle to harsh. ≤, ≥: fails up to there, works beyond. –: does not"
+        "A number: the first failure from gentle to harsh. ≤, ≥: fails up to there, works beyond."
+        " –: does not"
     )
     console.print(
-        "fail so far. never: fails everywhere. *: works again beyond, or fails before. Brackets, and how far apart"
+        "fail so far. never: fails everywhere. *: works again beyond, or fails before. Brackets,"
+        " and how far apart"
     )
-    console.print("values were scanned, are in limits.csv (works_at, fails_at, spacing) and on the page.")
-    console.print(f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True)
+    console.print(
+        "values were scanned, are in limits.csv (works_at, fails_at, spacing) and on the page."
+    )
+    console.print(
+        f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True
+    )
     lost = [f"{one.case} on {one.engine}" for one in limits if one.status != "ok"]
     lost += [f"{one.name} on {one.engine}" for one in results.maps if one.status != "ok"]
     lost += [f"{one.name} on {one.engine}" for one in results.laws if one.status != "ok"]

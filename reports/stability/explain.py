@@ -1,7 +1,8 @@
-"""Gives every limit its reason: the row of the table that fits it, or what was found by playing its failing run again.
+"""Gives every limit its reason: the row of the table that fits it, or what was found by playing its
+failing run again.
 
-A reason is tested by what it predicts, by the limit of a variant, by an intervention or by an ablation; else it is
-called likely.
+A reason is tested by what it predicts, by the limit of a variant, by an intervention or by an
+ablation; else it is called likely.
 """
 
 from __future__ import annotations
@@ -17,13 +18,15 @@ from reports.stability.reasons import Reason, reason_of
 from reports.stability.search import Search
 
 NEAR = (
-    1.05  # a prediction may be off by this factor: the quick form's bracket is as wide, and a collision lost by degrees
+    # a prediction may be off by this factor: the quick form's bracket is as wide, and a collision
+    # lost by degrees
+    1.05
 )
 
 
 def tried_out(search: Search, limit: Limit) -> Limit:
-    """The limit with what was found by playing its failing run again: the mechanisms that suffice for it, or an
-    intervention that removes it.
+    """The limit with what was found by playing its failing run again: the mechanisms that suffice
+    for it, or an intervention that removes it.
 
     Where a reason is written down, only an ablation can confirm it; what it predicts is enough.
     """
@@ -31,11 +34,16 @@ def tried_out(search: Search, limit: Limit) -> Limit:
     if reason is not None and reason.predicts is not None and brackets(limit, reason.predicts):
         return limit
     limit = replace(limit, mechanisms=sufficient_mechanisms(search, limit))
-    return limit if limit.mechanisms or reason else replace(limit, intervention=intervention_of(search, limit))
+    return (
+        limit
+        if limit.mechanisms or reason
+        else replace(limit, intervention=intervention_of(search, limit))
+    )
 
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
-    """The limits with their reasons, each tested if it can be: by itself, or by the limit of its variant among them."""
+    """The limits with their reasons, each tested if it can be: by itself, or by the limit of its
+    variant among them."""
     by_name = {(limit.case, limit.engine): limit for limit in limits}
     return [with_reason(limit, by_name) for limit in limits]
 
@@ -49,7 +57,9 @@ def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit
         return limit
     reason = reason_of(limit)
     if reason is None:
-        varied = CASES[limit.case].parameter if limit.case in CASES else limit.case.rsplit(":", 1)[-1]
+        varied = (
+            CASES[limit.case].parameter if limit.case in CASES else limit.case.rsplit(":", 1)[-1]
+        )
         text, source, tested = why_played(limit, varied)
         return replace(limit, reason=text, source=source, tested=tested)
     tests = tests_of(limit, reason, by_name)

@@ -1,5 +1,5 @@
-"""Keeps of the first failing run at a limit what is shown: the samples around the failure, and the collisions among
-them."""
+"""Keeps of the first failing run at a limit what is shown: the samples around the failure, and the
+collisions among them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 
 
 def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
-    """Save the first failing run of a search, and what it is shown beside, if there is any: here, not for the page."""
+    """Save the first failing run of a search, and what it is shown beside, if there is any: here,
+    not for the page."""
     failing, seen = limit.failing, search.failure(limit)
     if failing is None or seen is None or seen[1].trajectory is None:
         return
@@ -33,11 +34,16 @@ def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
     path.write_bytes(packed(part_of(run.trajectory, shown, scenario), small=True))
     with suppress(NoTruth):
         if scenario.truth is not None:
-            beside_file(path).write_bytes(packed(part_of(scenario.truth(scenario.times), shown, scenario), small=True))
+            beside_file(path).write_bytes(
+                packed(part_of(scenario.truth(scenario.times), shown, scenario), small=True)
+            )
 
 
-def kept_failure(limit: Limit, folder: Path, scenario: Scenario) -> tuple[Trajectory, Trajectory | None] | None:
-    """What was saved: the failing run and the one beside it; None if nothing was, or it is not of the scenario."""
+def kept_failure(
+    limit: Limit, folder: Path, scenario: Scenario
+) -> tuple[Trajectory, Trajectory | None] | None:
+    """What was saved: the failing run and the one beside it; None if nothing was, or it is not of
+    the scenario."""
     path = file_of(limit, folder)
     if not path.exists() or limit.failing is None:
         return None
@@ -53,13 +59,20 @@ def kept_failure(limit: Limit, folder: Path, scenario: Scenario) -> tuple[Trajec
 def of_scenario(one: Trajectory, scenario: Scenario, most: int) -> bool:
     """Whether arrays that were read back are those of at most so many samples of the scenario."""
     k, n, collisions = len(np.atleast_1d(one.t)), scenario.scene.n, one.collisions
-    shapes = {"t": (k,), "position": (k, n, 2), "velocity": (k, n, 2), "angle": (k, n), "angular_velocity": (k, n)}
+    shapes = {
+        "t": (k,),
+        "position": (k, n, 2),
+        "velocity": (k, n, 2),
+        "angle": (k, n),
+        "angular_velocity": (k, n),
+    }
     columns = [collisions.t, collisions.i, collisions.j, collisions.impulse]
     return (
         k <= most
         and all(getattr(one, name).shape == shape for name, shape in shapes.items())
         and all(
-            column.shape == collisions.t.shape == (collisions.t.size,) and column.dtype.kind in "iuf"
+            column.shape == collisions.t.shape == (collisions.t.size,)
+            and column.dtype.kind in "iuf"
             for column in columns
         )
         and bool(((collisions.i >= 0) & (collisions.i < n) & (collisions.j < n)).all())
@@ -70,7 +83,8 @@ def file_of(limit: Limit, folder: Path) -> Path:
     """The file of the failing run."""
     name = f"{limit.case}.{limit.engine}"
     if "/" in name or len(name) > 200:  # two folders may have a file of one name
-        name = f"{Path(limit.case).name}.{limit.engine}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"[-200:]
+        digest = hashlib.sha256(name.encode()).hexdigest()[:8]
+        name = f"{Path(limit.case).name}.{limit.engine}-{digest}"[-200:]
     name = name.replace(":", "-")
     return folder / "trajectories" / f"{name}.npz"
 
@@ -81,7 +95,8 @@ def beside_file(path: Path) -> Path:
 
 
 def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
-    """The samples around the failure, up to `BEFORE` and `AFTER` it; where it is early or late, more of the others."""
+    """The samples around the failure, up to `BEFORE` and `AFTER` it; where it is early or late,
+    more of the others."""
     at = failing.at if np.isfinite(failing.at) else 0.0
     middle = int(np.clip(round(at / scenario.sample_interval), 0, scenario.samples))
     first = max(0, min(middle - BEFORE, scenario.samples - BEFORE - AFTER))
@@ -89,10 +104,12 @@ def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
 
 
 def part_of(whole: Trajectory, shown: NDArray[np.int64], scenario: Scenario) -> Trajectory:
-    """A trajectory at the samples `shown` that it has, and what it strikes meanwhile, if that is few enough to
-    show."""
+    """A trajectory at the samples `shown` that it has, and what it strikes meanwhile, if that is
+    few enough to show."""
     first, last = shown[0], shown[-1]
-    t, x, v, angle, spin = (frozen(getattr(whole, name)[first : last + 1]) for name in ("t", *STATE))
+    t, x, v, angle, spin = (
+        frozen(getattr(whole, name)[first : last + 1]) for name in ("t", *STATE)
+    )
     collisions = whole.collisions
     low, high = (k * scenario.sample_interval for k in (first - 0.5, last + 0.5))
     among = (collisions.t >= low) & (collisions.t <= high)

@@ -1,5 +1,5 @@
-"""What the literature says of a gas of equal hard disks: pressure and rate of collisions, in the bulk and between
-walls."""
+"""What the literature says of a gas of equal hard disks: pressure and rate of collisions, in the
+bulk and between walls."""
 
 from __future__ import annotations
 
@@ -10,19 +10,35 @@ from typing import NamedTuple
 import numpy as np
 
 # B_k / B_2^(k-1) of hard disks, k = 1 .. 10 (Clisby & McCoy, J. Stat. Phys. 122, 15, 2006).
-VIRIALS = (1, 1, (16 / 3 - 4 * np.sqrt(3) / np.pi) / 4, 0.53223180, 0.33355604, 0.1988425, 0.1148728, 0.0649930,
-           0.0362193, 0.0199537)  # fmt: skip
+VIRIALS = (
+    1,
+    1,
+    (16 / 3 - 4 * np.sqrt(3) / np.pi) / 4,
+    0.53223180,
+    0.33355604,
+    0.1988425,
+    0.1148728,
+    0.0649930,
+    0.0362193,
+    0.0199537,
+)
 
 
 @cache
 def approximant() -> tuple[np.ndarray, np.ndarray]:
-    """Numerator and denominator, highest power first, of the Pade approximant [4/5] of the virial series."""
+    """Numerator and denominator, highest power first, of the Pade approximant [4/5] of the virial
+    series."""
     series = np.array(VIRIALS) * 2.0 ** np.arange(10)
     matrix = np.array(
-        [[series[5 + row - col] if 5 + row - col >= 0 else 0.0 for col in range(1, 6)] for row in range(5)]
+        [
+            [series[5 + row - col] if 5 + row - col >= 0 else 0.0 for col in range(1, 6)]
+            for row in range(5)
+        ]
     )
     below = np.append(1.0, np.linalg.solve(matrix, -series[5:10]))
-    above = np.array([sum(below[m] * series[k - m] for m in range(min(k, 5) + 1)) for k in range(5)])
+    above = np.array(
+        [sum(below[m] * series[k - m] for m in range(min(k, 5) + 1)) for k in range(5)]
+    )
     return above[::-1], below[::-1]
 
 
@@ -35,8 +51,8 @@ def compressibility(packing: float) -> float:
 def bulk_packing(packing: float, radius: float, size: np.ndarray) -> float:
     """The packing far from the walls of a box that its disks cover by `packing`.
 
-    A hard wall has the line tension rho r kT / (1 - eta), so by Gibbs' adsorption equation rho r (1 - eta) / (1 + eta)
-    disks a length are missing along it; at a corner two such strips overlap.
+    A hard wall has the line tension rho r kT / (1 - eta), so by Gibbs' adsorption equation rho r (1
+    - eta) / (1 + eta) disks a length are missing along it; at a corner two such strips overlap.
     """
     area, around = size.prod(), 2 * size.sum()
     bulk = packing
@@ -53,13 +69,16 @@ class Gas(NamedTuple):
     rate: float
 
 
-def gas_in_box(n: int, radius: float, size: np.ndarray, temperature: float, mass: float = 1.0) -> Gas:
+def gas_in_box(
+    n: int, radius: float, size: np.ndarray, temperature: float, mass: float = 1.0
+) -> Gas:
     """What `n` equal disks in a box of `size` (2,) m do at kT = `temperature` J, e = 1.
 
-    Across a cut through the box acts the pressure of the bulk, less the line tension of the two walls that are cut
-    (scaled particle theory: Helfand, Frisch & Lebowitz, J. Chem. Phys. 34, 1037, 1961). The virials of walls and
-    collisions add up to 2 N kT, whatever the gas is like, and a collision has the mean impulse sqrt(pi m kT): this
-    gives the rate, which is Enskog's, 4 / sqrt(pi) (Z - 1) a disk, where there are no walls.
+    Across a cut through the box acts the pressure of the bulk, less the line tension of the two
+    walls that are cut (scaled particle theory: Helfand, Frisch & Lebowitz, J. Chem. Phys. 34, 1037,
+    1961). The virials of walls and collisions add up to 2 N kT, whatever the gas is like, and a
+    collision has the mean impulse sqrt(pi m kT): this gives the rate, which is Enskog's, 4 /
+    sqrt(pi) (Z - 1) a disk, where there are no walls.
     """
     bulk = bulk_packing(n * pi * radius**2 / size.prod(), radius, size)
     density = bulk / (pi * radius**2)

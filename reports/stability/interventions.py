@@ -1,4 +1,5 @@
-"""Why a scene fails of which nothing was written down: the failing run with one thing changed, until it works."""
+"""Why a scene fails of which nothing was written down: the failing run with one thing changed,
+until it works."""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ from reports.stability.vary import at_offset, at_scale, at_tempo
 from scenarios.model import Scenario
 
 FINER = 8
-UNITS = 32.0  # a power of two: what knows no unit plays the same to the last bit, so that no change helps by chance
+# a power of two: what knows no unit plays the same to the last bit, so that no change helps by
+# chance
+UNITS = 32.0
 
 
 def finer(one: Scenario) -> Scenario:
@@ -83,45 +86,80 @@ class Intervention(NamedTuple):
 
 SAYS_SO = "it says so"
 INTERVENTIONS = {
-    "at_home": Intervention("box2d*", "offset", "positions are float32, too coarse so far out", "at the origin", at_home),
+    "at_home": Intervention(
+        "box2d*", "offset", "positions are float32, too coarse so far out", "at the origin", at_home
+    ),
     "faster": Intervention(
-        "[pb]*", "*", "too slow for a time of the engine's own (threshold of restitution, rate of position correction)",
-        "32 times as fast", faster,
+        "[pb]*",
+        "*",
+        "too slow for a time of the engine's own (threshold of restitution, rate of position"
+        " correction)",
+        "32 times as fast",
+        faster,
     ),
     "slower": Intervention(
-        "[pb]*", "*", "too fast for a time of the engine's own (cap on speed, rate of position correction)",
-        "32 times as slow", slower,
+        "[pb]*",
+        "*",
+        "too fast for a time of the engine's own (cap on speed, rate of position correction)",
+        "32 times as slow",
+        slower,
     ),
     "larger": Intervention(
-        "[pb]*", "*", "too small for a length of the engine's own (slop, margin, skin)",
-        "32 times as large, at the same speeds", larger,
+        "[pb]*",
+        "*",
+        "too small for a length of the engine's own (slop, margin, skin)",
+        "32 times as large, at the same speeds",
+        larger,
     ),
     "smaller": Intervention(
-        "[pb]*", "*", "too large for a length of the engine's own (cap on the way in a step, slop)",
-        "32 times as small, at the same speeds", smaller,
+        "[pb]*",
+        "*",
+        "too large for a length of the engine's own (cap on the way in a step, slop)",
+        "32 times as small, at the same speeds",
+        smaller,
     ),
-    "in_order": Intervention("reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"),
-    "finer": Intervention("*", "[!d]*", f"{ACTS_AT_END}, and the step is too large for that", "in steps of an eighth", finer),
+    "in_order": Intervention(
+        "reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"
+    ),
+    "finer": Intervention(
+        "*",
+        "[!d]*",
+        f"{ACTS_AT_END}, and the step is too large for that",
+        "in steps of an eighth",
+        finer,
+    ),
     **{
-        f"{bullets.partition(':')[0]}_swept": Intervention(bullets.removesuffix("+bullets"), "*",
-            "disks are not swept against each other", f"as {bullets}", engine=bullets)
+        f"{bullets.partition(':')[0]}_swept": Intervention(
+            bullets.removesuffix("+bullets"),
+            "*",
+            "disks are not swept against each other",
+            f"as {bullets}",
+            engine=bullets,
+        )
         for bullets in BULLETS
     },
     **{
-        f"{engine}_matched": Intervention(f"{engine}:shipped", "*", "a default of the engine that the matched profile changes",
-                                  f"as {engine}:matched", engine=f"{engine}:matched")
+        f"{engine}_matched": Intervention(
+            f"{engine}:shipped",
+            "*",
+            "a default of the engine that the matched profile changes",
+            f"as {engine}:matched",
+            engine=f"{engine}:matched",
+        )
         for engine in dict.fromkeys(name.partition(":")[0] for name in ENGINES)
         if f"{engine}:shipped" in ENGINES and f"{engine}:matched" in ENGINES
     },
-}  # fmt: skip
-"""In the order in which they are tried: what shows one thing alone comes first, a finer step where nothing finer does.
+}
+"""In the order in which they are tried: what shows one thing alone comes first, a finer step where
+nothing finer does.
 
 Where the step itself is varied, a finer one is no news.
 """
 
 
 def intervention_of(search: Search, limit: Limit) -> str:
-    """The first change with which the run that failed at the limit works; "" if none does, or nothing failed.
+    """The first change with which the run that failed at the limit works; "" if none does, or
+    nothing failed.
 
     What an engine refuses is explained by itself.
     """
@@ -132,13 +170,18 @@ def intervention_of(search: Search, limit: Limit) -> str:
     for name, intervention in INTERVENTIONS.items():
         if intervention.fits(search.engine, search.case.parameter):
             changed = intervention.change(scenario)
-            if not judge(search.case.predicate, changed, play_as(intervention.engine or search.engine, changed)).failed:
+            if not judge(
+                search.case.predicate,
+                changed,
+                play_as(intervention.engine or search.engine, changed),
+            ).failed:
                 return name
     return ""
 
 
 def why_played(limit: Limit, varied: str) -> tuple[str, str, str]:
-    """Why a scene fails of which nothing was written down before, where that stands, and how it was tested, or ""."""
+    """Why a scene fails of which nothing was written down before, where that stands, and how it was
+    tested, or ""."""
     failing = limit.failing
     if failing is None:
         return "", "", ""
@@ -148,5 +191,9 @@ def why_played(limit: Limit, varied: str) -> tuple[str, str, str]:
         return intervention.reason, "", f"works {intervention.how}"
     if failing.broken == "refused":
         return "the engine refuses it", "", SAYS_SO
-    tried = [intervention.how for intervention in INTERVENTIONS.values() if intervention.fits(limit.engine, varied)]
+    tried = [
+        intervention.how
+        for intervention in INTERVENTIONS.values()
+        if intervention.fits(limit.engine, varied)
+    ]
     return f"{NOT_KNOWN}; it also fails {', '.join(tried)}" if tried else NOT_KNOWN, "", ""

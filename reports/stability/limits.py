@@ -1,4 +1,5 @@
-"""What a case of the stability report asks, how thoroughly, and what a limit is; search.py finds one."""
+"""What a case of the stability report asks, how thoroughly, and what a limit is; search.py finds
+one."""
 
 from __future__ import annotations
 
@@ -13,7 +14,12 @@ from reports.stability.variants import VARIANTS, Variant, played
 from scenarios.model import Scenario
 
 EXACT, NOT_KNOWN = "the exact answer", "not known"
-LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND = "limit", "does not fail", "never works", "works only beyond"
+LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND = (
+    "limit",
+    "does not fail",
+    "never works",
+    "works only beyond",
+)
 
 
 @dataclass(frozen=True)
@@ -21,10 +27,11 @@ class Form:
     """How thorough a search is.
 
     Attributes:
-        few: runs at a value that is only passed on the way; next to the limit a value gets all of its case.
+        few: runs at a value that is only passed on the way; next to the limit a value gets all of
+            its case.
         ratio: how close the bracket is made.
-        whole: whether every value is played to its last run, also where one has failed, and those that only this form
-            scans are, too.
+        whole: whether every value is played to its last run, also where one has failed, and those
+            that only this form scans are, too.
     """
 
     name: str
@@ -33,8 +40,9 @@ class Form:
     whole: bool
 
 
-# A gas comes upon a bad cluster of contacts sooner or later: one in 20 of pymunk's is off by 1 % from v dt = 0.25 R on,
-# half of them at none up to 2 R. The first of them is a matter of the draw; that more than a quarter are is not.
+# A gas comes upon a bad cluster of contacts sooner or later: one in 20 of pymunk's is off by 1 %
+# from v dt = 0.25 R on, half of them at none up to 2 R. The first of them is a matter of the draw;
+# that more than a quarter are is not.
 RARELY = 1 / 4
 ALL = 10**6  # runs: more than any case has
 QUICK = Form("quick", few=4, ratio=1.05, whole=False)
@@ -57,18 +65,22 @@ class Case:
         asks: the question in one sentence.
         parameter, unit: what is varied, dimensionless where it can be.
         values: to scan, from gentle to harsh.
-        scene: (value, number of the run from 0) -> the scenario; it is played at its only step size. Fewer runs are the
-            first of more.
+        scene: (value, number of the run from 0) -> the scenario; it is played at its only step
+            size. Fewer runs are the first of more.
         predicate: what failing means.
-        runs: at a value: 1 where nothing differs, else phases of the collision within a step, or seeds.
+        runs: at a value: 1 where nothing differs, else phases of the collision within a step, or
+            seeds.
         whole: whether the parameter counts something.
         also: engines of `VARIANTS` besides those of `ENGINES`: an engine with one thing changed.
-        play: engine and scenario -> the run and what it is judged by, where that takes more than one call of `play`.
+        play: engine and scenario -> the run and what it is judged by, where that takes more than
+            one call of `play`.
         quick_values: to scan in the quick form, where a run is long: some of `values`.
-        refines: whether the first edge is bisected, and the full form scans between the values (not with `by_chance`).
-        ratio: how close the bracket is made at best, where a run is long or what is drawn differs much.
-        by_chance: share of the runs at a value that may fail by chance, where what is read is a statistic or the worst
-            of it depends on what is drawn.
+        refines: whether the first edge is bisected, and the full form scans between the values (not
+            with `by_chance`).
+        ratio: how close the bracket is made at best, where a run is long or what is drawn differs
+            much.
+        by_chance: share of the runs at a value that may fail by chance, where what is read is a
+            statistic or the worst of it depends on what is drawn.
         beside: what a failing run is shown beside.
     """
 
@@ -96,7 +108,8 @@ class Case:
         return 1 if self.values[-1] > self.values[0] else -1
 
     def scan(self, form: Form) -> tuple[float, ...]:
-        """The values to scan; in the full form those half way between them as well, so that the quick ones are some.
+        """The values to scan; in the full form those half way between them as well, so that the
+        quick ones are some.
 
         Not where runs may fail by chance: the more values, the sooner too many do.
         """
@@ -105,10 +118,13 @@ class Case:
         if not self.refines or self.by_chance:
             return self.values
         halves = (self.half_way(*pair, self.ratio) for pair in pairwise(self.values))
-        return tuple(sorted({*self.values, *filter(None, halves)}, key=lambda value: self.harsher * value))
+        return tuple(
+            sorted({*self.values, *filter(None, halves)}, key=lambda value: self.harsher * value)
+        )
 
     def half_way(self, one: float, other: float, ratio: float) -> float | None:
-        """The value in the middle of two in their logarithm; None if they are within a ratio, or there is none."""
+        """The value in the middle of two in their logarithm; None if they are within a ratio, or
+        there is none."""
         low, high = min(one, other), max(one, other)
         if high <= low * ratio:
             return None
@@ -120,9 +136,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Trial:
-    """The runs at one value: how many, how many of them failed, the worst reading, and the first that failed.
+    """The runs at one value: how many, how many of them failed, the worst reading, and the first
+    that failed.
 
-    So many as are `allowed` may fail by chance. `left`: whether it was left at a failure, with runs not played.
+    So many as are `allowed` may fail by chance. `left`: whether it was left at a failure, with runs
+    not played.
     """
 
     value: float
@@ -150,19 +168,23 @@ class Limit:
     Attributes:
         case, engine: names; the engine is a key of `VARIANTS`.
         form: of `FORMS`.
-        verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on), or "works only beyond"
-            (at works_at, and not at the gentler fails_at).
-        works_at: the harshest value before the first failure, where all runs of the form were played; nan: none.
-        fails_at: the first failure on the way from gentle to harsh: more runs failed than may by chance; nan: none.
+        verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on), or
+            "works only beyond" (at works_at, and not at the gentler fails_at).
+        works_at: the harshest value before the first failure, where all runs of the form were
+            played; nan: none.
+        fails_at: the first failure on the way from gentle to harsh: more runs failed than may by
+            chance; nan: none.
         trials: every value tried, from gentle to harsh.
-        monotone: False if there is more than one edge among the values tried: it works again beyond,
-            or fails at the gentlest as well.
-        spacing: the resolution: the largest ratio of two neighbours among the values tried, up to the first failure.
+        monotone: False if there is more than one edge among the values tried: it works again
+            beyond, or fails at the gentlest as well.
+        spacing: the resolution: the largest ratio of two neighbours among the values tried, up to
+            the first failure.
         seconds: of processor time that the search took.
-        intervention: the change of `INTERVENTIONS` with which the failing run works; "" if none was found, or looked
-            for.
-        mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; "" likewise.
-        reason, source, tested: why, where that stands, and how it was tested: "" is a likely reason.
+        intervention: the change of `INTERVENTIONS` with which the failing run works; "" if none was
+            found, or looked for.
+        mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; ""
+        likewise. reason, source, tested: why, where that stands, and how it was tested: "" is a
+            likely reason.
     """
 
     case: str
@@ -193,7 +215,11 @@ class Limit:
         if self.status != "ok":
             return self.status
         if self.verdict == NEVER_WORKS:
-            return "refused" if self.failing is not None and self.failing.broken == "refused" else "never"
+            return (
+                "refused"
+                if self.failing is not None and self.failing.broken == "refused"
+                else "never"
+            )
         return "–" if self.verdict == NEVER_FAILS else ""
 
     @property
@@ -216,5 +242,6 @@ class Limit:
 
 
 def engines_of(case: Case) -> list[str]:
-    """Who plays a case: every row of `ENGINES`, and the case's own variants, in the order of `VARIANTS`."""
+    """Who plays a case: every row of `ENGINES`, and the case's own variants, in the order of
+    `VARIANTS`."""
     return [name for name, engine in VARIANTS.items() if not engine.change or name in case.also]

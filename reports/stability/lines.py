@@ -1,4 +1,5 @@
-"""The schema of the journal of `crosscheck stability`: what a line holds, and what of it must be as case or map say."""
+"""The schema of the journal of `crosscheck stability`: what a line holds, and what of it must be as
+case or map say."""
 
 from __future__ import annotations
 
@@ -10,7 +11,18 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from adapters.engines import ENGINES
-from reports.run.journal_lines import Count, EngineProfile, File, Kinds, Line, Machine, Number, Seconds, Seed, Words
+from reports.run.journal_lines import (
+    Count,
+    EngineProfile,
+    File,
+    Kinds,
+    Line,
+    Machine,
+    Number,
+    Seconds,
+    Seed,
+    Words,
+)
 from reports.stability.ablations import reason_by_ablation
 from reports.stability.cases import CASES
 from reports.stability.interventions import INTERVENTIONS
@@ -24,7 +36,7 @@ from reports.stability.limits import (
     Limit,
     Trial,
     engines_of,
-)  # fmt: skip
+)
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import GAPS, TOUCHING, LawOf
 from reports.stability.vary import VARIES
@@ -128,7 +140,10 @@ class MapRow(Line):
         if [tuple(cell[:2]) for cell in self.cells] != grid:
             raise ValueError("cells: must be those of the map's grid, in order")
         for k, (_, _, value, failed, broken) in enumerate(self.cells):
-            must_be(f"cells[{k}]", number_like(value) and isinstance(failed, bool) and isinstance(broken, str))
+            must_be(
+                f"cells[{k}]",
+                number_like(value) and isinstance(failed, bool) and isinstance(broken, str),
+            )
         return self
 
 
@@ -147,8 +162,13 @@ class LawRow(Line):
             raise ValueError("gaps: must be those that are played, in order")
         for k, (_, law, *numbers, velocity) in enumerate(self.gaps):
             must_be(f"gaps[{k}]", isinstance(law, str) and all(map(number_like, numbers)))
-            whole = isinstance(velocity, list) and len(velocity) in (0, len(TOUCHING[self.name].position))
-            pairs = whole and all(isinstance(v, list) and len(v) == 2 and all(map(number_like, v)) for v in velocity)
+            whole = isinstance(velocity, list) and len(velocity) in (
+                0,
+                len(TOUCHING[self.name].position),
+            )
+            pairs = whole and all(
+                isinstance(v, list) and len(v) == 2 and all(map(number_like, v)) for v in velocity
+            )
             must_be(f"gaps[{k}][5]", pairs)
         return self
 
@@ -156,7 +176,9 @@ class LawRow(Line):
 def must_be(where: str, whole: bool) -> None:
     """Raise `ValueError` where a list does not hold what it should."""
     if not whole:
-        raise ValueError(f"{where}: must hold numbers and text as `crosscheck stability` writes them")
+        raise ValueError(
+            f"{where}: must hold numbers and text as `crosscheck stability` writes them"
+        )
 
 
 def number_like(value: Any) -> bool:
@@ -197,7 +219,8 @@ KINDS = Kinds(
 
 
 def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
-    """Why there is no such case or engine, as the end of a sentence; "" if there is. files: those of the header."""
+    """Why there is no such case or engine, as the end of a sentence; "" if there is. files: those
+    of the header."""
     if isinstance(one, Limit):
         path, _, what = one.case.rpartition(":")
         if one.case not in CASES and (path not in files or what not in VARIES):
@@ -211,13 +234,20 @@ def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
 def impossible(limit: Limit, case: Case) -> str:
     """Why no search of the case ends so, as the end of a sentence; "" if one may."""
     if limit.status != "ok":
-        lost = isnan(limit.works_at) and isnan(limit.fails_at) and all(isnan(trial.value) for trial in limit.trials)
+        lost = (
+            isnan(limit.works_at)
+            and isnan(limit.fails_at)
+            and all(isnan(trial.value) for trial in limit.trials)
+        )
         return "" if lost else f"limit.status = {limit.status!r}: must be 'ok', as there are values"
     values = [trial.value for trial in limit.trials]
     low, high = min(case.values), max(case.values)
     for k, trial in enumerate(limit.trials):
         if not low <= trial.value <= high or (case.whole and trial.value != round(trial.value)):
-            return f"limit.trials[{k}].value = {trial.value!r}: must be from {low} to {high}, as the case has it"
+            return (
+                f"limit.trials[{k}].value = {trial.value!r}: must be from {low} to {high}, as the"
+                " case has it"
+            )
         if fault := miscounted(trial, case, trial.value == limit.fails_at):
             return f"limit.trials[{k}]: {fault}"
     if values != sorted(set(values), key=lambda value: case.harsher * value):
@@ -226,7 +256,9 @@ def impossible(limit: Limit, case: Case) -> str:
     for name, there in ends.items():
         value = getattr(limit, name)
         if (value not in values) if there else not isnan(value):
-            return f"limit.{name} = {value!r}: must be {'one of the values tried' if there else 'nan'}"
+            return (
+                f"limit.{name} = {value!r}: must be {'one of the values tried' if there else 'nan'}"
+            )
     try:
         if limit.mechanisms:
             reason_by_ablation(limit)
@@ -238,7 +270,10 @@ def impossible(limit: Limit, case: Case) -> str:
 def miscounted(trial: Trial, case: Case, at_the_limit: bool) -> str:
     """Why no runs at a value of the case give that, as the end of a sentence; "" if some may."""
     if trial.runs > case.runs or trial.failed > trial.runs or trial.allowed > case.runs:
-        return f"runs = {trial.runs}, failed = {trial.failed}: must be at most {case.runs}, as the case has it"
+        return (
+            f"runs = {trial.runs}, failed = {trial.failed}: must be at most {case.runs}, as the"
+            " case has it"
+        )
     if not -1 <= trial.first < trial.runs or (trial.first < 0) != (trial.failed == 0):
         return f"first = {trial.first}: must be that of a run that failed, or -1"
     if trial.left and (at_the_limit or not trial.failed):

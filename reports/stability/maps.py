@@ -45,7 +45,9 @@ class Map:
     predicate: Predicate
     runs: int = 2
     only: tuple[str, ...] = ()
-    play: Callable[[str, Scenario, float, float], Run] = lambda engine, scenario, _x, _y: play_as(engine, scenario)
+    play: Callable[[str, Scenario, float, float], Run] = lambda engine, scenario, _x, _y: play_as(
+        engine, scenario
+    )
 
     def engines(self, asked: Sequence[str]) -> list[str]:
         """Those asked for that have both parameters."""
@@ -54,7 +56,8 @@ class Map:
 
 @dataclass(frozen=True)
 class MapOf:
-    """A map on an engine: rows (x, y, worst reading, whether a run failed, what broke); s of processor time it took."""
+    """A map on an engine: rows (x, y, worst reading, whether a run failed, what broke); s of
+    processor time it took."""
 
     name: str
     engine: str
@@ -65,7 +68,9 @@ class MapOf:
     @staticmethod
     def from_record(record: dict[str, Any]) -> MapOf:
         """From a line of the journal."""
-        cells = tuple((x, y, float(value), failed, broken) for x, y, value, failed, broken in record["cells"])
+        cells = tuple(
+            (x, y, float(value), failed, broken) for x, y, value, failed, broken in record["cells"]
+        )
         return MapOf(record["name"], record["engine"], cells, record["status"])
 
 
@@ -76,7 +81,10 @@ def map_of(name: str, engine: str) -> MapOf:
     for x in one.x:
         for y in one.y:
             scenarios = [one.scene(x, y, run) for run in range(one.runs)]
-            readings = [judge(one.predicate, scenario, one.play(engine, scenario, x, y)) for scenario in scenarios]
+            readings = [
+                judge(one.predicate, scenario, one.play(engine, scenario, x, y))
+                for scenario in scenarios
+            ]
             worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
             broken = next((f"{r.broken}: {r.event}" for r in readings if r.failed), "")
             cells.append((x, y, worst, any(r.failed for r in readings), broken))
@@ -87,11 +95,14 @@ def with_iterations(engine: str, scenario: Scenario, _ratio: float, count: float
     """Play with so many iterations, or substeps, whichever the engine has."""
     work = ENGINES[engine].work
     assert work is not None
-    return play_once(partial(changed, engine, **{work.setting: int(count)}), engine, scenario, scenario.dt(1))
+    return play_once(
+        partial(changed, engine, **{work.setting: int(count)}), engine, scenario, scenario.dt(1)
+    )
 
 
 def collision_at(x: float, y: float, run: int) -> Scenario:
-    """x = dt over 1/64 s, y = closing speed in m/s: `flyby` in other units of time would be the same scene."""
+    """x = dt over 1/64 s, y = closing speed in m/s: `flyby` in other units of time would be the
+    same scene."""
     return flyby(y, run, dt=x / 64)
 
 
@@ -102,22 +113,39 @@ MAPS = {
     one.name: one
     for one in (
         Map(
-            "dt_and_speed", "Is a head-on collision of disks of 0.25 m at e = 1 elastic, whatever the step and the speed?",
-            "dt (1/64 s)", "closing speed (m/s)", COLLISIONS_X, COLLISIONS_Y, collision_at, RESTITUTION_OFF,
+            "dt_and_speed",
+            "Is a head-on collision of disks of 0.25 m at e = 1 elastic, whatever the step and the"
+            " speed?",
+            "dt (1/64 s)",
+            "closing speed (m/s)",
+            COLLISIONS_X,
+            COLLISIONS_Y,
+            collision_at,
+            RESTITUTION_OFF,
         ),
         Map(
-            "mass_ratio_and_iterations", "How many iterations does a heavy disk need that stands on a light one?",
-            "m2 / m1", "iterations (Box2D 3.1: substeps)", (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4),
+            "mass_ratio_and_iterations",
+            "How many iterations does a heavy disk need that stands on a light one?",
+            "m2 / m1",
+            "iterations (Box2D 3.1: substeps)",
+            (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4),
             (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0),
-            lambda x, _y, _run: column(2, np.array([1.0, x])), STANDS, runs=1,
+            lambda x, _y, _run: column(2, np.array([1.0, x])),
+            STANDS,
+            runs=1,
             only=tuple(name for name, row in ENGINES.items() if row.work),
             play=with_iterations,
         ),
         Map(
-            "packing_and_dt", "How much energy does a gas of 36 disks lose or gain in 100 steps?",
-            "packing", "v dt / R", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75),
+            "packing_and_dt",
+            "How much energy does a gas of 36 disks lose or gain in 100 steps?",
+            "packing",
+            "v dt / R",
+            (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75),
             (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0),
-            lambda x, y, run: gas(x, run, steps=100, step=y), ENERGY_DRIFTS, runs=1,
+            lambda x, y, run: gas(x, run, steps=100, step=y),
+            ENERGY_DRIFTS,
+            runs=1,
         ),
     )
-}  # fmt: skip
+}

@@ -14,7 +14,8 @@ from reports.stability.touching import AT_ONCE, PAIRS, AtGap
 
 
 class LimitCell(NamedTuple):
-    """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none), failed."""
+    """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none),
+    failed."""
 
     text: str
     remark: str = ""
@@ -39,7 +40,8 @@ class MapTable(NamedTuple):
 
 
 def cell_of(case: Case, limit: Limit | None) -> LimitCell:
-    """A limit in the overview: the deeper its colour, the earlier on the way from gentle to harsh it fails."""
+    """A limit in the overview: the deeper its colour, the earlier on the way from gentle to harsh
+    it fails."""
     if limit is None:
         return LimitCell("")
     remark = f"{limit.verdict}. {why(limit)}"
@@ -78,7 +80,8 @@ def bracket(limit: Limit) -> tuple[str, str]:
 
 
 def pattern(limit: Limit) -> str:
-    """Every value tried, from gentle to harsh: how it works and fails where it does not do so once and for all."""
+    """Every value tried, from gentle to harsh: how it works and fails where it does not do so once
+    and for all."""
     return "" if limit.monotone else "".join("o" if trial.works else "x" for trial in limit.trials)
 
 
@@ -87,30 +90,38 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     mine = [limit for limit in limits if limit.engine in ENGINES]
     cases = list(dict.fromkeys(limit.case for limit in mine))
     failing = [limit for limit in mine if limit.verdict != NEVER_FAILS]
-    found = [f"{len(mine)} searches in {len(cases)} cases: {len(mine) - len(failing)} found no failure as far as they "
-             f"went, {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} a limit, and "
-             f"{sum(limit.verdict == NEVER_WORKS for limit in mine)} failed everywhere."]  # fmt: skip
+    found = [
+        f"{len(mine)} searches in {len(cases)} cases: {len(mine) - len(failing)} found no failure"
+        f" as far as they went, {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} a"
+        f" limit, and {sum(limit.verdict == NEVER_WORKS for limit in mine)} failed everywhere."
+    ]
     fails: dict[str, list[str]] = {}
     for limit in failing:
         fails.setdefault(limit.engine, []).append(limit.case)
     if fails:
-        engines = dict.fromkeys(limit.engine for limit in mine)  # in reading order, which decides between equals
+        # in reading order, which decides between equals
+        engines = dict.fromkeys(limit.engine for limit in mine)
         order = sorted(engines, key=lambda engine: len(fails.get(engine, [])))
-        found.append(f"Of these {len(cases)} cases {order[0]} fails in the fewest, {len(fails.get(order[0], []))}, and "
-                     f"{order[-1]} in the most, {len(fails[order[-1]])}. Each fails somewhere else.")  # fmt: skip
+        found.append(
+            f"Of these {len(cases)} cases {order[0]} fails in the fewest,"
+            f" {len(fails.get(order[0], []))}, and {order[-1]} in the most,"
+            f" {len(fails[order[-1]])}. Each fails somewhere else."
+        )
     tested = [limit for limit in failing if limit.tested]
     found.append(
-        f"The reasons of {len(tested)} of the {len(failing)} limits were tested: the limit follows from the reason, "
-        "or an engine that differs in that one thing gets farther, or the failing run works without it, or the "
-        "reference with end-of-step detection and the fewest mechanisms of the engine that suffice works and fails at the same values. "
-        "The others are called likely, or not known."
+        f"The reasons of {len(tested)} of the {len(failing)} limits were tested: the limit follows"
+        " from the reason, or an engine that differs in that one thing gets farther, or the"
+        " failing run works without it, or the reference with end-of-step detection and the fewest"
+        " mechanisms of the engine that suffice works and fails at the same values. The others are"
+        " called likely, or not known."
     )
     odd = [limit for limit in mine if not limit.monotone]
     if odd:
         names = ", ".join(dict.fromkeys(f"{limit.engine} in {limit.case}" for limit in odd[:3]))
         found.append(
-            f"{len(odd)} of the searches found more than one edge (marked *): an engine that works again beyond its "
-            f"first failure, as {names}. What stands in the table is the first failure."
+            f"{len(odd)} of the searches found more than one edge (marked *): an engine that works"
+            f" again beyond its first failure, as {names}. What stands in the table is the first"
+            " failure."
         )
     return found
 
@@ -120,20 +131,29 @@ def map_tables(maps: Sequence[MapOf]) -> dict[str, list[MapTable]]:
     tables: dict[str, list[MapTable]] = {}
     for one in maps:
         bound = MAPS[one.name].predicate.bound
-        at = {(x, y): map_cell(value, failed, broken, bound) for x, y, value, failed, broken in one.cells}
-        rows = [(y, [at[x, y] for x in MAPS[one.name].x if (x, y) in at]) for y in reversed(MAPS[one.name].y)]
+        at = {
+            (x, y): map_cell(value, failed, broken, bound)
+            for x, y, value, failed, broken in one.cells
+        }
+        rows = [
+            (y, [at[x, y] for x in MAPS[one.name].x if (x, y) in at])
+            for y in reversed(MAPS[one.name].y)
+        ]
         tables.setdefault(one.name, []).append(MapTable(one.engine, rows))
     return tables
 
 
 def map_cell(value: float, failed: bool, broken: str, bound: float) -> LimitCell:
-    """A reading as a share of its bound: pale far below, the deep half of the ramp where it fails."""
+    """A reading as a share of its bound: pale far below, the deep half of the ramp where it
+    fails."""
     if isnan(value):
         return LimitCell("r" if broken.startswith("refused") else "!", broken, -1, True)
     steps = (0.01, 0.1, 0.3, 1.0, 2.0, 5.0, 20.0, 100.0, 1e3)
     share = value / bound
     return LimitCell(
-        "×" if failed else "", f"{number(value)}{'; ' + broken if broken else ''}", sum(share > s for s in steps)
+        "×" if failed else "",
+        f"{number(value)}{'; ' + broken if broken else ''}",
+        sum(share > s for s in steps),
     )
 
 

@@ -1,4 +1,5 @@
-"""Writes stability.html: the limits, the maps, and of every limit the first run that failed, to look at."""
+"""Writes stability.html: the limits, the maps, and of every limit the first run that failed, to
+look at."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ SECONDS = 5.0  # a replay lasts
 
 @dataclass(frozen=True)
 class Replay:
-    """The first failing run of an engine: what the page's player takes, its height over its width, and a sentence."""
+    """The first failing run of an engine: what the page's player takes, its height over its width,
+    and a sentence."""
 
     engine: str
     pack: str
@@ -56,7 +58,9 @@ class CaseSection:
 
     def cell(self, engine: str) -> overview.LimitCell:
         """Its limit in the overview; empty where it was not asked."""
-        return overview.cell_of(self.case, next((limit for limit in self.limits if limit.engine == engine), None))
+        return overview.cell_of(
+            self.case, next((limit for limit in self.limits if limit.engine == engine), None)
+        )
 
     def replay(self, engine: str) -> Replay | None:
         """The replay of an engine's failure, if there is one."""
@@ -70,16 +74,34 @@ def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
     for limit in limits:
         by_case.setdefault(limit.case, []).append(limit)
     sections = [section_of(case_named(name), found, folder) for name, found in by_case.items()]
-    names = [limit.engine for limit in limits] + [one.engine for one in maps] + [one.engine for one in laws]
+    names = (
+        [limit.engine for limit in limits]
+        + [one.engine for one in maps]
+        + [one.engine for one in laws]
+    )
     names = list(dict.fromkeys(names))
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
     html = render(
-        "stability/stability.html.j2", generator=GENERATOR, scripts=(*CHARTED, "stability/stability.js"),
-        styles=["stability/stability.css"], looks=looks, plotly=True,
-        sections=sections, families=families_of(sections), findings=overview.findings(limits), about=results.header,
-        engines=[name for name in names if "+" not in name], maps=overview.map_tables(maps), all_maps=MAPS, laws=laws,
-        touching=TOUCHING, gaps=GAPS, words=overview, exact=EXACT, form=FORMS[results.header["form"]],
-    )  # fmt: skip
+        "stability/stability.html.j2",
+        generator=GENERATOR,
+        scripts=(*CHARTED, "stability/stability.js"),
+        styles=["stability/stability.css"],
+        looks=looks,
+        plotly=True,
+        sections=sections,
+        families=families_of(sections),
+        findings=overview.findings(limits),
+        about=results.header,
+        engines=[name for name in names if "+" not in name],
+        maps=overview.map_tables(maps),
+        all_maps=MAPS,
+        laws=laws,
+        touching=TOUCHING,
+        gaps=GAPS,
+        words=overview,
+        exact=EXACT,
+        form=FORMS[results.header["form"]],
+    )
     put_text(path, html)
 
 
@@ -95,11 +117,19 @@ def section_of(case: Case, limits: list[Limit], folder: Path) -> CaseSection:
     """All that the page shows of one case."""
     replays = [replay for limit in limits if (replay := replay_of(case, limit, folder)) is not None]
     drawing = readings(case, limits)
-    return CaseSection(case, limits, replays, overview.reasons(limits), drawing, packed_charts({"readings": drawing}))
+    return CaseSection(
+        case,
+        limits,
+        replays,
+        overview.reasons(limits),
+        drawing,
+        packed_charts({"readings": drawing}),
+    )
 
 
 def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
-    """The first failing run at the limit, from just before the failure; None if nothing was kept."""
+    """The first failing run at the limit, from just before the failure; None if nothing was
+    kept."""
     failing = limit.failing
     if failing is None or not isfinite(failing.value):
         return None
@@ -135,29 +165,43 @@ def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, 
 
 
 def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
-    """The worst reading of every engine against the parameter, and the bound above which it fails."""
+    """The worst reading of every engine against the parameter, and the bound above which it
+    fails."""
     predicate = case.predicate
     if predicate.bound == 0:
         return shares(case, limits)
     title = f"{predicate.name.capitalize()}, {predicate.unit}"
     caption = (
-        f"The worst of the runs played at each {case.parameter}, harsher to the right; above the dotted line it fails. "
-        "A line that ends has nothing to read there: refused, broken off, or not a number."
+        f"The worst of the runs played at each {case.parameter}, harsher to the right; above the"
+        " dotted line it fails. A line that ends has nothing to read there: refused, broken off,"
+        " or not a number."
     )
     lines = []
     for limit in limits:
-        trials = [trial for trial in limit.trials if np.isfinite(trial.worst) and np.isfinite(trial.value)]
+        trials = [
+            trial for trial in limit.trials if np.isfinite(trial.worst) and np.isfinite(trial.value)
+        ]
         if len(trials) > 1:
-            x, y = (np.array([getattr(trial, name) for trial in trials], float) for name in ("value", "worst"))
+            x, y = (
+                np.array([getattr(trial, name) for trial in trials], float)
+                for name in ("value", "worst")
+            )
             lines.append(ChartLine(named(limit), x, np.abs(y)))
     if not lines or not any((line.y > 0).any() for line in lines):
         return Drawing(title, "No engine reads more than 0 anywhere.", None)
     ends = [min(case.values), max(case.values)]
     guide = {
-        "type": "scatter", "x": shortened(ends), "y": [predicate.bound or None] * 2, "mode": "lines", "name": "bound",
-        "hoverinfo": "skip", "line": {"color": style.look(style.TRUTH).light, "dash": "dot", "width": 1.3},
-    }  # fmt: skip
-    return Drawing(title, caption, figure_of(lines, axis_of(case), predicate.unit, markers=40, guide=[guide]))
+        "type": "scatter",
+        "x": shortened(ends),
+        "y": [predicate.bound or None] * 2,
+        "mode": "lines",
+        "name": "bound",
+        "hoverinfo": "skip",
+        "line": {"color": style.look(style.TRUTH).light, "dash": "dot", "width": 1.3},
+    }
+    return Drawing(
+        title, caption, figure_of(lines, axis_of(case), predicate.unit, markers=40, guide=[guide])
+    )
 
 
 def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
@@ -165,14 +209,18 @@ def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
     lines = []
     for limit in limits:
         trials = [trial for trial in limit.trials if not trial.left]
-        x, y = (np.array(pair, float) for pair in zip(*((t.value, t.failed / t.runs) for t in trials)))
+        x, y = (
+            np.array(pair, float) for pair in zip(*((t.value, t.failed / t.runs) for t in trials))
+        )
         lines.append(ChartLine(named(limit), x, y))
     caption = (
-        f"How many of the runs at each {case.parameter} failed; harsher to the right. Values that were left at their "
-        "first failing run, as the quick form does, are not drawn."
+        f"How many of the runs at each {case.parameter} failed; harsher to the right. Values that"
+        " were left at their first failing run, as the quick form does, are not drawn."
     )
     title = f"{case.predicate.name.capitalize()}, share of runs"
-    return Drawing(title, caption, figure_of(lines, axis_of(case), "share of runs", log=False, markers=40))
+    return Drawing(
+        title, caption, figure_of(lines, axis_of(case), "share of runs", log=False, markers=40)
+    )
 
 
 def axis_of(case: Case) -> dict[str, Any]:

@@ -1,4 +1,5 @@
-"""Where in its step a collision happens in the runs of a case: evenly spread and drawn, few the first of many."""
+"""Where in its step a collision happens in the runs of a case: evenly spread and drawn, few the
+first of many."""
 
 from __future__ import annotations
 
@@ -19,8 +20,9 @@ def sampled(seed: int) -> tuple[float, ...]:
 def phase(run: int) -> float:
     """Where in its step the collision of a run happens, from 0 to 1, its beginning and its end.
 
-    Run 0 has it at the step's very beginning, found latest of all; of the others every second is spread evenly (van der
-    Corput, 1/2, 1/4, 3/4, 1/8 ...), and the rest are drawn: what repeats with the step could miss the even ones alone.
+    Run 0 has it at the step's very beginning, found latest of all; of the others every second is
+    spread evenly (van der Corput, 1/2, 1/4, 3/4, 1/8 ...), and the rest are drawn: what repeats
+    with the step could miss the even ones alone.
     """
     if run == 0:
         return EDGE
@@ -29,7 +31,8 @@ def phase(run: int) -> float:
 
 
 def radical_inverse(k: int) -> float:
-    """The binary digits of k mirrored at the point: 1 -> 1/2, 2 -> 1/4, 3 -> 3/4 (van der Corput, 1935)."""
+    """The binary digits of k mirrored at the point: 1 -> 1/2, 2 -> 1/4, 3 -> 3/4 (van der Corput,
+    1935)."""
     value, share = 0.0, 0.5
     while k:
         value, k, share = value + share * (k & 1), k >> 1, share / 2

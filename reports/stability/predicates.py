@@ -1,4 +1,5 @@
-"""What failing means: named predicates with units, each a number read off a run and the bound it must not pass."""
+"""What failing means: named predicates with units, each a number read off a run and the bound it
+must not pass."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ from scenarios.model import Array, Scenario, Trajectory
 
 
 class Reading(NamedTuple):
-    """A number in the predicate's unit; when (s), how and at which disk (-1: all) it broke, and what: a predicate."""
+    """A number in the predicate's unit; when (s), how and at which disk (-1: all) it broke, and
+    what: a predicate."""
 
     value: float
     at: float = np.nan
@@ -30,7 +32,8 @@ class Predicate(NamedTuple):
         unit: of the number.
         bound: the largest that still works.
         means: what failing is, in words.
-        read: scenario and run, played to its end -> the reading; `failed` and `broken` are filled in by `judge`.
+        read: scenario and run, played to its end -> the reading; `failed` and `broken` are filled
+            in by `judge`.
     """
 
     name: str
@@ -46,7 +49,8 @@ def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Reading:
         outcome = "refused" if run.status == "unsupported" else run.status
         at = float(run.trajectory.t[-1]) if run.trajectory is not None else 0.0
         return Reading(np.nan, at, run.reason, outcome, True)
-    with np.errstate(over="ignore", invalid="ignore"):  # what was thrown far enough overflows, and fails
+    # what was thrown far enough overflows, and fails
+    with np.errstate(over="ignore", invalid="ignore"):
         reading = predicate.read(scenario, run.trajectory)
     if reading.value <= predicate.bound:
         return reading
@@ -86,10 +90,16 @@ def _collisions_spurious(scenario: Scenario, played: Trajectory) -> Reading:
 
 
 def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
-    closing, separating = (float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1]))
+    closing, separating = (
+        float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1])
+    )
     e = -separating / closing
     off = abs(e - scenario.scene.restitution)
-    return Reading(off, float(truth_of(scenario).collisions.t[0]), f"the collision is played with e = {e + 0.0:.3g}")
+    return Reading(
+        off,
+        float(truth_of(scenario).collisions.t[0]),
+        f"the collision is played with e = {e + 0.0:.3g}",
+    )
 
 
 def _strays(scenario: Scenario, played: Trajectory) -> Reading:
@@ -99,7 +109,9 @@ def _strays(scenario: Scenario, played: Trajectory) -> Reading:
     off = np.abs(way - ought) / ought
     worst = int(np.nanargmax(off)) if np.isfinite(off).any() else 0
     return Reading(
-        float(off[worst]), float(played.t[-1]), f"disk {worst} has gone {way[worst] / ought[worst]:.4g} of its way"
+        float(off[worst]),
+        float(played.t[-1]),
+        f"disk {worst} has gone {way[worst] / ought[worst]:.4g} of its way",
     )
 
 
@@ -109,20 +121,32 @@ def _velocity_off(scenario: Scenario, played: Trajectory) -> Reading:
     own = np.linalg.norm(true.velocity[-1], axis=1)
     share = off / np.where(own > 0, own, np.linalg.norm(true.velocity[0], axis=1).max())
     worst = int(np.nanargmax(share)) if np.isfinite(share).any() else 0
-    return Reading(float(share[worst]), float(true.collisions.t[0]), f"disk {worst} leaves with another velocity")
+    return Reading(
+        float(share[worst]),
+        float(true.collisions.t[0]),
+        f"disk {worst} leaves with another velocity",
+    )
 
 
 def _scaled_deviation(scenario: Scenario, played: Trajectory) -> Reading:
     true = truth_of(scenario)
-    off = (np.linalg.norm(played.position - true.position, axis=2) / scenario.scene.radius).max(axis=1)
-    return Reading(float(off.max()), first_above(played.t, off, 0.25), "here it leaves the path it has at scale 1")
+    off = (np.linalg.norm(played.position - true.position, axis=2) / scenario.scene.radius).max(
+        axis=1
+    )
+    return Reading(
+        float(off.max()),
+        first_above(played.t, off, 0.25),
+        "here it leaves the path it has at scale 1",
+    )
 
 
 def _angle_off(scenario: Scenario, played: Trajectory) -> Reading:
     turned = played.t * scenario.scene.angular_velocity[0]
     off = np.abs(played.angle[:, 0] - turned)[1:] / turned[1:]
     return Reading(
-        float(off[-1]), float(played.t[1]), f"turns {played.angle[-1, 0] / turned[-1]:.4g} times as far as it should"
+        float(off[-1]),
+        float(played.t[1]),
+        f"turns {played.angle[-1, 0] / turned[-1]:.4g} times as far as it should",
     )
 
 
@@ -132,28 +156,39 @@ def _spring_grows(_: Scenario, played: Trajectory) -> Reading:
     # Means over a quarter: a bounded method swings within a period, and comes back.
     factor = float(energy[-quarter:].mean() / energy[:quarter].mean())
     at = first_above(played.t, np.abs(np.log2(energy / energy[0])), SPRING_GROWS.bound)
-    return Reading(abs(float(np.log2(factor))), at, f"the energy is {factor:.3g} of what it was, after 300 steps")
+    return Reading(
+        abs(float(np.log2(factor))),
+        at,
+        f"the energy is {factor:.3g} of what it was, after 300 steps",
+    )
 
 
 def _bounces_off(scenario: Scenario, played: Trajectory) -> Reading:
     heights = apexes(scenario, played)
     below = played.position[:, 0, 1] < 0
     if len(heights) < 2 or below[-1]:
-        return Reading(np.nan, first_above(played.t, below.astype(float), 0.5), "the ball falls through the floor")
+        return Reading(
+            np.nan,
+            first_above(played.t, below.astype(float), 0.5),
+            "the ball falls through the floor",
+        )
     changes = np.diff(heights)
     worst = int(np.argmax(np.abs(changes)))
     word, mean = "higher" if changes[worst] > 0 else "lower", float(np.abs(changes.mean()))
     return Reading(
-        float(np.abs(changes[worst])), first_bounce(scenario),
-        f"bounce {worst + 1} comes {abs(changes[worst]):.3g} of the height {word}, the mean of all is {mean:.3g}",
-    )  # fmt: skip
+        float(np.abs(changes[worst])),
+        first_bounce(scenario),
+        f"bounce {worst + 1} comes {abs(changes[worst]):.3g} of the height {word}, the mean of all"
+        f" is {mean:.3g}",
+    )
 
 
 def apexes(scenario: Scenario, played: Trajectory) -> Array:
-    """(k,) how high a dropped ball comes in each flight, the drop itself the first, over the height of the drop.
+    """(k,) how high a dropped ball comes in each flight, the drop itself the first, over the height
+    of the drop.
 
-    An apex is the vertex of the parabola through the three highest samples of a flight, the first three of the drop. A
-    flight with fewer is left out.
+    An apex is the vertex of the parabola through the three highest samples of a flight, the first
+    three of the drop. A flight with fewer is left out.
     """
     y = played.position[:, 0, 1] - scenario.scene.radius[0]
     top = np.flatnonzero((y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])) + 1
@@ -164,7 +199,8 @@ def apexes(scenario: Scenario, played: Trajectory) -> Array:
 
 
 def apex_drift(scenario: Scenario, played: Trajectory) -> float:
-    """Mean change of a bouncing ball's apex per bounce, from the first bounce to the last, over the height of the drop.
+    """Mean change of a bouncing ball's apex per bounce, from the first bounce to the last, over the
+    height of the drop.
 
     nan of a ball that does not bounce twice.
     """
@@ -179,25 +215,51 @@ def first_bounce(scenario: Scenario) -> float:
 
 
 COLLISIONS_MISSED = Predicate(
-    "collisions missed", "collisions", 0.0, "a disk passes through another that it should collision", _collisions_missed
+    "collisions missed",
+    "collisions",
+    0.0,
+    "a disk passes through another that it should collision",
+    _collisions_missed,
 )
 COLLISIONS_SPURIOUS = Predicate(
-    "spurious collisions", "of the speed", 1e-3, "a disk is deflected that touches nothing", _collisions_spurious
+    "spurious collisions",
+    "of the speed",
+    1e-3,
+    "a disk is deflected that touches nothing",
+    _collisions_spurious,
 )
 RESTITUTION_OFF = Predicate(
     "restitution off", "1", 0.01, "the collision is not played with the scene's e", _restitution_off
 )
 STRAYS = Predicate("strays", "of the way", 0.01, "a free disk has not gone its way", _strays)
 VELOCITY_OFF = Predicate(
-    "velocity off", "of the speed", 1e-3, "a disk leaves the collision with another velocity", _velocity_off
+    "velocity off",
+    "of the speed",
+    1e-3,
+    "a disk leaves the collision with another velocity",
+    _velocity_off,
 )
 SCALED_DEVIATION = Predicate(
-    "deviation", "radii", 0.25, "the path, scaled back, is not the one that the scene has at scale 1", _scaled_deviation
+    "deviation",
+    "radii",
+    0.25,
+    "the path, scaled back, is not the one that the scene has at scale 1",
+    _scaled_deviation,
 )
-ANGLE_OFF = Predicate("angle off", "of the angle", 0.02, "a free disk does not turn as fast as it spins", _angle_off)
+ANGLE_OFF = Predicate(
+    "angle off", "of the angle", 0.02, "a free disk does not turn as fast as it spins", _angle_off
+)
 BOUNCES_OFF = Predicate(
-    "bounce off", "of the height", 0.01, "after a bounce the ball does not come as high as before it", _bounces_off
+    "bounce off",
+    "of the height",
+    0.01,
+    "after a bounce the ball does not come as high as before it",
+    _bounces_off,
 )
 SPRING_GROWS = Predicate(
-    "spring grows", "doublings of energy", 1.0, "the energy of an oscillator doubles or halves", _spring_grows
+    "spring grows",
+    "doublings of energy",
+    1.0,
+    "the energy of an oscillator doubles or halves",
+    _spring_grows,
 )

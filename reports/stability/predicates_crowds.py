@@ -11,14 +11,19 @@ from scenarios.model import Scenario, Trajectory
 
 def _stands(scenario: Scenario, played: Trajectory) -> Reading:
     scene = scenario.scene
-    moved = (np.linalg.norm(played.position - played.position[0], axis=2) / scene.radius).max(axis=1)
+    moved = (np.linalg.norm(played.position - played.position[0], axis=2) / scene.radius).max(
+        axis=1
+    )
     speed = np.linalg.norm(played.velocity[len(played) // 2 :], axis=2) / own_speed(scenario)
     jitter = float(np.sqrt((speed**2).mean(axis=1)).mean())
     worst = int(np.argmax(np.linalg.norm(played.position[-1] - played.position[0], axis=1)))
     sinks = Reading(
-        float(moved.max()) / MOST_SINKING, first_above(played.t, moved, MOST_SINKING),
-        f"disk {worst} has moved by {moved.max():.3g} radii", "sinks", disk=worst,
-    )  # fmt: skip
+        float(moved.max()) / MOST_SINKING,
+        first_above(played.t, moved, MOST_SINKING),
+        f"disk {worst} has moved by {moved.max():.3g} radii",
+        "sinks",
+        disk=worst,
+    )
     jitters = Reading(
         jitter / MOST_JITTER,
         float(played.t[len(played) // 2]),
@@ -36,12 +41,18 @@ def own_speed(scenario: Scenario) -> float:
 
 def _ejected(scenario: Scenario, played: Trajectory) -> Reading:
     speed = (np.linalg.norm(played.velocity, axis=2) / scenario.scene.radius).max(axis=1)
-    return Reading(float(speed[-1]), first_above(played.t, speed, EJECTED.bound), f"thrown at {speed[-1]:.3g} radii/s")
+    return Reading(
+        float(speed[-1]),
+        first_above(played.t, speed, EJECTED.bound),
+        f"thrown at {speed[-1]:.3g} radii/s",
+    )
 
 
 def _still_overlap(scenario: Scenario, played: Trajectory) -> Reading:
     left = laws.penetration(played, scenario.scene)
-    return Reading(float(left[-1]), float(played.t[-1]), f"an overlap of {left[-1]:.3g} radii is left")
+    return Reading(
+        float(left[-1]), float(played.t[-1]), f"an overlap of {left[-1]:.3g} radii is left"
+    )
 
 
 def _bursts(scenario: Scenario, played: Trajectory) -> Reading:
@@ -50,9 +61,12 @@ def _bursts(scenario: Scenario, played: Trajectory) -> Reading:
     outside = ((played.position < low) | (played.position > high)).any(axis=2).sum(axis=1)
     speed = (np.linalg.norm(played.velocity, axis=2) / scene.radius).max(axis=1)
     escapes = Reading(
-        2.0 * float(outside.max()), first_above(played.t, outside.astype(float), 0.5),
-        f"{outside.max()} disks are out of the box", "escape", disk=-1,
-    )  # fmt: skip
+        2.0 * float(outside.max()),
+        first_above(played.t, outside.astype(float), 0.5),
+        f"{outside.max()} disks are out of the box",
+        "escape",
+        disk=-1,
+    )
     flies = Reading(
         float(speed.max()) / MOST_SPEED,
         first_above(played.t, speed, MOST_SPEED),
@@ -67,16 +81,29 @@ def _not_at_rest(scenario: Scenario, played: Trajectory) -> Reading:
     late = played.velocity[-max(1, len(played) // 10) :]
     speed = np.sqrt((late**2).sum(axis=2).mean(axis=1)) / own_speed(scenario)
     return Reading(
-        float(speed.max()), float(played.t[-len(late)]), f"still moves at {speed.max():.3g} sqrt(g R)", disk=-1
+        float(speed.max()),
+        float(played.t[-len(late)]),
+        f"still moves at {speed.max():.3g} sqrt(g R)",
+        disk=-1,
     )
 
 
 MOST_SINKING, MOST_JITTER, MOST_SPEED = 0.1, 0.02, 10.0  # radii; sqrt(g R); radii/s
 
 STANDS = Predicate(
-    "does not stand", "of the bound", 1.0, "a disk sinks by 0.1 radii, or trembles at 0.02 sqrt(g R)", _stands
+    "does not stand",
+    "of the bound",
+    1.0,
+    "a disk sinks by 0.1 radii, or trembles at 0.02 sqrt(g R)",
+    _stands,
 )
 EJECTED = Predicate("thrown apart", "radii/s", 0.1, "two disks at rest are given energy", _ejected)
-STILL_OVERLAP = Predicate("still overlap", "radii", 0.02, "an overlap is left after a second", _still_overlap)
-BURSTS = Predicate("bursts", "of the bound", 1.0, "a disk leaves the box, or flies at 10 radii/s", _bursts)
-NOT_AT_REST = Predicate("not at rest", "sqrt(g R)", 0.05, "what should lie still moves", _not_at_rest)
+STILL_OVERLAP = Predicate(
+    "still overlap", "radii", 0.02, "an overlap is left after a second", _still_overlap
+)
+BURSTS = Predicate(
+    "bursts", "of the bound", 1.0, "a disk leaves the box, or flies at 10 radii/s", _bursts
+)
+NOT_AT_REST = Predicate(
+    "not at rest", "sqrt(g R)", 0.05, "what should lie still moves", _not_at_rest
+)

@@ -1,4 +1,5 @@
-"""What failing means for gases at e = 1: what drifts, and where they part from what the literature says of them."""
+"""What failing means for gases at e = 1: what drifts, and where they part from what the literature
+says of them."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from reports.stability.predicates import Predicate, Reading, first_above, truth_
 from scenarios.model import Array, Scenario, Trajectory
 
 BLOCKS = 10
-ERRORS = 4.0  # block errors: of ten blocks a mean is farther off by chance in 3 of 1000 readings (Student's t)
+# block errors: of ten blocks a mean is farther off by chance in 3 of 1000 readings (Student's t)
+ERRORS = 4.0
 MOST_OFF = 0.05  # of what the literature says, besides
 RANGES = 5  # of speed, each of which holds as many disks as the others
 
@@ -32,20 +34,32 @@ def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
     whole = np.linalg.norm(mass * velocity[0], axis=1).sum()
     off = np.linalg.norm(momentum - momentum[0], axis=1) / whole
     at = first_above(played.t, off, MOMENTUM_DRIFTS.bound)
-    return Reading(float(off.max()), at, f"momentum of {off.max():.3g} of all there is came from nowhere", disk=-1)
+    return Reading(
+        float(off.max()),
+        at,
+        f"momentum of {off.max():.3g} of all there is came from nowhere",
+        disk=-1,
+    )
 
 
 def _gas_parts(scenario: Scenario, played: Trajectory) -> Reading:
-    apart = np.linalg.norm(played.position - truth_of(scenario).position, axis=2) / scenario.scene.radius
+    apart = (
+        np.linalg.norm(played.position - truth_of(scenario).position, axis=2)
+        / scenario.scene.radius
+    )
     off = apart.max(axis=1)
     worst = int(np.argmax(apart[-1]))
     return Reading(
-        float(off.max()), first_above(played.t, off, GAS_PARTS.bound), f"disk {worst} is somewhere else", disk=worst
+        float(off.max()),
+        first_above(played.t, off, GAS_PARTS.bound),
+        f"disk {worst} is somewhere else",
+        disk=worst,
     )
 
 
 def in_blocks(series: Array) -> Array:
-    """(`BLOCKS`, ...) means of a series (k, ...) over as many stretches of it; the first tenth is left out."""
+    """(`BLOCKS`, ...) means of a series (k, ...) over as many stretches of it; the first tenth is
+    left out."""
     settled = series[len(series) // 10 :]
     return np.array([block.mean(axis=0) for block in np.array_split(settled, BLOCKS)])
 
@@ -62,7 +76,9 @@ def _temperatures_part(scenario: Scenario, played: Trajectory) -> Reading:
     blocks = np.log2(in_blocks(heavy) / in_blocks(light))
     off = max(0.0, abs(float(blocks.mean())) - ERRORS * block_error(blocks))
     at = first_above(played.t, np.abs(np.log2(heavy / light)), 1.0)
-    return Reading(off, at, f"heavy disks are {2 ** blocks.mean():.3g} times as hot as light ones", disk=-1)
+    return Reading(
+        off, at, f"heavy disks are {2 ** blocks.mean():.3g} times as hot as light ones", disk=-1
+    )
 
 
 def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
@@ -79,22 +95,30 @@ def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
     )
     if not np.isnan(collisions.impulse).any():  # Box2D 3.1 reports no impulses
         exchanged = counted(played, collisions.j < 0, collisions.impulse)
-        parts.append(_beside("pressure", exchanged, ought.force, "the pressure of the virial series"))
+        parts.append(
+            _beside("pressure", exchanged, ought.force, "the pressure of the virial series")
+        )
     return max(parts, key=lambda part: part.value)._replace(at=float(played.t[len(played) // 10]))
 
 
 def literature(scenario: Scenario) -> Gas:
-    """What the gas of equal disks of a scenario should do, at the temperature that it starts with."""
+    """What the gas of equal disks of a scenario should do, at the temperature that it starts
+    with."""
     scene = scenario.scene
     size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
     temperature = scene.mass[0] * (scene.velocity**2).sum() / 2 / scene.n
-    return gas_in_box(scene.n, float(scene.radius[0]), size, float(temperature), float(scene.mass[0]))
+    return gas_in_box(
+        scene.n, float(scene.radius[0]), size, float(temperature), float(scene.mass[0])
+    )
 
 
 def counted(played: Trajectory, which: NDArray[np.bool_], weights: Array) -> Array:
-    """(`BLOCKS`,) sums of the weights of some collisions, a second, in as many stretches after the first tenth."""
+    """(`BLOCKS`,) sums of the weights of some collisions, a second, in as many stretches after the
+    first tenth."""
     edges = np.linspace(0.1 * played.t[-1], played.t[-1], BLOCKS + 1)
-    return np.histogram(played.collisions.t[which], edges, weights=weights[which])[0] / np.diff(edges)
+    return np.histogram(played.collisions.t[which], edges, weights=weights[which])[0] / np.diff(
+        edges
+    )
 
 
 def _beside(what: str, blocks: Array, ought: float, whose: str, disk: int = -1) -> Reading:
@@ -109,16 +133,20 @@ def _speeds(played: Trajectory) -> list[Reading]:
     shares = in_blocks(shares_of_speeds(played))
     words = ("the slowest", *("those between",) * (RANGES - 2), "the fastest")
     return [
-        _beside("not Maxwell", shares[:, k], 1 / RANGES, f"the share that {words[k]} fifth should be")
+        _beside(
+            "not Maxwell", shares[:, k], 1 / RANGES, f"the share that {words[k]} fifth should be"
+        )
         for k in range(RANGES)
     ]
 
 
 def shares_of_speeds(played: Trajectory) -> Array:
-    """(k, `RANGES`) share of the disks in each of the ranges of speed that should hold equally many.
+    """(k, `RANGES`) share of the disks in each of the ranges of speed that should hold equally
+    many.
 
-    Velocities of n equal disks at a given energy are spread evenly over a sphere in 2n dimensions: a disk has more than
-    the share s of the energy with the probability (1 - s)^(n - 1), which is Maxwell's exp(-m v2 / 2kT) for many.
+    Velocities of n equal disks at a given energy are spread evenly over a sphere in 2n dimensions:
+    a disk has more than the share s of the energy with the probability (1 - s)^(n - 1), which is
+    Maxwell's exp(-m v2 / 2kT) for many.
     """
     energy = (played.velocity**2).sum(axis=2)
     n = energy.shape[1]
@@ -128,18 +156,29 @@ def shares_of_speeds(played: Trajectory) -> Array:
     return (bins[:, :, None] == np.arange(RANGES)).mean(axis=1)
 
 
-ENERGY_DRIFTS = Predicate("energy drifts", "of the energy", 0.01, "energy comes or goes at e = 1", _energy_drifts)
+ENERGY_DRIFTS = Predicate(
+    "energy drifts", "of the energy", 0.01, "energy comes or goes at e = 1", _energy_drifts
+)
 MOMENTUM_DRIFTS = Predicate(
-    "momentum drifts", "of all momenta", 1e-5, "momentum comes from nowhere: more than a hundred roundings in float32",
+    "momentum drifts",
+    "of all momenta",
+    1e-5,
+    "momentum comes from nowhere: more than a hundred roundings in float32",
     _momentum_drifts,
-)  # fmt: skip
+)
 GAS_PARTS = Predicate("parts", "radii", 1e-3, "the same gas is somewhere else", _gas_parts)
 TEMPERATURES_PART = Predicate(
-    "temperatures part", "doublings", 0.5, "one kind of disk is hotter by half a doubling and 4 block errors",
+    "temperatures part",
+    "doublings",
+    0.5,
+    "one kind of disk is hotter by half a doubling and 4 block errors",
     _temperatures_part,
-)  # fmt: skip
+)
 WRONG_GAS = Predicate(
-    "wrong gas", "of the bound", 1.0,
-    "Maxwell's speeds, Enskog's rate or the virial series' wall pressure are missed by 5 % and 4 block errors",
+    "wrong gas",
+    "of the bound",
+    1.0,
+    "Maxwell's speeds, Enskog's rate or the virial series' wall pressure are missed by 5 % and 4"
+    " block errors",
     _wrong_gas,
-)  # fmt: skip
+)

@@ -15,9 +15,19 @@ LEAST_WAY = 0.01  # radii between two samples, less of which is rounding
 
 
 def _usable(scenario: Scenario, played: Trajectory) -> Reading:
-    parts = [part for part in (_rise(scenario, played), _overlap(scenario, played), _escape(scenario, played),
-             _stuck(scenario, played), _wrong_collisions(scenario, played)) if part is not None]  # fmt: skip
-    return max(parts, key=lambda part: part.value, default=Reading(0.0))  # a disk alone can do nothing wrong
+    parts = [
+        part
+        for part in (
+            _rise(scenario, played),
+            _overlap(scenario, played),
+            _escape(scenario, played),
+            _stuck(scenario, played),
+            _wrong_collisions(scenario, played),
+        )
+        if part is not None
+    ]
+    # a disk alone can do nothing wrong
+    return max(parts, key=lambda part: part.value, default=Reading(0.0))
 
 
 def _rise(scenario: Scenario, played: Trajectory) -> Reading | None:
@@ -27,7 +37,11 @@ def _rise(scenario: Scenario, played: Trajectory) -> Reading | None:
     rise = (energy - energy[0]) / (scales.energy(scenario) or 1.0)
     at = first_above(played.t, rise, MOST_RISE)
     return Reading(
-        float(rise.max()) / MOST_RISE, at, f"energy grows by {rise.max():.3g} of what is at hand", "energy", disk=-1
+        float(rise.max()) / MOST_RISE,
+        at,
+        f"energy grows by {rise.max():.3g} of what is at hand",
+        "energy",
+        disk=-1,
     )
 
 
@@ -37,7 +51,11 @@ def _overlap(scenario: Scenario, played: Trajectory) -> Reading | None:
     overlap = laws.penetration(played, scenario.scene)
     at = first_above(played.t, overlap, MOST_OVERLAP)
     return Reading(
-        float(overlap.max()) / MOST_OVERLAP, at, f"an overlap of {overlap.max():.3g} radii", "penetration", disk=-1
+        float(overlap.max()) / MOST_OVERLAP,
+        at,
+        f"an overlap of {overlap.max():.3g} radii",
+        "penetration",
+        disk=-1,
     )
 
 
@@ -47,14 +65,20 @@ def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
     through = np.flatnonzero(laws.through_walls(played, scenario.scene))
     event = f"disk {through[0]} goes through a wall" if len(through) else ""
     return Reading(
-        2.0 * len(through), float(played.t[-1]), event, "escape", disk=int(through[0]) if len(through) else -1
+        2.0 * len(through),
+        float(played.t[-1]),
+        event,
+        "escape",
+        disk=int(through[0]) if len(through) else -1,
     )
 
 
 def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
-    """A disk that keeps its velocity and does not go its way, as the last place of its position is too coarse.
+    """A disk that keeps its velocity and does not go its way, as the last place of its position is
+    too coarse.
 
-    Before its first collision only: two collisions between two samples may leave it the velocity it had.
+    Before its first collision only: two collisions between two samples may leave it the velocity it
+    had.
     """
     scene, v, collisions = scenario.scene, played.velocity, played.collisions
     if len(played) < 2 or scene.wrap is not None:
@@ -68,7 +92,9 @@ def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
     lost = np.where(steady & (ought > LEAST_WAY), 1 - went / np.where(ought > 0, ought, 1.0), 0.0)
     k, disk = np.unravel_index(int(lost.argmax()), lost.shape)
     event = f"disk {disk} goes {max(1 - float(lost[k, disk]), 0.0):.3g} of its way"
-    return Reading(float(lost.max()) / MOST_LOST, float(played.t[k + 1]), event, "strays", disk=int(disk))
+    return Reading(
+        float(lost.max()) / MOST_LOST, float(played.t[k + 1]), event, "strays", disk=int(disk)
+    )
 
 
 def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
@@ -79,25 +105,40 @@ def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
     played, true = cut(played, k), cut(true, k)
     dt = scenario.dt(scenario.substeps[0])
     found = match(played.collisions, true.collisions, float(true.t[-1]), dt)
-    wrong = found.first_wrong or never_collision(played.collisions, true.collisions, float(true.t[-1]) - 3 * dt)
+    wrong = found.first_wrong or never_collision(
+        played.collisions, true.collisions, float(true.t[-1]) - 3 * dt
+    )
     if wrong is None:
         return None
     at, what = wrong
     kind, pair = what.split(maxsplit=1)
     count = len(found.missed) + len(found.spurious)
-    return Reading(2.0 * max(count, 1), at, f"{kind} collision: {pair}", "collisions", disk=int(pair.split("-")[0]))
+    return Reading(
+        2.0 * max(count, 1),
+        at,
+        f"{kind} collision: {pair}",
+        "collisions",
+        disk=int(pair.split("-")[0]),
+    )
 
 
 def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
-    """The first true collision up to `end` s of a pair that never collisions in the run; `match` lets those pass that
-    are close."""
+    """The first true collision up to `end` s of a pair that never collisions in the run; `match`
+    lets those pass that are close."""
     hard = (true.impulse > 0) & (true.t < end)
     missed = np.flatnonzero(hard & ~np.isin(pair_keys(true), pair_keys(played)))
-    return (float(true.t[missed[0]]), f"missed {who(true.i[missed[0]], true.j[missed[0]])}") if len(missed) else None
+    return (
+        (float(true.t[missed[0]]), f"missed {who(true.i[missed[0]], true.j[missed[0]])}")
+        if len(missed)
+        else None
+    )
 
 
 USABLE = Predicate(
-    "unusable", "of the bound", 1.0,
-    "not finite, through a wall, 5 % more energy, an overlap of a tenth of a radius, half a way lost, a wrong collision",
+    "unusable",
+    "of the bound",
+    1.0,
+    "not finite, through a wall, 5 % more energy, an overlap of a tenth of a radius, half a way"
+    " lost, a wrong collision",
     _usable,
-)  # fmt: skip
+)

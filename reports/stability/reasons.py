@@ -1,4 +1,5 @@
-"""The table of reasons: why an engine fails where it does, a sentence and its source, and what must bear it out."""
+"""The table of reasons: why an engine fails where it does, a sentence and its source, and what must
+bear it out."""
 
 from __future__ import annotations
 
@@ -7,7 +8,15 @@ from math import atan, pi, sqrt
 from typing import NamedTuple
 
 from adapters.mechanisms.table import DIGITS, FLIGHT, IMPULSE, POSITION_CORRECTION, RESTITUTION
-from reports.stability.ablations import B2_SETTINGS, B2_TYPES, END_OF_STEP, OF_PYMUNK, PRODUCT, THRESHOLD, THRESHOLDS
+from reports.stability.ablations import (
+    B2_SETTINGS,
+    B2_TYPES,
+    END_OF_STEP,
+    OF_PYMUNK,
+    PRODUCT,
+    THRESHOLD,
+    THRESHOLDS,
+)
 from reports.stability.cases import CASES
 from reports.stability.limits import NEVER_FAILS, Limit
 
@@ -21,8 +30,8 @@ class Reason(NamedTuple):
         source: where it is written down.
         predicts: the limit that follows from it.
         variant: an engine that differs in this thing only, or in little else, and must get farther.
-        mechanism: of `adapters.mechanisms.table`, or `END_OF_STEP`: what it speaks of; an ablation that has the limit
-            must have it.
+        mechanism: of `adapters.mechanisms.table`, or `END_OF_STEP`: what it speaks of; an ablation
+            that has the limit must have it.
     """
 
     cases: str
@@ -34,12 +43,21 @@ class Reason(NamedTuple):
     mechanism: str = ""
 
 
-DISCRETE = "contacts are detected at the ends of steps only, and missed once the centres have passed each other"
+DISCRETE = (
+    "contacts are detected at the ends of steps only, and missed once the centres have passed each"
+    " other"
+)
 GEOMETRY = "geometry: (v dt)² = (2R)² - b² between disks, v dt = R at a thin wall"
-EULER_OUT = "the force is that of a position other than the new one: with x' = x + v dt the oscillator's map grows by 1 + (w dt)²"
+EULER_OUT = (
+    "the force is that of a position other than the new one: with x' = x + v dt the oscillator's"
+    " map grows by 1 + (w dt)²"
+)
 QUARTER = "nothing turns by more than pi/2 a step"
 MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES"
-SWEEP = "restitution is one sweep after the substeps, so a disk that touches two others in a step loses energy"
+SWEEP = (
+    "restitution is one sweep after the substeps, so a disk that touches two others in a step loses"
+    " energy"
+)
 FOUND_LATE = "a collision is detected up to a step late, and lasts about a step too long"
 
 
@@ -52,22 +70,46 @@ REASONS = (
     # One collision.
     *(
         Reason(
-            case, engine, DISCRETE, GEOMETRY, limit, f"{engine}+bullets" if engine.startswith("box2d") else "", END_OF_STEP
+            case,
+            engine,
+            DISCRETE,
+            GEOMETRY,
+            limit,
+            f"{engine}+bullets" if engine.startswith("box2d") else "",
+            END_OF_STEP,
         )
         for case, limit in (
-            ("tunnelling_head_on", 2.0), ("tunnelling_offset", 2 * sqrt(1 - 0.49)), ("tunnelling_thin_wall", 1.0),
-            ("tunnelling_thick_wall", 11.0), ("grazing", 1 - sqrt(1 - 0.01)),
+            ("tunnelling_head_on", 2.0),
+            ("tunnelling_offset", 2 * sqrt(1 - 0.49)),
+            ("tunnelling_thin_wall", 1.0),
+            ("tunnelling_thick_wall", 11.0),
+            ("grazing", 1 - sqrt(1 - 0.01)),
         )
         for engine in ("reference:*", "pymunk:*", "box2d:matched", "box2d_v3:matched")
         if (case, engine) != ("grazing", "box2d_v3:matched")
     ),
-    Reason("tunnelling_*", "*", DISCRETE + "; disks are not swept unless one is a bullet", "Box2D manual, bullets",
-           mechanism=END_OF_STEP),
-    Reason("grazing", "*", DISCRETE + "; the chord of a grazing collision is shorter than v dt", GEOMETRY,
-           mechanism=END_OF_STEP),
     Reason(
-        "near_miss", "box2d_v3:*", "a contact counts from a gap of four slops on, with a normal fixed before the step",
-        "Box2D 3.1 src/constants.h: B2_SPECULATIVE_DISTANCE", None, "box2d_v3:matched", IMPULSE,
+        "tunnelling_*",
+        "*",
+        DISCRETE + "; disks are not swept unless one is a bullet",
+        "Box2D manual, bullets",
+        mechanism=END_OF_STEP,
+    ),
+    Reason(
+        "grazing",
+        "*",
+        DISCRETE + "; the chord of a grazing collision is shorter than v dt",
+        GEOMETRY,
+        mechanism=END_OF_STEP,
+    ),
+    Reason(
+        "near_miss",
+        "box2d_v3:*",
+        "a contact counts from a gap of four slops on, with a normal fixed before the step",
+        "Box2D 3.1 src/constants.h: B2_SPECULATIVE_DISTANCE",
+        None,
+        "box2d_v3:matched",
+        IMPULSE,
     ),
     *(
         Reason(case, f"{box}:shipped", THRESHOLD, source, limit, f"{box}:matched", RESTITUTION)
@@ -75,153 +117,389 @@ REASONS = (
         for box, source in THRESHOLDS.items()
     ),
     Reason(
-        "restitution", "pymunk:shipped", PRODUCT, OF_PYMUNK, 1 - (1 + sqrt(1 - 0.04)) / 2, "pymunk:matched",
+        "restitution",
+        "pymunk:shipped",
+        PRODUCT,
+        OF_PYMUNK,
+        1 - (1 + sqrt(1 - 0.04)) / 2,
+        "pymunk:matched",
         RESTITUTION,
     ),
     # One disk, or two.
     *(
         Reason(
-            "bounce_drift", engine, "the position correction out of the floor adds height", "Munk2D src/cpSpaceStep.c, collision_bias",
-            None, "pymunk:matched", POSITION_CORRECTION,
+            "bounce_drift",
+            engine,
+            "the position correction out of the floor adds height",
+            "Munk2D src/cpSpaceStep.c, collision_bias",
+            None,
+            "pymunk:matched",
+            POSITION_CORRECTION,
         )
         for engine in ("pymunk:shipped", "pymunk:matched+position_correction")
     ),
-    Reason("bounce_drift", "pymunk:matched", "v dt exceeds the radius, and the floor is missed", GEOMETRY, mechanism=END_OF_STEP),
+    Reason(
+        "bounce_drift",
+        "pymunk:matched",
+        "v dt exceeds the radius, and the floor is missed",
+        GEOMETRY,
+        mechanism=END_OF_STEP,
+    ),
     *(
         Reason(
-            "bounce_drift", engine, "the velocity after gravity is reflected: every bounce gains |v| dt of height",
-            "order of operations in a step: gravity, then restitution", 0.005, "", IMPULSE,
+            "bounce_drift",
+            engine,
+            "the velocity after gravity is reflected: every bounce gains |v| dt of height",
+            "order of operations in a step: gravity, then restitution",
+            0.005,
+            "",
+            IMPULSE,
         )
         for engine in ("box2d:*", "reference:lesson")
     ),
     Reason(
-        "bounce_drift", "reference:exercise",
-        "what gravity adds until a collision is found, up to a step late, is reflected with it: up to |v| dt of height",
-        "order of operations in a step: gravity, flight, then restitution", 0.005, "", FLIGHT,
+        "bounce_drift",
+        "reference:exercise",
+        "what gravity adds until a collision is found, up to a step late, is reflected with it: up"
+        " to |v| dt of height",
+        "order of operations in a step: gravity, flight, then restitution",
+        0.005,
+        "",
+        FLIGHT,
     ),
     Reason(
-        "bounce_drift", "box2d_v3:shipped", "the soft contact takes about |v| dt of height a bounce",
-        "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched", IMPULSE,
+        "bounce_drift",
+        "box2d_v3:shipped",
+        "the soft contact takes about |v| dt of height a bounce",
+        "Box2D 3.1 src/contact_solver.c, soft step",
+        None,
+        "box2d_v3:matched",
+        IMPULSE,
     ),
     Reason(
-        "bounce_drift", "box2d_v3:matched*", "the soft contact takes up to |v| dt / substeps of height a bounce",
-        "Box2D 3.1 src/contact_solver.c, soft step", None, "box2d_v3:matched+16_substeps", IMPULSE,
+        "bounce_drift",
+        "box2d_v3:matched*",
+        "the soft contact takes up to |v| dt / substeps of height a bounce",
+        "Box2D 3.1 src/contact_solver.c, soft step",
+        None,
+        "box2d_v3:matched+16_substeps",
+        IMPULSE,
     ),
     Reason(
-        "scale_up", "box2d:shipped", "nothing moves by more than 2 units a step: the velocity is cut",
-        B2_SETTINGS + "b2_maxTranslation", 30.0, "box2d:matched", IMPULSE,
+        "scale_up",
+        "box2d:shipped",
+        "nothing moves by more than 2 units a step: the velocity is cut",
+        B2_SETTINGS + "b2_maxTranslation",
+        30.0,
+        "box2d:matched",
+        IMPULSE,
     ),
     Reason(
-        "scale_up", "box2d_v3:shipped", "nothing is faster than 400 m/s: the velocity is cut",
-        B2_TYPES + "maximumLinearSpeed", 100.0, "box2d_v3:matched",
+        "scale_up",
+        "box2d_v3:shipped",
+        "nothing is faster than 400 m/s: the velocity is cut",
+        B2_TYPES + "maximumLinearSpeed",
+        100.0,
+        "box2d_v3:matched",
     ),
     Reason(
-        "far_from_origin", "box2d*", "positions are float32: beyond 4096 m a step of 1/240 m is 9 last places, not 8.5",
-        "IEEE 754", 4096.0, "", DIGITS,
+        "far_from_origin",
+        "box2d*",
+        "positions are float32: beyond 4096 m a step of 1/240 m is 9 last places, not 8.5",
+        "IEEE 754",
+        4096.0,
+        "",
+        DIGITS,
     ),
     Reason("spin", "box2d:shipped", QUARTER, B2_SETTINGS + "b2_maxRotation", pi / 2 / 0.98),
     Reason("spin", "box2d:matched", QUARTER + "; refused", B2_SETTINGS + "b2_maxRotation", pi / 2),
     Reason(
-        "spin", "box2d_v3:shipped", "nothing turns by more than pi/4 a step, and a substep turns by atan(w h) only",
-        "Box2D 3.1 src/constants.h: B2_MAX_ROTATION", 4 * atan(pi / 16) / 0.98,
+        "spin",
+        "box2d_v3:shipped",
+        "nothing turns by more than pi/4 a step, and a substep turns by atan(w h) only",
+        "Box2D 3.1 src/constants.h: B2_MAX_ROTATION",
+        4 * atan(pi / 16) / 0.98,
     ),
     Reason(
-        "spin", "box2d_v3:matched*", "nothing turns by more than pi/4 a step; refused",
-        "Box2D 3.1 src/constants.h: B2_MAX_ROTATION", pi / 4,
+        "spin",
+        "box2d_v3:matched*",
+        "nothing turns by more than pi/4 a step; refused",
+        "Box2D 3.1 src/constants.h: B2_MAX_ROTATION",
+        pi / 4,
     ),
     Reason(
-        "stiff_force", "reference:exercise", "symplectic Euler is unstable from w dt = 2 on", "linear stability", 2.0
+        "stiff_force",
+        "reference:exercise",
+        "symplectic Euler is unstable from w dt = 2 on",
+        "linear stability",
+        2.0,
     ),
     Reason(
-        "stiff_force", "box2d:matched", "the swing reaches 2 units of length a step, where the engine cuts it; refused",
+        "stiff_force",
+        "box2d:matched",
+        "the swing reaches 2 units of length a step, where the engine cuts it; refused",
         B2_SETTINGS + "b2_maxTranslation",
     ),
-    *(Reason("stiff_force", engine, EULER_OUT, MAP, growth_limit(1.0)) for engine in ("reference:lesson", "pymunk:*")),
+    *(
+        Reason("stiff_force", engine, EULER_OUT, MAP, growth_limit(1.0))
+        for engine in ("reference:lesson", "pymunk:*")
+    ),
     Reason(
-        "stiff_force", "box2d_v3:*", "the force is constant over four substeps: the map grows by 1 + 3/8 (w dt)²", MAP,
+        "stiff_force",
+        "box2d_v3:*",
+        "the force is constant over four substeps: the map grows by 1 + 3/8 (w dt)²",
+        MAP,
         growth_limit(0.375),
     ),
     *(
         Reason(
-            "stiff_force", engine, "the force is constant during a step: the map grows by 1 + (w dt)² / 2", MAP,
+            "stiff_force",
+            engine,
+            "the force is constant during a step: the map grows by 1 + (w dt)² / 2",
+            MAP,
             growth_limit(0.5),
         )
         for engine in ("event_driven:*", "reference:ordered")
     ),
     # What every exact method refuses.
-    Reason("*", "event_driven:*", "it refuses what has no single continuation: overlaps, and collisions that accumulate",
-           "adapters/event_driven/events.py"),
+    Reason(
+        "*",
+        "event_driven:*",
+        "it refuses what has no single continuation: overlaps, and collisions that accumulate",
+        "adapters/event_driven/events.py",
+    ),
     # Stacks.
     *(
-        Reason(case, "reference:ordered", "the collisions of a step are bounded, and what is left shows as overlap",
-               "reference_impl/ordered.py")
+        Reason(
+            case,
+            "reference:ordered",
+            "the collisions of a step are bounded, and what is left shows as overlap",
+            "reference_impl/ordered.py",
+        )
         for case in ("column", "heavy_on_light", "pile_comes_to_rest")
     ),
-    Reason("dt_*", "reference:ordered", "the collisions of a step are bounded, and what is left shows as overlap",
-           "reference_impl/ordered.py"),
-    Reason("overlap_recovery", "reference:ordered", "overlaps that no collision made are not corrected",
-           "reference_impl/ordered.py"),
-    Reason("column", "reference:*", "each pair is projected once a step, without regard to the others",
-           "exercise 11, task 2", mechanism=POSITION_CORRECTION),
-    Reason("heavy_on_light", "reference:*", "each pair is projected once a step, without regard to the others",
-           "exercise 11, task 2", mechanism=POSITION_CORRECTION),
-    Reason("column", "pymunk:*", "overlaps are corrected by a share per step, down to a slop a contact",
-           "Munk2D src/cpArbiter.c, cpArbiterPreStep", mechanism=POSITION_CORRECTION),
-    Reason("heavy_on_light", "pymunk:shipped", "10 sequential impulses do not carry a heavy disk on a light one",
-           "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched", IMPULSE),
-    Reason("heavy_on_light", "*", "sequential impulses converge as slowly as the masses are unequal",
-           "Catto, Iterative dynamics with temporal coherence, 2005", mechanism=IMPULSE),
-    Reason("column", "*", "every contact may keep its slop, and soft ones give way as the load grows",
-           "Box2D, b2_linearSlop; contact softness in 3.1", mechanism=POSITION_CORRECTION),
-    Reason("overlap_recovery", "pymunk:shipped", "overlaps up to a slop of 0.1 m, here 0.4 radii, are left",
-           "Munk2D src/cpSpace.c, collisionSlop", 0.02, "pymunk:matched", POSITION_CORRECTION),
-    Reason("overlap_recovery", "box2d:shipped", "overlaps up to a slop of 5 mm, here 0.02 radii, are left",
-           B2_SETTINGS + "b2_linearSlop", 0.02, "box2d:matched", POSITION_CORRECTION),
-    Reason("overlap_*", "*", "an overlap is corrected by a share per step", "the engine's position correction",
-           mechanism=POSITION_CORRECTION),
-    Reason("overfull_box", "*", "disks are moved beyond a wall, and from there on outwards", "walls have two sides",
-           mechanism=POSITION_CORRECTION),
-    Reason("*_comes_to_rest", "box2d:matched", "without a threshold a lying disk chatters at e g dt / (1 - e)",
-           "fixed point of v' = e (v + g dt)", None, "box2d:shipped"),
-    Reason("*_comes_to_rest", "box2d:shipped", "chatter above the threshold of 1 m/s goes on for ever",
-           "fixed point of v' = e (v + g dt)"),
-    Reason("*_comes_to_rest", "reference:*", "gravity is added before the bounce, so a lying disk chatters",
-           "fixed point of v' = e (v + g dt)"),
+    Reason(
+        "dt_*",
+        "reference:ordered",
+        "the collisions of a step are bounded, and what is left shows as overlap",
+        "reference_impl/ordered.py",
+    ),
+    Reason(
+        "overlap_recovery",
+        "reference:ordered",
+        "overlaps that no collision made are not corrected",
+        "reference_impl/ordered.py",
+    ),
+    Reason(
+        "column",
+        "reference:*",
+        "each pair is projected once a step, without regard to the others",
+        "exercise 11, task 2",
+        mechanism=POSITION_CORRECTION,
+    ),
+    Reason(
+        "heavy_on_light",
+        "reference:*",
+        "each pair is projected once a step, without regard to the others",
+        "exercise 11, task 2",
+        mechanism=POSITION_CORRECTION,
+    ),
+    Reason(
+        "column",
+        "pymunk:*",
+        "overlaps are corrected by a share per step, down to a slop a contact",
+        "Munk2D src/cpArbiter.c, cpArbiterPreStep",
+        mechanism=POSITION_CORRECTION,
+    ),
+    Reason(
+        "heavy_on_light",
+        "pymunk:shipped",
+        "10 sequential impulses do not carry a heavy disk on a light one",
+        "Catto, Iterative dynamics with temporal coherence, 2005",
+        None,
+        "pymunk:matched",
+        IMPULSE,
+    ),
+    Reason(
+        "heavy_on_light",
+        "*",
+        "sequential impulses converge as slowly as the masses are unequal",
+        "Catto, Iterative dynamics with temporal coherence, 2005",
+        mechanism=IMPULSE,
+    ),
+    Reason(
+        "column",
+        "*",
+        "every contact may keep its slop, and soft ones give way as the load grows",
+        "Box2D, b2_linearSlop; contact softness in 3.1",
+        mechanism=POSITION_CORRECTION,
+    ),
+    Reason(
+        "overlap_recovery",
+        "pymunk:shipped",
+        "overlaps up to a slop of 0.1 m, here 0.4 radii, are left",
+        "Munk2D src/cpSpace.c, collisionSlop",
+        0.02,
+        "pymunk:matched",
+        POSITION_CORRECTION,
+    ),
+    Reason(
+        "overlap_recovery",
+        "box2d:shipped",
+        "overlaps up to a slop of 5 mm, here 0.02 radii, are left",
+        B2_SETTINGS + "b2_linearSlop",
+        0.02,
+        "box2d:matched",
+        POSITION_CORRECTION,
+    ),
+    Reason(
+        "overlap_*",
+        "*",
+        "an overlap is corrected by a share per step",
+        "the engine's position correction",
+        mechanism=POSITION_CORRECTION,
+    ),
+    Reason(
+        "overfull_box",
+        "*",
+        "disks are moved beyond a wall, and from there on outwards",
+        "walls have two sides",
+        mechanism=POSITION_CORRECTION,
+    ),
+    Reason(
+        "*_comes_to_rest",
+        "box2d:matched",
+        "without a threshold a lying disk chatters at e g dt / (1 - e)",
+        "fixed point of v' = e (v + g dt)",
+        None,
+        "box2d:shipped",
+    ),
+    Reason(
+        "*_comes_to_rest",
+        "box2d:shipped",
+        "chatter above the threshold of 1 m/s goes on for ever",
+        "fixed point of v' = e (v + g dt)",
+    ),
+    Reason(
+        "*_comes_to_rest",
+        "reference:*",
+        "gravity is added before the bounce, so a lying disk chatters",
+        "fixed point of v' = e (v + g dt)",
+    ),
     # Gases.
     *(
-        Reason(case, f"{box}:shipped", f"{THRESHOLD}; friction", source, None, f"{box}:matched", RESTITUTION)
-        for case in ("dense_gas", "fast_gas", "long_gas", "heavy_in_gas", "equipartition", "thermometer")
+        Reason(
+            case,
+            f"{box}:shipped",
+            f"{THRESHOLD}; friction",
+            source,
+            None,
+            f"{box}:matched",
+            RESTITUTION,
+        )
+        for case in (
+            "dense_gas",
+            "fast_gas",
+            "long_gas",
+            "heavy_in_gas",
+            "equipartition",
+            "thermometer",
+        )
         for box, source in THRESHOLDS.items()
     ),
     *(
-        Reason(case, "box2d_v3:*", SWEEP, "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask", mechanism=IMPULSE)
-        for case in ("dense_gas", "fast_gas", "long_gas", "heavy_in_gas", "equipartition", "thermometer")
+        Reason(
+            case,
+            "box2d_v3:*",
+            SWEEP,
+            "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask",
+            mechanism=IMPULSE,
+        )
+        for case in (
+            "dense_gas",
+            "fast_gas",
+            "long_gas",
+            "heavy_in_gas",
+            "equipartition",
+            "thermometer",
+        )
     ),
-    Reason("dense_gas", "pymunk:shipped", "10 sequential impulses do not solve a cluster of contacts",
-           "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched", IMPULSE),
+    Reason(
+        "dense_gas",
+        "pymunk:shipped",
+        "10 sequential impulses do not solve a cluster of contacts",
+        "Catto, Iterative dynamics with temporal coherence, 2005",
+        None,
+        "pymunk:matched",
+        IMPULSE,
+    ),
     *(
-        Reason(case, "pymunk:*", "10 sequential impulses do not solve a cluster of contacts",
-               "Catto, Iterative dynamics with temporal coherence, 2005", None, "pymunk:matched", IMPULSE)
+        Reason(
+            case,
+            "pymunk:*",
+            "10 sequential impulses do not solve a cluster of contacts",
+            "Catto, Iterative dynamics with temporal coherence, 2005",
+            None,
+            "pymunk:matched",
+            IMPULSE,
+        )
         for case in ("fast_gas", "long_gas")
     ),
-    Reason("long_wrapped_gas", "box2d*", "impulses are rounded to float32, and what is left over adds up", "IEEE 754",
-           mechanism=DIGITS),
-    Reason("*_gas", "box2d:matched", "separating contacts aim at 0 and closing ones at e v in one solve",
-           "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp", mechanism=IMPULSE),
-    Reason("*_gas", "*", "sequential impulses do not solve a cluster of contacts in a step",
-           "Catto, Iterative dynamics with temporal coherence, 2005", mechanism=IMPULSE),
-    Reason("thermometer", "*", FOUND_LATE, "penetration and return: one dt a collision", mechanism=END_OF_STEP),
-    Reason("equipartition", "*", "energy is lost at unequal rates by light and heavy disks", "e < 1 in some collisions"),
-    Reason("insertion_order", "*", "sums and contacts are taken in the order of insertion, and chaos magnifies it",
-           "Lyapunov exponent of the gas"),
-    Reason("restart", "*", "the impulses and contacts of the last step are not part of the state that can be read",
-           "warm starting; contact caches"),
-)  # fmt: skip
+    Reason(
+        "long_wrapped_gas",
+        "box2d*",
+        "impulses are rounded to float32, and what is left over adds up",
+        "IEEE 754",
+        mechanism=DIGITS,
+    ),
+    Reason(
+        "*_gas",
+        "box2d:matched",
+        "separating contacts aim at 0 and closing ones at e v in one solve",
+        "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp",
+        mechanism=IMPULSE,
+    ),
+    Reason(
+        "*_gas",
+        "*",
+        "sequential impulses do not solve a cluster of contacts in a step",
+        "Catto, Iterative dynamics with temporal coherence, 2005",
+        mechanism=IMPULSE,
+    ),
+    Reason(
+        "thermometer",
+        "*",
+        FOUND_LATE,
+        "penetration and return: one dt a collision",
+        mechanism=END_OF_STEP,
+    ),
+    Reason(
+        "equipartition",
+        "*",
+        "energy is lost at unequal rates by light and heavy disks",
+        "e < 1 in some collisions",
+    ),
+    Reason(
+        "insertion_order",
+        "*",
+        "sums and contacts are taken in the order of insertion, and chaos magnifies it",
+        "Lyapunov exponent of the gas",
+    ),
+    Reason(
+        "restart",
+        "*",
+        "the impulses and contacts of the last step are not part of the state that can be read",
+        "warm starting; contact caches",
+    ),
+)
 
 
 def reason_of(limit: Limit) -> Reason | None:
-    """The first row that fits; None where nothing failed. Of a scene of one's own only what holds in all of them."""
+    """The first row that fits; None where nothing failed. Of a scene of one's own only what holds
+    in all of them."""
     if limit.verdict == NEVER_FAILS:
         return None
     rows = [row for row in REASONS if limit.case in CASES or row.cases == "*"]
-    return next((r for r in rows if fnmatch(limit.case, r.cases) and fnmatch(limit.engine, r.engines)), None)
+    return next(
+        (r for r in rows if fnmatch(limit.case, r.cases) and fnmatch(limit.engine, r.engines)), None
+    )

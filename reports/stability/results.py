@@ -1,5 +1,5 @@
-"""The stability report: every case on every engine through the runner, journalled as each ends, with its table of
-limits."""
+"""The stability report: every case on every engine through the runner, journalled as each ends,
+with its table of limits."""
 
 from __future__ import annotations
 
@@ -35,9 +35,26 @@ from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 
 COLUMNS = (
-    "engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "seeds", "reason",
-    "verdict", "failed_fraction", "runs", "monotone", "spacing", "tested", "source", "event", "form",
-)  # fmt: skip
+    "engine",
+    "profile",
+    "case",
+    "parameter",
+    "works_at",
+    "fails_at",
+    "unit",
+    "predicate",
+    "seeds",
+    "reason",
+    "verdict",
+    "failed_fraction",
+    "runs",
+    "monotone",
+    "spacing",
+    "tested",
+    "source",
+    "event",
+    "form",
+)
 TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one engine
 SLOWEST_FIRST = (
     "long_gas",
@@ -53,7 +70,8 @@ SLOWEST_FIRST = (
 
 @dataclass(frozen=True)
 class StabilityPlan:
-    """What is asked for: names of `CASES` or FILE.toml:vary, of `MAPS`, `TOUCHING` and `ENGINES`, a key of `FORMS`."""
+    """What is asked for: names of `CASES` or FILE.toml:vary, of `MAPS`, `TOUCHING` and `ENGINES`, a
+    key of `FORMS`."""
 
     cases: Sequence[str]
     maps: Sequence[str]
@@ -97,17 +115,25 @@ def found_limit(task: Task, folder: Path) -> Limit:
     return replace(limit, seconds=process_time() - started)
 
 
-def carry_out(plan: StabilityPlan, journal: Journal, done: Collection[Task], progress: Progress) -> None:
+def carry_out(
+    plan: StabilityPlan, journal: Journal, done: Collection[Task], progress: Progress
+) -> None:
     """Do every task that is not `done`; all goes into the journal's folder."""
     folder = journal.path.parent
     (folder / "trajectories").mkdir(exist_ok=True)
-    files = {path: digest_of(path) for path, _, _ in (name.rpartition(":") for name in plan.cases) if path}
+    files = {
+        path: digest_of(path)
+        for path, _, _ in (name.rpartition(":") for name in plan.cases)
+        if path
+    }
     header = about(plan.command, 0) | {"form": plan.form, "files": files}
     journal.append({"header": header})
     with writing(folder, ["machine.json"]):
         put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
     wanted = tasks_of(plan)
-    tasks: dict[Any, Callable[[], Any]] = {task: partial(task, folder) for task in wanted if task not in done}
+    tasks: dict[Any, Callable[[], Any]] = {
+        task: partial(task, folder) for task in wanted if task not in done
+    }
     progress.start(len(tasks), len(wanted))
     with closing(run_all(tasks, plan.workers, TIMEOUT[plan.form])) as results:
         for task, result in results:
@@ -120,8 +146,14 @@ def carry_out(plan: StabilityPlan, journal: Journal, done: Collection[Task], pro
 
 def tasks_of(plan: StabilityPlan) -> list[Task]:
     """All tasks, the slowest first, so that none is left over at the end."""
-    tasks = [Task("map", name, engine, plan.form) for name in plan.maps for engine in MAPS[name].engines(plan.engines)]
-    tasks += [Task("law", name, engine, plan.form) for name in plan.touching for engine in plan.engines]
+    tasks = [
+        Task("map", name, engine, plan.form)
+        for name in plan.maps
+        for engine in MAPS[name].engines(plan.engines)
+    ]
+    tasks += [
+        Task("law", name, engine, plan.form) for name in plan.touching for engine in plan.engines
+    ]
     for name in plan.cases:
         tasks += [
             Task("limit", name, engine, plan.form)
@@ -140,11 +172,14 @@ def failed(task: Task, failure: Failure) -> Limit | MapOf | LawOf:
         return LawOf(task.name, task.engine, (), status=failure.status)
     event = f"{failure.status}: {failure.reason}"
     trial = Trial(nan, 1, 1, nan, 0, nan, event, failure.status)
-    return Limit(task.name, task.engine, task.form, NEVER_WORKS, nan, nan, (trial,), status=failure.status)
+    return Limit(
+        task.name, task.engine, task.form, NEVER_WORKS, nan, nan, (trial,), status=failure.status
+    )
 
 
 class StabilityResults(NamedTuple):
-    """All that was found: the limits with their reasons, the maps, the laws of touching disks, and the header."""
+    """All that was found: the limits with their reasons, the maps, the laws of touching disks, and
+    the header."""
 
     limits: list[Limit]
     maps: list[MapOf]
@@ -153,28 +188,38 @@ class StabilityResults(NamedTuple):
 
 
 def read(folder: Path) -> StabilityResults:
-    """The stability report in a folder, in reading order; raises `ValueError` if its journal cannot be used."""
+    """The stability report in a folder, in reading order; raises `ValueError` if its journal cannot
+    be used."""
     headers, results = journalled(folder)
     limits = [one for one in results.values() if isinstance(one, Limit)]
     maps = [one for one in results.values() if isinstance(one, MapOf)]
     laws = [one for one in results.values() if isinstance(one, LawOf)]
     order = {name: k for k, name in enumerate(CASES)}
     engines = list(dict.fromkeys(engine for case in CASES.values() for engine in engines_of(case)))
-    limits.sort(key=lambda limit: (order.get(limit.case, len(order)), limit.case, engines.index(limit.engine)))
+    limits.sort(
+        key=lambda limit: (
+            order.get(limit.case, len(order)),
+            limit.case,
+            engines.index(limit.engine),
+        )
+    )
     maps.sort(key=lambda one: (list(MAPS).index(one.name), engines.index(one.engine)))
     laws.sort(key=lambda one: (list(TOUCHING).index(one.name), engines.index(one.engine)))
     return StabilityResults(explained(limits), maps, laws, headers[-1])
 
 
 def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | MapOf | LawOf]]:
-    """The headers in a folder's journal, and what came of every task; of two lines on one the later holds.
+    """The headers in a folder's journal, and what came of every task; of two lines on one the later
+    holds.
 
     Raises:
         ValueError: naming a line that does not fit.
     """
     made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
-        "limit": limit_from, "map": MapOf.from_record, "law": LawOf.from_record,
-    }  # fmt: skip
+        "limit": limit_from,
+        "map": MapOf.from_record,
+        "law": LawOf.from_record,
+    }
     headers: list[dict[str, Any]] = []
     results: dict[Task, Limit | MapOf | LawOf] = {}
     for number, kind, line in checked_lines(folder, KINDS):
@@ -194,7 +239,11 @@ def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | M
 
 def wrong(result: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
     """As `impossible`, of a limit whose case is known: not of a file that is not what it was."""
-    path = "" if not isinstance(result, Limit) or result.case in CASES else result.case.rpartition(":")[0]
+    path = (
+        ""
+        if not isinstance(result, Limit) or result.case in CASES
+        else result.case.rpartition(":")[0]
+    )
     if not isinstance(result, Limit) or (path and digest_of(path) != files[path]):
         return ""
     return impossible(result, case_named(result.case))
@@ -202,8 +251,12 @@ def wrong(result: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
 
 def limit_from(record: dict[str, Any]) -> Limit:
     """The limit of a line of the journal, where what is not finite is text."""
-    trials = tuple(Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"])
-    return Limit(**record | floats(record, "works_at", "fails_at", "spacing", "seconds") | {"trials": trials})
+    trials = tuple(
+        Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"]
+    )
+    return Limit(
+        **record | floats(record, "works_at", "fails_at", "spacing", "seconds") | {"trials": trials}
+    )
 
 
 def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
@@ -212,7 +265,8 @@ def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
 
 
 def done_before(folder: Path, plan: StabilityPlan) -> tuple[int, set[Task]]:
-    """How many tasks ended well in an interrupted run, and those of the plan, if versions and scene files are the same.
+    """How many tasks ended well in an interrupted run, and those of the plan, if versions and scene
+    files are the same.
 
     Raises:
         ValueError: the journal is none of a stability report.
@@ -221,7 +275,8 @@ def done_before(folder: Path, plan: StabilityPlan) -> tuple[int, set[Task]]:
     well = {task for task, result in results.items() if result.status == "ok"}
     versions = about("", 0)["versions"]
     same = all(
-        header["versions"] == versions and all(digest_of(path) == digest for path, digest in header["files"].items())
+        header["versions"] == versions
+        and all(digest_of(path) == digest for path, digest in header["files"].items())
         for header in headers
     )
     return len(well), well & set(tasks_of(plan)) if same else set()
@@ -234,17 +289,32 @@ def table(limits: Sequence[Limit]) -> pd.DataFrame:
 
 def row_of(limit: Limit) -> dict[str, Any]:
     """The limit as a row of limits.csv."""
-    case, failing = case_named(limit.case), limit.failing or (limit.trials[0] if limit.status != "ok" else None)
+    case, failing = (
+        case_named(limit.case),
+        limit.failing or (limit.trials[0] if limit.status != "ok" else None),
+    )
     engine, profile = limit.engine.split(":")
     return {
-        "engine": engine, "profile": profile, "case": limit.case, "parameter": case.parameter,
-        "works_at": shortened(limit.works_at), "fails_at": shortened(limit.fails_at), "unit": case.unit,
+        "engine": engine,
+        "profile": profile,
+        "case": limit.case,
+        "parameter": case.parameter,
+        "works_at": shortened(limit.works_at),
+        "fails_at": shortened(limit.fails_at),
+        "unit": case.unit,
         "predicate": failing.broken if failing else case.predicate.name,
-        "seeds": max(trial.runs for trial in limit.trials), "reason": limit.why, "verdict": limit.verdict,
-        "failed_fraction": failing.failed / failing.runs if failing else 0.0, "runs": limit.runs,
-        "monotone": limit.monotone, "spacing": shortened(limit.spacing), "tested": limit.tested, "source": limit.source,
-        "event": failing.event if failing else "", "form": limit.form,
-    }  # fmt: skip
+        "seeds": max(trial.runs for trial in limit.trials),
+        "reason": limit.why,
+        "verdict": limit.verdict,
+        "failed_fraction": failing.failed / failing.runs if failing else 0.0,
+        "runs": limit.runs,
+        "monotone": limit.monotone,
+        "spacing": shortened(limit.spacing),
+        "tested": limit.tested,
+        "source": limit.source,
+        "event": failing.event if failing else "",
+        "form": limit.form,
+    }
 
 
 def shortened(value: float) -> float:

@@ -1,4 +1,5 @@
-"""Finds the limit up to which an engine works: the first failure on the way from gentle to harsh, then bisection."""
+"""Finds the limit up to which an engine works: the first failure on the way from gentle to harsh,
+then bisection."""
 
 from __future__ import annotations
 
@@ -7,7 +8,17 @@ from itertools import pairwise
 from math import isfinite, isnan, nan
 
 from adapters.play import Run
-from reports.stability.limits import ALL, LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Form, Limit, Trial
+from reports.stability.limits import (
+    ALL,
+    LIMIT,
+    NEVER_FAILS,
+    NEVER_WORKS,
+    ONLY_BEYOND,
+    Case,
+    Form,
+    Limit,
+    Trial,
+)
 from reports.stability.predicates import Reading, judge
 from reports.stability.variants import VARIANTS
 from scenarios.model import Scenario
@@ -15,7 +26,8 @@ from scenarios.model import Scenario
 
 @dataclass
 class Search:
-    """One case on one engine; remembers what was read at each value and the first failing run there."""
+    """One case on one engine; remembers what was read at each value and the first failing run
+    there."""
 
     case: Case
     engine: str
@@ -24,10 +36,14 @@ class Search:
     seen: dict[float, tuple[Scenario, Run]] = field(default_factory=dict)
 
     def limit(self) -> Limit:
-        """Scan until the first failure, bisect between it and what works before; then see what works again beyond."""
+        """Scan until the first failure, bisect between it and what works before; then see what
+        works again beyond."""
         scan = self.case.scan(self.form)
-        first = next((k for k, value in enumerate(scan) if not self.trial(value, self.few).works), len(scan))
-        while first and not self.trial(scan[first - 1]).works:  # the few runs on the way did not show it
+        first = next(
+            (k for k, value in enumerate(scan) if not self.trial(value, self.few).works), len(scan)
+        )
+        # the few runs on the way did not show it
+        while first and not self.trial(scan[first - 1]).works:
             first -= 1
         works = [True] * first + [self.trial(value).works for value in scan[first:]]
         if all(works):
@@ -41,14 +57,16 @@ class Search:
         return self.limit_of(ONLY_BEYOND, *self.bracket(scan[edge], scan[edge - 1]))
 
     def bracket(self, good: float, bad: float) -> tuple[float, float]:
-        """What works and what fails, brought together by bisection as close as form and case say."""
+        """What works and what fails, brought together by bisection as close as form and case
+        say."""
         ratio = max(self.form.ratio, self.case.ratio)
         while self.case.refines and (middle := self.case.half_way(good, bad, ratio)) is not None:
             good, bad = (middle, bad) if self.trial(middle).works else (good, middle)
         return good, bad
 
     def trial(self, value: float, runs: int = ALL, to_the_end: bool = False) -> Trial:
-        """Play a value up to so many runs; it is left where more have failed than may, unless the form is the full one.
+        """Play a value up to so many runs; it is left where more have failed than may, unless the
+        form is the full one.
 
         Where a run has failed that may have by chance, all are played.
         """
@@ -57,7 +75,9 @@ class Search:
         while len(readings) < (most if failed or to_the_end else min(runs, most)):
             if failed > self.allowed and not (self.form.whole or to_the_end):
                 break
-            scenario, run = self.case.play(VARIANTS[self.engine], self.case.scene(value, len(readings)))
+            scenario, run = self.case.play(
+                VARIANTS[self.engine], self.case.scene(value, len(readings))
+            )
             readings.append(judge(self.case.predicate, scenario, run))
             failed += readings[-1].failed
             if readings[-1].failed:
@@ -66,7 +86,8 @@ class Search:
 
     @property
     def few(self) -> int:
-        """Runs at a value that is only passed on the way: half of them at least where some may fail by chance."""
+        """Runs at a value that is only passed on the way: half of them at least where some may fail
+        by chance."""
         return max(self.form.few, self.case.runs // 2) if self.case.by_chance else self.form.few
 
     @property
@@ -83,18 +104,36 @@ class Search:
             return Trial(value, count, failed, worst)
         first = next(k for k, reading in enumerate(readings) if reading.failed)
         one, left = readings[first], count < self.case.runs
-        return Trial(value, count, failed, worst, first, one.at, one.event, one.broken, one.disk, self.allowed, left)
+        return Trial(
+            value,
+            count,
+            failed,
+            worst,
+            first,
+            one.at,
+            one.event,
+            one.broken,
+            one.disk,
+            self.allowed,
+            left,
+        )
 
     def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
-        """The limit, with all that was tried from gentle to harsh; at its failure every run is played."""
+        """The limit, with all that was tried from gentle to harsh; at its failure every run is
+        played."""
         if not isnan(fails_at):
             self.trial(fails_at, to_the_end=True)
-        trials = tuple(self.tried(value) for value in sorted(self.readings, key=lambda x: self.case.harsher * x))
+        trials = tuple(
+            self.tried(value)
+            for value in sorted(self.readings, key=lambda x: self.case.harsher * x)
+        )
         changes = sum(one.works != other.works for one, other in pairwise(trials))
         until = [trial.value for trial in trials]
         if verdict == LIMIT:
             until = until[: until.index(fails_at) + 1]
-        spacing = max((max(one / other, other / one) for one, other in pairwise(until)), default=nan)
+        spacing = max(
+            (max(one / other, other / one) for one, other in pairwise(until)), default=nan
+        )
         names = self.case.name, self.engine, self.form.name
         return Limit(*names, verdict, works_at, fails_at, trials, changes <= 1, spacing)
 

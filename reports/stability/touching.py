@@ -1,7 +1,8 @@
-"""Which law an engine follows where touching disks are struck, and how far they must be apart until the question is
-gone.
+"""Which law an engine follows where touching disks are struck, and how far they must be apart until
+the question is gone.
 
-Named, never scored: where disks touch, no limit of small gaps decides; where they do not, the exact answer does.
+Named, never scored: where disks touch, no limit of small gaps decides; where they do not, the exact
+answer does.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario
 from scenarios.truth.exact import with_oracle
 
-NEAR = 0.02  # of the incoming speed: an engine whose velocities are farther from every law follows none of them
+# of the incoming speed: an engine whose velocities are farther from every law follows none of them
+NEAR = 0.02
 SPEED, DT = (
     8.0,
     1 / 1024,
@@ -39,7 +41,8 @@ class Touching:
         asks: what happens, in a sentence.
         position: (n, 2) in radii, all touching; disk 0 comes in along x at speed 1.
         displaced: (n, 2) by how much a disk is moved for each radius of gap.
-        laws: name -> velocities (n, 2) in units of the incoming speed; several where the order is free.
+        laws: name -> velocities (n, 2) in units of the incoming speed; several where the order is
+            free.
         source: of the laws.
     """
 
@@ -51,9 +54,11 @@ class Touching:
 
 
 class AtGap(NamedTuple):
-    """What an engine did at a gap in radii: the law it is nearest to, how far it is, and what it made of the start's.
+    """What an engine did at a gap in radii: the law it is nearest to, how far it is, and what it
+    made of the start's.
 
-    `law` is "none" if it is farther than `NEAR` from every one; momentum: by how much it changed, of all there is;
+    `law` is "none" if it is farther than `NEAR` from every one; momentum: by how much it changed,
+    of all there is;
     energy: what is left of it; velocity: of the disks, over the incoming speed.
     """
 
@@ -85,7 +90,16 @@ class LawOf:
         gaps = []
         for gap, law, *numbers, velocity in record["gaps"]:
             off, momentum, energy = map(float, numbers)
-            gaps.append(AtGap(gap, law, off, momentum, energy, tuple((float(x), float(y)) for x, y in velocity)))
+            gaps.append(
+                AtGap(
+                    gap,
+                    law,
+                    off,
+                    momentum,
+                    energy,
+                    tuple((float(x), float(y)) for x, y in velocity),
+                )
+            )
         return LawOf(**record | {"gaps": tuple(gaps)})
 
 
@@ -98,9 +112,13 @@ def cradle(n: int) -> Touching:
     together[:, 0] = 2 / n
     together[0, 0] -= 1
     return Touching(
-        f"A disk strikes a row of {n - 1}.", row, apart, {PAIRS: [last], AT_ONCE: [together]},
-        "equal masses swap velocities pair by pair; or e = 1 is asked of every contact in one solve",
-    )  # fmt: skip
+        f"A disk strikes a row of {n - 1}.",
+        row,
+        apart,
+        {PAIRS: [last], AT_ONCE: [together]},
+        "equal masses swap velocities pair by pair; or e = 1 is asked of every contact in one"
+        " solve",
+    )
 
 
 BREAK = np.array([[-1 / 8, -sqrt(3) / 8], [3 / 4, sqrt(3) / 4], [3 / 8, -sqrt(3) / 8]])
@@ -122,14 +140,18 @@ TOUCHING = {
 
 
 def scene_of(one: Touching, gap: float) -> Scenario:
-    """Disk 0 flies in and is there in the middle of its fourth step; seen until the last collision is long over."""
+    """Disk 0 flies in and is there in the middle of its fourth step; seen until the last collision
+    is long over."""
     position = (one.position + gap * one.displaced) * RADIUS
     position[0, 0] -= SPEED * DT * (LEAD + 0.5)
     n = len(position)
     scene = lay_out(
-        position=position, velocity=[[SPEED, 0], *np.zeros((n - 1, 2))], radius=np.full(n, RADIUS), mass=np.ones(n),
+        position=position,
+        velocity=[[SPEED, 0], *np.zeros((n - 1, 2))],
+        radius=np.full(n, RADIUS),
+        mass=np.ones(n),
         restitution=1.0,
-    )  # fmt: skip
+    )
     crossing = 4 * gap * RADIUS / (SPEED * DT)  # steps: four gaps, or one at a quarter of the speed
     steps = LEAD + 1 + AFTER + ceil(crossing)
     return Scenario("touching", one.asks, one.source, scene, steps * DT, DT, (1,))
@@ -137,7 +159,8 @@ def scene_of(one: Touching, gap: float) -> Scenario:
 
 @cache
 def answers(name: str, gap: float) -> dict[str, list[Array]]:
-    """Law -> the velocities (n, 2) it allows; of disks that do not touch, pair after pair is the exact answer."""
+    """Law -> the velocities (n, 2) it allows; of disks that do not touch, pair after pair is the
+    exact answer."""
     one = TOUCHING[name]
     if gap == 0:
         return one.laws
@@ -152,7 +175,11 @@ def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
     for gap in gaps:
         run = play_as(engine, scene_of(TOUCHING[name], gap))
         if run.status != "ok" or run.trajectory is None:
-            found.append(AtGap(gap, "refused" if run.status == "unsupported" else run.status, nan, nan, nan, ()))
+            found.append(
+                AtGap(
+                    gap, "refused" if run.status == "unsupported" else run.status, nan, nan, nan, ()
+                )
+            )
             continue
         velocity = run.trajectory.velocity[-1] / SPEED
         found.append(named(velocity, gap, answers(name, gap)))
@@ -161,7 +188,10 @@ def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
 
 def named(velocity: Array, gap: float, laws: dict[str, list[Array]]) -> AtGap:
     """The law that velocities (n, 2), in units of the incoming speed, are nearest to."""
-    off = {law: min(float(np.abs(velocity - v).max()) for v in allowed) for law, allowed in laws.items()}
+    off = {
+        law: min(float(np.abs(velocity - v).max()) for v in allowed)
+        for law, allowed in laws.items()
+    }
     nearest = min(off, key=lambda law: off[law])
     momentum = float(np.linalg.norm(velocity.sum(axis=0) - [1, 0]))
     rows = tuple((float(x), float(y)) for x, y in velocity)

@@ -1,4 +1,5 @@
-"""Who is put to the test: every row of `ENGINES`, and engines with one thing changed, to test a reason by."""
+"""Who is put to the test: every row of `ENGINES`, and engines with one thing changed, to test a
+reason by."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from scenarios.model import Scenario, Scene
 
 
 class Variant(NamedTuple):
-    """A name, engine:profile; how to make its engine; and what is changed in it: "" for a row of `ENGINES`."""
+    """A name, engine:profile; how to make its engine; and what is changed in it: "" for a row of
+    `ENGINES`."""
 
     name: str
     make: Callable[[], Engine]
@@ -53,7 +55,8 @@ CHANGED = tuple(
     for variant, (_, what, _) in row.variants.items()
 )
 VARIANTS: dict[str, Variant] = {
-    variant.name: variant for variant in (*(Variant(name, row.make) for name, row in ENGINES.items()), *CHANGED)
+    variant.name: variant
+    for variant in (*(Variant(name, row.make) for name, row in ENGINES.items()), *CHANGED)
 }
 
 

@@ -22,7 +22,9 @@ FAMILY = "A scene of your own"
 def at_speed(one: Scenario, x: float) -> Scenario:
     """All start velocities and spins times x."""
     scene = one.scene
-    faster: Scene = replace(scene, velocity=scene.velocity * x, angular_velocity=scene.angular_velocity * x)
+    faster: Scene = replace(
+        scene, velocity=scene.velocity * x, angular_velocity=scene.angular_velocity * x
+    )
     return with_oracle(replace(one, scene=faster))
 
 
@@ -45,10 +47,15 @@ def at_scale(one: Scenario, x: float) -> Scenario:
     """All lengths times x, times as they are: velocities, gravity and thrusts grow along."""
     scene = one.scene
     larger: Scene = replace(
-        scene, position=scene.position * x, velocity=scene.velocity * x, radius=scene.radius * x,
-        inertia=scene.inertia * x**2, walls=scene.walls * x, gravity=scene.gravity * x,
+        scene,
+        position=scene.position * x,
+        velocity=scene.velocity * x,
+        radius=scene.radius * x,
+        inertia=scene.inertia * x**2,
+        walls=scene.walls * x,
+        gravity=scene.gravity * x,
         wrap=None if scene.wrap is None else scene.wrap * x,
-    )  # fmt: skip
+    )
     thrusts = [scaled_thrust(t, x, x**2) for t in one.thrusts]
     return replace(one, scene=larger, thrusts=thrusts, truth=similar(one, size=x))
 
@@ -57,13 +64,23 @@ def at_tempo(one: Scenario, x: float) -> Scenario:
     """The same film x times as fast, in steps that are as much shorter."""
     scene = one.scene
     sped: Scene = replace(
-        scene, velocity=scene.velocity * x, angular_velocity=scene.angular_velocity * x, gravity=scene.gravity * x**2
+        scene,
+        velocity=scene.velocity * x,
+        angular_velocity=scene.angular_velocity * x,
+        gravity=scene.gravity * x**2,
     )
-    thrusts = [replace(scaled_thrust(t, x**2, x**2), start=t.start / x, stop=t.stop / x) for t in one.thrusts]
+    thrusts = [
+        replace(scaled_thrust(t, x**2, x**2), start=t.start / x, stop=t.stop / x)
+        for t in one.thrusts
+    ]
     return replace(
-        one, scene=sped, thrusts=thrusts, duration=one.duration / x, sample_interval=one.sample_interval / x,
+        one,
+        scene=sped,
+        thrusts=thrusts,
+        duration=one.duration / x,
+        sample_interval=one.sample_interval / x,
         truth=similar(one, tempo=x),
-    )  # fmt: skip
+    )
 
 
 def at_offset(one: Scenario, x: float) -> Scenario:
@@ -81,9 +98,11 @@ def at_offset(one: Scenario, x: float) -> Scenario:
 def similar(
     one: Scenario, size: float = 1.0, tempo: float = 1.0, by: Array | float = 0.0
 ) -> Callable[[Array], Trajectory] | None:
-    """The exact answer of a scene so many times as large and as fast, and moved by so many m, from that of the scene.
+    """The exact answer of a scene so many times as large and as fast, and moved by so many m, from
+    that of the scene.
 
-    It is exact but for the last place of the scene's numbers; the oracle itself follows nothing that is far from 1.
+    It is exact but for the last place of the scene's numbers; the oracle itself follows nothing
+    that is far from 1.
     """
     truth = one.truth
     if truth is None:
@@ -93,11 +112,20 @@ def similar(
         was = truth(t * tempo)
         collisions = was.collisions
         return replace(
-            was, t=was.t / tempo, position=was.position * size + by, velocity=was.velocity * (size * tempo),
-            angular_velocity=was.angular_velocity * tempo, horizon=was.horizon / tempo,
+            was,
+            t=was.t / tempo,
+            position=was.position * size + by,
+            velocity=was.velocity * (size * tempo),
+            angular_velocity=was.angular_velocity * tempo,
+            horizon=was.horizon / tempo,
             error_bound=was.error_bound * size,
-            collisions=Collisions(frozen(collisions.t / tempo), collisions.i, collisions.j, frozen(collisions.impulse * (size * tempo))),
-        )  # fmt: skip
+            collisions=Collisions(
+                frozen(collisions.t / tempo),
+                collisions.i,
+                collisions.j,
+                frozen(collisions.impulse * (size * tempo)),
+            ),
+        )
 
     return changed
 
@@ -112,8 +140,16 @@ VARIES: dict[str, tuple[str, tuple[float, ...], Callable[[Scenario, float], Scen
     "dt": ("s", (), in_steps),
     "speed": ("times as fast", (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS), at_speed),
     "mass_ratio": ("times as heavy", (*FACTORS, 1e4, 1e5, 1e6), at_mass_ratio),
-    "restitution": ("1", (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0), at_restitution),
-    "scale": ("times as large", (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS), at_scale),
+    "restitution": (
+        "1",
+        (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0),
+        at_restitution,
+    ),
+    "scale": (
+        "times as large",
+        (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS),
+        at_scale,
+    ),
     "offset": ("m", (*FACTORS, 1e4, 1e5, 1e6), at_offset),
 }
 """What is varied -> its unit, the values to scan, and how."""
@@ -132,7 +168,10 @@ def cannot_vary(one: Scenario, what: str) -> str:
     if what == "mass_ratio" and one.scene.static.all():
         return "no disk moves, so that none can be made heavier"
     if what == "dt" and not ladder(one):
-        return "it lasts less than ten steps of an eighth of its sample_interval, the finest that would be tried"
+        return (
+            "it lasts less than ten steps of an eighth of its sample_interval, the finest that"
+            " would be tried"
+        )
     return ""
 
 
@@ -142,6 +181,12 @@ def case_of_file(path: str, what: str) -> Case:
     one = read_scene_file(Path(path))
     unit, values, _ = VARIES[what]
     return Case(
-        f"{path}:{what}", FAMILY, f"{one.name}: {one.asks}", what, unit, values or dense_ladder(one),
-        partial(varied, path, what), USABLE,
-    )  # fmt: skip
+        f"{path}:{what}",
+        FAMILY,
+        f"{one.name}: {one.asks}",
+        what,
+        unit,
+        values or dense_ladder(one),
+        partial(varied, path, what),
+        USABLE,
+    )

@@ -11,12 +11,15 @@ from reports.terminal.foreign_text import legible
 
 
 class Console(RichConsole):
-    """Every string that is printed is `legible`, and means no markup and no emoji; what has a colour is a `Text`."""
+    """Every string that is printed is `legible`, and means no markup and no emoji; what has a
+    colour is a `Text`."""
 
     def __init__(self, *, stderr: bool = False, width: int | None = None) -> None:
-        """Print on standard output, or on standard error; `width` in columns, default the terminal's."""
+        """Print on standard output, or on standard error; `width` in columns, default the
+        terminal's."""
         super().__init__(stderr=stderr, width=width, markup=False, emoji=False)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """What all strings go through: those that are printed, and those of tables, their titles and headings."""
+        """What all strings go through: those that are printed, and those of tables, their titles
+        and headings."""
         return super().render_str(legible(text), **options | {"markup": False, "emoji": False})

@@ -1,4 +1,5 @@
-"""How a command ends: its exit status, what it says on standard error, and that it does end when it is signalled to."""
+"""How a command ends: its exit status, what it says on standard error, and that it does end when it
+is signalled to."""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ class Listening:
         self.status = DONE
 
     def __call__(self, number: int, _: object) -> NoReturn:
-        """Raise `Stopped`, and again every `AGAIN` s: what is raised in a destructor or a callback from C is lost."""
+        """Raise `Stopped`, and again every `AGAIN` s: what is raised in a destructor or a callback
+        from C is lost."""
         self.status = self.status or STATUS[signal.Signals(number)]
         signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
         raise Stopped(self.status)
@@ -89,7 +91,8 @@ def deaf() -> Iterator[None]:
 
 @contextmanager
 def unbroken() -> Iterator[None]:
-    """What must not be left half done and takes no time: a signal that comes meanwhile is heard after it."""
+    """What must not be left half done and takes no time: a signal that comes meanwhile is heard
+    after it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {*STATUS, signal.SIGALRM})
     try:
         yield
@@ -99,7 +102,8 @@ def unbroken() -> Iterator[None]:
 
 @contextmanager
 def ends_on_signals() -> Iterator[None]:
-    """A command from its first word to its last; signalled to stop it exits with 130 or 143 and waits for no thread.
+    """A command from its first word to its last; signalled to stop it exits with 130 or 143 and
+    waits for no thread.
 
     What a thread still has under way is in another process, which ends with this one.
     """
@@ -118,15 +122,18 @@ def ends_on_signals() -> Iterator[None]:
                 with suppress(OSError, ValueError):
                     stream.flush()
             # Typer makes 130 of any KeyboardInterrupt.
-            os._exit(listening.status if status == INTERRUPTED or not isinstance(status, int) else status)
+            os._exit(
+                listening.status if status == INTERRUPTED or not isinstance(status, int) else status
+            )
 
 
 @contextmanager
 def broken_off(part: Path, kept: Callable[[], str]) -> Iterator[None]:
-    """What writes into `part` for long: broken off, or without room on the disk, it says what is `kept` of it.
+    """What writes into `part` for long: broken off, or without room on the disk, it says what is
+    `kept` of it.
 
-    Exits 130 after Ctrl-C, 143 after SIGTERM, 1 if something cannot be written, or may not any more, 2 if what was kept
-    before does not fit.
+    Exits 130 after Ctrl-C, 143 after SIGTERM, 1 if something cannot be written, or may not any
+    more, 2 if what was kept before does not fit.
     """
     with stoppable():
         try:

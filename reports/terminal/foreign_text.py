@@ -1,4 +1,5 @@
-"""Text that others wrote (names of files, scenes, messages of engines), as a terminal and a file can hold it."""
+"""Text that others wrote (names of files, scenes, messages of engines), as a terminal and a file
+can hold it."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from adapters.own_solver.file import printable
 
 
 def legible(text: str) -> str:
-    """The text with what would act on a terminal (escape codes, bytes that are no UTF-8) as it is written in code.
+    """The text with what would act on a terminal (escape codes, bytes that are no UTF-8) as it is
+    written in code.
 
     Line ends stay, as sentences of this program hold some.
     """
@@ -31,8 +33,10 @@ def put_text(path: Path, text: str) -> None:
 
 
 def put_bytes(path: Path, data: bytes) -> None:
-    """Write a file as `whole` does; a pipe or a device is written to as it comes. Raises `OSError`."""
-    if path.exists() and not path.is_file():  # asked before links are followed: /dev/stdout leads to no path at all
+    """Write a file as `whole` does; a pipe or a device is written to as it comes. Raises
+    `OSError`."""
+    # asked before links are followed: /dev/stdout leads to no path at all
+    if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
     with whole(path.resolve()) as file:
@@ -41,7 +45,8 @@ def put_bytes(path: Path, data: bytes) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
-    """A file to write to that takes the place of `path` when all of it is written; raises `OSError`."""
+    """A file to write to that takes the place of `path` when all of it is written; raises
+    `OSError`."""
     part = path.with_name(f".crosscheck-{os.getpid()}.part")
     try:
         with part.open("xb") as file:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from time import perf_counter
 from types import TracebackType
 
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.progress import Progress as Bar
 
 from reports.terminal.console import Console
@@ -15,14 +21,20 @@ QUIET = 30.0  # s between two lines where there is no terminal that a bar could 
 
 
 class Progress:
-    """A bar that says what runs, how long one takes and how long all will; in a log, a line now and then."""
+    """A bar that says what runs, how long one takes and how long all will; in a log, a line now and
+    then."""
 
     def __init__(self) -> None:
         self.bar = Bar(
-            TextColumn("{task.description:<44.44}", markup=False), BarColumn(), MofNCompleteColumn(),
-            TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[each]}"),
+            TextColumn("{task.description:<44.44}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[each]}"),
             console=Console(stderr=True),
-        )  # fmt: skip
+        )
 
     def __enter__(self) -> Progress:
         self.began = perf_counter()
@@ -30,7 +42,9 @@ class Progress:
         self.bar.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, value: object, trace: TracebackType | None
+    ) -> None:
         self.bar.stop()
 
     def say(self, what: str) -> None:

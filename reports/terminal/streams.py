@@ -1,4 +1,5 @@
-"""The standard streams as a command can rely on them: they may be closed, on a full disk, or know few letters."""
+"""The standard streams as a command can rely on them: they may be closed, on a full disk, or know
+few letters."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from reports.terminal.exits import DONE, FAILED, say
 
 
 class Outlet(io.FileIO):
-    """A file descriptor that takes all it is given: what fails to be written is dropped, for the work goes on.
+    """A file descriptor that takes all it is given: what fails to be written is dropped, for the
+    work goes on.
 
     Attributes:
         fault: the first that was met, or None; after it nothing more is tried.
@@ -33,9 +35,11 @@ class Outlet(io.FileIO):
 
 @contextmanager
 def printing() -> Iterator[None]:
-    """Within it nothing that a command prints ends it: letters that a stream does not know are written in code.
+    """Within it nothing that a command prints ends it: letters that a stream does not know are
+    written in code.
 
-    Exits 1, and says why, if standard output did not take all; what fails on standard error has nowhere to be reported.
+    Exits 1, and says why, if standard output did not take all; what fails on standard error has
+    nowhere to be reported.
     """
     fill_gaps()
     outlet = open_stream("stdout", 1)
@@ -46,12 +50,16 @@ def printing() -> Iterator[None]:
         sys.stdout.flush()
         if outlet.fault is None:
             raise
-        say(f"cannot write to standard output: {outlet.fault.strerror}; not all was printed, but every file is written")
+        say(
+            f"cannot write to standard output: {outlet.fault.strerror}; not all was printed, but"
+            " every file is written"
+        )
         sys.exit(FAILED if end.code in (None, DONE) else end.code)
 
 
 def fill_gaps() -> None:
-    """Put something that nothing can be written to, and that is at its end, where a stream was closed.
+    """Put something that nothing can be written to, and that is at its end, where a stream was
+    closed.
 
     The next file that is opened would have its number else, and would be printed into.
     """

@@ -25,10 +25,11 @@ TUNE = Kind("crosscheck tune")
 
 
 def tune(engines: Sequence[str], out: Path) -> NoReturn:
-    """Search the settings of `engines`, all that have any if none is named; write matched.csv into `out`; exits 0.
+    """Search the settings of `engines`, all that have any if none is named; write matched.csv into
+    `out`; exits 0.
 
-    The table of an engine is written as soon as its search has ended. Exits 2 on a name that is no engine with
-    settings, or where `out` may not be written, 130 and 143 when broken off.
+    The table of an engine is written as soon as its search has ended. Exits 2 on a name that is no
+    engine with settings, or where `out` may not be written, 130 and 143 when broken off.
     """
     if faults := [unknown("engine", name, TUNED) for name in engines if name not in TUNED]:
         refuse(faults)
@@ -36,11 +37,14 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
         out = place_of(out)
         may_replace(out, TUNE)
         out.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=out.parent):  # so that it is known before the search whether it can be written
+        # so that it is known before the search whether it can be written
+        with TemporaryFile(dir=out.parent):
             pass
     tables: list[pd.DataFrame] = []
     with (
-        broken_off(out, lambda: f"What had ended is in {out / NAME}." if tables else "No search had ended."),
+        broken_off(
+            out, lambda: f"What had ended is in {out / NAME}." if tables else "No search had ended."
+        ),
         Progress() as bar,
     ):
         for engine in dict.fromkeys(engines or TUNED):
@@ -58,10 +62,15 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
 
 def show(table: pd.DataFrame) -> None:
     """Print what is chosen, and why not the others."""
-    rows = Table(title="Error over the chosen settings' error, at equal cost", title_justify="left", box=None)
+    rows = Table(
+        title="Error over the chosen settings' error, at equal cost", title_justify="left", box=None
+    )
     for column in ("engine", "setting", "value", "error", "on other seeds", "cost", "verdict"):
         rows.add_column(column, overflow="fold")
     for _, row in table[table.verdict.isin([CHOSEN, BETTER, NO_BETTER, BREAKS])].iterrows():
-        numbers = ["" if pd.isna(row[name]) else f"{row[name]:.3g}" for name in ("equal_cost", "again", "cost")]
+        numbers = [
+            "" if pd.isna(row[name]) else f"{row[name]:.3g}"
+            for name in ("equal_cost", "again", "cost")
+        ]
         rows.add_row(row.engine, row.setting, row.value, *numbers, row.verdict)
     Console().print(rows)

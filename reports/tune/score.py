@@ -1,4 +1,5 @@
-"""How well an engine plays the tuning scenes with some settings, and at what cost, against others of its settings."""
+"""How well an engine plays the tuning scenes with some settings, and at what cost, against others
+of its settings."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from scenarios.families.tuning import FAMILIES, LADDER, one_of
 from scenarios.model import Array, Scenario, Trajectory
 
 FLOOR = 1e-6  # radii: below the finest accuracy that any page asks for, an error is as good as none
-MORE_ENERGY, SOME_ENERGY = 1.1, 0.01  # times as much energy as before, and so much of that at hand, may be wrong
+# times as much energy as before, and so much of that at hand, may be wrong
+MORE_ENERGY, SOME_ENERGY = 1.1, 0.01
 TIMED_SUBSTEPS, ROUNDS = 4, 7
 Make = Callable[[], Engine]
 Asked = tuple[Scenario, Trajectory | None]
@@ -28,10 +30,11 @@ class TrialScores(NamedTuple):
     """What settings made of the tuning scenes; s scenes, k step sizes from coarse to fine.
 
     Attributes:
-        error: (s, k) root mean square distance from the exact answer over disks and samples, in radii, at least
-            `FLOOR`; inf where a scene was refused or failed, nan where there is no exact answer.
-        gained: (s, k) energy over the energy at hand: at e = 1 the largest change, else the largest rise.
-        missed, spurious: (s, k) collisions.
+        error: (s, k) root mean square distance from the exact answer over disks and samples, in
+            radii, at least `FLOOR`; inf where a scene was refused or failed, nan where there is no
+            exact answer.
+        gained: (s, k) energy over the energy at hand: at e = 1 the largest change, else the largest
+        rise. missed, spurious: (s, k) collisions.
     """
 
     error: Array
@@ -46,7 +49,8 @@ class Against(NamedTuple):
     Attributes:
         same_dt: geometric mean over scenes and steps of error over error, at the same step size.
         equal_cost: the same, at equal cost.
-        better, worse: how many of the scenes and steps have an error at equal cost smaller or larger by 20 %.
+        better, worse: how many of the scenes and steps have an error at equal cost smaller or
+            larger by 20 %.
         of: how many there are.
         faults: what they break, each in a few words.
     """
@@ -61,8 +65,11 @@ class Against(NamedTuple):
 
 @cache
 def posed(families: tuple[str, ...], seeds: tuple[int, ...]) -> tuple[Asked, ...]:
-    """The tuning scenes with their exact answers, which are cut at their horizons; family by family."""
-    scenes = [one_of(each, seed) for each in FAMILIES if each.__name__ in families for seed in seeds]
+    """The tuning scenes with their exact answers, which are cut at their horizons; family by
+    family."""
+    scenes = [
+        one_of(each, seed) for each in FAMILIES if each.__name__ in families for seed in seeds
+    ]
     return tuple((scene, scene.truth(scene.times) if scene.truth else None) for scene in scenes)
 
 
@@ -72,7 +79,9 @@ def measured(make: Make, scenes: Sequence[Asked]) -> TrialScores:
     return TrialScores(*np.moveaxis(np.array(rows, float), -1, 0))
 
 
-def of_run(make: Make, scenario: Scenario, truth: Trajectory | None, substeps: int) -> tuple[float, float, int, int]:
+def of_run(
+    make: Make, scenario: Scenario, truth: Trajectory | None, substeps: int
+) -> tuple[float, float, int, int]:
     """Error, energy gained, missed and spurious collisions; see `TrialScores`."""
     dt, scene = scenario.dt(substeps), scenario.scene
     run = play_once(make, "tuned:engine", scenario, dt)
@@ -97,14 +106,21 @@ def against(now: TrialScores, before: TrialScores, cost: float, scenes: Sequence
     had = np.log(before.error[both])
     same, equal = np.log(now.error[both]) - had, np.log(at_cost(now.error, cost)[both]) - had
     counts = int((equal < np.log(0.8)).sum()), int((equal > np.log(1.25)).sum()), int(both.sum())
-    return Against(float(np.exp(same.mean())), float(np.exp(equal.mean())), *counts, faults_of(now, before, scenes))
+    return Against(
+        float(np.exp(same.mean())),
+        float(np.exp(equal.mean())),
+        *counts,
+        faults_of(now, before, scenes),
+    )
 
 
 def at_cost(error: Array, cost: float) -> Array:
-    """(s, k) what the errors would be if a step cost as much as before: those at cost times the step size.
+    """(s, k) what the errors would be if a step cost as much as before: those at cost times the
+    step size.
 
-    Steps that cost twice as much are half as many. error (s, k) is read between the step sizes of the ladder on a line
-    of its logarithm over that of dt; beyond its ends it is of first order, in proportion to dt.
+    Steps that cost twice as much are half as many. error (s, k) is read between the step sizes of
+    the ladder on a line of its logarithm over that of dt; beyond its ends it is of first order, in
+    proportion to dt.
     """
     ladder = -np.log(LADDER)[::-1]  # ln dt + const, increasing
     wanted = ladder + np.log(cost)
@@ -117,8 +133,9 @@ def at_cost(error: Array, cost: float) -> Array:
 def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) -> list[str]:
     """What `now` breaks that `before` kept, family by family.
 
-    A scene refused or failed; missed or spurious collisions, more of them than by counting noise (n + sqrt(n): where
-    there was none, none may come); an energy that is wrong by more than `MORE_ENERGY` and `SOME_ENERGY`.
+    A scene refused or failed; missed or spurious collisions, more of them than by counting noise (n
+    + sqrt(n): where there was none, none may come); an energy that is wrong by more than
+    `MORE_ENERGY` and `SOME_ENERGY`.
     """
     family = np.array([scene.name.rsplit("-", 1)[0] for scene, _ in scenes])
     faults = []
@@ -139,10 +156,13 @@ def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) ->
 def cost_of(make: Make, than: Make, scenes: Sequence[Asked]) -> float:
     """What a step costs over what it costs with the other settings: geometric mean over scenes.
 
-    Both are timed in turns, `ROUNDS` times a scene, of which the shortest counts; see `Engine.listening` for why no
-    collision is logged. Time of this thread, so that what else the machine does is not in it.
+    Both are timed in turns, `ROUNDS` times a scene, of which the shortest counts; see
+    `Engine.listening` for why no collision is logged. Time of this thread, so that what else the
+    machine does is not in it.
     """
-    times = [[(spent(make, scene), spent(than, scene)) for _ in range(ROUNDS)] for scene, _ in scenes]
+    times = [
+        [(spent(make, scene), spent(than, scene)) for _ in range(ROUNDS)] for scene, _ in scenes
+    ]
     mine, theirs = np.min(times, axis=1).T
     return float(np.exp(np.log(mine / theirs).mean()))
 

@@ -1,4 +1,5 @@
-"""The search: setting by setting, then the pairs, again and again until nothing on the grid is better."""
+"""The search: setting by setting, then the pairs, again and again until nothing on the grid is
+better."""
 
 from __future__ import annotations
 
@@ -18,12 +19,24 @@ from reports.tune.score import Against, Make, TrialScores, against, cost_of, mea
 from scenarios.families.tuning import FAMILIES
 
 SEEDS, OTHER_SEEDS = (0, 1), (2, 3)  # what is chosen on, and what has to bear it out
-LEAST = 0.9  # times the error: what gains less is kept as it is, as other seeds may read as much more
+# times the error: what gains less is kept as it is, as other seeds may read as much more
+LEAST = 0.9
 SWEEPS = 4
 COLUMNS = [
-    "engine", "setting", "value", "chosen", "same_dt", "cost", "equal_cost", "again", "better", "worse", "of",
-    "verdict", "why",
-]  # fmt: skip
+    "engine",
+    "setting",
+    "value",
+    "chosen",
+    "same_dt",
+    "cost",
+    "equal_cost",
+    "again",
+    "better",
+    "worse",
+    "of",
+    "verdict",
+    "why",
+]
 MATCHED = ":matched"
 CHOSEN, BETTER, NO_BETTER, BREAKS = "chosen", "better", "no better", "breaks"
 NO_SEARCH = "not searched"
@@ -43,7 +56,8 @@ def searched_of(engine: str) -> Searched:
 
 
 class Trial(NamedTuple):
-    """One change of the chosen settings: what it is against them at equal cost, on both halves of the seeds."""
+    """One change of the chosen settings: what it is against them at equal cost, on both halves of
+    the seeds."""
 
     change: dict[str, Any]
     cost: float
@@ -87,7 +101,11 @@ class Search:
     def keeps(self, settings: dict[str, Any]) -> set[str]:
         """The probes of the conformance suite that it keeps."""
         row = replace(TUNED[self.engine], make=self.make(settings))
-        return {finding.probe for finding in conform(self.engine + MATCHED, row) if finding.verdict == "keeps"}
+        return {
+            finding.probe
+            for finding in conform(self.engine + MATCHED, row)
+            if finding.verdict == "keeps"
+        }
 
     def played(self, settings: dict[str, Any]) -> tuple[TrialScores, TrialScores]:
         """What the settings make of both halves; measured once."""
@@ -106,7 +124,10 @@ class Search:
         first, again = (against(*each) for each in zip(now, before, (cost, cost), self.scenes))
         trial = Trial(change, cost, first, again, sorted(self.kept - self.keeps(settings)))
         what = ", ".join(f"{name} {value:g}" for name, value in change.items())
-        self.say(f"{self.engine} {what}: {trial.first.equal_cost:.3f}, {trial.again.equal_cost:.3f}: {trial.verdict}")
+        self.say(
+            f"{self.engine} {what}: {trial.first.equal_cost:.3f}, {trial.again.equal_cost:.3f}:"
+            f" {trial.verdict}"
+        )
         return trial
 
     def groups(self) -> Iterator[list[dict[str, Any]]]:
@@ -115,7 +136,9 @@ class Search:
             yield [{name: value} for value in values if value != self.chosen[name]]
         for names, *tried in self.searched.pairs:
             changes = [dict(zip(names, values)) for values in product(*tried)]
-            yield [each for each in changes if all(each[name] != self.chosen[name] for name in each)]
+            yield [
+                each for each in changes if all(each[name] != self.chosen[name] for name in each)
+            ]
 
     def sweep(self) -> tuple[list[Trial], bool]:
         """All trials, taking the best of each setting at once; and whether anything was taken."""
@@ -132,7 +155,8 @@ class Search:
         return trials, taken
 
     def run(self) -> pd.DataFrame:
-        """Sweep until nothing is taken; the table of the last sweep, against what is chosen then."""
+        """Sweep until nothing is taken; the table of the last sweep, against what is chosen
+        then."""
         for _ in range(SWEEPS):
             trials, taken = self.sweep()
             if not taken:
@@ -140,23 +164,37 @@ class Search:
         return table(self.engine, self.searched, self.chosen, trials)
 
 
-def table(engine: str, searched: Searched, chosen: dict[str, Any], trials: Sequence[Trial]) -> pd.DataFrame:
-    """Columns `COLUMNS`: what is chosen of each setting, every change tried, and what was not searched and why.
+def table(
+    engine: str, searched: Searched, chosen: dict[str, Any], trials: Sequence[Trial]
+) -> pd.DataFrame:
+    """Columns `COLUMNS`: what is chosen of each setting, every change tried, and what was not
+    searched and why.
 
-    same_dt, equal_cost and again (equal cost, on the other seeds) are error over the chosen settings' error, cost a
-    step's over theirs; better and worse count scenes and steps, of both halves, that differ by 20 %.
+    same_dt, equal_cost and again (equal cost, on the other seeds) are error over the chosen
+    settings' error, cost a step's over theirs; better and worse count scenes and steps, of both
+    halves, that differ by 20 %.
     """
     rows: list[dict[str, Any]] = []
     for name, (_, what) in searched.settings.items():
         of_it = [each for each in trials if list(each.change) == [name]]
-        rows.append({"setting": name, "value": shown(chosen[name]), "chosen": True, "verdict": CHOSEN, "why": what})
+        rows.append(
+            {
+                "setting": name,
+                "value": shown(chosen[name]),
+                "chosen": True,
+                "verdict": CHOSEN,
+                "why": what,
+            }
+        )
         rows += [row_of(each) for each in of_it]
     rows += [row_of(each) for each in trials if len(each.change) > 1]
     rows += [
         {"setting": name, "chosen": False, "verdict": NO_SEARCH, "why": why}
         for name, why in searched.left_alone.items()
     ]
-    return with_reasons(pd.DataFrame([{"engine": engine} | row for row in rows], columns=COLUMNS)).round(4)
+    return with_reasons(
+        pd.DataFrame([{"engine": engine} | row for row in rows], columns=COLUMNS)
+    ).round(4)
 
 
 def with_reasons(made: pd.DataFrame) -> pd.DataFrame:
@@ -177,11 +215,19 @@ def row_of(trial: Trial) -> dict[str, Any]:
     """A row of the table."""
     first, again = trial.first, trial.again
     return {
-        "setting": " + ".join(trial.change), "value": " + ".join(map(shown, trial.change.values())), "chosen": False,
-        "same_dt": first.same_dt, "cost": trial.cost, "equal_cost": first.equal_cost, "again": again.equal_cost,
-        "better": first.better + again.better, "worse": first.worse + again.worse, "of": first.of + again.of,
-        "verdict": trial.verdict, "why": "; ".join(trial.faults),
-    }  # fmt: skip
+        "setting": " + ".join(trial.change),
+        "value": " + ".join(map(shown, trial.change.values())),
+        "chosen": False,
+        "same_dt": first.same_dt,
+        "cost": trial.cost,
+        "equal_cost": first.equal_cost,
+        "again": again.equal_cost,
+        "better": first.better + again.better,
+        "worse": first.worse + again.worse,
+        "of": first.of + again.of,
+        "verdict": trial.verdict,
+        "why": "; ".join(trial.faults),
+    }
 
 
 def shown(value: Any) -> str:

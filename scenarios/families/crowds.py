@@ -29,13 +29,19 @@ def simbenchmark_bouncing() -> Scenario:
         gap, speed = legs.at(t)
         position = np.stack(np.broadcast_arrays(x, (gap + radius)[:, None]), axis=-1)
         velocity = np.stack(np.broadcast_arrays(0.0, np.tile(speed[:, None], n)), axis=-1)
-        collisions = [collision for disk in range(n) for collision in legs.wall_collisions(disk, (0,), mass, 1.0)]
+        collisions = [
+            collision
+            for disk in range(n)
+            for collision in legs.wall_collisions(disk, (0,), mass, 1.0)
+        ]
         return answer(scene, t, (position, velocity), collisions)
 
     return Scenario(
         name="simbenchmark_bouncing",
         asks="Does every ball of forty-nine keep its energy over twenty seconds of bouncing?",
-        source='SimBenchmark (ETH Zurich, Robotic Systems Lab), "Bouncing", its 7 x 7 balls in one row',
+        source=(
+            'SimBenchmark (ETH Zurich, Robotic Systems Lab), "Bouncing", its 7 x 7 balls in one row'
+        ),
         scene=scene,
         duration=20.0,
         sample_interval=0.02,

@@ -1,4 +1,5 @@
-"""The scenes of the lesson "Simple body dynamics": a body, its flight, a boundary, a box of falling disks."""
+"""The scenes of the lesson "Simple body dynamics": a body, its flight, a boundary, a box of falling
+disks."""
 
 from __future__ import annotations
 
@@ -26,7 +27,9 @@ def free_fall() -> Scenario:
     )
 
     def truth(t: Array) -> Trajectory:
-        return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity, scene.gravity))
+        return answer(
+            scene, t, flight(t[:, None, None], scene.position, scene.velocity, scene.gravity)
+        )
 
     return Scenario(
         name="free_fall",
@@ -54,7 +57,9 @@ def ping_pong() -> Scenario:
     def truth(t: Array) -> Trajectory:
         legs = to_and_fro(scene.position[0, 1] - low, 1.0, high - low, 1.0, t[-1])
         y, speed = legs.at(t)
-        position, velocity = (np.stack([np.zeros_like(y), a], axis=-1)[:, None] for a in (y + low, speed))
+        position, velocity = (
+            np.stack([np.zeros_like(y), a], axis=-1)[:, None] for a in (y + low, speed)
+        )
         return answer(scene, t, (position, velocity), legs.wall_collisions(0, (1, 0), 1.0, 1.0))
 
     return Scenario(
@@ -84,7 +89,10 @@ def falling_box(seed: int = 0) -> Scenario:
     )
     question = Scenario(
         name="falling_box",
-        asks="Do thirty disks that fall in a box stay inside it and apart, and lose energy only by collisions?",
+        asks=(
+            "Do thirty disks that fall in a box stay inside it and apart, and lose energy only by"
+            " collisions?"
+        ),
         source=f"{SOURCE}, parts 3 and 4, in two dimensions",
         scene=scene,
         duration=2.0,

@@ -11,7 +11,10 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Trajectory
 from scenarios.truth.closed_forms import Collision, Motion, answer, pair
 
-SOURCE = "momentum, and Newton's restitution along the line of centres (Landau & Lifshitz, Mechanics, 17)"
+SOURCE = (
+    "momentum, and Newton's restitution along the line of centres (Landau & Lifshitz,"
+    " Mechanics, 17)"
+)
 TAG = {0.0: "e0", 0.5: "e05", 0.9: "e09", 1.0: "e1"}
 
 
@@ -30,7 +33,9 @@ def _pairs(
     x, v, m = (np.asarray(a, float) for a in (position, velocity, mass))
     r = np.full(len(m), radius)
     spins = np.zeros(len(m)) if spin is None else np.asarray(spin, float)
-    scene = lay_out(position=x, velocity=v, radius=r, mass=m, angular_velocity=spins, restitution=restitution)
+    scene = lay_out(
+        position=x, velocity=v, radius=r, mass=m, angular_velocity=spins, restitution=restitution
+    )
 
     def truth(t: Array) -> Trajectory:
         motions: list[Motion] = []
@@ -39,7 +44,9 @@ def _pairs(
             two = slice(i, i + 2)
             legs, impulse = pair(x[two], v[two], r[two], m[two], restitution)
             motions.append(legs.at(t))
-            collisions += [(float(at), i, i + 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)]
+            collisions += [
+                (float(at), i, i + 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)
+            ]
         position, velocity = (np.concatenate(part, axis=1) for part in zip(*motions))
         return answer(scene, t, (position, velocity), collisions)
 
@@ -63,7 +70,8 @@ def head_on_unequal(restitution: float) -> Scenario:
     """A light disk and one of seven times its mass, both moving, on one line."""
     return _pairs(
         f"head_on_unequal_{TAG[restitution]}",
-        f"Do a light and a heavy disk share momentum in a head-on collision as e = {restitution:g} says?",
+        f"Do a light and a heavy disk share momentum in a head-on collision as e = {restitution:g}"
+        " says?",
         position=[[-1.11, 0], [1.87, 0]],
         velocity=[[1.3, 0], [-0.6, 0]],
         mass=[1, 7],
@@ -73,10 +81,12 @@ def head_on_unequal(restitution: float) -> Scenario:
 
 
 def oblique(restitution: float) -> Scenario:
-    """Two spinning disks that meet off centre: without friction the collision leaves the spin alone."""
+    """Two spinning disks that meet off centre: without friction the collision leaves the spin
+    alone."""
     return _pairs(
         f"oblique_{TAG[restitution]}",
-        f"Do two disks that meet off centre part at the angles of e = {restitution:g}, their spin untouched?",
+        f"Do two disks that meet off centre part at the angles of e = {restitution:g}, their spin"
+        " untouched?",
         position=[[-1.8, -0.1], [1.7, 0.2]],
         velocity=[[1.2, 0.1], [-0.7, 0.05]],
         mass=[1, 2],
@@ -90,7 +100,8 @@ def mass_ratios() -> Scenario:
     """Seven lanes, in each a disk of mass 1 and one of mass 1, 10, ... 1e6."""
     lanes = np.arange(7)
     y = 2.0 * (lanes - 3)
-    # A little farther away in each lane, so that the seven collisions fall at different phases of a step.
+    # A little farther away in each lane, so that the seven collisions fall at different phases of a
+    # step.
     light = np.stack([-1.442 - 0.0499 * lanes, y], axis=-1)
     heavy = np.stack([1.3 + 0.0 * lanes, y], axis=-1)
     return _pairs(
@@ -105,7 +116,8 @@ def mass_ratios() -> Scenario:
 
 
 def slow_collision() -> Scenario:
-    """Half a metre a second: slower than the threshold below which some engines make every collision dead."""
+    """Half a metre a second: slower than the threshold below which some engines make every
+    collision dead."""
     return _pairs(
         "slow_collision",
         "Is a collision at 0.5 m/s as elastic as a fast one, or is it below a threshold?",
@@ -122,7 +134,8 @@ def near_miss() -> Scenario:
     radius = 0.25
     return _pairs(
         "near_miss",
-        "Which engine reports a spurious collision when a fast disk passes another at 1.005 times the touching distance?",
+        "Which engine reports a spurious collision when a fast disk passes another at 1.005 times"
+        " the touching distance?",
         position=[[-6, 1.005 * 2 * radius], [0.03, 0]],
         velocity=[[12, 0], [0, 0]],  # 0.2 radii per step of 1/240 s
         mass=[1, 1],

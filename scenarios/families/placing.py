@@ -30,10 +30,12 @@ def scatter(
     radius: Array,
     first: ArrayLike | None = None,
 ) -> Array:
-    """(n, 2) m, centres drawn uniformly between the corners, each again until its disk meets none before it.
+    """(n, 2) m, centres drawn uniformly between the corners, each again until its disk meets none
+    before it.
 
-    radius (n,) m. first (2,) m: where disk 0 stands, if it is not drawn. For sparse disks only: equal ones
-    close four times their own area to the next, so up to a quarter of the box a free place always remains.
+    radius (n,) m. first (2,) m: where disk 0 stands, if it is not drawn. For sparse disks only:
+    equal ones close four times their own area to the next, so up to a quarter of the box a free
+    place always remains.
     """
     centres: list[Array] = [] if first is None else [np.asarray(first, float)]
     while len(centres) < len(radius):

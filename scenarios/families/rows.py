@@ -24,11 +24,16 @@ def _on_line(x: Array, v: Array) -> Motion:
 def line_gas() -> Scenario:
     """Fifteen equal disks between two walls."""
     n, radius, length = 15, 0.25, 12.0
-    # As irregular as a random draw, without one; plain multiples i sqrt(2) would make simultaneous collisions.
+    # As irregular as a random draw, without one; plain multiples i sqrt(2) would make simultaneous
+    # collisions.
     squares = np.arange(1, n + 2) ** 2
     gap = 0.2 + (squares * np.sqrt(5)) % 1
     v = 4 * ((squares[:n] * np.sqrt(2)) % 1) - 2
-    x = np.cumsum(gap)[:-1] / gap.sum() * (length - 2 * radius * n) + radius + 2 * radius * np.arange(n)
+    x = (
+        np.cumsum(gap)[:-1] / gap.sum() * (length - 2 * radius * n)
+        + radius
+        + 2 * radius * np.arange(n)
+    )
     position, velocity = _on_line(x, v)
     scene = lay_out(
         position=position,
@@ -54,7 +59,9 @@ def line_gas() -> Scenario:
     )
 
 
-def counting_pi(collisions: int, ratio: float, duration: float, ladder: tuple[int, ...]) -> Scenario:
+def counting_pi(
+    collisions: int, ratio: float, duration: float, ladder: tuple[int, ...]
+) -> Scenario:
     """A wall, a light disk and one 100^k times as heavy, whose collisions count out pi."""
     radius, speed = np.array([0.25, 0.5]), 0.25
     mass = np.array([1.0, ratio])
@@ -73,9 +80,18 @@ def counting_pi(collisions: int, ratio: float, duration: float, ladder: tuple[in
 
     def truth(t: Array) -> Trajectory:
         room, rate = galperin(gap, speed, mass, t)
-        # The unfolding angle, up to pi, is rounded; its lever is the heavy disk's weighted distance.
-        bound = 4 * EPS * float(np.sqrt(mass[1] / mass[0])) * float(np.abs(gap[1] - speed * t).max())
-        return answer(scene, t, _on_line(room + shift, rate), galperin_collisions(gap, speed, mass), error_bound=bound)
+        # The unfolding angle, up to pi, is rounded; its lever is the heavy disk's weighted
+        # distance.
+        bound = (
+            4 * EPS * float(np.sqrt(mass[1] / mass[0])) * float(np.abs(gap[1] - speed * t).max())
+        )
+        return answer(
+            scene,
+            t,
+            _on_line(room + shift, rate),
+            galperin_collisions(gap, speed, mass),
+            error_bound=bound,
+        )
 
     return Scenario(
         name=f"galperin_{collisions}",
@@ -93,7 +109,9 @@ def _cradle(position: Array) -> Scene:
     """Five equal disks, e = 1, of which the first two come in."""
     n = len(position)
     x, v = _on_line(position, np.array([1.0, 1.0, 0.0, 0.0, 0.0]))
-    return lay_out(position=x, velocity=v, radius=np.full(n, 0.25), mass=np.ones(n), restitution=1.0)
+    return lay_out(
+        position=x, velocity=v, radius=np.full(n, 0.25), mass=np.ones(n), restitution=1.0
+    )
 
 
 def cradle_with_gaps() -> Scenario:
@@ -108,7 +126,9 @@ def cradle_with_gaps() -> Scenario:
 
     return Scenario(
         name="cradle_with_gaps",
-        asks="Do two disks leave a cradle when two come in, if a centimetre lies between its disks?",
+        asks=(
+            "Do two disks leave a cradle when two come in, if a centimetre lies between its disks?"
+        ),
         source="equal masses swap velocities at e = 1: they stay sorted",
         scene=scene,
         duration=4.0,
@@ -134,7 +154,8 @@ ROWS = (
     line_gas,
     partial(counting_pi, 3, 1.0, 12.0, (1, 2, 4, 8)),
     partial(counting_pi, 31, 1e2, 15.0, (1, 2, 4, 8)),
-    partial(counting_pi, 314, 1e4, 31.0, (1, 4, 16, 64)),  # its collisions follow each other by 0.4 ms
+    # its collisions follow each other by 0.4 ms
+    partial(counting_pi, 314, 1e4, 31.0, (1, 4, 16, 64)),
     cradle_with_gaps,
     cradle_touching,
 )

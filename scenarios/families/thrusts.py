@@ -22,8 +22,8 @@ def spin_under_torque() -> Scenario:
         mass=[2.0, 0.7],
         restitution=1.0,
     )
-    # Disk, first and last sample, force N, torque N m: whole intervals, so that every step is under a thrust from its
-    # start to its end or not at all.
+    # Disk, first and last sample, force N, torque N m: whole intervals, so that every step is under
+    # a thrust from its start to its end or not at all.
     table = (
         (0, 0, 240, [0.0, 0.0], 0.125),
         (0, 30, 90, [0.6, 0.2], 0.0),

@@ -1,6 +1,8 @@
-"""Scenes that settings are chosen on, sampled from a seed; none is of the catalogue, which settings are judged on.
+"""Scenes that settings are chosen on, sampled from a seed; none is of the catalogue, which settings
+are judged on.
 
-Sizes and speeds differ from scene to scene, so that no setting can be right for one length or one speed alone.
+Sizes and speeds differ from scene to scene, so that no setting can be right for one length or one
+speed alone.
 """
 
 from __future__ import annotations
@@ -17,10 +19,13 @@ from scenarios.truth.exact import with_oracle
 
 SAMPLE_INTERVAL = 1 / 60  # s
 LADDER = (1, 2, 4)  # steps in it
-RADII, SPEEDS = (0.1, 3.0), (2.0, 20.0)  # m; radii a second, so .03 to .3 radii in the coarsest step
+# m; radii a second, so .03 to .3 radii in the coarsest step
+RADII, SPEEDS = (0.1, 3.0), (2.0, 20.0)
 ELASTIC, INELASTIC = 1.0, (0.3, 0.9)
-LEAST_GAP, MOST_GAP = 0.005, 0.05  # of the touching distance: nearer than that two disks pass as good as touching
-PASSING, FASTER = 8, 3.0  # so many pairs graze or miss in a scene, faster than elsewhere: up to a radius a step
+# of the touching distance: nearer than that two disks pass as good as touching
+LEAST_GAP, MOST_GAP = 0.005, 0.05
+# so many pairs graze or miss in a scene, faster than elsewhere: up to a radius a step
+PASSING, FASTER = 8, 3.0
 LANE = 6.0  # touching distances from pair to pair
 FAR = 100.0  # radii, to the end of a floor
 
@@ -33,10 +38,13 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def posed(asks: str, scene: Scene, duration: float) -> Scenario:
-    """The scenario with the oracle for its answer, cut to whole samples; `tuning` gives it its name."""
+    """The scenario with the oracle for its answer, cut to whole samples; `tuning` gives it its
+    name."""
     samples = max(round(duration / SAMPLE_INTERVAL), 4)
     source = "sampled for crosscheck tune"
-    question = Scenario("unnamed", asks, source, scene, samples * SAMPLE_INTERVAL, SAMPLE_INTERVAL, substeps=LADDER)
+    question = Scenario(
+        "unnamed", asks, source, scene, samples * SAMPLE_INTERVAL, SAMPLE_INTERVAL, substeps=LADDER
+    )
     return with_oracle(question)
 
 
@@ -48,16 +56,24 @@ def one_restitution(rng: np.random.Generator) -> float:
 def flight_alone(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """One disk, thrown."""
     scene = lay_out(
-        position=[[0.0, 0.0]], velocity=[v * r * rng.normal(size=2)], radius=[r], mass=[1.0], gravity=[0, -v * r],
+        position=[[0.0, 0.0]],
+        velocity=[v * r * rng.normal(size=2)],
+        radius=[r],
+        mass=[1.0],
+        gravity=[0, -v * r],
         restitution=1.0,
-    )  # fmt: skip
+    )
     return posed("How far from its parabola is a thrown disk?", scene, 1.0)
 
 
-def pairs(rng: np.random.Generator, radius: Array, speed: float, offset: Array, duration: float, asks: str) -> Scenario:
-    """Pairs of disks with these two radii in lanes beside each other; pair k passes at offset[k] touching distances.
+def pairs(
+    rng: np.random.Generator, radius: Array, speed: float, offset: Array, duration: float, asks: str
+) -> Scenario:
+    """Pairs of disks with these two radii in lanes beside each other; pair k passes at offset[k]
+    touching distances.
 
-    They close at `speed` m/s and come to touch, or pass, after .3 to .4 s: each pair at a phase of the step of its own.
+    They close at `speed` m/s and come to touch, or pass, after .3 to .4 s: each pair at a phase of
+    the step of its own.
     """
     turn, n, touch = rng.uniform(0, 2 * np.pi), len(offset), radius.sum()
     along, across = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
@@ -67,21 +83,39 @@ def pairs(rng: np.random.Generator, radius: Array, speed: float, offset: Array, 
     drift = np.outer(0.1 * speed * rng.normal(size=n), along)
     scene = lay_out(
         position=np.stack([lane - apart / 2, lane + apart / 2], axis=1).reshape(-1, 2),
-        velocity=np.stack([drift + speed / 2 * along, drift - speed / 2 * along], axis=1).reshape(-1, 2),
-        radius=np.tile(radius, n), mass=10 ** rng.uniform(-1, 1, 2 * n), restitution=one_restitution(rng),
-    )  # fmt: skip
+        velocity=np.stack([drift + speed / 2 * along, drift - speed / 2 * along], axis=1).reshape(
+            -1, 2
+        ),
+        radius=np.tile(radius, n),
+        mass=10 ** rng.uniform(-1, 1, 2 * n),
+        restitution=one_restitution(rng),
+    )
     return posed(asks, scene, duration)
 
 
 def head_on(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """Two disks that meet in the line of their centres."""
-    return pairs(rng, unlike(rng, r), v * r, np.zeros(1), 1.0, "How far off are two disks after they collided head-on?")
+    return pairs(
+        rng,
+        unlike(rng, r),
+        v * r,
+        np.zeros(1),
+        1.0,
+        "How far off are two disks after they collided head-on?",
+    )
 
 
 def oblique(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """Two that meet beside it."""
     offset = rng.uniform(0.2, 0.9, 1)
-    return pairs(rng, unlike(rng, r), v * r, offset, 1.0, "How far off are two disks after an oblique collision?")
+    return pairs(
+        rng,
+        unlike(rng, r),
+        v * r,
+        offset,
+        1.0,
+        "How far off are two disks after an oblique collision?",
+    )
 
 
 def grazing(rng: np.random.Generator, r: float, v: float) -> Scenario:
@@ -94,7 +128,12 @@ def near_miss(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """Pairs that do not collide."""
     offset = 1 + near(rng)
     return pairs(
-        rng, np.array([r, r]), FASTER * v * r, offset, 0.5, "Is there a spurious collision of two disks that miss?"
+        rng,
+        np.array([r, r]),
+        FASTER * v * r,
+        offset,
+        0.5,
+        "Is there a spurious collision of two disks that miss?",
     )
 
 
@@ -112,9 +151,13 @@ def onto_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """One disk at a wall, at an angle."""
     x = -rng.uniform(0.35, 0.4) * v * r - r
     scene = lay_out(
-        position=[[x, 0.0]], velocity=[[v * r, v * r * rng.normal()]], radius=[r], mass=[1.0],
-        walls=[[[0, -FAR * r], [0, FAR * r]]], restitution=one_restitution(rng),
-    )  # fmt: skip
+        position=[[x, 0.0]],
+        velocity=[[v * r, v * r * rng.normal()]],
+        radius=[r],
+        mass=[1.0],
+        walls=[[[0, -FAR * r], [0, FAR * r]]],
+        restitution=one_restitution(rng),
+    )
     return posed("How far off is a disk after a wall?", scene, 1.0)
 
 
@@ -123,9 +166,12 @@ def onto_static(rng: np.random.Generator, r: float, v: float) -> Scenario:
     y = rng.uniform(0, 2)
     x = -(rng.uniform(0.35, 0.4) * v + np.sqrt(9 - y * y))
     scene = lay_out(
-        position=[[x * r, y * r], [0, 0]], velocity=[[v * r, 0], [0, 0]],
-        radius=[r, 2 * r], mass=[1.0, np.inf], restitution=one_restitution(rng),
-    )  # fmt: skip
+        position=[[x * r, y * r], [0, 0]],
+        velocity=[[v * r, 0], [0, 0]],
+        radius=[r, 2 * r],
+        mass=[1.0, np.inf],
+        restitution=one_restitution(rng),
+    )
     return posed("How far off is a disk after a static one?", scene, 1.0)
 
 
@@ -133,20 +179,30 @@ def wall_to_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """One disk, to and fro some times."""
     reach = r + 0.2 * v * r
     scene = lay_out(
-        position=[[rng.uniform(-0.1, 0.1) * v * r, 0]], velocity=[[v * r, 0]], radius=[r], mass=[1.0],
+        position=[[rng.uniform(-0.1, 0.1) * v * r, 0]],
+        velocity=[[v * r, 0]],
+        radius=[r],
+        mass=[1.0],
         walls=[[[-reach, -2 * r], [-reach, 2 * r]], [[reach, -2 * r], [reach, 2 * r]]],
         restitution=one_restitution(rng),
-    )  # fmt: skip
+    )
     return posed("How far off is a disk between two walls?", scene, 2.0)
 
 
-def dropped(rng: np.random.Generator, r: float, v: float, restitution: float, falls: float) -> Scenario:
+def dropped(
+    rng: np.random.Generator, r: float, v: float, restitution: float, falls: float
+) -> Scenario:
     """A ball that reaches its floor at the speed v, for the time of so many falls of .3 to .5 s."""
     t = rng.uniform(0.3, 0.5)
     scene = lay_out(
-        position=[[0, r + v * r * t / 2]], velocity=[[0, 0]], radius=[r], mass=[1.0], gravity=[0, -v * r / t],
-        walls=[[[-FAR * r, 0], [FAR * r, 0]]], restitution=restitution,
-    )  # fmt: skip
+        position=[[0, r + v * r * t / 2]],
+        velocity=[[0, 0]],
+        radius=[r],
+        mass=[1.0],
+        gravity=[0, -v * r / t],
+        walls=[[[-FAR * r, 0], [FAR * r, 0]]],
+        restitution=restitution,
+    )
     return posed("How far off is a ball that bounces?", scene, falls * t)
 
 
@@ -165,7 +221,10 @@ def long_bounce(rng: np.random.Generator, r: float, v: float) -> Scenario:
     ball = dropped(rng, r, v, ELASTIC, 80.0)
     asks = "Does a ball keep its energy over many bounces?"
     return replace(
-        ball, asks=asks, truth=None, without_truth="after so many bounces the detection delay is all there is"
+        ball,
+        asks=asks,
+        truth=None,
+        without_truth="after so many bounces the detection delay is all there is",
     )
 
 
@@ -179,7 +238,9 @@ def coming_to_rest(rng: np.random.Generator, r: float, v: float) -> Scenario:
         legs = bouncing(height, g, restitution, t[-1])
         gap, speed = legs.at(t)
         position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + r, speed))
-        return answer(asked.scene, t, (position, velocity), legs.wall_collisions(0, (0,), 1.0, restitution))
+        return answer(
+            asked.scene, t, (position, velocity), legs.wall_collisions(0, (0,), 1.0, restitution)
+        )
 
     return replace(asked, truth=truth)
 
@@ -191,11 +252,16 @@ def landing(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 def row(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """Five equal disks with small gaps, of which the first comes in."""
-    x = np.cumsum(np.append(0.0, 2 * r + r * np.append(rng.uniform(0.25, 0.3) * v, rng.uniform(0.02, 0.3, 3))))
+    x = np.cumsum(
+        np.append(0.0, 2 * r + r * np.append(rng.uniform(0.25, 0.3) * v, rng.uniform(0.02, 0.3, 3)))
+    )
     scene = lay_out(
-        position=np.stack([x, 0 * x], axis=-1), velocity=[[v * r, 0], *[[0, 0]] * 4], radius=np.full(5, r),
-        mass=np.ones(5), restitution=one_restitution(rng),
-    )  # fmt: skip
+        position=np.stack([x, 0 * x], axis=-1),
+        velocity=[[v * r, 0], *[[0, 0]] * 4],
+        radius=np.full(5, r),
+        mass=np.ones(5),
+        restitution=one_restitution(rng),
+    )
     return posed("How far off is a row of disks after a collision went through it?", scene, 1.0)
 
 
@@ -203,9 +269,12 @@ def light_between(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """A light disk between a wall and a heavy one that comes in."""
     scene = lay_out(
         position=[[rng.uniform(1.5, 3) * r, 0], [rng.uniform(5, 6) * r + 0.2 * v * r, 0]],
-        velocity=[[0, 0], [-v * r / 2, 0]], radius=[r, r], mass=[1.0, log_uniform(rng, 3, 30)],
-        walls=[[[0, -2 * r], [0, 2 * r]]], restitution=1.0,
-    )  # fmt: skip
+        velocity=[[0, 0], [-v * r / 2, 0]],
+        radius=[r, r],
+        mass=[1.0, log_uniform(rng, 3, 30)],
+        walls=[[[0, -2 * r], [0, 2 * r]]],
+        restitution=1.0,
+    )
     return posed("How far off are a light and a heavy disk after some collisions?", scene, 2.0)
 
 
@@ -215,14 +284,19 @@ def small_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
     places = pitch * (np.stack(np.meshgrid(np.arange(3), np.arange(3)), axis=-1).reshape(-1, 2) - 1)
     room, half = pitch / 2 - r, 1.5 * pitch
     scene = lay_out(
-        position=places + rng.uniform(-0.9 * room, 0.9 * room, (n, 2)), velocity=v * r * rng.normal(size=(n, 2)),
-        radius=np.full(n, r), mass=np.ones(n), walls=box([-half] * 2, [half] * 2), restitution=one_restitution(rng),
-    )  # fmt: skip
+        position=places + rng.uniform(-0.9 * room, 0.9 * room, (n, 2)),
+        velocity=v * r * rng.normal(size=(n, 2)),
+        radius=np.full(n, r),
+        mass=np.ones(n),
+        walls=box([-half] * 2, [half] * 2),
+        restitution=one_restitution(rng),
+    )
     return posed("How far off is a small gas before chaos has its way?", scene, 6.0 / v)
 
 
 def long_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """The same at e = 1 for some ten times as long, which only conservation of energy is asked of."""
+    """The same at e = 1 for some ten times as long, which only conservation of energy is asked
+    of."""
     gas = small_gas(rng, r, v)
     scene = replace(gas.scene, restitution=ELASTIC)
     why = "after so many collisions chaos has its way"
@@ -231,14 +305,20 @@ def long_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def column(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Three to eight disks that rest on each other; their gravity is that of a fall at speed v in .4 s."""
+    """Three to eight disks that rest on each other; their gravity is that of a fall at speed v in
+    .4 s."""
     n = int(rng.integers(3, 9))
     r = 2.0 ** round(np.log2(r))  # so that they touch exactly
     y = r + 2 * r * np.arange(n)
     scene = lay_out(
-        position=np.stack([0 * y, y], axis=-1), velocity=np.zeros((n, 2)), radius=np.full(n, r), mass=np.ones(n),
-        gravity=[0, -v * r / 0.4], walls=[[[-FAR * r, 0], [FAR * r, 0]]], restitution=0.0,
-    )  # fmt: skip
+        position=np.stack([0 * y, y], axis=-1),
+        velocity=np.zeros((n, 2)),
+        radius=np.full(n, r),
+        mass=np.ones(n),
+        gravity=[0, -v * r / 0.4],
+        walls=[[[-FAR * r, 0], [FAR * r, 0]]],
+        restitution=0.0,
+    )
     contacts = [(0.0, 0, -1, 0.0), *((0.0, i, i + 1, 0.0) for i in range(n - 1))]
     asked = posed("Does a column of disks stay as it is?", scene, 2.0)
     return replace(asked, truth=lambda t: at_rest(scene, t, contacts))
@@ -249,21 +329,45 @@ def sliding(_rng: np.random.Generator, r: float, v: float) -> Scenario:
     r, g = 2.0 ** round(np.log2(r)) * 0.625, v * r
     down = np.array([4.0, -3.0]) / 5
     scene = lay_out(
-        position=[np.array([0.6, 0.8]) * r], velocity=[[0, 0]], radius=[r], mass=[1.0], gravity=[0, -g],
-        walls=[np.array([-8 * r * down, FAR * r * down])], restitution=0.0,
-    )  # fmt: skip
+        position=[np.array([0.6, 0.8]) * r],
+        velocity=[[0, 0]],
+        radius=[r],
+        mass=[1.0],
+        gravity=[0, -g],
+        walls=[np.array([-8 * r * down, FAR * r * down])],
+        restitution=0.0,
+    )
 
     def truth(t: Array) -> Trajectory:
         motion = flight(t[:, None, None], scene.position, scene.velocity, 0.6 * g * down)
         return answer(scene, t, motion, [(0.0, 0, -1, 0.0)])
 
-    return replace(posed("Does a disk slide down a smooth incline as it should?", scene, 1.0), truth=truth)
+    return replace(
+        posed("Does a disk slide down a smooth incline as it should?", scene, 1.0), truth=truth
+    )
 
 
 FAMILIES: tuple[Sampled, ...] = (
-    flight_alone, head_on, oblique, grazing, near_miss, onto_wall, onto_static, wall_to_wall, bouncing_elastic,
-    bouncing_lossy, long_bounce, coming_to_rest, landing, row, light_between, small_gas, long_gas, column, sliding,
-)  # fmt: skip
+    flight_alone,
+    head_on,
+    oblique,
+    grazing,
+    near_miss,
+    onto_wall,
+    onto_static,
+    wall_to_wall,
+    bouncing_elastic,
+    bouncing_lossy,
+    long_bounce,
+    coming_to_rest,
+    landing,
+    row,
+    light_between,
+    small_gas,
+    long_gas,
+    column,
+    sliding,
+)
 
 
 def tuning(seeds: Sequence[int]) -> list[Scenario]:

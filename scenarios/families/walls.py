@@ -1,4 +1,5 @@
-"""One disk and what does not move: floors, walls, a box, an incline, static disks; and a stack at rest."""
+"""One disk and what does not move: floors, walls, a box, an incline, static disks; and a stack at
+rest."""
 
 from __future__ import annotations
 
@@ -6,15 +7,26 @@ import numpy as np
 
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.truth.closed_forms import Collision, answer, at_rest, bouncing, flight, offset_growth, to_and_fro
+from scenarios.truth.closed_forms import (
+    Collision,
+    answer,
+    at_rest,
+    bouncing,
+    flight,
+    offset_growth,
+    to_and_fro,
+)
 
 G = 9.81
 FLOOR = [[[-10, 0], [10, 0]]]
 EPS = float(np.finfo(float).eps)
 
 
-def _ball(name: str, asks: str, height: float, restitution: float, duration: float, least: float = 0.0) -> Scenario:
-    """A ball dropped from `height` m over the floor; bounces that last less than `least` s are not listed."""
+def _ball(
+    name: str, asks: str, height: float, restitution: float, duration: float, least: float = 0.0
+) -> Scenario:
+    """A ball dropped from `height` m over the floor; bounces that last less than `least` s are not
+    listed."""
     radius, mass = 0.25, 1.0
     scene = lay_out(
         position=[[0.0, radius + height]],
@@ -53,7 +65,8 @@ def bouncing_ball_e09() -> Scenario:
     """A ball that bounces ever lower, infinitely often, until it rests at 9 s."""
     return _ball(
         "bouncing_ball_e09",
-        "Does a ball dropped at e = 0.9 lose height as it should, and come to rest at the right time?",
+        "Does a ball dropped at e = 0.9 lose height as it should, and come to rest at the right"
+        " time?",
         height=1.11,
         restitution=0.9,
         duration=10.0,
@@ -75,10 +88,14 @@ def wall_to_wall() -> Scenario:
     )
 
     def truth(t: Array) -> Trajectory:
-        legs = to_and_fro(scene.position[0, 0] + reach, scene.velocity[0, 0], 2 * reach, restitution, t[-1])
+        legs = to_and_fro(
+            scene.position[0, 0] + reach, scene.velocity[0, 0], 2 * reach, restitution, t[-1]
+        )
         x, speed = legs.at(t)
         position, velocity = (np.stack([a, 0 * a], axis=-1)[:, None] for a in (x - reach, speed))
-        return answer(scene, t, (position, velocity), legs.wall_collisions(0, (1, 0), mass, restitution))
+        return answer(
+            scene, t, (position, velocity), legs.wall_collisions(0, (1, 0), mass, restitution)
+        )
 
     return Scenario(
         name="wall_to_wall",
@@ -110,8 +127,12 @@ def box_billiard() -> Scenario:
             to_and_fro(x - a, v, b - a, 1.0, t[-1])
             for x, v, a, b in zip(scene.position[0], scene.velocity[0], low + radius, high - radius)
         ]
-        position, velocity = (np.stack(part, axis=-1)[:, None] for part in zip(*(leg.at(t) for leg in legs)))
-        collisions = legs[0].wall_collisions(0, (2, 0), mass, 1.0) + legs[1].wall_collisions(0, (3, 1), mass, 1.0)
+        position, velocity = (
+            np.stack(part, axis=-1)[:, None] for part in zip(*(leg.at(t) for leg in legs))
+        )
+        collisions = legs[0].wall_collisions(0, (2, 0), mass, 1.0) + legs[1].wall_collisions(
+            0, (3, 1), mass, 1.0
+        )
         return answer(scene, t, (position + low + radius, velocity), collisions)
 
     return Scenario(
@@ -126,8 +147,10 @@ def box_billiard() -> Scenario:
 
 
 def disk_between_static_disks() -> Scenario:
-    """A disk bounces between two static ones along a tilted line; an offset grows 2.6-fold at each."""
-    # All multiples of (4, 3) by binary fractions: the start is exactly on the line, whatever its tilt.
+    """A disk bounces between two static ones along a tilted line; an offset grows 2.6-fold at
+    each."""
+    # All multiples of (4, 3) by binary fractions: the start is exactly on the line, whatever its
+    # tilt.
     along = np.array([4.0, 3.0])
     radius, mass, static = 0.5, 1.0, 1.0
     centre, place, speed = 0.375, -0.00390625, 0.26953125  # in units of `along`, which is 5 long
@@ -147,11 +170,15 @@ def disk_between_static_disks() -> Scenario:
         position[:, 0], velocity[:, 0] = np.outer(x - reach, along), np.outer(v, along)
         kick = 2 * mass * speed * 5
         collisions = [(float(at), 0, 2 - k % 2, kick) for k, at in enumerate(legs.start[1:])]
-        # A rounding of one part in 2^52 grows to 1e-9 m in that many bounces, in any float64 engine.
+        # A rounding of one part in 2^52 grows to 1e-9 m in that many bounces, in any float64
+        # engine.
         growth = offset_growth(10 * reach, radius + static)
         bounces = int(np.log(1e-9 / (EPS * centre * 5)) / np.log(growth))
         horizon = float(legs.start[min(bounces, len(collisions))])
-        bound, reason = 4 * EPS * centre * 5, "there a rounding has grown to 1e-9 m on the unstable orbit"
+        bound, reason = (
+            4 * EPS * centre * 5,
+            "there a rounding has grown to 1e-9 m on the unstable orbit",
+        )
         return answer(scene, t, (position, velocity), collisions, None, horizon, bound, reason)
 
     return Scenario(
@@ -240,7 +267,8 @@ def column_of_ten() -> Scenario:
 
 
 def _touching(scene: Scene) -> list[Collision]:
-    """The contacts of disks stacked on wall 0: they act from t = 0 with a force, so with no impulse."""
+    """The contacts of disks stacked on wall 0: they act from t = 0 with a force, so with no
+    impulse."""
     return [(0.0, 0, -1, 0.0), *((0.0, i, i + 1, 0.0) for i in range(scene.n - 1))]
 
 

@@ -1,4 +1,5 @@
-"""A scenario as a TOML file: read with every fault named at once, written to read back bit for bit."""
+"""A scenario as a TOML file: read with every fault named at once, written to read back bit for
+bit."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ MOST_BYTES = 5_000_000
 LONG_NUMBER = re.compile(r"(?<![\w.])\d[\d_]{4000,}")
 MOST_FAULTS = 100  # listed; n disks in one place would make n2 / 2 lines
 
-# Disks placed to touch are off by the rounding of their coordinates; a few thousand roundings are forgiven.
+# Disks placed to touch are off by the rounding of their coordinates; a few thousand roundings are
+# forgiven.
 TOUCHING = 1e-12
 
 
@@ -39,15 +41,23 @@ class SceneFileError(ValueError):
         super().__init__("\n".join(self.faults))
 
 
-_KINDS = {bool: "boolean", str: "string", int: "integer", float: "float", list: "array", dict: "table"}
+_KINDS = {
+    bool: "boolean",
+    str: "string",
+    int: "integer",
+    float: "float",
+    list: "array",
+    dict: "table",
+}
 
 
 def read_scene_file(path: str | Path) -> Scenario:
-    """The scenario a TOML file describes; its source is the file's name, its truth is the oracle's, if it has one.
+    """The scenario a TOML file describes; its source is the file's name, its truth is the oracle's,
+    if it has one.
 
     Raises:
-        SceneFileError: with one line per fault, `FILE: KEY = VALUE: what is wrong; what is allowed`, at most
-            `MOST_FAULTS`, and one that says that there are more.
+        SceneFileError: with one line per fault, `FILE: KEY = VALUE: what is wrong; what is
+            allowed`, at most `MOST_FAULTS`, and one that says that there are more.
     """
     try:
         file = _checked(_parsed(Path(path)))
@@ -58,10 +68,14 @@ def read_scene_file(path: str | Path) -> Scenario:
         faults = error.faults
     except RecursionError:
         faults = ["arrays in arrays in arrays; must be as flat as a scene is"]
-    except ValueError as error:  # what passes here, say a radius whose square is 0, the nouns still refuse
+    except (
+        ValueError
+    ) as error:  # what passes here, say a radius whose square is 0, the nouns still refuse
         faults = str(error).split("; ")
     if len(faults) > MOST_FAULTS:
-        faults[MOST_FAULTS:] = [f"more than {MOST_FAULTS} faults; must be none (the rest is not listed)"]
+        faults[MOST_FAULTS:] = [
+            f"more than {MOST_FAULTS} faults; must be none (the rest is not listed)"
+        ]
     if faults:
         named = str(path).replace("\n", "\\n")  # for a fault is a line
         raise SceneFileError(f"{named}: {fault}" for fault in faults)
@@ -76,7 +90,8 @@ def _parsed(path: Path) -> dict[str, Any]:
         text = data[:MOST_BYTES].decode()
         if len(data) > MOST_BYTES:
             raise SceneFileError([f"larger than {MOST_BYTES} bytes; must be smaller"])
-        return tomllib.loads(text.removeprefix("\ufeff"))  # some editors begin every file with a byte order mark
+        # some editors begin every file with a byte order mark
+        return tomllib.loads(text.removeprefix("\ufeff"))
     except SceneFileError:
         raise
     except OSError as error:
@@ -84,19 +99,29 @@ def _parsed(path: Path) -> dict[str, Any]:
         raise SceneFileError([f"{reason}; must be a readable TOML file"]) from None
     except UnicodeDecodeError as error:
         line, byte = data.count(b"\n", 0, error.start) + 1, data[error.start]
-        raise SceneFileError([f"line {line}: byte 0x{byte:02x} is not text; must be UTF-8"]) from None
+        raise SceneFileError(
+            [f"line {line}: byte 0x{byte:02x} is not text; must be UTF-8"]
+        ) from None
     except tomllib.TOMLDecodeError as error:
         what, where = str(error)[:-1].rsplit(" (at ", 1)
         if where == "end of document":
             where = f"line {text.count(chr(10)) + 1}, column {len(text) - text.rfind(chr(10))}"
         raise SceneFileError([f"{where}: {what[0].lower()}{what[1:]}; must be TOML"]) from None
-    except ValueError as error:  # Python's own limits: a null byte in a path, an integer of 4300 digits
+    except (
+        ValueError
+    ) as error:  # Python's own limits: a null byte in a path, an integer of 4300 digits
         if long := LONG_NUMBER.search(text):
             line = text.count("\n", 0, long.start()) + 1
-            key = text[text.rfind("\n", 0, long.start()) + 1 : long.start()].partition("=")[0].strip()
+            key = (
+                text[text.rfind("\n", 0, long.start()) + 1 : long.start()].partition("=")[0].strip()
+            )
             what = f"line {line}: {_shortened(key)}: an integer of {len(long[0])} digits"
-            raise SceneFileError([f"{what}; must be a number of at most {sys.get_int_max_str_digits()}"]) from None
-        raise SceneFileError([f"{str(error).split(';')[0].lower()}; must be a readable TOML file"]) from None
+            raise SceneFileError(
+                [f"{what}; must be a number of at most {sys.get_int_max_str_digits()}"]
+            ) from None
+        raise SceneFileError(
+            [f"{str(error).split(';')[0].lower()}; must be a readable TOML file"]
+        ) from None
 
 
 def _checked(table: dict[str, Any]) -> SceneTable:
@@ -105,7 +130,9 @@ def _checked(table: dict[str, Any]) -> SceneTable:
         context = {"disks": len(disks) if isinstance(disks, list) else math.inf}
         return SceneTable.model_validate(table, context=context)
     except ValidationError as error:
-        raise SceneFileError(_sentence(fault) for fault in error.errors(include_url=False)) from None
+        raise SceneFileError(
+            _sentence(fault) for fault in error.errors(include_url=False)
+        ) from None
 
 
 def _sentence(fault: ErrorDetails) -> str:
@@ -126,7 +153,10 @@ def _sentence(fault: ErrorDetails) -> str:
     if kind == "model_type":
         return f"{said}of type {_KINDS.get(type(value), 'date')}; must be a table"
     if kind in ("too_short", "too_long"):
-        return f"{said}{len(value)} item{'s'[: len(value) != 1]}; must be {fields[words[-1]].description}"
+        return (
+            f"{said}{len(value)} item{'s'[: len(value) != 1]}; must be"
+            f" {fields[words[-1]].description}"
+        )
     wrong = f"of type {_KINDS.get(type(value), 'date')}; " if kind.endswith("_type") else ""
     return f"{said}{wrong}must be {fields[words[-1]].description}"
 
@@ -145,7 +175,8 @@ def _toml(value: object) -> str:
     if isinstance(value, list):
         return f"[{', '.join(_toml(item) for item in value)}]"
     if isinstance(value, str):
-        # TOML wants DEL escaped, which json does not, and whole emoji, which json would escape in halves.
+        # TOML wants DEL escaped, which json does not, and whole emoji, which json would escape in
+        # halves.
         text = json.dumps(value, ensure_ascii=False)
         return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in text)
     if isinstance(value, bool):
@@ -194,7 +225,10 @@ def _outside_wrap(file: SceneTable) -> Iterator[str]:
     low, high = file.wrap.low, file.wrap.high
     for i, disk in enumerate(file.disk):
         if not all(a <= x <= b for a, x, b in zip(low, disk.position, high)):
-            yield f"disk[{i}].position = {disk.position}: outside [wrap]; must be from {low} to {high} (m)"
+            yield (
+                f"disk[{i}].position = {disk.position}: outside [wrap]; must be from {low} to"
+                f" {high} (m)"
+            )
 
 
 def _overlaps(scene: Scene, free_walls: int) -> Iterator[str]:
@@ -211,13 +245,16 @@ def _overlaps(scene: Scene, free_walls: int) -> Iterator[str]:
 
 
 def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
-    """Each (first, second, overlap m, smallest shift (2,) m of the second to end it); walls count before disks.
+    """Each (first, second, overlap m, smallest shift (2,) m of the second to end it); walls count
+    before disks.
 
-    A disk is taken as a thick wall of no length, so that one row of distances serves both. The disks stand in
-    the order of their left edges, and a row is measured against a slice of them: a wall against all that may
-    reach it, a disk against those that begin within it. Memory stays linear.
+    A disk is taken as a thick wall of no length, so that one row of distances serves both. The
+    disks stand in the order of their left edges, and a row is measured against a slice of them: a
+    wall against all that may reach it, a disk against those that begin within it. Memory stays
+    linear.
     """
-    w, x = len(scene.walls), np.argmax(np.ptp(scene.position, axis=0))  # "left" is along the longer side
+    # "left" is along the longer side
+    w, x = len(scene.walls), np.argmax(np.ptp(scene.position, axis=0))
     order = np.argsort(scene.position[:, x] - scene.radius, kind="stable")
     position, radius = scene.position[order], scene.radius[order]
     number = np.concatenate([np.arange(w), w + order])
@@ -225,7 +262,9 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
     along = np.concatenate([scene.walls[:, 1], position]) - start
     thick = np.concatenate([np.zeros(w), radius])
     edge, left = position[:, x] - radius, scene.walls[:, :, x].min(axis=1)
-    first = np.concatenate([np.searchsorted(edge, left - 2 * radius.max()), np.arange(1, scene.n + 1)])
+    first = np.concatenate(
+        [np.searchsorted(edge, left - 2 * radius.max()), np.arange(1, scene.n + 1)]
+    )
     last = np.searchsorted(edge, start[:, x] + np.maximum(along[:, x], 0) + thick, "right")
     for row, length in enumerate(np.hypot(along[:, 0], along[:, 1])):
         near = slice(first[row], last[row])
@@ -235,17 +274,29 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
         distance = np.hypot(away[:, 0], away[:, 1])
         overlap = thick[row] + radius[near] - distance
         for k in np.flatnonzero(overlap > 0):
-            rounding = TOUCHING * np.abs([*position[near][k], *offset[k], thick[row] + radius[near][k]]).max()
-            normal = away[k] / distance[k] if distance[k] > rounding else np.array([-unit[1], unit[0]])
+            rounding = (
+                TOUCHING
+                * np.abs([*position[near][k], *offset[k], thick[row] + radius[near][k]]).max()
+            )
+            normal = (
+                away[k] / distance[k] if distance[k] > rounding else np.array([-unit[1], unit[0]])
+            )
             one, two = number[row], number[w + first[row] + k]
             if overlap[k] > rounding:
-                # Where the side is not known, the way out may lead across the middle: it is longer by that.
+                # Where the side is not known, the way out may lead across the middle: it is longer
+                # by that.
                 reach = thick[row] + radius[near][k] - away[k] @ normal
-                yield min(one, two), max(one, two), overlap[k], normal * reach * np.sign(two - one) + 0.0
+                yield (
+                    min(one, two),
+                    max(one, two),
+                    overlap[k],
+                    normal * reach * np.sign(two - one) + 0.0,
+                )
 
 
 def write_scene_file(scenario: Scenario, path: str | Path) -> None:
-    """Write `scenario` to `path`, every float so that it reads back bit for bit; truth and seed are left out.
+    """Write `scenario` to `path`, every float so that it reads back bit for bit; truth and seed are
+    left out.
 
     Raises:
         OSError: where the file cannot be written.
@@ -267,8 +318,13 @@ def scene_text(scenario: Scenario) -> str:
     blocks += [("[[wall]]", {"start": start, "end": end}) for start, end in scene.walls.tolist()]
     if scene.wrap is not None:
         blocks += [("[wrap]", dict(zip(("low", "high"), scene.wrap.tolist())))]
-    blocks += [("[[thrust]]", vars(thrust) | {"force": thrust.force.tolist()}) for thrust in scenario.thrusts]
-    texts = ["\n".join([head, *(f"{key} = {_toml(row[key])}" for key in row)]) for head, row in blocks]
+    blocks += [
+        ("[[thrust]]", vars(thrust) | {"force": thrust.force.tolist()})
+        for thrust in scenario.thrusts
+    ]
+    texts = [
+        "\n".join([head, *(f"{key} = {_toml(row[key])}" for key in row)]) for head, row in blocks
+    ]
     return "\n\n".join(texts) + "\n"
 
 
@@ -280,4 +336,8 @@ def _disk_row(scene: Scene, i: int) -> dict[str, object]:
     solid = scene.mass[i] * (scene.radius[i] * scene.radius[i]) / 2
     usual = {"mass": None, "inertia": float(solid), "angle": 0.0, "angular_velocity": 0.0}
     # Compared as text, for -0.0 == 0.0 and is another number all the same.
-    return {key: value for key, value in row.items() if key not in usual or repr(value) != repr(usual[key])}
+    return {
+        key: value
+        for key, value in row.items()
+        if key not in usual or repr(value) != repr(usual[key])
+    }

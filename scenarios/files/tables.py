@@ -1,7 +1,8 @@
-"""The tables a scene file is made of, and what each key may hold; how a fault is reported is not defined here.
+"""The tables a scene file is made of, and what each key may hold; how a fault is reported is not
+defined here.
 
-A description completes the sentence "KEY = VALUE: must be ...". A check that needs two keys sits on the later
-one, so that a fault in one key never hides the faults of another.
+A description completes the sentence "KEY = VALUE: must be ...". A check that needs two keys sits on
+the later one, so that a fault in one key never hides the faults of another.
 """
 
 from __future__ import annotations
@@ -16,11 +17,13 @@ from pydantic_core import PydanticCustomError
 
 MOST_DISKS = 100_000
 MOST_WALLS = 10_000
-MOST_PAIRS = 20_000_000  # disks times walls, each of which is measured when a scene is read: some 2 s
+# disks times walls, each of which is measured when a scene is read: some 2 s
+MOST_PAIRS = 20_000_000
 MOST_STEPS = 10_000_000  # over the whole dt ladder, for one engine
 SMALLEST, LARGEST = 1e-9, 1e9
-"""The scale of a scene, SI: no number of it is larger than `LARGEST`, nothing that has a size (radius, mass, time,
-wall, box) is smaller than `SMALLEST`. So no square, energy or path that is made of a few of them leaves float64."""
+"""The scale of a scene, SI: no number of it is larger than `LARGEST`, nothing that has a size
+(radius, mass, time, wall, box) is smaller than `SMALLEST`. So no square, energy or path that is
+made of a few of them leaves float64."""
 
 
 def in_scale(value: float) -> float:
@@ -31,7 +34,8 @@ def in_scale(value: float) -> float:
 
 
 def of_size(value: float, power: int = 1) -> float:
-    """What is positive; `power`: the product of so many such numbers. What is not positive has another fault."""
+    """What is positive; `power`: the product of so many such numbers. What is not positive has
+    another fault."""
     smallest, largest = SMALLEST**power, LARGEST**power
     if value > 0 and not smallest <= value <= largest:
         raise ValueError(f"out of scale; must be from {smallest:g} to {largest:g} (SI)")
@@ -68,12 +72,19 @@ class DiskTable(_Table):
 
     static: bool = Field(False, strict=True, description="true or false")
     position: Pair = Field(description="two finite numbers [x, y] (m)")
-    velocity: Pair | None = Field(None, validate_default=True, description="two finite numbers [x, y] (m/s)")
+    velocity: Pair | None = Field(
+        None, validate_default=True, description="two finite numbers [x, y] (m/s)"
+    )
     radius: Size = Field(gt=0, description="positive and finite (m)")
     mass: Size | None = Field(
-        None, gt=0, validate_default=True, description="positive and finite (kg); left out if static"
+        None,
+        gt=0,
+        validate_default=True,
+        description="positive and finite (kg); left out if static",
     )
-    inertia: Inertia | None = Field(None, gt=0, description="positive (kg m2); inf: it does not turn")
+    inertia: Inertia | None = Field(
+        None, gt=0, description="positive (kg m2); inf: it does not turn"
+    )
     angle: Finite = Field(0.0, description="a finite number (rad)")
     angular_velocity: Finite = Field(0.0, description="a finite number (rad/s)")
 
@@ -105,7 +116,10 @@ class WallTable(_Table):
         if end == start:
             raise ValueError("the wall has no length; must differ from its start")
         if (length := math.dist(start, end)) < SMALLEST:
-            raise ValueError(f"out of scale: a wall of {length:g} m; must be {SMALLEST:g} m from its start or more")
+            raise ValueError(
+                f"out of scale: a wall of {length:g} m; must be {SMALLEST:g} m from its start or"
+                " more"
+            )
         return end
 
 
@@ -122,7 +136,9 @@ class CornersTable(_Table):
         if low is not high and not (low[0] < high[0] and low[1] < high[1]):
             raise ValueError(f"not above low = {low}; must be greater in both x and y (m)")
         if low is not high and min(high[0] - low[0], high[1] - low[1]) < SMALLEST:
-            raise ValueError(f"out of scale: too near to low = {low}; must be {SMALLEST:g} m above it or more")
+            raise ValueError(
+                f"out of scale: too near to low = {low}; must be {SMALLEST:g} m above it or more"
+            )
         return high
 
 
@@ -156,17 +172,26 @@ class ThrustTable(_Table):
 class SceneTable(_Table):
     """The whole file."""
 
-    name: str = Field(pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z", description="at most 100 of a-z, 0-9, '_' and '-'")
+    name: str = Field(
+        pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z", description="at most 100 of a-z, 0-9, '_' and '-'"
+    )
     asks: str | None = Field(None, description="a question, a string")
     duration: Size = Field(gt=0, description="positive and finite (s)")
     sample_interval: Size = Field(gt=0, description="positive and finite (s)")
     substeps: list[Count] = Field(
-        [1, 2, 4, 8], min_length=1, validate_default=True, description="whole numbers from 1, increasing"
+        [1, 2, 4, 8],
+        min_length=1,
+        validate_default=True,
+        description="whole numbers from 1, increasing",
     )
     gravity: Pair = Field([0.0, 0.0], description="two finite numbers [x, y] (m/s2)")
     restitution: Strict = Field(ge=0, le=1, description="from 0 to 1")
-    disk: list[DiskTable] = Field(min_length=1, max_length=MOST_DISKS, description=f"1 to {MOST_DISKS} [[disk]] tables")
-    wall: list[WallTable] = Field([], max_length=MOST_WALLS, description=f"at most {MOST_WALLS} [[wall]] tables")
+    disk: list[DiskTable] = Field(
+        min_length=1, max_length=MOST_DISKS, description=f"1 to {MOST_DISKS} [[disk]] tables"
+    )
+    wall: list[WallTable] = Field(
+        [], max_length=MOST_WALLS, description=f"at most {MOST_WALLS} [[wall]] tables"
+    )
     box: CornersTable | None = Field(None, description="one [box] table with low and high")
     wrap: CornersTable | None = Field(None, description="one [wrap] table with low and high")
     thrust: list[ThrustTable] = Field([], description="[[thrust]] tables")
@@ -213,5 +238,9 @@ class SceneTable(_Table):
 
 
 TABLES: dict[str, type[_Table]] = {
-    "disk": DiskTable, "wall": WallTable, "box": CornersTable, "wrap": CornersTable, "thrust": ThrustTable,
-}  # fmt: skip
+    "disk": DiskTable,
+    "wall": WallTable,
+    "box": CornersTable,
+    "wrap": CornersTable,
+    "thrust": ThrustTable,
+}

@@ -1,4 +1,5 @@
-"""Truth records kept on disk under a hash of what was asked, in the user's cache folder; never needed, only faster."""
+"""Truth records kept on disk under a hash of what was asked, in the user's cache folder; never
+needed, only faster."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ NUMBERS = ("horizon", "error_bound", "bits", "method", "reason", "float64_horizo
 
 
 def folder() -> Path | None:
-    """$CROSSCHECK_CACHE, or crosscheck2d in $XDG_CACHE_HOME or ~/.cache; None where there is no home."""
+    """$CROSSCHECK_CACHE, or crosscheck2d in $XDG_CACHE_HOME or ~/.cache; None where there is no
+    home."""
     if given := os.environ.get("CROSSCHECK_CACHE"):
         return Path(given)
     if base := os.environ.get("XDG_CACHE_HOME"):
@@ -38,13 +40,21 @@ def folder() -> Path | None:
 
 
 def key_of(scenario: Scenario, certifying: bool) -> str:
-    """A hash over all that decides a record: scene, thrusts, duration, the oracle's source and what it can prove."""
+    """A hash over all that decides a record: scene, thrusts, duration, the oracle's source and what
+    it can prove."""
     scene, hashed = scenario.scene, hashlib.sha256()
     parts = [
-        scene.position, scene.velocity, scene.radius, scene.mass, scene.walls, scene.gravity, scene.restitution,
-        [] if scene.wrap is None else scene.wrap, scenario.duration,
+        scene.position,
+        scene.velocity,
+        scene.radius,
+        scene.mass,
+        scene.walls,
+        scene.gravity,
+        scene.restitution,
+        [] if scene.wrap is None else scene.wrap,
+        scenario.duration,
         *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
-    ]  # fmt: skip
+    ]
     hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())
     for part in parts:
         hashed.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
@@ -53,21 +63,35 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
 
 @cache
 def source_hash(folder: Path = HERE) -> str:
-    """A hash over the source in this folder, so that a changed oracle never answers with what it said before."""
+    """A hash over the source in this folder, so that a changed oracle never answers with what it
+    said before."""
     files = sorted(folder.rglob("*.py"))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
 
 def look_up(key: str) -> dict[str, Any] | None:
-    """The fields of the record kept under `key`; None where there is none that can be read in full."""
+    """The fields of the record kept under `key`; None where there is none that can be read in
+    full."""
     where = folder()
     return None if where is None else unpacked(where / f"{key}.npz")
 
 
-# What reading a torn or foreign archive raises: it is as good as none. One bit makes an unknown compression
-# (NotImplementedError), an encrypted file (RuntimeError), or an array larger than any memory.
-UNREADABLE = (OSError, ValueError, LookupError, EOFError, TypeError, RuntimeError, MemoryError, SyntaxError,
-              zipfile.BadZipFile, zlib.error, RecursionError)  # fmt: skip
+# What reading a torn or foreign archive raises: it is as good as none. One bit makes an unknown
+# compression (NotImplementedError), an encrypted file (RuntimeError), or an array larger than any
+# memory.
+UNREADABLE = (
+    OSError,
+    ValueError,
+    LookupError,
+    EOFError,
+    TypeError,
+    RuntimeError,
+    MemoryError,
+    SyntaxError,
+    zipfile.BadZipFile,
+    zlib.error,
+    RecursionError,
+)
 
 
 def packed(fields: dict[str, Any]) -> bytes:
@@ -79,14 +103,17 @@ def packed(fields: dict[str, Any]) -> bytes:
 
 
 def unpacked(path: Path) -> dict[str, Any] | None:
-    """The fields of the record in a file that holds what `packed` gave; None if it cannot be read in full."""
+    """The fields of the record in a file that holds what `packed` gave; None if it cannot be read
+    in full."""
     try:
         with opened(path) as file, np.load(file, allow_pickle=False) as saved:
             arrays = {name: frozen(saved[name]) for name in ARRAYS}
             numbers = json.loads(str(saved["numbers"]))
     except UNREADABLE:
         return None
-    fits = all(arrays[name].shape[1:] == (width,) for name, width in ARRAYS.items()) and is_said(numbers)
+    fits = all(arrays[name].shape[1:] == (width,) for name, width in ARRAYS.items()) and is_said(
+        numbers
+    )
     return arrays | numbers | {"remains": tuple(numbers["remains"])} if fits else None
 
 
@@ -106,7 +133,8 @@ def is_said(numbers: Any) -> bool:
 
 
 def keep(key: str, fields: dict[str, Any]) -> bool:
-    """Write the fields of a record under `key`, whole or not at all; False where the folder cannot be written to."""
+    """Write the fields of a record under `key`, whole or not at all; False where the folder cannot
+    be written to."""
     where = folder()
     if where is None:
         return False
@@ -116,7 +144,8 @@ def keep(key: str, fields: dict[str, Any]) -> bool:
         handle, temporary = tempfile.mkstemp(dir=where, suffix=".part")
         with os.fdopen(handle, "wb") as file:
             file.write(packed(fields))
-        # Another process may write the same record at the same time: the last rename wins, both are whole.
+        # Another process may write the same record at the same time: the last rename wins, both are
+        # whole.
         os.replace(temporary, where / f"{key}.npz")
     except OSError:
         if temporary:

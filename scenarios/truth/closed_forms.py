@@ -1,6 +1,8 @@
-"""Closed forms of flights, bounces, single collisions and thrusts: exact answers without any stepping.
+"""Closed forms of flights, bounces, single collisions and thrusts: exact answers without any
+stepping.
 
-SI units, float64; right to 1e-13 of the lengths and speeds of a scene (tests/scenarios/test_closed_forms.py).
+SI units, float64; right to 1e-13 of the lengths and speeds of a scene
+(tests/scenarios/test_closed_forms.py).
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ from scenarios.model import Array, Collisions, Scene, Thrust, Trajectory, frozen
 Collision = tuple[float, int, int, float]
 """t s, disk, other disk or -1 - wall, impulse N s."""
 Motion = tuple[Array, Array]
-"""Position and velocity at k instants, (k, ...) m and m/s; or angle and angular velocity, rad and rad/s."""
+"""Position and velocity at k instants, (k, ...) m and m/s; or angle and angular velocity, rad and
+rad/s."""
 
 
 def answer(
@@ -31,8 +34,9 @@ def answer(
 ) -> Trajectory:
     """An exact motion as the `Trajectory` of `scene` at the times t (k,) s, cut at `horizon` s.
 
-    motion: position and velocity (k, n, 2) m, m/s. turning: angle and angular velocity (k, n) rad, rad/s;
-    left out where nothing turns a disk: it keeps its spin. collisions: those after the last sample are dropped.
+    motion: position and velocity (k, n, 2) m, m/s. turning: angle and angular velocity (k, n) rad,
+    rad/s; left out where nothing turns a disk: it keeps its spin. collisions: those after the last
+    sample are dropped.
     reason: why it is valid no longer.
     """
     angle, angular_velocity = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
@@ -43,7 +47,9 @@ def answer(
         velocity=frozen(motion[1][kept]),
         angle=frozen(angle[kept]),
         angular_velocity=frozen(angular_velocity[kept]),
-        collisions=Collisions.of([collision for collision in collisions if kept.any() and collision[0] <= t[kept][-1]]),
+        collisions=Collisions.of(
+            [collision for collision in collisions if kept.any() and collision[0] <= t[kept][-1]]
+        ),
         horizon=horizon,
         error_bound=error_bound,
         reason=reason,
@@ -56,8 +62,11 @@ def at_rest(scene: Scene, t: Array, collisions: Iterable[Collision] = ()) -> Tra
     return answer(scene, t, (position, np.zeros_like(position)), collisions)
 
 
-def flight(t: Array, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike = 0.0) -> Motion:
-    """Position x + v t + a t2 / 2 and velocity v + a t after t s, all broadcast (Galilei's parabola)."""
+def flight(
+    t: Array, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike = 0.0
+) -> Motion:
+    """Position x + v t + a t2 / 2 and velocity v + a t after t s, all broadcast (Galilei's
+    parabola)."""
     x, v, a = np.asarray(position), np.asarray(velocity), np.asarray(acceleration)
     return x + (v + a * t / 2) * t, v + a * t + np.zeros_like(x)
 
@@ -82,8 +91,11 @@ class Legs:
         since = (t - self.start[leg]).reshape(-1, *[1] * (self.position.ndim - 1))
         return flight(since, self.position[leg], self.velocity[leg], self.acceleration[leg])
 
-    def wall_collisions(self, disk: int, walls: Sequence[int], mass: float, restitution: float) -> list[Collision]:
-        """Collisions of a motion along one axis: on walls[0], walls[1] ... in turn, m (1 + e) |v| N s each."""
+    def wall_collisions(
+        self, disk: int, walls: Sequence[int], mass: float, restitution: float
+    ) -> list[Collision]:
+        """Collisions of a motion along one axis: on walls[0], walls[1] ... in turn, m (1 + e) |v| N
+        s each."""
         before = np.abs(self.velocity[1:]) / restitution
         impulse = mass * (1 + restitution) * before
         return [
@@ -105,7 +117,8 @@ def bouncing(height: float, gravity: float, restitution: float, until: float) ->
     (any textbook of mechanics, under "bouncing ball"). The last leg is the rest. 0 < e <= 1.
     """
     e, fall, speed = restitution, np.sqrt(2 * height / gravity), np.sqrt(2 * gravity * height)
-    # For e < 1 the bounces left out last 1e-14 of the fall each and are lower than a float can tell.
+    # For e < 1 the bounces left out last 1e-14 of the fall each and are lower than a float can
+    # tell.
     count = int(until / (2 * fall)) + 2 if e == 1 else int(np.log(1e-14) / np.log(e))
     k = np.arange(1.0, count + 1)
     rest = np.inf if e == 1 else fall * (1 + e) / (1 - e)
@@ -118,25 +131,34 @@ def bouncing(height: float, gravity: float, restitution: float, until: float) ->
     )
 
 
-def to_and_fro(place: float, velocity: float, length: float, restitution: float, until: float) -> Legs:
-    """A point between 0 and `length` m that flies freely and is thrown back at both ends, up to `until` s.
+def to_and_fro(
+    place: float, velocity: float, length: float, restitution: float, until: float
+) -> Legs:
+    """A point between 0 and `length` m that flies freely and is thrown back at both ends, up to
+    `until` s.
 
-    Leg k has speed v e^k and lasts D / (v e^k) (elementary; e = 1: the triangle wave). 0 < e <= 1, v != 0.
+    Leg k has speed v e^k and lasts D / (v e^k) (elementary; e = 1: the triangle wave). 0 < e <= 1,
+    v != 0.
     """
     speed, up = abs(velocity), velocity > 0
     k = np.arange(1.0, int(until * speed / length) + 3)
     first = (length - place if up else place) / speed
     at_top = (k % 2 == 1) == up
     return Legs(
-        start=np.array([0, *first + length / (speed * restitution) * geometric(1 / restitution, k - 1)]),
+        start=np.array(
+            [0, *first + length / (speed * restitution) * geometric(1 / restitution, k - 1)]
+        ),
         position=np.array([place, *np.where(at_top, length, 0.0)]),
         velocity=np.array([velocity, *np.where(at_top, -1, 1) * speed * restitution**k]),
         acceleration=np.zeros(len(k) + 1),
     )
 
 
-def pair(position: Array, velocity: Array, radius: Array, mass: Array, restitution: float) -> tuple[Legs, Array]:
-    """Two disks that fly freely and collision once or never: their legs (s, 2, 2) and the impulses (s - 1,) N s.
+def pair(
+    position: Array, velocity: Array, radius: Array, mass: Array, restitution: float
+) -> tuple[Legs, Array]:
+    """Two disks that fly freely and collision once or never: their legs (s, 2, 2) and the impulses
+    (s - 1,) N s.
 
     position, velocity (2, 2) m, m/s; radius, mass (2,) m, kg. Contact at |r + u t| = R = r_1 + r_2:
     t = c / (-b + sqrt(d)), c = r.r - R^2, b = r.u, d = b^2 - u.u c = u.u R^2 - (r x u)^2; impulse
@@ -165,8 +187,8 @@ def pair(position: Array, velocity: Array, radius: Array, mass: Array, restituti
 def offset_growth(free_path: float, reach: float) -> float:
     """How much a distance from the centre line grows per bounce between two static disks.
 
-    q + sqrt(q^2 - 1), q = 1 + s / R: s m from surface to surface, R m the sum of the two radii that meet
-    (the eigenvalue of the two-disk orbit; Gaspard & Rice, J. Chem. Phys. 90, 2225, 1989).
+    q + sqrt(q^2 - 1), q = 1 + s / R: s m from surface to surface, R m the sum of the two radii that
+    meet (the eigenvalue of the two-disk orbit; Gaspard & Rice, J. Chem. Phys. 90, 2225, 1989).
     """
     q = 1 + free_path / reach
     return float(q + np.sqrt(q * q - 1))
@@ -175,15 +197,18 @@ def offset_growth(free_path: float, reach: float) -> float:
 def world_thrusts(scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
     """Free disks under constant thrusts fixed in the world, at the times t (k,) s.
 
-    The sum of x + v t and, for each thrust, a (acted^2 / 2 + acted (t - stop)+), acted = how long it has
-    acted; torque and angle alike (Newton's second law, twice integrated).
+    The sum of x + v t and, for each thrust, a (acted^2 / 2 + acted (t - stop)+), acted = how long
+    it has acted; torque and angle alike (Newton's second law, twice integrated).
     """
     position, velocity = flight(t[:, None, None], scene.position, scene.velocity)
     angle, angular_velocity = flight(t[:, None], scene.angle, scene.angular_velocity)
     for thrust in thrusts:
         acted = np.clip(t - thrust.start, 0, thrust.stop - thrust.start)
         moved = acted * (acted / 2 + np.maximum(t - thrust.stop, 0))
-        acceleration, spin_up = thrust.force / scene.mass[thrust.disk], thrust.torque / scene.inertia[thrust.disk]
+        acceleration, spin_up = (
+            thrust.force / scene.mass[thrust.disk],
+            thrust.torque / scene.inertia[thrust.disk],
+        )
         velocity[:, thrust.disk] += acted[:, None] * acceleration
         position[:, thrust.disk] += moved[:, None] * acceleration
         angular_velocity[:, thrust.disk] += acted * spin_up
@@ -192,10 +217,12 @@ def world_thrusts(scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajecto
 
 
 def body_thrust(t: Array, acceleration: Array, angle: float, spin: float) -> Motion:
-    """Displacement m and gain of velocity m/s, (k, 2) each, after t (k,) s of a thrust fixed to its disk.
+    """Displacement m and gain of velocity m/s, (k, 2) each, after t (k,) s of a thrust fixed to its
+    disk.
 
-    acceleration (2,) m/s2 in the disk's own axes, turned by angle + spin t; spin != 0. In the complex
-    plane the integrals of exp(i w t): gain = f (exp(i w t) - 1) / (i w), displacement = (gain - f t) / (i w).
+    acceleration (2,) m/s2 in the disk's own axes, turned by angle + spin t; spin != 0. In the
+    complex plane the integrals of exp(i w t): gain = f (exp(i w t) - 1) / (i w), displacement =
+    (gain - f t) / (i w).
     """
     f = complex(*acceleration) * np.exp(1j * angle)
     half = spin * t / 2

@@ -1,5 +1,5 @@
-"""The exact answer to scenes without a closed form: event by event in many digits, and no further than it is
-right."""
+"""The exact answer to scenes without a closed form: event by event in many digits, and no further
+than it is right."""
 
 from __future__ import annotations
 
@@ -21,19 +21,24 @@ from scenarios.truth.record import TruthRecord, record_of
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be distinguished
 LEAST_GAIN = 1.05  # times as far must half as many bits again reach, or more will not help
-SPARE, LEFT = 1.3, 64  # times as many bits as the rate so far asks for, and so many to be left for the accuracy
+# times as many bits as the rate so far asks for, and so many to be left for the accuracy
+SPARE, LEFT = 1.3, 64
 MOST_DISKS = 200
-WORK = 40_000  # steps of the event loop for one attempt, some twenty seconds; few attempts get so far
+# steps of the event loop for one attempt, some twenty seconds; few attempts get so far
+WORK = 40_000
 HEAVY = 4096  # bits that make a step twice as dear as one of few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, EVENT_DRIVEN, NOTHING = "closed form", "event-driven, in many digits", "nothing"
-COARSE = 0.45  # of the time that is left for both of two precisions: the finer one takes a little longer
-ACCURACY = 1e-12  # radii of the smallest disk, and s; two precisions that differ by more have diverged
+# of the time that is left for both of two precisions: the finer one takes a little longer
+COARSE = 0.45
+# radii of the smallest disk, and s; two precisions that differ by more have diverged
+ACCURACY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class OracleTruth:
-    """The truth of a scenario by the oracle; nothing is computed before it is called, nor what is `known` already."""
+    """The truth of a scenario by the oracle; nothing is computed before it is called, nor what is
+    `known` already."""
 
     scenario: Scenario
     known: TruthRecord | None = None
@@ -47,14 +52,17 @@ class OracleTruth:
         """
         one = self.scenario
         if np.max(t) > one.duration * (1 + 1e-9):
-            raise ValueError(f"t = {np.max(t):g} s: the truth of {one.name} is known up to {one.duration:g} s")
+            raise ValueError(
+                f"t = {np.max(t):g} s: the truth of {one.name} is known up to {one.duration:g} s"
+            )
         record = self.record()
         if record.horizon < one.sample_interval:
             raise NoTruth(record.reason)
         return record.sampled(one.scene, one.thrusts, t)
 
     def record(self, clock: Clock | None = None) -> TruthRecord:
-        """The record: from the cache, or computed and put there, unless a `clock` cut it off. Raises `NoTruth`."""
+        """The record: from the cache, or computed and put there, unless a `clock` cut it off.
+        Raises `NoTruth`."""
         if self.known is not None:
             return self.known
         key = key_of(self.scenario, has_balls())
@@ -73,7 +81,8 @@ def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:
 
 
 def answered_by(scenario: Scenario) -> str:
-    """The cheapest model that answers it and is no engine, which the harness takes for its truth: one of the three."""
+    """The cheapest model that answers it and is no engine, which the harness takes for its truth:
+    one of the three."""
     if scenario.truth is None:
         return NOTHING
     return EVENT_DRIVEN if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
@@ -87,7 +96,8 @@ def with_oracle(scenario: Scenario) -> Scenario:
 def computed(
     scenario: Scenario, kind: Callable[[int], Numbers] | None = None, clock: Clock | None = None
 ) -> TruthRecord:
-    """The record of a scenario: proven by balls where they are installed and can, else the same at two precisions.
+    """The record of a scenario: proven by balls where they are installed and can, else the same at
+    two precisions.
 
     kind: numbers to compute it in, at two precisions, whatever is installed.
     clock: when it is over, the record is that of what was found until then.
@@ -97,11 +107,15 @@ def computed(
     """
     scene, thrusts = scenario.scene, scenario.thrusts
     if scene.n > MOST_DISKS:
-        raise NoTruth(f"{scene.n} disks are more than the {MOST_DISKS} that are computed in many digits")
+        raise NoTruth(
+            f"{scene.n} disks are more than the {MOST_DISKS} that are computed in many digits"
+        )
     if fault := _out_of_scale(scenario):
         raise NoTruth(fault)
     if any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts):
-        raise NoTruth("a thrust that turns with its disk makes paths whose contacts no polynomial gives")
+        raise NoTruth(
+            "a thrust that turns with its disk makes paths whose contacts no polynomial gives"
+        )
     forced = [thrust for thrust in thrusts if thrust.force.any()]
     clock = clock or Clock()
     record = certified(scenario, forced, clock) if kind is None and has_balls() else None
@@ -109,10 +123,11 @@ def computed(
 
 
 def certified(scenario: Scenario, forced: Sequence[Thrust], clock: Clock) -> TruthRecord | None:
-    """The record by interval arithmetic, which proves every comparison; None where no precision decides one.
+    """The record by interval arithmetic, which proves every comparison; None where no precision
+    decides one.
 
-    How far the first bits reach shows how many are needed for all: a motion loses them at a steady rate. When the
-    `clock` is over it is that of the attempt which got farthest.
+    How far the first bits reach shows how many are needed for all: a motion loses them at a steady
+    rate. When the `clock` is over it is that of the attempt which got farthest.
     """
     bits, before, until, accuracy = FEWEST_BITS, 0.0, scenario.duration, accuracy_of(scenario)
     attempts: list[tuple[Path, int]] = []
@@ -141,16 +156,28 @@ def steps(bits: int) -> int:
 
 
 def farthest(scenario: Scenario, attempts: Sequence[tuple[Path, int]], clock: Clock) -> TruthRecord:
-    """The record of the attempt that got farthest, as far as it is exact; each is a path and the bits it is in."""
-    found = [(exact_until(path, scenario.duration, accuracy_of(scenario)), path, bits) for path, bits in attempts]
+    """The record of the attempt that got farthest, as far as it is exact; each is a path and the
+    bits it is in."""
+    found = [
+        (exact_until(path, scenario.duration, accuracy_of(scenario)), path, bits)
+        for path, bits in attempts
+    ]
     (end, error), path, bits = max(found, key=lambda one: one[0][0])
     if end < path.end or not path.reason:
-        path = replace(path, end=end, reason=f"{clock.reason} at t = {end:.9g} s", disks=[], outcomes=[], named=[])
+        path = replace(
+            path,
+            end=end,
+            reason=f"{clock.reason} at t = {end:.9g} s",
+            disks=[],
+            outcomes=[],
+            named=[],
+        )
     return record_of(scenario, path, error, bits, "certified")
 
 
 def exact_until(path: Path, until: float, accuracy: float) -> tuple[float, float]:
-    """Up to when the spread of a path is less than `accuracy` m, to the last place of float64, and the spread then."""
+    """Up to when the spread of a path is less than `accuracy` m, to the last place of float64, and
+    the spread then."""
     table, end = widths(path), min(path.end, until)
     if (most := widest(table, end)) < accuracy:
         return end, most
@@ -167,12 +194,19 @@ def spread(path: Path, until: float) -> float:
 
 
 def widths(path: Path) -> Array:
-    """(l, 3) of every leg: when it begins, s, how wide its balls are then, m, and by how much they widen, m/s."""
+    """(l, 3) of every leg: when it begins, s, how wide its balls are then, m, and by how much they
+    widen, m/s."""
     rows = []
     for leg in (leg for legs in path.legs for leg in legs):
         x, y, u, v, late = (float(ball.rad()) for ball in (leg.x, leg.y, leg.vx, leg.vy, leg.t))
         speed = max(float(abs(leg.vx)), float(abs(leg.vy)))
-        rows.append((float(leg.t), max(x, y) + late * speed, max(u, v) + sum(float(x.rad()) for x in leg.hop or ())))
+        rows.append(
+            (
+                float(leg.t),
+                max(x, y) + late * speed,
+                max(u, v) + sum(float(x.rad()) for x in leg.hop or ()),
+            )
+        )
     return np.array(rows)
 
 
@@ -185,7 +219,8 @@ def widest(table: Array, until: float) -> float:
 def two_precisions(
     scenario: Scenario, forced: Sequence[Thrust], kind: Callable[[int], Numbers], clock: Clock
 ) -> TruthRecord:
-    """The record in numbers of one kind, up to where twice as many bits say the same, or the `clock` is over."""
+    """The record in numbers of one kind, up to where twice as many bits say the same, or the
+    `clock` is over."""
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     attempts: list[tuple[Path, float, int]] = []
     while True:
@@ -203,23 +238,40 @@ def two_precisions(
             break
         needed = ceil(SPARE * bits * until / max(diverged, until * bits / MOST_BITS))
         bits = min(max(2 * bits, needed), MOST_BITS // 2)
-    best = max(attempts, key=lambda attempt: min(attempt[0].end, until)) if clock.struck else attempts[-1]
+    best = (
+        max(attempts, key=lambda attempt: min(attempt[0].end, until))
+        if clock.struck
+        else attempts[-1]
+    )
     return record_of(scenario, *best, "two-precision")
 
 
 def _out_of_scale(scenario: Scenario) -> str:
-    """What is too small or too large for `Numbers.tie`, which takes numbers to be of the order of 1; or ""."""
+    """What is too small or too large for `Numbers.tie`, which takes numbers to be of the order of
+    1; or ""."""
     scene = scenario.scene
     if not (scene.radius >= 1 / LARGEST).all():
-        return f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a collision from a touch"
+        return (
+            f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a"
+            " collision from a touch"
+        )
     sizes = {
-        "radius": scene.radius, "position": scene.position, "wall": scene.walls, "velocity": scene.velocity,
-        "gravity": scene.gravity, "duration": np.array([scenario.duration]),
-        "acceleration by a thrust": np.array([p.force / scene.mass[p.disk] for p in scenario.thrusts]),
-    }  # fmt: skip
+        "radius": scene.radius,
+        "position": scene.position,
+        "wall": scene.walls,
+        "velocity": scene.velocity,
+        "gravity": scene.gravity,
+        "duration": np.array([scenario.duration]),
+        "acceleration by a thrust": np.array(
+            [p.force / scene.mass[p.disk] for p in scenario.thrusts]
+        ),
+    }
     for name, values in sizes.items():
         if values.size and (most := float(np.abs(values).max())) > LARGEST:
-            return f"the largest {name} is {most:g} (SI), above {LARGEST:g}: too large to follow exactly"
+            return (
+                f"the largest {name} is {most:g} (SI), above {LARGEST:g}: too large to follow"
+                " exactly"
+            )
     return ""
 
 
@@ -228,14 +280,19 @@ def accuracy_of(scenario: Scenario) -> float:
     return ACCURACY * float(scenario.scene.radius.min())
 
 
-def difference(coarse: Path, fine: Path, until: float, k: Numbers, accuracy: float) -> tuple[float, float]:
-    """When the two part, s, or inf: the first event in which they differ by `accuracy` m; the error until then, m."""
+def difference(
+    coarse: Path, fine: Path, until: float, k: Numbers, accuracy: float
+) -> tuple[float, float]:
+    """When the two part, s, or inf: the first event in which they differ by `accuracy` m; the error
+    until then, m."""
     diverged, errors = np.inf, [(0.0, 0.0)]
     end = min(coarse.end, fine.end, until)
     with k.precise():
         for mine, theirs in zip(coarse.legs, fine.legs):
             for leg in mine[len(theirs) :] + theirs[len(mine) :]:
-                diverged = min(diverged, float(leg.t)) if float(leg.t) < end - ACCURACY else diverged
+                diverged = (
+                    min(diverged, float(leg.t)) if float(leg.t) < end - ACCURACY else diverged
+                )
             for one, other in zip(mine, theirs):
                 t = min(float(one.t), float(other.t))
                 if t < end and (error := _apart(one, other, end - t)) > accuracy:

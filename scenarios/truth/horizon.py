@@ -1,21 +1,25 @@
-"""How long a float64 solver can follow an exact motion: a rounding of the start, carried along to first order.
+"""How long a float64 solver can follow an exact motion: a rounding of the start, carried along to
+first order.
 
-Motions from starts a rounding apart diverge exponentially; after that a distance to the exact answer says nothing about
-a solver. The horizon is when that happens. It comes from the oracle's own path: every number of the start may be off by
-2^-52 of the largest, each on its own, and what becomes of it is the derivative of flight and of every collision
-(Dellago, Posch & Hoover, Phys. Rev. E 53, 1485, 1996; with falling disks and rest the same for parabolas and for
-motion along a wall). The derivative is wanted to a few per cent, so it is float64 along a path in many digits. A near
-miss by less than a rounding has no derivative and is not seen.
+Motions from starts a rounding apart diverge exponentially; after that a distance to the exact
+answer says nothing about a solver. The horizon is when that happens. It comes from the oracle's own
+path: every number of the start may be off by 2^-52 of the largest, each on its own, and what
+becomes of it is the derivative of flight and of every collision (Dellago, Posch & Hoover, Phys.
+Rev. E 53, 1485, 1996; with falling disks and rest the same for parabolas and for motion along a
+wall). The derivative is wanted to a few per cent, so it is float64 along a path in many digits. A
+near miss by less than a rounding has no derivative and is not seen.
 
-The limit is set on the standard deviation over roundings of all numbers at once, each on its own. One rounded start
-strays by a normal number times that, less than it in two of three draws: falling_box ends at 0.409 s, and single draws
-pass the limit from 0.395 to 0.47 s, most of them at 0.43 to 0.45 s.
+The limit is set on the standard deviation over roundings of all numbers at once, each on its own.
+One rounded start strays by a normal number times that, less than it in two of three draws:
+falling_box ends at 0.409 s, and single draws pass the limit from 0.395 to 0.47 s, most of them at
+0.43 to 0.45 s.
 
-The rounding is that of the largest coordinate in the scene, also where that belongs to a disk that the others never
-meet: ten times as far, and the horizon of the rest is ln 10 growth times shorter (2.67 s become 2.39 s for a gas of
-eight disks as a row at rest that none of them meets is put at 30 m instead of 3 m). So a horizon is too short there
-rather than too long. Each number's own rounding would not do instead: an engine rounds what it takes from its partner
-and from its walls, too.
+The rounding is that of the largest coordinate in the scene, also where that belongs to a disk that
+the others never
+meet: ten times as far, and the horizon of the rest is ln 10 growth times shorter (2.67 s become
+2.39 s for a gas of eight disks as a row at rest that none of them meets is put at 30 m instead of 3
+m). So a horizon is too short there rather than too long. Each number's own rounding would not do
+instead: an engine rounds what it takes from its partner and from its walls, too.
 """
 
 from __future__ import annotations
@@ -30,14 +34,18 @@ from scenarios.truth.oracle.path import Event, Path
 
 EPS = float(np.finfo(float).eps)
 DIVERGED = 1e-9
-"""Of a disk's radius: the standard deviation of its position from which on it counts as diverged."""
-BOUNCES = 64  # of those that die out so many are looked at; what comes later lasts less than float64 can tell
+"""Of a disk's radius: the standard deviation of its position from which on it counts as
+diverged."""
+# of those that die out so many are looked at; what comes later lasts less than float64 can tell
+BOUNCES = 64
 
 
 def float64_horizon(scenario: Scenario, path: Path) -> float:
-    """s, until when starts a rounding apart stay together along `path`, see `DIVERGED`; inf: as far as the path goes.
+    """s, until when starts a rounding apart stay together along `path`, see `DIVERGED`; inf: as far
+    as the path goes.
 
-    Contacts that touch are kept touching: what lies on a wall, or on another disk, has no freedom across it.
+    Contacts that touch are kept touching: what lies on a wall, or on another disk, has no freedom
+    across it.
     """
     nearby = Nearby(scenario, path)
     end = min(path.end, scenario.duration)
@@ -54,9 +62,14 @@ def float64_horizon(scenario: Scenario, path: Path) -> float:
 def roundings(scene: Scene) -> tuple[Array, Array]:
     """Two (n, d, 2): what 2^-52 of the largest coordinate, or speed, in each of d numbers moves.
 
-    Where all centres lie on one line along an axis and nothing moves across it, nothing is rounded across it either.
+    Where all centres lie on one line along an axis and nothing moves across it, nothing is rounded
+    across it either.
     """
-    lined = (scene.position == scene.position[0]).all(axis=0) & ~scene.velocity.any(axis=0) & (scene.gravity == 0)
+    lined = (
+        (scene.position == scene.position[0]).all(axis=0)
+        & ~scene.velocity.any(axis=0)
+        & (scene.gravity == 0)
+    )
     free = np.argwhere(~scene.static[:, None] & ~lined)
     dx, dv = np.zeros((2, scene.n, 2 * len(free), 2))
     for k, (i, axis) in enumerate(free):
@@ -66,7 +79,8 @@ def roundings(scene: Scene) -> tuple[Array, Array]:
 
 
 class Body(NamedTuple):
-    """One side of a collision: its motion along the path, what it is off by, its acceleration before and after, 1/mass.
+    """One side of a collision: its motion along the path, what it is off by, its acceleration
+    before and after, 1/mass.
 
     Shapes (2,), m, m/s, m/s2; `dx` and `dv` (d, 2).
     """
@@ -81,14 +95,17 @@ class Body(NamedTuple):
 
 
 class Nearby:
-    """All starts a rounding from that of a path, carried along it: one derivative for each number of the start.
+    """All starts a rounding from that of a path, carried along it: one derivative for each number
+    of the start.
 
     Attributes:
         moving: the disks that are not static.
-        t: (n,) s, the time that each disk has been carried to; `leg`: (n,) on which of its legs that is.
-        dx, dv: (n, d, 2) m, m/s, how far each disk is off then, for a rounding of each of d numbers.
-        struck, v: (n,) s and (n, 2) m/s, when each disk collided last, and its velocity after that.
-        instant: s, when the latest collision was; `late`: (d,) s, by how much each rounding delays it.
+        t: (n,) s, the time that each disk has been carried to; `leg`: (n,) on which of its legs
+        that is. dx, dv: (n, d, 2) m, m/s, how far each disk is off then, for a rounding of each of
+        d numbers. struck, v: (n,) s and (n, 2) m/s, when each disk collided last, and its velocity
+        after that.
+        instant: s, when the latest collision was; `late`: (d,) s, by how much each rounding delays
+            it.
         diverged: s, when the first disk is off by too much; inf: none is so far.
     """
 
@@ -99,7 +116,9 @@ class Nearby:
         self.dx, self.dv = roundings(scene)
         self.struck, self.v = np.full(scene.n, -1.0), np.zeros((scene.n, 2))
         self.instant, self.late = 0.0, np.zeros(self.dx.shape[1])
-        self.switches = {edge for thrust in scenario.thrusts for edge in (thrust.start, thrust.stop)}
+        self.switches = {
+            edge for thrust in scenario.thrusts for edge in (thrust.start, thrust.stop)
+        }
         self.diverged = np.inf
 
     def carry(self, i: int, until: float) -> None:
@@ -115,8 +134,14 @@ class Nearby:
         hop = self.path.legs[i][self.leg[i]].hop
         if hop is not None:
             self.bounce(i, hop)
-        here, drift, since, limit = self.dx[i], self.dv[i], until - self.t[i], DIVERGED * self.scene.radius[i]
-        # |dx + dv s|^2 = limit^2, summed over the roundings: they are independent, so that their variances add.
+        here, drift, since, limit = (
+            self.dx[i],
+            self.dv[i],
+            until - self.t[i],
+            DIVERGED * self.scene.radius[i],
+        )
+        # |dx + dv s|^2 = limit^2, summed over the roundings: they are independent, so that their
+        # variances add.
         room, slope, growth = limit**2 - (here**2).sum(), (here * drift).sum(), (drift**2).sum()
         if not room > 0:  # or nan, after a graze that no float64 can follow
             self.diverged = min(self.diverged, self.t[i])
@@ -125,10 +150,12 @@ class Nearby:
         self.dx[i], self.t[i] = here + drift * since, until
 
     def bounce(self, i: int, hop: Hop) -> None:
-        """Note when disk i diverges across a wall on which its bounces die out; what is left is along the wall.
+        """Note when disk i diverges across a wall on which its bounces die out; what is left is
+        along the wall.
 
-        Bounce k begins at u s_k, s_k = (2 / g) (1 - e^k) / (1 - e), with the speed u e^k (`oracle_record.along`): off
-        by dt at the first one and by du, it begins dt + du s_k late and lasts 2 du e^k / g longer.
+        Bounce k begins at u s_k, s_k = (2 / g) (1 - e^k) / (1 - e), with the speed u e^k
+        (`oracle_record.along`): off by dt at the first one and by du, it begins dt + du s_k late
+        and lasts 2 du e^k / g longer.
         """
         normal, u, g = np.array([float(hop.nx), float(hop.ny)]), float(hop.speed), float(hop.fall)
         e, k = self.scene.restitution, np.arange(BOUNCES)[:, None]
@@ -147,13 +174,20 @@ class Nearby:
         self.leg[i] += 1
         # A collision has seen to what follows it, and a thrust switches when it switches.
         if t != self.struck[i] and t not in self.switches:
-            self.dv[i] += np.outer(self.release(i, before, t), acceleration(before) - acceleration(leg))
+            self.dv[i] += np.outer(
+                self.release(i, before, t), acceleration(before) - acceleration(leg)
+            )
         for contact in leg.held:
             self.hold(i, contact.j if contact.kind == "wall" and len(leg.held) == 1 else None)
 
     def release(self, i: int, leg: Leg, t: float) -> Array:
-        """(d,) s, how much later disk i leaves what held it: the end of its wall, or a disk that is struck."""
-        spans = [self.scene.walls[c.j, 1] - self.scene.walls[c.j, 0] for c in leg.held if c.kind == "wall"]
+        """(d,) s, how much later disk i leaves what held it: the end of its wall, or a disk that is
+        struck."""
+        spans = [
+            self.scene.walls[c.j, 1] - self.scene.walls[c.j, 0]
+            for c in leg.held
+            if c.kind == "wall"
+        ]
         if len(spans) == 1 and (speed := float(spans[0] @ along(leg, t)[1])):
             return -self.dx[i] @ spans[0] / speed
         return self.late if t == self.instant else np.zeros_like(self.late)
@@ -168,10 +202,12 @@ class Nearby:
             part[i] = np.outer(part[i] @ way, way)
 
     def collide(self, event: Event) -> None:
-        """Carry both sides through a collision; what touched before collides when the instant's new contact does.
+        """Carry both sides through a collision; what touched before collides when the instant's new
+        contact does.
 
-        To first order: the gap closes `late` s later, where the normal is tilted and the closing speed another, so
-        that the impulse is; and what has flown on for as long has done so with the old velocity.
+        To first order: the gap closes `late` s later, where the normal is tilted and the closing
+        speed another, so that the impulse is; and what has flown on for as long has done so with
+        the old velocity.
         """
         t, e, impulse = float(event.t), self.scene.restitution, float(event.impulse)
         if t > self.instant:
@@ -181,7 +217,8 @@ class Nearby:
         way, dv, share = two.x - one.x, two.v - one.v, one.weight + two.weight
         normal = way / np.hypot(*way)
         if event.new and t > 0:
-            closing = -impulse * share / (1 + e)  # normal.dv, which would have lost its digits in a graze
+            # normal.dv, which would have lost its digits in a graze
+            closing = -impulse * share / (1 + e)
             self.late = -(two.dx - one.dx) @ normal / closing
         late = self.late[:, None]
         shift = two.dx - one.dx + dv * late
@@ -208,7 +245,8 @@ class Nearby:
         return Body(x, v, self.dx[i], self.dv[i], before, after, weight)
 
     def other(self, event: Event, one: Body) -> tuple[Body, float]:
-        """The other side of a collision, and the radius, m, at which its normal turns: none at the face of a wall."""
+        """The other side of a collision, and the radius, m, at which its normal turns: none at the
+        face of a wall."""
         if event.j >= 0:
             two = self.body(event.j, float(event.t))
             return two, float(np.hypot(*(two.x - one.x)))
@@ -230,4 +268,8 @@ def along(leg: Leg, t: float) -> tuple[Array, Array]:
 def acceleration(leg: Leg) -> Array:
     """(2,) m/s2 on a leg, with the fall of what bounces on a wall."""
     a = np.array([float(leg.ax), float(leg.ay)])
-    return a if leg.hop is None else a - float(leg.hop.fall) * np.array([float(leg.hop.nx), float(leg.hop.ny)])
+    return (
+        a
+        if leg.hop is None
+        else a - float(leg.hop.fall) * np.array([float(leg.hop.nx), float(leg.hop.ny)])
+    )

@@ -1,4 +1,5 @@
-"""Closed forms of disks on a line: equal masses that pass their velocities on, and Galperin's billiard."""
+"""Closed forms of disks on a line: equal masses that pass their velocities on, and Galperin's
+billiard."""
 
 from __future__ import annotations
 
@@ -9,7 +10,8 @@ from scenarios.truth.closed_forms import Collision, Motion
 
 
 def fold(place: Array, length: float) -> tuple[Array, Array]:
-    """A free point thrown back at 0 and `length` m: where it is, and the sign (1 or -1) of its velocity.
+    """A free point thrown back at 0 and `length` m: where it is, and the sign (1 or -1) of its
+    velocity.
 
     place: any shape, m, where it would be without walls. `length` inf: no walls.
     """
@@ -20,16 +22,18 @@ def fold(place: Array, length: float) -> tuple[Array, Array]:
 
 
 def free_points(x: Array, radius: float) -> Array:
-    """(n,) m, the equal disks of a row without their widths: z_i = x_i - r - 2 r i, i from the left."""
+    """(n,) m, the equal disks of a row without their widths: z_i = x_i - r - 2 r i, i from the
+    left."""
     return x - radius - 2 * radius * np.arange(len(x))
 
 
 def row(x: Array, v: Array, radius: float, length: float, t: Array) -> Motion:
-    """Position and velocity (k, n) of equal disks on a line, e = 1, walls at 0 and `length` m (inf: none).
+    """Position and velocity (k, n) of equal disks on a line, e = 1, walls at 0 and `length` m (inf:
+    none).
 
-    Equal masses swap velocities: the free points z_i pass through each other, and disk i is the i-th
-    of them from the left (Tonks, Phys. Rev. 50, 955, 1936; Jepsen, J. Math. Phys. 6, 405, 1965).
-    x, v (n,) m, m/s, from the left; t (k,) s.
+    Equal masses swap velocities: the free points z_i pass through each other, and disk i is the
+    i-th of them from the left (Tonks, Phys. Rev. 50, 955, 1936; Jepsen, J. Math. Phys. 6, 405,
+    1965). x, v (n,) m, m/s, from the left; t (k,) s.
     """
     z, sign = fold(free_points(x, radius) + np.multiply.outer(t, v), length - 2 * radius * len(x))
     order = np.argsort(z, axis=-1)
@@ -40,8 +44,11 @@ def row(x: Array, v: Array, radius: float, length: float, t: Array) -> Motion:
     )
 
 
-def row_collisions(x: Array, v: Array, radius: float, length: float, mass: float, until: float) -> list[Collision]:
-    """The collisions of `row` up to `until` s; wall 0 is the one at 0, wall 1 the one at `length` m.
+def row_collisions(
+    x: Array, v: Array, radius: float, length: float, mass: float, until: float
+) -> list[Collision]:
+    """The collisions of `row` up to `until` s; wall 0 is the one at 0, wall 1 the one at `length`
+    m.
 
     Two free points meet where one meets the other or its mirror image; the meeting disks are
     those whose ranks the two points hold.
@@ -70,12 +77,14 @@ def row_collisions(x: Array, v: Array, radius: float, length: float, mass: float
 
 
 def galperin(gap: Array, speed: float, mass: Array, t: Array) -> Motion:
-    """Free room (k, 2) m in front of wall and light disk, and its rate (k, 2) m/s, at the times t (k,) s.
+    """Free room (k, 2) m in front of wall and light disk, and its rate (k, 2) m/s, at the times t
+    (k,) s.
 
-    A light disk at rest between a wall and a heavy disk that comes in with `speed`, e = 1. gap (2,) m: of the
-    light disk to the wall, of the heavy one to the wall less the light one's width; mass (2,) kg. With
-    a = sqrt(M) X, b = sqrt(m) x the pair is one point in a wedge of the angle atan(sqrt(m / M)), and
-    unfolding the wedge makes its path a straight line (Galperin, Regul. Chaotic Dyn. 8, 375, 2003).
+    A light disk at rest between a wall and a heavy disk that comes in with `speed`, e = 1. gap (2,)
+    m: of the light disk to the wall, of the heavy one to the wall less the light one's width; mass
+    (2,) kg. With a = sqrt(M) X, b = sqrt(m) x the pair is one point in a wedge of the angle
+    atan(sqrt(m / M)), and unfolding the wedge makes its path a straight line (Galperin, Regul.
+    Chaotic Dyn. 8, 375, 2003).
     """
     root = np.sqrt(mass)
     wedge = np.arctan2(root[0], root[1])
@@ -93,16 +102,18 @@ def galperin(gap: Array, speed: float, mass: Array, t: Array) -> Motion:
 
 
 def galperin_collisions(gap: Array, speed: float, mass: Array) -> list[Collision]:
-    """All collisions of `galperin`, ceil(pi / wedge) - 1: of the light disk 0 with disk 1 and wall 0 in turn.
+    """All collisions of `galperin`, ceil(pi / wedge) - 1: of the light disk 0 with disk 1 and wall
+    0 in turn.
 
-    The straight line crosses the k-th image of the wedge's sides at the angle k wedge, where it loses
-    2 sqrt(M) V sin(k wedge) of its mass-weighted velocity.
+    The straight line crosses the k-th image of the wedge's sides at the angle k wedge, where it
+    loses 2 sqrt(M) V sin(k wedge) of its mass-weighted velocity.
     """
     root = np.sqrt(mass)
     wedge = np.arctan2(root[0], root[1])
     k = np.arange(1, int(np.ceil(np.pi / wedge)))
     t = (gap[1] - root[0] * gap[0] / np.tan(k * wedge) / root[1]) / speed
     kick = 2 * root[1] * speed * np.sin(k * wedge)
-    # What an impulse of 1 N s changes of it: by 1 / sqrt(mu) between the disks, by 1 / sqrt(m) at the wall.
+    # What an impulse of 1 N s changes of it: by 1 / sqrt(mu) between the disks, by 1 / sqrt(m) at
+    # the wall.
     impulse = kick * np.where(k % 2 == 1, np.sqrt(1 / (1 / mass).sum()), root[0])
     return [(float(t[i]), 0, 1 if k[i] % 2 == 1 else -1, float(impulse[i])) for i in range(len(k))]

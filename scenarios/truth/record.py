@@ -1,5 +1,5 @@
-"""The truth record: an exact motion in float64 as flights and bounces, with its collisions, its end and what is left
-open."""
+"""The truth record: an exact motion in float64 as flights and bounces, with its collisions, its end
+and what is left open."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from scenarios.truth.horizon import DIVERGED, float64_horizon
 from scenarios.truth.oracle.path import Event, Path
 
 EPS = float(np.finfo(float).eps)
-ROUNDINGS = 4 * EPS  # of the largest coordinate and of the longest way: a few for a leg's start, a time, a sample
-LEAST = 1e-4  # s; of the bounces that die out those that last less are not listed, as in `walls.bouncing_ball_e09`
+# of the largest coordinate and of the longest way: a few for a leg's start, a time, a sample
+ROUNDINGS = 4 * EPS
+# s; of the bounces that die out those that last less are not listed, as in
+# `walls.bouncing_ball_e09`
+LEAST = 1e-4
 TOUCH = 1e-6  # m, what is closer to a wall at the end may be in contact with it
 NONE: Array = frozen(np.zeros((0, 1)))
 
@@ -25,18 +28,20 @@ class TruthRecord:
     """An exact motion as its flights, and how far it can be trusted.
 
     Attributes:
-        legs: (l, 12) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2, and where the disk bounces on for good beside that:
-            normal nx, ny, speed m/s after the first bounce, fall m/s2; else 0. Disk by disk in order of time.
-        events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle |v_n| / |v|; an
-            impulse of 0 is no collision: from there on the disk rests on the other.
+        legs: (l, 12) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2, and where the disk bounces on for
+            good beside that: normal nx, ny, speed m/s after the first bounce, fall m/s2; else 0.
+            Disk by disk in order of time.
+        events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
+            |v_n| / |v|; an impulse of 0 is no collision: from there on the disk rests on the other.
         horizon: s; nothing is said of what comes later.
         error_bound: m.
         bits: of the numbers it was computed with.
-        method: "closed form", "two-precision" (the same with half as many bits) or "certified" (interval arithmetic).
+        method: "closed form", "two-precision" (the same with half as many bits) or "certified"
+            (interval arithmetic).
         reason: why it ends where it does.
         float64_horizon: s; until then a float64 engine can be held to it, see `horizon.py`.
-        outcomes: (o, 4) outcome, disk, vx, vy m/s: where the order of simultaneous collisions matters, all ends it may
-            have.
+        outcomes: (o, 4) outcome, disk, vx, vy m/s: where the order of simultaneous collisions
+            matters, all ends it may have.
         orders: (p, 3) outcome, disk, other: the collisions, in one order, that lead to each.
         remains: what can still be said after the end, a sentence each.
     """
@@ -54,8 +59,8 @@ class TruthRecord:
     remains: tuple[str, ...] = ()
 
     def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
-        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64; later times are left
-        out."""
+        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64;
+        later times are left out."""
         t = np.asarray(t, float)
         position, velocity = np.empty((len(t), scene.n, 2)), np.empty((len(t), scene.n, 2))
         for i in range(scene.n):
@@ -63,22 +68,31 @@ class TruthRecord:
             leg = legs[np.maximum(np.searchsorted(legs[:, 1], t, side="right") - 1, 0)]
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
         turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
-        # What lies there from the start counts as a contact that begins with no impulse; later ones began before.
+        # What lies there from the start counts as a contact that begins with no impulse; later ones
+        # began before.
         collisions: list[Collision] = [
-            (float(at), int(i), int(j), float(kick)) for at, i, j, kick, _ in self.events if kick or not at
+            (float(at), int(i), int(j), float(kick))
+            for at, i, j, kick, _ in self.events
+            if kick or not at
         ]
         angles = turning.angle, turning.angular_velocity
         until, reason = self.horizon, self.reason
         if self.float64_horizon < until:
-            until, reason = self.float64_horizon, "beyond it the rounding of float64 makes any engine diverge"
-        return answer(scene, t, (position, velocity), collisions, angles, until, self.error_bound, reason)
+            until, reason = (
+                self.float64_horizon,
+                "beyond it the rounding of float64 makes any engine diverge",
+            )
+        return answer(
+            scene, t, (position, velocity), collisions, angles, until, self.error_bound, reason
+        )
 
 
 def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
-    """Position and velocity (k, 2) on the legs (k, 12) at the times t (k,) s: the flight, and the bounces across it.
+    """Position and velocity (k, 2) on the legs (k, 12) at the times t (k,) s: the flight, and the
+    bounces across it.
 
-    Bounce k begins s_k = 2 v (1 - e^k) / (g (1 - e)) after the first one at the speed v e^k; from 2 v / (g (1 - e)) on
-    there is none (any textbook of mechanics, under "bouncing ball").
+    Bounce k begins s_k = 2 v (1 - e^k) / (g (1 - e)) after the first one at the speed v e^k; from 2
+    v / (g (1 - e)) on there is none (any textbook of mechanics, under "bouncing ball").
     """
     since, normal, speed = (t - leg[:, 1])[:, None], leg[:, 8:10], leg[:, 10:11]
     v, a = leg[:, 4:6], leg[:, 6:8]
@@ -104,11 +118,17 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
     end = min(path.end, scenario.duration) if path.reason else np.inf
     legs = legs_of(path, end)
     rows = [_row(event) for event in path.events if float(event.t) < end]
-    rows += [collision for leg, stop in bouncing(legs, end) for collision in bounces(scenario.scene, leg, stop)]
+    rows += [
+        collision
+        for leg, stop in bouncing(legs, end)
+        for collision in bounces(scenario.scene, leg, stop)
+    ]
     outcomes = [
-        [k, i, *map(float, v)] for k, one in enumerate(path.outcomes) for i, v in one.velocities.items()
+        [k, i, *map(float, v)]
+        for k, one in enumerate(path.outcomes)
+        for i, v in one.velocities.items()
         if i < scenario.scene.n
-    ]  # fmt: skip
+    ]
     orders = [[k, *pair] for k, collisions in enumerate(path.named) for pair in collisions]
     return TruthRecord(
         legs=frozen(legs),
@@ -129,8 +149,8 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
 def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
     """The path up to where legs and samples, which are float64, tell it as exactly as is promised.
 
-    What is promised is `DIVERGED` radii of the smallest disk, as it is by that that engines are held to an answer. Far
-    from the origin, and after a long way, the rounding of float64 is more.
+    What is promised is `DIVERGED` radii of the smallest disk, as it is by that that engines are
+    held to an answer. Far from the origin, and after a long way, the rounding of float64 is more.
     """
     end = min(path.end, scenario.duration) if path.reason else scenario.duration
     legs = legs_of(path, end)
@@ -139,24 +159,41 @@ def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
         return path
     held, lost = 0.0, end
     for _ in range(64):  # halvings: to the last place of float64
-        held, lost = (middle, lost) if reach(legs, middle := (held + lost) / 2) <= room else (held, middle)
-    reason = f"the rounding of float64 is more than {DIVERGED:g} of the smallest radius from t = {held:.9g} s on"
+        held, lost = (
+            (middle, lost) if reach(legs, middle := (held + lost) / 2) <= room else (held, middle)
+        )
+    reason = (
+        f"the rounding of float64 is more than {DIVERGED:g} of the smallest radius from t ="
+        f" {held:.9g} s on"
+    )
     return replace(path, end=held, reason=reason, disks=[], outcomes=[], named=[])
 
 
 def legs_of(path: Path, end: float) -> Array:
     """(l, 12), as of `TruthRecord.legs`, those that begin before `end` s."""
-    flights = [(i, leg) for i, legs in enumerate(path.legs) for leg in legs if float(leg.t) < end or leg is legs[0]]
-    return np.array([[i, *map(float, leg.numbers), *[0.0] * (11 - len(leg.numbers))] for i, leg in flights])
+    flights = [
+        (i, leg)
+        for i, legs in enumerate(path.legs)
+        for leg in legs
+        if float(leg.t) < end or leg is legs[0]
+    ]
+    return np.array(
+        [[i, *map(float, leg.numbers), *[0.0] * (11 - len(leg.numbers))] for i, leg in flights]
+    )
 
 
 def reach(legs: Array, until: float) -> float:
-    """m, what is rounded up to `until` s: the largest coordinate, and how far the largest speed goes in that time."""
+    """m, what is rounded up to `until` s: the largest coordinate, and how far the largest speed
+    goes in that time."""
     begun = legs[:, 1] <= until
     follows = np.append(legs[1:, 0] == legs[:-1, 0], False)
     stop = np.minimum(np.where(follows, np.append(legs[1:, 1], until), until), until)
-    s, (x, v, a) = np.maximum(stop - legs[:, 1], 0.0)[:, None], (legs[:, 2:4], legs[:, 4:6], legs[:, 6:8])
-    far = np.maximum(np.abs(x), np.abs(x + (v + a * s / 2) * s)) + np.abs(a) * s**2 / 8  # between the two an apex
+    s, (x, v, a) = (
+        np.maximum(stop - legs[:, 1], 0.0)[:, None],
+        (legs[:, 2:4], legs[:, 4:6], legs[:, 6:8]),
+    )
+    # between the two an apex
+    far = np.maximum(np.abs(x), np.abs(x + (v + a * s / 2) * s)) + np.abs(a) * s**2 / 8
     speed = np.maximum(np.abs(v), np.abs(v + a * s)) + legs[:, 10:11]
     return float(far[begun].max() + until * speed[begun].max())
 
@@ -174,9 +211,12 @@ def bouncing(legs: Array, end: float) -> Iterator[tuple[Array, float]]:
 
 
 def bounces(scene: Scene, leg: Array, stop: float) -> Iterator[list[float]]:
-    """Rows as of `TruthRecord.events` for the bounces on a leg, up to `stop` s, as far as they last `LEAST` s."""
+    """Rows as of `TruthRecord.events` for the bounces on a leg, up to `stop` s, as far as they last
+    `LEAST` s."""
     e, v, g, disk = scene.restitution, leg[10], leg[11], int(leg[0])
-    count = max(0, int(np.ceil(np.log(LEAST * g / (2 * v)) / np.log(e)))) if LEAST * g < 2 * v else 0
+    count = (
+        max(0, int(np.ceil(np.log(LEAST * g / (2 * v)) / np.log(e)))) if LEAST * g < 2 * v else 0
+    )
     wall = wall_beside(scene, leg)
     for k in range(1, count):
         t = leg[1] + 2 * v / g * (1 - e**k) / (1 - e)
@@ -198,29 +238,45 @@ def wall_beside(scene: Scene, leg: Array) -> int:
 
 
 def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iterator[str]:
-    """What can be said of these disks after the end: momentum along walls, if all are parallel; energy falls."""
+    """What can be said of these disks after the end: momentum along walls, if all are parallel;
+    energy falls."""
     ours = [i for i in sorted(set(disks)) if i < scene.n and not scene.static[i]]
     last = [legs[(legs[:, 0] == i) & (legs[:, 1] <= end)][-1] for i in ours]
-    x, v = (np.array(part) for part in zip(*(along(leg[None], np.array([end]), scene.restitution) for leg in last)))
+    x, v = (
+        np.array(part)
+        for part in zip(*(along(leg[None], np.array([end]), scene.restitution) for leg in last))
+    )
     x, v, mass = x[:, 0], v[:, 0], scene.mass[ours]
     start, span = scene.walls[:, 0], scene.walls[:, 1] - scene.walls[:, 0]
     share = ((x[:, None] - start) * span).sum(axis=-1) / (span**2).sum(axis=1)
-    apart = np.hypot(*np.moveaxis(x[:, None] - start - np.clip(share, 0, 1)[..., None] * span, -1, 0))
+    apart = np.hypot(
+        *np.moveaxis(x[:, None] - start - np.clip(share, 0, 1)[..., None] * span, -1, 0)
+    )
     touched = apart - scene.radius[ours][:, None] < TOUCH
     near = span[touched.any(axis=0)]
     names = f"disk {ours[0]}" if len(ours) == 1 else "disks " + ", ".join(map(str, ours))
     momentum = (mass[:, None] * v).sum(axis=0)
-    # Round a fixed disk, or round the end of a wall, the normal turns: no direction keeps its momentum.
-    if any(scene.static[i] for i in disks if i < scene.n) or (touched & ((share <= 0) | (share >= 1))).any():
+    # Round a fixed disk, or round the end of a wall, the normal turns: no direction keeps its
+    # momentum.
+    if (
+        any(scene.static[i] for i in disks if i < scene.n)
+        or (touched & ((share <= 0) | (share >= 1))).any()
+    ):
         near = np.eye(2)
     exception = " but for gravity" if scene.gravity.any() else ""
     if not len(near):
         total = f"({momentum[0]:.6g}, {momentum[1]:.6g}) N s"
         yield f"{names}: nothing else touches them, so their momentum, {total}, stays{exception}"
-    elif np.abs(near[:, 0] * near[0, 1] - near[:, 1] * near[0, 0]).max() <= EPS * np.abs(near).max() ** 2:
+    elif (
+        np.abs(near[:, 0] * near[0, 1] - near[:, 1] * near[0, 0]).max()
+        <= EPS * np.abs(near).max() ** 2
+    ):
         way = near[0] / np.hypot(*near[0])
         yield (
-            f"{names}: all walls they touch lie along ({way[0]:.4g}, {way[1]:.4g}), so their momentum that way, "
-            f"{momentum @ way:.6g} N s, stays{exception}"
+            f"{names}: all walls they touch lie along ({way[0]:.4g}, {way[1]:.4g}), so their"
+            f" momentum that way, {momentum @ way:.6g} N s, stays{exception}"
         )
-    yield f"{names}: their kinetic energy, {(mass * (v**2).sum(axis=1)).sum() / 2:.6g} J, can only fall{exception}"
+    yield (
+        f"{names}: their kinetic energy, {(mass * (v**2).sum(axis=1)).sum() / 2:.6g} J, can only"
+        f" fall{exception}"
+    )

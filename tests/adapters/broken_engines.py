@@ -1,4 +1,5 @@
-"""Adapters with one fault each, made from the reference adapter: what the conformance suite is there to catch."""
+"""Adapters with one fault each, made from the reference adapter: what the conformance suite is
+there to catch."""
 
 from __future__ import annotations
 
@@ -141,7 +142,9 @@ class MassFromDensity(Sound):
     """A fixture of density 1 set the mass after it was given."""
 
     def load(self, scene, dt):
-        super().load(replace(scene, mass=np.where(scene.static, np.inf, np.pi * scene.radius**2)), dt)
+        super().load(
+            replace(scene, mass=np.where(scene.static, np.inf, np.pi * scene.radius**2)), dt
+        )
 
 
 class SolidDiskInertia(Sound):
@@ -189,7 +192,9 @@ class NumbersWallsFromTheEnd(Sound):
 
     def collisions(self):
         return [
-            ContactImpulse(h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse)
+            ContactImpulse(
+                h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse
+            )
             for h in self.log
         ]
 
@@ -254,7 +259,8 @@ class RaisesInStep(Sound):
 
 
 class Exact(Reference):
-    """The solver that takes collisions in their order: beside it a wrong energy is not lost among detection delays."""
+    """The solver that takes collisions in their order: beside it a wrong energy is not lost among
+    detection delays."""
 
     def __init__(self) -> None:
         super().__init__(ordered)
@@ -270,7 +276,8 @@ class Freezes(Exact):
 
 
 class Scales(Exact):
-    """At the tenth and 60th step (a ship rests before) all velocities become `factor` times as large."""
+    """At the tenth and 60th step (a ship rests before) all velocities become `factor` times as
+    large."""
 
     factor = 1.0
 

@@ -1,5 +1,5 @@
-"""The ablated reference: with no mechanism on it is the exercise, with all it is an engine, and each does what its
-formula says."""
+"""The ablated reference: with no mechanism on it is the exercise, with all it is an engine, and
+each does what its formula says."""
 
 from __future__ import annotations
 
@@ -68,7 +68,10 @@ def test_free_flight_is_off_by_its_closed_form_in_any_order(order: tuple[str, ..
     scene = scenario("free_fall")
     dt = scene.dt(2)
     assert scene.truth is not None
-    off = positions(AblatedReference(order, alpha=alpha), scene, dt)[:, 0] - scene.truth(scene.times).position[:, 0]
+    off = (
+        positions(AblatedReference(order, alpha=alpha), scene, dt)[:, 0]
+        - scene.truth(scene.times).position[:, 0]
+    )
     expected = (alpha - 0.5) * dt * scene.times[:, None] * scene.scene.gravity
 
     # 720 moves that each round a height of up to 10 m.
@@ -94,7 +97,8 @@ def test_a_late_collision_is_off_by_the_change_of_velocity_times_its_delay():
 def test_a_ball_gains_speed_times_dt_of_height_where_it_bounces_off_a_velocity_after_gravity(
     order: tuple[str, ...], gain: float
 ):
-    """And nothing where it bounces off that before: per bounce, with the flight of such an engine."""
+    """And nothing where it bounces off that before: per bounce, with the flight of such an
+    engine."""
     scene = scenario("bouncing_ball_e1")
     dt, g = scene.dt(4), -scene.scene.gravity[1]
     fall = scene.scene.position[0, 1] - scene.scene.radius[0]
@@ -118,9 +122,11 @@ def run_of(name: str, scene: Scenario, dt: float) -> Run:
 @pytest.mark.parametrize(
     ("name", "scene", "samples", "bound"),
     [
-        # Bounds of rounding, in m: of float64 where the engine keeps that, else of so many steps of up to some metres.
-        ("reference:exercise", "falling_box", 25, 1e-11),  # 135 collisions, or 351, hand on what rounding does
-        # Ten iterations end before the impulses do, so that the order of the contacts decides the last digits.
+        # Bounds of rounding, in m: of float64 where the engine keeps that, else of so many steps of
+        # up to some metres. 135 collisions, or 351, hand on what rounding does
+        ("reference:exercise", "falling_box", 25, 1e-11),
+        # Ten iterations end before the impulses do, so that the order of the contacts decides the
+        # last digits.
         ("pymunk:matched", "gas_of_100", 58, 1e-5),
         ("pymunk:shipped", "oblique_e09", 240, 1e-12),
         ("pymunk:matched", "bouncing_ball_e09", 600, 1e-12),
@@ -132,7 +138,9 @@ def run_of(name: str, scene: Scenario, dt: float) -> Run:
         ("box2d_v3:matched", "bouncing_ball_e1", 600, 2400 * FLOAT32),
     ],
 )
-def test_with_all_its_mechanisms_the_reference_is_the_engine(name: str, scene: str, samples: int, bound: float):
+def test_with_all_its_mechanisms_the_reference_is_the_engine(
+    name: str, scene: str, samples: int, bound: float
+):
     """And without them it is far from it."""
     played = scenario(scene)
     played = replace(played, duration=samples * played.sample_interval)
@@ -157,7 +165,9 @@ def test_with_all_its_mechanisms_the_reference_is_the_engine(name: str, scene: s
         ("box2d:shipped", "box_billiard", "friction"),
     ],
 )
-def test_what_is_switched_off_in_the_engine_is_what_is_left_out_in_the_reference(name: str, scene: str, mechanism: str):
+def test_what_is_switched_off_in_the_engine_is_what_is_left_out_in_the_reference(
+    name: str, scene: str, mechanism: str
+):
     """The engine without it is the reference with all but it."""
     played = scenario(scene)
     dt = played.dt(4)
@@ -166,7 +176,9 @@ def test_what_is_switched_off_in_the_engine_is_what_is_left_out_in_the_reference
     assert left_out.without is not None
     engine = left_out.without()
     without = positions(engine, played, dt)
-    others = positions(with_mechanisms([each for each in mechanisms if each is not left_out]), played, dt)
+    others = positions(
+        with_mechanisms([each for each in mechanisms if each is not left_out]), played, dt
+    )
     everything = positions(with_mechanisms(mechanisms), played, dt)
 
     assert np.abs(without - others).max() <= 2000 * 4 * FLOAT32
@@ -174,12 +186,16 @@ def test_what_is_switched_off_in_the_engine_is_what_is_left_out_in_the_reference
 
 
 def test_every_engine_with_mechanisms_is_known_and_flies_as_its_row_says():
-    """The table of mechanisms names rows of `ENGINES`; the impulse is what an engine's own order of stages is."""
+    """The table of mechanisms names rows of `ENGINES`; the impulse is what an engine's own order of
+    stages is."""
     assert set(MECHANISMS) < set(ENGINES)
     scene = scenario("head_on_equal_e09")
     for name in MECHANISMS:
         mechanisms = {
-            each.name: each for each in mechanisms_of(name, run_of(name, scene, 0.1 / 6).settings, scene.scene, 0.1 / 6)
+            each.name: each
+            for each in mechanisms_of(
+                name, run_of(name, scene, 0.1 / 6).settings, scene.scene, 0.1 / 6
+            )
         }
         assert mechanisms[FLIGHT].parameters == {"alpha": ENGINES[name].alpha}
         assert name.startswith("reference") or "order" in mechanisms[IMPULSE].parameters
@@ -193,7 +209,8 @@ grid = np.stack(np.meshgrid(np.arange(3), np.arange(3)), -1).reshape(-1, 2) * 1.
 n = np.arange(9)
 velocity = np.where(n == 4, 0, 1)[:, None] * np.stack([np.sin(1.0 + n), np.cos(2.0 * n)], -1)
 scene = lay_out(
-    position=grid, velocity=velocity, radius=0.3 + 0.1 * np.sin(n), mass=np.where(n == 4, np.inf, 1.0 + n % 3),
+    position=grid, velocity=velocity, radius=0.3 + 0.1 * np.sin(n),
+    mass=np.where(n == 4, np.inf, 1.0 + n % 3),
     walls=box([-0.6, -0.6], [2.6, 2.6]), restitution=0.8, gravity=[0.1, -0.7],
     angular_velocity=np.where(n == 4, 0, 1.0),
 )
@@ -211,19 +228,26 @@ def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
     """A crowd with walls, gravity, friction and a static disk, through every stage."""
     outputs = [
         subprocess.run(
-            [sys.executable, "-c", PLAIN], capture_output=True, check=True, cwd=Path(__file__).parents[2],
+            [sys.executable, "-c", PLAIN],
+            capture_output=True,
+            check=True,
+            cwd=Path(__file__).parents[2],
             env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
         ).stdout
         for disabled in ("0", "1")
-    ]  # fmt: skip
+    ]
     assert len(outputs[0]) == 4 * 2 * 9 * 2 * 8
     assert outputs[0] == outputs[1]
 
 
 ROW = lay_out(
-    position=[[x, 0.5] for x in (0.0, 1.0, 2.0, 5.0, 6.0)], velocity=[[0.0, -1.0]] * 5, radius=[0.5] * 5,
-    mass=[1.0] * 5, walls=[[[-2.0, 0.0], [9.0, 0.0]]], restitution=0.0,
-)  # fmt: skip
+    position=[[x, 0.5] for x in (0.0, 1.0, 2.0, 5.0, 6.0)],
+    velocity=[[0.0, -1.0]] * 5,
+    radius=[0.5] * 5,
+    mass=[1.0] * 5,
+    walls=[[[-2.0, 0.0], [9.0, 0.0]]],
+    restitution=0.0,
+)
 
 
 def found(stage: str) -> list[tuple[int, int]]:
@@ -236,9 +260,28 @@ def found(stage: str) -> list[tuple[int, int]]:
 
 def test_colours_never_hold_a_moving_disk_twice_and_what_stands_comes_after_the_first():
     """Pairs 01 and 34, then 12 with the floors of the others, then those of 1 and 2."""
-    assert found("by_colour") == [(0, 1), (3, 4), (1, 2), (0, -1), (3, -1), (4, -1), (1, -1), (2, -1)]
+    assert found("by_colour") == [
+        (0, 1),
+        (3, 4),
+        (1, 2),
+        (0, -1),
+        (3, -1),
+        (4, -1),
+        (1, -1),
+        (2, -1),
+    ]
 
 
 def test_islands_come_from_the_last_disk_on_and_the_floor_joins_none():
-    """First all of the last two, then all of the first three, each from its last disk to its first."""
-    assert found("by_island") == [(4, -1), (3, 4), (3, -1), (2, -1), (1, 2), (1, -1), (0, 1), (0, -1)]
+    """First all of the last two, then all of the first three, each from its last disk to its
+    first."""
+    assert found("by_island") == [
+        (4, -1),
+        (3, 4),
+        (3, -1),
+        (2, -1),
+        (1, 2),
+        (1, -1),
+        (0, 1),
+        (0, -1),
+    ]

@@ -1,4 +1,5 @@
-"""The conformance suite catches what it is there to catch, and finds in the real engines what is known of them."""
+"""The conformance suite catches what it is there to catch, and finds in the real engines what is
+known of them."""
 
 from __future__ import annotations
 
@@ -38,7 +39,9 @@ def test_no_engine_breaks_the_protocol(name):
 def test_the_departures_of_an_engine_are_exactly_those_in_the_table(name):
     """Strict both ways: a departure that is gone is news as well."""
     known = {departure.probe for departure in DEPARTURES if departure.engine == name}
-    assert {probe for probe, finding in findings_of(name).items() if finding.verdict == "departs"} == known
+    assert {
+        probe for probe, finding in findings_of(name).items() if finding.verdict == "departs"
+    } == known
 
 
 @pytest.mark.parametrize("departure", DEPARTURES, ids=lambda d: f"{d.engine}-{d.probe}")
@@ -53,9 +56,12 @@ def test_a_departure_is_as_large_as_its_cause_makes_it(departure):
 
 
 def test_only_shipped_profiles_depart_from_the_impact_law():
-    """The matched profiles and the reference keep e at every speed, momentum, and the tangential velocities."""
+    """The matched profiles and the reference keep e at every speed, momentum, and the tangential
+    velocities."""
     law = {probe for probe in PROBES if probe.startswith(("restitution", "friction", "pair"))}
-    departing = {name for name in ENGINES for probe in law if findings_of(name)[probe].verdict != "keeps"}
+    departing = {
+        name for name in ENGINES for probe in law if findings_of(name)[probe].verdict != "keeps"
+    }
     assert departing == {"pymunk:shipped", "box2d:shipped", "box2d_v3:shipped"}
     assert all(finding.verdict == "keeps" for finding in findings_of("reference:exercise").values())
 
@@ -146,7 +152,8 @@ def test_the_threshold_of_both_box2ds_is_1_metre_per_second(name):
 
 @pytest.mark.parametrize("dt", [1 / 32, 1 / 64, 1 / 128])
 def test_box2d_moves_a_disk_by_at_most_two_metres_a_step(dt):
-    """The cap is on the way, so half the dt doubles the speed; matched has units as long as half of it."""
+    """The cap is on the way, so half the dt doubles the speed; matched has units as long as half of
+    it."""
     for name, speed in (("box2d:shipped", 2 / dt), ("box2d:matched", 512.0)):
         with loaded(ENGINES[name], one_disk(velocity=(512.0, 0.0)), dt) as engine:
             engine.step()
@@ -180,7 +187,8 @@ def test_the_friction_of_box2d_v3_is_bounded_by_the_impulse_before_restitution(e
 
 @pytest.mark.parametrize("broken", CAUGHT_BY, ids=lambda broken: broken.__name__)
 def test_a_broken_adapter_is_caught_by_the_probe_meant_for_it(broken):
-    """With the verdict that this probe gives, and by what it read: no exception counts as caught."""
+    """With the verdict that this probe gives, and by what it read: no exception counts as
+    caught."""
     finding = found_in(broken)[CAUGHT_BY[broken]]
     assert finding.verdict == PROBES[finding.probe].failure
     assert finding.got != "raised"
@@ -188,7 +196,9 @@ def test_a_broken_adapter_is_caught_by_the_probe_meant_for_it(broken):
 
 def test_every_probe_that_can_find_a_broken_protocol_has_a_broken_adapter():
     """No probe of the protocol is there without a proof that it works."""
-    assert {name for name, probe in PROBES.items() if probe.failure == "breaks"} <= set(CAUGHT_BY.values())
+    assert {name for name, probe in PROBES.items() if probe.failure == "breaks"} <= set(
+        CAUGHT_BY.values()
+    )
 
 
 def test_the_untouched_reference_keeps_everything():

@@ -1,4 +1,5 @@
-"""What `play` makes of every engine: exact impulses, the exercise's wrap, refusals, runaways, repeats."""
+"""What `play` makes of every engine: exact impulses, the exercise's wrap, refusals, runaways,
+repeats."""
 
 from __future__ import annotations
 
@@ -28,7 +29,9 @@ BOX = [[-5.0, -3.0], [5.0, 3.0]]  # of the exercise
 
 def asked(scene, thrusts=(), duration=1.0, sample_interval=0.1):
     """A scenario without a truth."""
-    return Scenario("probe", "What happens?", "here", scene, duration, sample_interval, thrusts=thrusts)
+    return Scenario(
+        "probe", "What happens?", "here", scene, duration, sample_interval, thrusts=thrusts
+    )
 
 
 def played(name, scenario, dt):
@@ -46,10 +49,17 @@ def arrays(trajectory):
     return [
         array.tobytes()
         for array in (
-            trajectory.t, trajectory.position, trajectory.velocity, trajectory.angle, trajectory.angular_velocity,
-            collisions.t, collisions.i, collisions.j, collisions.impulse,
+            trajectory.t,
+            trajectory.position,
+            trajectory.velocity,
+            trajectory.angle,
+            trajectory.angular_velocity,
+            collisions.t,
+            collisions.i,
+            collisions.j,
+            collisions.impulse,
         )
-    ]  # fmt: skip
+    ]
 
 
 @pytest.mark.parametrize("name", ENGINES)
@@ -69,7 +79,8 @@ def test_a_body_frame_thrust_turns_with_the_disk(name):
     scene = replace(one_disk(), angle=np.array([np.pi / 2]))
     thrust = Thrust(0, 0.0, 1.0, [7.3, 0.0], frame="body")
     end = played(name, asked(scene, [thrust]), 0.05).trajectory.at(-1)
-    # The angle, pi / 2, is known to a rounding, which turns the force; each of 20 steps rounds a velocity.
+    # The angle, pi / 2, is known to a rounding, which turns the force; each of 20 steps rounds a
+    # velocity.
     assert end.velocity[0] == pytest.approx([0.0, 1.0], abs=(2 + 2 * 20) * ENGINES[name].rounding)
 
 
@@ -84,10 +95,15 @@ def test_the_shares_of_a_thrust_add_up_to_its_length(start, lasts, dt, at_once):
     """However the steps are cut into samples, and no step is lost or done twice."""
     thrust = Thrust(0, start, start + lasts, [1.0, 0.0])
     steps = at_once * (int((start + lasts) / dt / at_once) + 1)
-    cuts = [cut for first in range(0, steps, at_once) for cut in thrust_steps([thrust], first, at_once, dt)]
+    cuts = [
+        cut
+        for first in range(0, steps, at_once)
+        for cut in thrust_steps([thrust], first, at_once, dt)
+    ]
     assert sum(count for count, _ in cuts) == steps
     shares = sum(share for _, acting in cuts for _, share in acting)
-    # The first and the last share may be dropped below 1e-9; start / dt rounds at 300 steps of 2^-53.
+    # The first and the last share may be dropped below 1e-9; start / dt rounds at 300 steps of
+    # 2^-53.
     assert abs(shares * dt - lasts) <= 2e-9 * dt + 300 * 2.0**-53
 
 
@@ -95,37 +111,49 @@ def test_the_shares_of_a_thrust_add_up_to_its_length(start, lasts, dt, at_once):
 def test_a_disk_that_leaves_the_box_is_set_onto_the_opposite_edge_and_keeps_its_velocity(name):
     """As in the exercise: onto the edge, however far it was beyond; the other coordinate stays."""
     scene = Scene(
-        position=[[4.99, 1.0], [1.0, -2.99]], velocity=[[2.0, 0.0], [0.0, -2.0]], radius=[0.25, 0.25], mass=[1.0, 1.0],
-        angular_velocity=[1.0, 0.0], restitution=0.5, wrap=BOX,
-    )  # fmt: skip
+        position=[[4.99, 1.0], [1.0, -2.99]],
+        velocity=[[2.0, 0.0], [0.0, -2.0]],
+        radius=[0.25, 0.25],
+        mass=[1.0, 1.0],
+        angular_velocity=[1.0, 0.0],
+        restitution=0.5,
+        wrap=BOX,
+    )
     with loaded(ENGINES[name], scene, 1 / 64) as engine:
         start = engine.read()
         engine.step()
         over = engine.read()
         engine.step(3)
         later = engine.read()
-    # Who steps finds a disk beyond the edge when the step ends; by events it flies on from there for the rest of it.
+    # Who steps finds a disk beyond the edge when the step ends; by events it flies on from there
+    # for the rest of it.
     rest = 2 / 64 - 0.01 if name in ("event_driven:float64", "reference:ordered") else 0.0
-    # The edges and the unit of length are short binary numbers, so even float32 sets them exactly; by events one
-    # time and one path are rounded.
+    # The edges and the unit of length are short binary numbers, so even float32 sets them exactly;
+    # by events one time and one path are rounded.
     exact = 4e-15 if rest else 0.0
     assert over.position.tolist() == [
-        pytest.approx([-5.0 + rest, 1.0], abs=exact), pytest.approx([1.0, 3.0 - rest], abs=exact)
-    ]  # fmt: skip
+        pytest.approx([-5.0 + rest, 1.0], abs=exact),
+        pytest.approx([1.0, 3.0 - rest], abs=exact),
+    ]
     assert (over.velocity == start.velocity).all()
     assert (over.angular_velocity == start.angular_velocity).all()
     assert later.position.tolist() == [
-        pytest.approx([-5.0 + rest + 3 / 32, 1.0], abs=exact), pytest.approx([1.0, 3.0 - rest - 3 / 32], abs=exact)
-    ]  # fmt: skip
+        pytest.approx([-5.0 + rest + 3 / 32, 1.0], abs=exact),
+        pytest.approx([1.0, 3.0 - rest - 3 / 32], abs=exact),
+    ]
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_disks_do_not_see_each_other_across_the_edge_but_meet_after_it(name):
     """Nothing happens while their images overlap; a collision once both are on the same side."""
     scene = Scene(
-        position=[[4.9, 0.0], [-4.2, 0.0]], velocity=[[2.0, 0.0], [0.0, 0.0]], radius=[0.25, 0.25], mass=[1.0, 1.0],
-        restitution=1.0, wrap=BOX,
-    )  # fmt: skip
+        position=[[4.9, 0.0], [-4.2, 0.0]],
+        velocity=[[2.0, 0.0], [0.0, 0.0]],
+        radius=[0.25, 0.25],
+        mass=[1.0, 1.0],
+        restitution=1.0,
+        wrap=BOX,
+    )
     apart = replace(scene, position=np.array([[4.9, 0.0], [-4.9, 0.0]]), velocity=np.zeros((2, 2)))
     still = played(name, asked(apart), 0.0125).trajectory
     assert len(still.collisions) == 0
@@ -133,14 +161,20 @@ def test_disks_do_not_see_each_other_across_the_edge_but_meet_after_it(name):
     assert np.abs(still.position - apart.position).max() <= 2 * ENGINES[name].rounding * 5
     met = played(name, asked(scene), 0.0125).trajectory
     assert (met.collisions.i.tolist(), met.collisions.j.tolist()) == ([0], [1])
-    # It leaves at 0.05 s and the gap of 0.3 m is closed 0.15 s later; a step to find it, and one to leave.
+    # It leaves at 0.05 s and the gap of 0.3 m is closed 0.15 s later; a step to find it, and one to
+    # leave.
     assert met.collisions.t[0] == pytest.approx(0.2, abs=2 * 0.0125)
 
 
 @pytest.mark.parametrize("name", FLOAT32_ENGINES)
 @pytest.mark.parametrize(
     "change",
-    [{"mass": [1e39]}, {"inertia": [1e-46]}, {"gravity": [0.0, -1e39]}, {"walls": [[[-1e39, -1.0], [1e39, -1.0]]]}],
+    [
+        {"mass": [1e39]},
+        {"inertia": [1e-46]},
+        {"gravity": [0.0, -1e39]},
+        {"walls": [[[-1e39, -1.0], [1e39, -1.0]]]},
+    ],
     ids=lambda change: next(iter(change)),
 )
 def test_a_value_beyond_float32_is_refused_with_its_name(name, change):
@@ -153,9 +187,12 @@ def test_a_value_beyond_float32_is_refused_with_its_name(name, change):
     assert run.trajectory is None
 
 
-@pytest.mark.parametrize("change", [{"velocity": [[1e37, 0.0]]}, {"gravity": [0.0, 1e34]}, {"position": [[2e38, 0.0]]}])
+@pytest.mark.parametrize(
+    "change", [{"velocity": [[1e37, 0.0]]}, {"gravity": [0.0, 1e34]}, {"position": [[2e38, 0.0]]}]
+)
 def test_a_value_beyond_float32_in_the_units_of_matched_box2d_is_refused(change):
-    """It fits as the scene states it, and does not once the unit of time is 1000 s and that of length 0.5 m."""
+    """It fits as the scene states it, and does not once the unit of time is 1000 s and that of
+    length 0.5 m."""
     scene = replace(one_disk(), **{key: np.array(value) for key, value in change.items()})
     run = played("box2d:matched", asked(scene), 0.1)
     assert run.status == "unsupported"
@@ -163,7 +200,8 @@ def test_a_value_beyond_float32_in_the_units_of_matched_box2d_is_refused(change)
 
 
 @pytest.mark.parametrize(
-    ("name", "library"), [("pymunk:shipped", "pymunk"), ("box2d:matched", "Box2D"), ("box2d_v3:shipped", "pyb2d3")]
+    ("name", "library"),
+    [("pymunk:shipped", "pymunk"), ("box2d:matched", "Box2D"), ("box2d_v3:shipped", "pyb2d3")],
 )
 def test_a_missing_library_is_a_refusal_with_its_name(name, library, monkeypatch):
     """A cell of that engine says so; nothing else fails."""
@@ -175,7 +213,9 @@ def test_a_missing_library_is_a_refusal_with_its_name(name, library, monkeypatch
     assert library in run.reason
 
 
-@pytest.mark.parametrize("name", ["reference:exercise", "reference:lesson", "pymunk:shipped", "pymunk:matched"])
+@pytest.mark.parametrize(
+    "name", ["reference:exercise", "reference:lesson", "pymunk:shipped", "pymunk:matched"]
+)
 def test_a_fast_disk_is_no_runaway(name):
     """However far it gets: it was asked to fly there."""
     run = played(name, asked(one_disk(velocity=(4e9, 0.0))), 0.05)
@@ -195,7 +235,10 @@ def test_a_disk_thrown_by_its_engine_is_diverged_and_says_how_far_and_when():
     """A thousand times as far as it can fly; the samples before it are kept."""
     run = play(Thrower(exercise), "broken:thrower", asked(one_disk(velocity=(1.0, 0.0))), 0.1)
     assert run.status == "diverged"
-    assert run.reason == f"a disk is {run_away(len(run.trajectory)):.3g} m away at {0.1 * len(run.trajectory):g} s"
+    assert (
+        run.reason == f"a disk is {run_away(len(run.trajectory)):.3g} m away at"
+        f" {0.1 * len(run.trajectory):g} s"
+    )
 
 
 def run_away(steps: int) -> float:
@@ -254,7 +297,8 @@ def test_matched_pymunk_resolves_slop_and_iterations_as_asked():
 
 
 def test_box2d_v3_reads_its_length_unit_off_the_engine():
-    """Off a default that is a multiple of it; negative control: what was asked for is not simply repeated."""
+    """Off a default that is a multiple of it; negative control: what was asked for is not simply
+    repeated."""
     import pyb2d3
 
     with loaded(ENGINES["box2d_v3:matched"], plain()) as engine:
@@ -274,20 +318,30 @@ def test_a_setting_that_cannot_be_read_back_says_so(name):
         if setting in settings and "box2d" in name:
             assert settings[setting][1] == "passed with every step"
     if name == "box2d_v3:matched":
-        assert settings["contact tuning (hertz, damping ratio, push speed in m/s)"][1] == "not readable"
+        assert (
+            settings["contact tuning (hertz, damping ratio, push speed in m/s)"][1]
+            == "not readable"
+        )
 
 
 @pytest.mark.parametrize("name", ["box2d:shipped", "box2d:matched"])
 def test_box2d_tells_its_own_sleep_setting(name):
-    """`world.allowSleeping` of box2d-py 2.3.8 is an attribute of the Python object that the engine never sees."""
+    """`world.allowSleeping` of box2d-py 2.3.8 is an attribute of the Python object that the engine
+    never sees."""
     with loaded(ENGINES[name], plain()) as engine:
-        assert engine.settings()["sleeping"][1] == engine.world.GetAllowSleeping() == (name == "box2d:shipped")
+        assert (
+            engine.settings()["sleeping"][1]
+            == engine.world.GetAllowSleeping()
+            == (name == "box2d:shipped")
+        )
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_an_engine_repeats_itself_bit_for_bit(name):
     """Twenty-one disks that spin, collide and wrap, with a thrust on one of them."""
-    scenario = replace(from_catalogue("asteroids", 1), thrusts=[Thrust(0, 0.11, 0.63, [0.2, 0.1], torque=0.05)])
+    scenario = replace(
+        from_catalogue("asteroids", 1), thrusts=[Thrust(0, 0.11, 0.63, [0.2, 0.1], torque=0.05)]
+    )
     scenario = replace(scenario, duration=20 * scenario.sample_interval)
     once, again = (played(name, scenario, scenario.sample_interval / 2) for _ in range(2))
     assert once.status == "ok"
@@ -308,6 +362,6 @@ def test_all_engines_at_once_play_as_each_alone():
         together[name] = history(engine)
     for engine in engines.values():
         engine.close()
-    assert {name: first_difference(together[name], alone[name]) for name in ENGINES} == dict.fromkeys(
-        ENGINES, "nowhere"
-    )
+    assert {
+        name: first_difference(together[name], alone[name]) for name in ENGINES
+    } == dict.fromkeys(ENGINES, "nowhere")

@@ -1,4 +1,5 @@
-"""An engine is played once and closed; where a collision begins in the impulses that it reports of, step by step."""
+"""An engine is played once and closed; where a collision begins in the impulses that it reports of,
+step by step."""
 
 from __future__ import annotations
 
@@ -46,8 +47,13 @@ def once(engine: Closing) -> str:
 
 
 def test_an_engine_that_is_played_once_is_closed_once_whatever_it_does():
-    """Played to the end, refused, failed, or with an error that is not its own and goes on to the caller."""
-    for raises, status in ((None, "ok"), (Unsupported("no"), "unsupported"), (ValueError("no"), "error")):
+    """Played to the end, refused, failed, or with an error that is not its own and goes on to the
+    caller."""
+    for raises, status in (
+        (None, "ok"),
+        (Unsupported("no"), "unsupported"),
+        (ValueError("no"), "error"),
+    ):
         engine = Closing(raises)
         assert once(engine) == status
         assert engine.closed == 1
@@ -69,12 +75,18 @@ def test_an_engine_whose_library_is_missing_refuses_by_its_name():
 
     run = play_once(missing, "toy:plain", SCENE, DT)
 
-    assert (run.engine, run.profile, run.status, run.trajectory) == ("toy", "plain", "unsupported", None)
+    assert (run.engine, run.profile, run.status, run.trajectory) == (
+        "toy",
+        "plain",
+        "unsupported",
+        None,
+    )
     assert run.reason == "toyland cannot be imported: No module named 'toyland'"
 
 
 def test_no_source_file_closes_an_engine_by_hand():
-    """But the game and the gases, whose engines outlive a function: all else is `play_once` or `closing`."""
+    """But the game and the gases, whose engines outlive a function: all else is `play_once` or
+    `closing`."""
     root = Path(__file__).parents[2]
     found = {
         path.relative_to(root).as_posix()
@@ -87,8 +99,8 @@ def test_no_source_file_closes_an_engine_by_hand():
 
 
 def test_weight_in_consecutive_steps_is_one_collision_and_collisions_are_each_their_own():
-    """Impulses no larger than weight continue the one before; a larger one is a collision again, a step later or
-    not."""
+    """Impulses no larger than weight continue the one before; a larger one is a collision again, a
+    step later or not."""
     collisions = [
         ContactImpulse(3, 1, 0, 2.0),
         ContactImpulse(4, 0, 1, 1.0),
@@ -108,11 +120,17 @@ def test_weight_in_consecutive_steps_is_one_collision_and_collisions_are_each_th
 
 
 @settings(derandomize=True)
-@given(st.sets(st.tuples(st.integers(0, 12), st.sampled_from([(0, 1), (0, 2), (1, 2), (1, -1), (1, -2)]))))
+@given(
+    st.sets(
+        st.tuples(st.integers(0, 12), st.sampled_from([(0, 1), (0, 2), (1, 2), (1, -1), (1, -2)]))
+    )
+)
 def test_collisions_are_the_beginnings_of_runs_of_impulses(impulses):
     """Counted the slow way: an impulse whose pair had none in the step before."""
     rows = sorted((step, pair) for step, pair in impulses)
-    found = first_collisions([ContactImpulse(step, *pair, 1.0) for step, pair in rows], 1.0, weight=1.0)
+    found = first_collisions(
+        [ContactImpulse(step, *pair, 1.0) for step, pair in rows], 1.0, weight=1.0
+    )
     begins = {(step + 1.0, *pair) for step, pair in impulses if (step - 1, pair) not in impulses}
     assert set(zip(found.t.tolist(), found.i.tolist(), found.j.tolist())) == begins
     assert (np.diff(found.t) >= 0).all()

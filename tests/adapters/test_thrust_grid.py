@@ -1,4 +1,5 @@
-"""A thrust that starts or stops inside a step displaces a disk in every engine, by as much as is said."""
+"""A thrust that starts or stops inside a step displaces a disk in every engine, by as much as is
+said."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,16 @@ EXACT = ("reference:ordered", "event_driven:float64")  # they are right to round
 def thrown(start: float, stop: float, torque: float = 0.0) -> Scenario:
     """A disk in free flight with a thrust."""
     scene = Scene(position=[[0, 0]], velocity=[[1, 0]], radius=[0.25], mass=[2], restitution=1)
-    one = Scenario("thrown", "Where is it?", "here", scene, 1.0, 0.1, (1, 2), [Thrust(0, start, stop, [3, -4], torque)])
+    one = Scenario(
+        "thrown",
+        "Where is it?",
+        "here",
+        scene,
+        1.0,
+        0.1,
+        (1, 2),
+        [Thrust(0, start, stop, [3, -4], torque)],
+    )
     return replace(one, truth=with_oracle(one).truth)
 
 
@@ -35,9 +45,12 @@ def largest_off(one: Scenario, name: str, dt: float) -> float:
 
 
 @pytest.mark.parametrize("name", EXACT)
-@pytest.mark.parametrize(("start", "stop"), [(0.23, 0.6), (0.2, 0.57), (0.2, 2.0), (0.23, 0.57), (0.21, 0.24)])
+@pytest.mark.parametrize(
+    ("start", "stop"), [(0.23, 0.6), (0.2, 0.57), (0.2, 2.0), (0.23, 0.57), (0.21, 0.24)]
+)
 def test_an_exact_engine_is_off_by_no_more_than_is_said(name: str, start: float, stop: float):
-    """By just that where one end alone is inside a step; a thrust on the grid, the control, costs nothing."""
+    """By just that where one end alone is inside a step; a thrust on the grid, the control, costs
+    nothing."""
     one = thrown(start, stop)
     for dt in map(one.dt, one.substeps):
         measured, said = largest_off(one, name, dt), off_grid(one, dt)
@@ -72,7 +85,9 @@ def test_the_note_names_the_steps_at_which_it_happens():
 def test_the_page_and_the_terminal_say_so(tmp_path: Path, stop: float, noted: bool):
     """With the scene; a scene on the grid has no such remark."""
     (tmp_path / "thrown.toml").write_text(scene_text(thrown(0.2, stop)))
-    done = crosscheck("run", "thrown.toml", "--engine", "reference:ordered", "--out", "mine", cwd=tmp_path)
+    done = crosscheck(
+        "run", "thrown.toml", "--engine", "reference:ordered", "--out", "mine", cwd=tmp_path
+    )
     page = (tmp_path / "mine" / "report.html").read_text("utf-8")
 
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,5 @@
-"""Prints what a check costs: `python -m tests.bench.check` checks the first hundred of the catalogue as a class.
+"""Prints what a check costs: `python -m tests.bench.check` checks the first hundred of the
+catalogue as a class.
 
 Seconds by the clock depend on what else the machine does; those of the processors do so far less.
 """
@@ -18,7 +19,9 @@ from tests.solvers.mutants import CORRECT, MUTANTS
 
 def spent() -> float:
     """Processor seconds of this process and of all it has waited for."""
-    return sum(use.ru_utime + use.ru_stime for use in map(getrusage, (RUSAGE_SELF, RUSAGE_CHILDREN)))
+    return sum(
+        use.ru_utime + use.ru_stime for use in map(getrusage, (RUSAGE_SELF, RUSAGE_CHILDREN))
+    )
 
 
 def main() -> None:
@@ -31,7 +34,10 @@ def main() -> None:
         paths = [mutant.write(Path(folder)) for mutant in MUTANTS[:100]]
         began, before = monotonic(), spent()
         judged(paths)
-        print(f"100 files: {monotonic() - began:.0f} s, {spent() - before:.0f} s of {os.cpu_count()} processors")
+        print(
+            f"100 files: {monotonic() - began:.0f} s, {spent() - before:.0f} s of {os.cpu_count()}"
+            " processors"
+        )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""How fast the event engine is: `python -m tests.bench.events` prints its figures and the floors they must reach.
+"""How fast the event engine is: `python -m tests.bench.events` prints its figures and the floors
+they must reach.
 
 `billiards` (PyPI, 0.5.0) is compared with where it is installed; nothing else here needs it.
 """
@@ -21,12 +22,17 @@ from tests.adapters.event_driven.gases import gas
 
 REPEATS = 5
 SLICES = 50  # short ones, so that on a busy machine some are undisturbed
-ROWS = ((1000, 0.3, 1_000_000), (100, 0.3, 1_000_000), (10_000, 0.3, 1_000_000), (1000, 0.5, 1_000_000))
+ROWS = (
+    (1000, 0.3, 1_000_000),
+    (100, 0.3, 1_000_000),
+    (10_000, 0.3, 1_000_000),
+    (1000, 0.5, 1_000_000),
+)
 
 
 def rate(n: int, packing: float, collisions: int) -> tuple[float, float]:
-    """Collisions of two disks a second on a torus, e = 1, after 50 collisions a disk: the best and the median of many
-    slices."""
+    """Collisions of two disks a second on a torus, e = 1, after 50 collisions a disk: the best and
+    the median of many slices."""
     scene, torus = gas(n, packing)
     engine = EventEngine(scene, torus)
     at = 0.0
@@ -49,14 +55,18 @@ def in_a_box(n: int, packing: float) -> Scene:
     """The gas of `gas` between walls: a little room is left around its lattice."""
     scene, torus = gas(n, packing)
     return Scene(
-        position=scene.position, velocity=scene.velocity, radius=scene.radius, mass=scene.mass, restitution=1.0,
+        position=scene.position,
+        velocity=scene.velocity,
+        radius=scene.radius,
+        mass=scene.mass,
+        restitution=1.0,
         walls=box(torus[0] - 0.5, torus[1] + 0.5),
-    )  # fmt: skip
+    )
 
 
 def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, float]:
-    """Seconds of `billiards` and of the engine for the same box, how many collisions, and how long both list the same,
-    s."""
+    """Seconds of `billiards` and of the engine for the same box, how many collisions, and how long
+    both list the same, s."""
     import billiards
 
     (left, bottom), (right, top) = scene.walls.min(axis=(0, 1)), scene.walls.max(axis=(0, 1))
@@ -67,8 +77,10 @@ def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, fl
             billiards.InfiniteWall((right, top), (left, top)),
             billiards.InfiniteWall((left, top), (left, bottom)),
         ]
-    )  # fmt: skip
-    for position, velocity, radius, mass in zip(scene.position, scene.velocity, scene.radius, scene.mass):
+    )
+    for position, velocity, radius, mass in zip(
+        scene.position, scene.velocity, scene.radius, scene.mass
+    ):
         other.add_ball(position, velocity, radius, mass)
     started = perf_counter()
     theirs = [(t, i, j) for t, i, j in other.evolve(until) if isinstance(j, int | np.integer)]
@@ -79,9 +91,14 @@ def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, fl
         started = perf_counter()
         engine.advance(until)
         fast = min(fast, perf_counter() - started)
-    ours = [tuple(collision) for collision in engine.collisions[engine.collisions[:, 2] >= 0][:, :3].tolist()]
+    ours = [
+        tuple(collision)
+        for collision in engine.collisions[engine.collisions[:, 2] >= 0][:, :3].tolist()
+    ]
     same = 0
-    while same < min(len(ours), len(theirs)) and {*ours[same][1:]} == {*map(float, theirs[same][1:3])}:
+    while same < min(len(ours), len(theirs)) and {*ours[same][1:]} == {
+        *map(float, theirs[same][1:3])
+    }:
         same += 1
     return slow, fast, len(engine.collisions), ours[same - 1][0] if same else 0.0
 
@@ -89,8 +106,12 @@ def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, fl
 def alone(code: str, **environment: str) -> float:
     """The number that a Python process of its own prints."""
     ran = subprocess.run(
-        [sys.executable, "-c", code], env=os.environ | environment, capture_output=True, text=True, check=True
-    )  # fmt: skip
+        [sys.executable, "-c", code],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return float(ran.stdout)
 
 
@@ -112,10 +133,11 @@ def compile_time() -> float:
     """Processor seconds for all kernels, from an empty cache."""
     with tempfile.TemporaryDirectory() as empty:
         return alone(
-            "from tests.adapters.event_driven.gases import gas; from time import process_time;"
-            "from adapters.event_driven.events import EventEngine; start = process_time();"
-            "engine = EventEngine(*gas(100, 0.3)); engine.advance(1.0); engine.look(1.0);"
-            "engine.accelerate(0, 1.0, (0.0, 0.0)); engine.advance(2.0); print(process_time() - start)",
+            "from tests.adapters.event_driven.gases import gas; from time import process_time;from"
+            " adapters.event_driven.events import EventEngine; start = process_time();engine ="
+            " EventEngine(*gas(100, 0.3)); engine.advance(1.0);"
+            " engine.look(1.0);engine.accelerate(0, 1.0, (0.0, 0.0)); engine.advance(2.0);"
+            " print(process_time() - start)",
             NUMBA_CACHE_DIR=empty,
         )
 
@@ -126,7 +148,10 @@ def main() -> None:
     for n, packing, collisions in ROWS:
         best, median = rate(n, packing, collisions)
         floor = "1.8" if (n, packing) == (1000, 0.3) else ""
-        print(f"{f'torus, N = {n}, packing {packing}: M collisions/s, best':58}{best / 1e6:14.2f}  {floor}")
+        print(
+            f"{f'torus, N = {n}, packing {packing}: M collisions/s, best':58}{best / 1e6:14.2f} "
+            f" {floor}"
+        )
         print(f"{'    median of ' + str(SLICES) + ' slices':58}{median / 1e6:14.2f}")
     print(f"{'compile all kernels, empty cache: s':58}{compile_time():14.1f}  10 at most")
     print(f"{'N = 100 000: MB':58}{memory():14.0f}  300 at most")
@@ -135,7 +160,10 @@ def main() -> None:
     except ModuleNotFoundError:
         print("billiards is not installed: `uv pip install billiards==0.5.0`")
         return
-    print(f"{f'box, N = 100, {collisions} collisions: billiards over this engine, seconds':58}{slow / fast:14.0f}  100")
+    print(
+        f"{f'box, N = 100, {collisions} collisions: billiards over this engine, seconds':58}"
+        f"{slow / fast:14.0f}  100"
+    )
     print(f"{'    the same collisions in the same order until: s':58}{same:14.2f}")
 
 

@@ -1,4 +1,5 @@
-"""How smoothly the game flies four engines and 21 disks in Chromium: `uv run python -m tests.bench.game [SECONDS]`."""
+"""How smoothly the game flies four engines and 21 disks in Chromium: `uv run python -m
+tests.bench.game [SECONDS]`."""
 
 from __future__ import annotations
 
@@ -37,10 +38,12 @@ MEANINGS = {
 
 
 def measure(seconds: float) -> tuple[dict[str, np.ndarray], float]:
-    """ms of each kind over so many seconds of a flight under thrust, and the flight's time over the clock's."""
+    """ms of each kind over so many seconds of a flight under thrust, and the flight's time over the
+    clock's."""
     with served(application(Game(FIRST))) as url, chromium() as browser:
         page, heard = opened(browser, url, viewport={"width": 1280, "height": 900})
-        page.wait_for_function("() => game.field && game.now.frame > 64", timeout=120_000)  # compiled by then
+        # compiled by then
+        page.wait_for_function("() => game.field && game.now.frame > 64", timeout=120_000)
         page.keyboard.down("w")
         page.evaluate(LISTEN)
         before = page.evaluate("[game.now.t, performance.now()]")
@@ -59,7 +62,10 @@ def main(seconds: float) -> None:
     print(f"{len(FIRST)} engines, 21 disks, {seconds:g} s: {', '.join(FIRST)}")
     print(f"{'ms':24}{'mean':>8}{'95 %':>8}{'most':>8}")
     for name, ms in rows.items():
-        print(f"{name:24}{ms.mean():8.2f}{np.quantile(ms, 0.95):8.2f}{ms.max():8.2f}  {MEANINGS[name]}")
+        print(
+            f"{name:24}{ms.mean():8.2f}{np.quantile(ms, 0.95):8.2f}{ms.max():8.2f} "
+            f" {MEANINGS[name]}"
+        )
     rate = 1e3 / rows["between two pictures"].mean()
     print(f"{rate:.1f} pictures a second; the flight goes at {pace:.1%} of the clock's pace")
 

@@ -1,7 +1,8 @@
-"""How far and how fast the oracle answers: `python -m tests.bench.oracle` prints its figures and writes them down.
+"""How far and how fast the oracle answers: `python -m tests.bench.oracle` prints its figures and
+writes them down.
 
-They go to tests/data/oracle_figures.csv, which `uv run pytest -m slow tests/bench/test_oracle_figures.py` computes
-again.
+They go to tests/data/oracle_figures.csv, which `uv run pytest -m slow
+tests/bench/test_oracle_figures.py` computes again.
 """
 
 from __future__ import annotations
@@ -29,8 +30,17 @@ FLOORS = {60.0: 0.2, 600.0: 3.0}  # s, for a certified answer of the box at e = 
 FALLS = {0.5: range(4), 0.8: range(4), 0.9: range(2)}  # restitution and seeds
 FALL = 10.0  # s, of the falling boxes
 COLUMNS = (
-    "scene", "duration_s", "method", "bits", "collisions", "rests", "first_rest_s", "horizon_s", "ends_because", "seconds",
-)  # fmt: skip
+    "scene",
+    "duration_s",
+    "method",
+    "bits",
+    "collisions",
+    "rests",
+    "first_rest_s",
+    "horizon_s",
+    "ends_because",
+    "seconds",
+)
 Row = dict[str, str | float | int]
 
 
@@ -42,7 +52,12 @@ def lasting_box(seed: int, duration: float) -> Scenario:
 def wrapped(duration: float) -> Scenario:
     """The asteroids at e = 1 on the exercise's wrap."""
     one = scenario("asteroids")
-    return replace(one, scene=replace(one.scene, restitution=1.0), duration=duration, sample_interval=duration / 100)
+    return replace(
+        one,
+        scene=replace(one.scene, restitution=1.0),
+        duration=duration,
+        sample_interval=duration / 100,
+    )
 
 
 def falling(restitution: float, seed: int) -> Scenario:
@@ -51,27 +66,38 @@ def falling(restitution: float, seed: int) -> Scenario:
 
 
 def figures(name: str, one: Scenario, repeats: int) -> Row:
-    """One row: what the record says, and the best time of a few, on the processor: others may use it, too."""
+    """One row: what the record says, and the best time of a few, on the processor: others may use
+    it, too."""
     best = np.inf
     for _ in range(repeats):
         started = process_time()
         record = computed(one)
         best = min(best, process_time() - started)
-    return {"scene": name, "duration_s": one.duration, **said(one, record), "seconds": round(best, 3)}
+    return {
+        "scene": name,
+        "duration_s": one.duration,
+        **said(one, record),
+        "seconds": round(best, 3),
+    }
 
 
 def said(one: Scenario, record: TruthRecord) -> Row:
     """What does not depend on the machine."""
     rests = record.events[record.events[:, 3] == 0, 0]
     return {
-        "method": record.method, "bits": record.bits, "collisions": len(record.events) - len(rests), "rests": len(rests),
+        "method": record.method,
+        "bits": record.bits,
+        "collisions": len(record.events) - len(rests),
+        "rests": len(rests),
         "first_rest_s": round(float(rests[0]), 6) if len(rests) else "",
-        "horizon_s": round(min(record.horizon, one.duration), 6), "ends_because": record.reason,
-    }  # fmt: skip
+        "horizon_s": round(min(record.horizon, one.duration), 6),
+        "ends_because": record.reason,
+    }
 
 
 def growth(one: Scenario, bits: int = 128) -> float:
-    """1/s, of the distance of runs with so many and twice as many bits, from 2^-bits to what they may be off."""
+    """1/s, of the distance of runs with so many and twice as many bits, from 2^-bits to what they
+    may be off."""
     coarse, fine = (trace(one.scene, [], one.duration, digits(each)) for each in (bits, 2 * bits))
     diverged, _ = difference(coarse, fine, one.duration, digits(2 * bits), accuracy_of(one))
     return (bits * log(2) + log(accuracy_of(one))) / diverged
@@ -80,7 +106,9 @@ def growth(one: Scenario, bits: int = 128) -> float:
 def main() -> None:
     """The table, row by row; and the file."""
     computed(lasting_box(0, 1.0))  # compiles what is not yet in numba's cache
-    print(f"growth of a distance, box 0: {growth(lasting_box(0, 600.0)):.2f} 1/s; floors {FLOORS} s")
+    print(
+        f"growth of a distance, box 0: {growth(lasting_box(0, 600.0)):.2f} 1/s; floors {FLOORS} s"
+    )
     with FIGURES.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()

@@ -1,13 +1,16 @@
-"""How fast the reference is beside the engines: `python -m tests.bench.reference` prints and writes its figures.
+"""How fast the reference is beside the engines: `python -m tests.bench.reference` prints and writes
+its figures.
 
-A gas of equal disks between walls (area fraction 0.3, e = 1, dt 1/240 s, kT = m = diameter = 1), played by every engine
-in turn, round by round in shuffled order: nothing is read and no collision is reported while the clock runs, and Python
-calls the engine once a step where it cannot take many. Each engine's own state goes on from round to round. The clock
-is that of the thread, which does not run while others have the processor; they still take its caches: leave the machine
-alone.
+A gas of equal disks between walls (area fraction 0.3, e = 1, dt 1/240 s, kT = m = diameter = 1),
+played by every engine in turn, round by round in shuffled order: nothing is read and no collision
+is reported while the clock runs, and Python calls the engine once a step where it cannot take many.
+Each engine's own state goes on from round to round. The clock is that of the thread, which does not
+run while others have the processor; they still take its
+caches: leave the machine alone.
 
-The figures go to tests/data/reference_figures.csv, each with the least or the most that is demanded of it;
-`uv run pytest tests/bench/test_reference_figures.py` holds them to it, and with `-m slow` measures some ratios anew.
+The figures go to tests/data/reference_figures.csv, each with the least or the most that is demanded
+of it; `uv run pytest tests/bench/test_reference_figures.py` holds them to it, and with `-m slow`
+measures some ratios anew.
 """
 
 from __future__ import annotations
@@ -37,7 +40,8 @@ from tests.reference_impl.test_ordered import CASES, off
 Step = Callable[[int], object]  # advances so many steps
 DT, ROUNDS, LONG = 1 / 240, 15, 0.02  # s, rounds, s that a round of one engine takes at least
 SIZES = (100, 1000, 10_000, 100_000)
-LEAST = {"pymunk": 8.0, "box2d": 25.0, "box2d_v3": 12.0}  # steps of the reference in one of theirs, of 1000 disks
+# steps of the reference in one of theirs, of 1000 disks
+LEAST = {"pymunk": 8.0, "box2d": 25.0, "box2d_v3": 12.0}
 FIGURES = Path(__file__).parents[2] / "tests" / "data" / "reference_figures.csv"
 
 
@@ -81,13 +85,17 @@ def box2d(profile: str, scene: Scene, dt: float) -> Step:
     engine = Box2DEngine(profile)
     engine.load(scene, dt)
     engine.world.contactListener = None
-    unit, velocity, position = dt / engine.time, engine.velocity_iterations, engine.position_iterations
+    unit, velocity, position = (
+        dt / engine.time,
+        engine.velocity_iterations,
+        engine.position_iterations,
+    )
     return lambda count: [engine.world.Step(unit, velocity, position) for _ in range(count)]
 
 
 def box2d_v3(profile: str, scene: Scene, dt: float) -> Step:
-    """The world, whose collision events nobody collects; its unit of length is global, so it is set before each
-    round."""
+    """The world, whose collision events nobody collects; its unit of length is global, so it is set
+    before each round."""
     import pyb2d3
 
     engine = Box2DV3(profile)
@@ -103,7 +111,8 @@ def box2d_v3(profile: str, scene: Scene, dt: float) -> Step:
 
 
 def engines(scene: Scene, dt: float) -> dict[str, Step]:
-    """Everyone who steps, and the reference a second time: what it measures against itself is the noise."""
+    """Everyone who steps, and the reference a second time: what it measures against itself is the
+    noise."""
     steps = {
         "reference:exercise": reference(verlet_list, scene, dt),
         "reference:exercise again": reference(verlet_list, scene, dt),
@@ -116,7 +125,8 @@ def engines(scene: Scene, dt: float) -> dict[str, Step]:
 
 
 def times(steps: dict[str, Step], warm: int) -> dict[str, np.ndarray]:
-    """(ROUNDS,) microseconds a step of each, interleaved in an order shuffled anew each round, after warming up."""
+    """(ROUNDS,) microseconds a step of each, interleaved in an order shuffled anew each round,
+    after warming up."""
     rng = np.random.default_rng(0)
     counts = {}
     for name, step in steps.items():
@@ -133,8 +143,11 @@ def times(steps: dict[str, Step], warm: int) -> dict[str, np.ndarray]:
     return {name: np.array(values) for name, values in samples.items()}
 
 
-def compared(scene: str, n: int, steps: dict[str, Step], least: dict[str, float]) -> Iterator[Figure]:
-    """What a step of each costs, and how many of the first go into it, within a round, whose noise is shared."""
+def compared(
+    scene: str, n: int, steps: dict[str, Step], least: dict[str, float]
+) -> Iterator[Figure]:
+    """What a step of each costs, and how many of the first go into it, within a round, whose noise
+    is shared."""
     measured = times(steps, 200)
     base = next(iter(measured))
     for name, samples in measured.items():
@@ -142,11 +155,14 @@ def compared(scene: str, n: int, steps: dict[str, Step], least: dict[str, float]
         yield Figure(scene, n, f"{name}, step", middle, high - low, "us")
         if name != base:
             ratio = float(np.median(samples / measured[base]))
-            yield Figure(scene, n, f"{name} over {base}", ratio, at_least=least.get(name.split(":")[0]))
+            yield Figure(
+                scene, n, f"{name} over {base}", ratio, at_least=least.get(name.split(":")[0])
+            )
 
 
 def added(n: int) -> float:
-    """Bytes a disk that playing n disks adds at most to what the process holds; scene and compiled code not counted."""
+    """Bytes a disk that playing n disks adds at most to what the process holds; scene and compiled
+    code not counted."""
     warm = Reference(verlet_list)
     warm.load(boxed_gas(1000, 0.3), DT)
     scene = boxed_gas(n, 0.3)
@@ -161,14 +177,20 @@ def added(n: int) -> float:
 
 def status(key: str) -> float:
     """Bytes, of a line in /proc/self/status."""
-    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(key))
+    (line,) = (
+        line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(key)
+    )
     return 1024.0 * float(line.split()[1])
 
 
 def memory(n: int) -> float:
     """`added` in a process of its own."""
     code = f"from tests.bench.reference import added; print(added({n}))"
-    return float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
+    return float(
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout
+    )
 
 
 def gases() -> Iterator[Figure]:
@@ -190,7 +212,8 @@ def sizes() -> Iterator[Figure]:
 
 
 def in_order() -> Iterator[Figure]:
-    """`reference:ordered` in the box of the asteroids: its cost, and how far off it is in 20 of them."""
+    """`reference:ordered` in the box of the asteroids: its cost, and how far off it is in 20 of
+    them."""
     asteroids, dt = boxed_asteroids(0), 1 / 60
     steps = {
         "reference:ordered": reference(ordered, asteroids, dt),
@@ -211,7 +234,12 @@ def in_order() -> Iterator[Figure]:
 def header() -> str:
     """Machine and versions, as comment lines."""
     saved = about("python -m tests.bench.reference", 0)
-    lines = {"started": saved["started"], **saved["machine"], **saved["versions"], "busy cores": f"{busy_cores():.2f}"}
+    lines = {
+        "started": saved["started"],
+        **saved["machine"],
+        **saved["versions"],
+        "busy cores": f"{busy_cores():.2f}",
+    }
     return "".join(f"# {key}: {value}\n" for key, value in lines.items())
 
 
@@ -223,7 +251,10 @@ def main() -> None:
         table.writerow(Figure._fields)
         for part in (gases, sizes, in_order):
             for figure in part():
-                row = ["" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else cell for cell in figure]
+                row = [
+                    "" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else cell
+                    for cell in figure
+                ]
                 table.writerow(row)
                 print("  ".join(map(str, row)), flush=True)
 

@@ -1,4 +1,5 @@
-"""What the harness adds to the engines' own time: `python -m tests.bench.runner` prints it, and the ceilings."""
+"""What the harness adds to the engines' own time: `python -m tests.bench.runner` prints it, and the
+ceilings."""
 
 from __future__ import annotations
 
@@ -34,19 +35,32 @@ ROUNDS = 3
 
 
 class Cost(NamedTuple):
-    """Of a run in s: wall time from the first line of the journal to the last, wall time inside the engines' `step`,
-    and processor time of this process and its workers."""
+    """Of a run in s: wall time from the first line of the journal to the last, wall time inside the
+    engines' `step`, and processor time of this process and its workers."""
 
     wall: float
     inside: float
     processor: float
 
 
-def played(scenarios: Mapping[str, Scenario], cells: list[Cell], workers: int, folder: Path) -> Cost:
+def played(
+    scenarios: Mapping[str, Scenario], cells: list[Cell], workers: int, folder: Path
+) -> Cost:
     """What it costs to play the cells into the folder."""
     questions = {scene: replace(one, truth=None) for scene, one in scenarios.items()}
-    tasks = {cell: partial(play_here, cell, ENGINES[cell.engine], questions[cell.scene]) for cell in cells}
-    plan = RunPlan(list(scenarios), {cell.engine: ENGINES[cell.engine] for cell in cells}, 0, [], False, 0, "bench")
+    tasks = {
+        cell: partial(play_here, cell, ENGINES[cell.engine], questions[cell.scene])
+        for cell in cells
+    }
+    plan = RunPlan(
+        list(scenarios),
+        {cell.engine: ENGINES[cell.engine] for cell in cells},
+        0,
+        [],
+        False,
+        0,
+        "bench",
+    )
     inside, started, before = 0.0, perf_counter(), sum(processor())
     with Journal(folder) as journal:
         begin(plan, journal, scenarios, len(tasks))
@@ -60,7 +74,9 @@ def played(scenarios: Mapping[str, Scenario], cells: list[Cell], workers: int, f
 
 def processor() -> list[float]:
     """s of processor time of this process, and of its workers that have ended."""
-    usages = [resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    usages = [
+        resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    ]
     return [usage.ru_utime + usage.ru_stime for usage in usages]
 
 
@@ -68,11 +84,14 @@ def crowd() -> Scenario:
     """1000 disks in a box, 20 s sampled 120 times."""
     scene, (low, high) = gas(1000, 0.3)
     scene = replace(scene, walls=box(low - 0.5, high + 0.5))
-    return Scenario("crowd", "How long do 1000 disks take?", "a gas", scene, 20.0, 1 / 6, (20, 40, 80))
+    return Scenario(
+        "crowd", "How long do 1000 disks take?", "a gas", scene, 20.0, 1 / 6, (20, 40, 80)
+    )
 
 
 def overhead_of_large() -> None:
-    """Wall over engine time with 1000 disks: a run of nine cells on one worker, its start included."""
+    """Wall over engine time with 1000 disks: a run of nine cells on one worker, its start
+    included."""
     names = ("pymunk:matched", "box2d:matched", "box2d_v3:matched")
     cells = [Cell("crowd", 0, name, k) for name in names for k in crowd().substeps]
     best: dict[str, float] = {}
@@ -85,13 +104,15 @@ def overhead_of_large() -> None:
     stepping, reading = (sum(column) for column in zip(*alone))
     print(f"1000 disks, 9 cells: wall over engine {best['wall']:.2f}   (ceiling 1.2)")
     print(
-        f"  processor {best['processor']:.2f} s: {stepping:.2f} the engines, {reading:.2f} the reading of the samples "
-        f"that the scene asks for, {best['processor'] - stepping - reading:.2f} the harness, starting included"
+        f"  processor {best['processor']:.2f} s: {stepping:.2f} the engines, {reading:.2f} the"
+        " reading of the samples that the scene asks for,"
+        f" {best['processor'] - stepping - reading:.2f} the harness, starting included"
     )
 
 
 def overhead_of_small() -> None:
-    """ms a cell beside the engine, of 500 cells of two disks and 241 samples, one worker, its start taken off."""
+    """ms a cell beside the engine, of 500 cells of two disks and 241 samples, one worker, its start
+    taken off."""
     slow_collision = {"slow_collision": scenario("slow_collision")}
     for name in ("pymunk:matched", "box2d:matched", "box2d_v3:matched"):
         rounds = []
@@ -106,14 +127,16 @@ def overhead_of_small() -> None:
         all_of_it = min(processor for _, _, processor in rounds)
         stepping, reading = (1e3 * s for s in least(name, slow_collision["slow_collision"], 1))
         print(
-            f"small cells, {name:<16} {wall:5.2f} ms a cell beside the engine; processor {all_of_it:.2f} ms: "
-            f"{stepping:.2f} the engine, {reading:.2f} the reading of the samples that the scene asks for, "
-            f"{all_of_it - stepping - reading:.2f} the harness   (ceiling 5)"
+            f"small cells, {name:<16} {wall:5.2f} ms a cell beside the engine; processor"
+            f" {all_of_it:.2f} ms: {stepping:.2f} the engine, {reading:.2f} the reading of the"
+            f" samples that the scene asks for, {all_of_it - stepping - reading:.2f} the harness  "
+            " (ceiling 5)"
         )
 
 
 def least(name: str, scene: Scenario, substeps: int) -> tuple[float, float]:
-    """s of processor time that an engine takes for all steps of a scenario and for all reads: the least of some."""
+    """s of processor time that an engine takes for all steps of a scenario and for all reads: the
+    least of some."""
     tries = []
     for _ in range(ROUNDS):
         engine, clock = ENGINES[name].make(), [0.0, 0.0]
@@ -140,20 +163,23 @@ class Clocked(Progress):
 
 
 def many_cells(folder: Path) -> None:
-    """5560 cells, 139 scenes of two disks, 10 engines, 4 steps: played, and their tables made once more; in processes
-    of their own, whose memory can be measured."""
+    """5560 cells, 139 scenes of two disks, 10 engines, 4 steps: played, and their tables made once
+    more; in processes of their own, whose memory can be measured."""
     for number in range(139):
         one = scenario("slow_collision")
         scene = replace(one.scene, velocity=one.scene.velocity * (1 + number / 100))
         path = folder / f"collision-{number}.toml"
-        write_scene_file(replace(one, name=f"collision-{number}", scene=scene, duration=1.0, truth=None), path)
+        write_scene_file(
+            replace(one, name=f"collision-{number}", scene=scene, duration=1.0, truth=None), path
+        )
     for what in (play_many, tables_again):
         words = [sys.executable, "-m", "tests.bench.runner", what.__name__, str(folder)]
         print(subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout.strip())
 
 
 def play_many(folder: Path) -> None:
-    """Print how long a run of all scenes takes, and how long after its last cell the tables are there."""
+    """Print how long a run of all scenes takes, and how long after its last cell the tables are
+    there."""
     scenes = sorted(str(path) for path in folder.glob("*.toml"))
     out = folder / "out"
     out.mkdir()
@@ -164,7 +190,10 @@ def play_many(folder: Path) -> None:
         archive = Archive.read(out)
         make_tables(archive, lambda _: None)
     made, inside = perf_counter(), sum(record["seconds"] for record in archive.records)
-    print(f"{len(archive.records)} cells on 2 workers: {made - started:.1f} s, {inside:.1f} s of them in the engines")
+    print(
+        f"{len(archive.records)} cells on 2 workers: {made - started:.1f} s, {inside:.1f} s of them"
+        " in the engines"
+    )
     print(f"  tables {made - progress.last:.2f} s after the last cell (ceiling 3), {used()}")
 
 
@@ -178,7 +207,10 @@ def tables_again(folder: Path) -> None:
 def used() -> str:
     """Processor time and memory of this process and of its workers."""
     seconds = processor()
-    mine, theirs = (resource.getrusage(who).ru_maxrss / 1e3 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    mine, theirs = (
+        resource.getrusage(who).ru_maxrss / 1e3
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
     return (
         f"processor {seconds[0]:.1f} s here and {seconds[1]:.1f} s in the workers, "
         f"memory {mine:.0f} MB here (ceiling 300) and {theirs:.0f} MB in the largest worker"

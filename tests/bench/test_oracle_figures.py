@@ -1,7 +1,7 @@
 """The figures of the oracle that are written down: computed again, and what they claim.
 
-`python -m tests.bench.oracle` writes them; `uv run pytest -m slow tests/bench/test_oracle_figures.py` computes them
-again.
+`python -m tests.bench.oracle` writes them; `uv run pytest -m slow
+tests/bench/test_oracle_figures.py` computes them again.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ WRITTEN = list(csv.DictReader(FIGURES.open(encoding="utf-8")))
 
 def row_of(name: str, duration: float) -> dict[str, str]:
     """The written row of a question."""
-    return next(row for row in WRITTEN if (row["scene"], float(row["duration_s"])) == (name, duration))
+    return next(
+        row for row in WRITTEN if (row["scene"], float(row["duration_s"])) == (name, duration)
+    )
 
 
 def test_the_box_is_certified_within_its_floors():
@@ -43,16 +45,22 @@ def test_falling_boxes_are_answered_beyond_their_first_rest():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not has_balls(), reason="python-flint is an extra: without it no row is certified")
+@pytest.mark.skipif(
+    not has_balls(), reason="python-flint is an extra: without it no row is certified"
+)
 @pytest.mark.parametrize(("name", "one"), [(name, one) for name, _, one in questions()])
 def test_the_figures_are_what_is_computed(name: str, one: Scenario):
-    """The same collisions, rests and horizon to the microsecond they are written with; nothing overlaps, energy
-    falls."""
+    """The same collisions, rests and horizon to the microsecond they are written with; nothing
+    overlaps, energy falls."""
     record, written = computed(one), row_of(name, one.duration)
     found, truth, scene = said(one, record), record.sampled(one.scene, [], one.times), one.scene
-    energy = (scene.mass * ((truth.velocity**2).sum(-1) / 2 - truth.position @ scene.gravity)).sum(axis=1)
+    energy = (scene.mass * ((truth.velocity**2).sum(-1) / 2 - truth.position @ scene.gravity)).sum(
+        axis=1
+    )
 
-    assert {name: str(value) for name, value in found.items()} == {name: written[name] for name in found}
+    assert {name: str(value) for name, value in found.items()} == {
+        name: written[name] for name in found
+    }
     assert smallest_gap(scene, truth.position).min() > -ACCURACY
     # Energies of up to 500 J, rounded.
     assert (np.diff(energy) < 1e-11).all()

@@ -1,7 +1,8 @@
-"""The figures of the reference that are written down: they are as demanded, and some are measured again.
-
-`python -m tests.bench.reference` writes them; `uv run pytest -m slow tests/bench/test_reference_figures.py` measures
+"""The figures of the reference that are written down: they are as demanded, and some are measured
 again.
+
+`python -m tests.bench.reference` writes them; `uv run pytest -m slow
+tests/bench/test_reference_figures.py` measures again.
 """
 
 from __future__ import annotations
@@ -13,8 +14,11 @@ import pytest
 from tests.adapters.event_driven.gases import boxed_gas
 from tests.bench.reference import DT, FIGURES, LEAST, compared, engines
 
-WRITTEN = [line for line in FIGURES.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-LOOSE = 2.0  # of what is demanded: on a busy machine the engines and the reference lose their caches unequally
+WRITTEN = [
+    line for line in FIGURES.read_text(encoding="utf-8").splitlines() if not line.startswith("#")
+]
+# of what is demanded: on a busy machine the engines and the reference lose their caches unequally
+LOOSE = 2.0
 
 
 def test_every_figure_is_as_demanded():
@@ -22,7 +26,9 @@ def test_every_figure_is_as_demanded():
     rows = [row for row in csv.DictReader(WRITTEN) if row["at_least"] or row["at_most"]]
     assert len(rows) >= 14
     for row in rows:
-        assert float(row["at_least"] or 0) <= float(row["value"]) <= float(row["at_most"] or "inf"), row
+        assert (
+            float(row["at_least"] or 0) <= float(row["value"]) <= float(row["at_most"] or "inf")
+        ), row
 
 
 @pytest.mark.slow

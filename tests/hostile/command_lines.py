@@ -54,7 +54,10 @@ REFUSED: dict[str, tuple[tuple[str, ...], str]] = {
     "memory of 400 digits": (("run", "--memory", "9" * 400), "--memory"),
     "timings backwards": (("run", "--timings", "-3"), "--timings"),
     "a scheduler that is none": (("run", "free_fall", "--scheduler", "here"), "here"),
-    "a scheduler that does not answer": (("run", "free_fall", "--scheduler", "tcp://127.0.0.1:1"), "tcp://127.0.0.1:1"),
+    "a scheduler that does not answer": (
+        ("run", "free_fall", "--scheduler", "tcp://127.0.0.1:1"),
+        "tcp://127.0.0.1:1",
+    ),
     "a scheduler in escape codes": (("run", "free_fall", "--scheduler", "tcp://\x1b[31m"), ""),
     "truth of nothing": (("truth",), "Missing argument"),
     "truth of two": (("truth", "slow_collision", "free_fall"), "free_fall"),
@@ -82,8 +85,16 @@ REFUSED: dict[str, tuple[tuple[str, ...], str]] = {
     "a flight that is not there": (("play", "nowhere.toml"), "nowhere.toml"),
     "a flight that is a folder": (("play", "."), "."),
     "seventeen engines in flight": (
-        ("play", *(word for _ in range(1) for name in ("reference", "pymunk", "box2d", "bullet") for word in
-                   ("--engine", name))), "bullet",
+        (
+            "play",
+            *(
+                word
+                for _ in range(1)
+                for name in ("reference", "pymunk", "box2d", "bullet")
+                for word in ("--engine", name)
+            ),
+        ),
+        "bullet",
     ),
     "help in a wrong place": (("--helpp",), "--helpp"),
     "a switch of the shell": (("run", ";", "rm", "-rf", "x"), ""),
@@ -93,28 +104,56 @@ REFUSED: dict[str, tuple[tuple[str, ...], str]] = {
     "a pattern that found nothing": (("run", "*.toml"), "*.toml"),
     "a home that a shell did not find": (("truth", "~/two.toml"), "~/two.toml"),
     "a URL": (("run", "https://example.com/two.toml"), "https:"),
-}  # fmt: skip
+}
 
 PLAYED = ("run", "two.toml", "--engine", "pymunk:shipped", "--dt", "0.02", "--out", "out")
 DONE: dict[str, tuple[tuple[str, ...], tuple[int, ...], str]] = {
     "a thousand workers": ((*PLAYED, "--workers", "1000"), (0,), "All 1 cells have ended: 1 ok"),
     "workers of 18 digits": ((*PLAYED, "--workers", "9" * 18), (0, 2), ""),
-    "more memory than there is": ((*PLAYED, "--workers", "1", "--memory", "1000000000"), (0,), "1 ok"),
+    "more memory than there is": (
+        (*PLAYED, "--workers", "1", "--memory", "1000000000"),
+        (0,),
+        "1 ok",
+    ),
     "a scene twice": (("run", "two.toml", *PLAYED[1:], "--workers", "1"), (0,), "All 1 cells"),
-    "an engine twice": ((*PLAYED, "--engine", "pymunk:shipped", "--workers", "1"), (0,), "All 1 cells"),
+    "an engine twice": (
+        (*PLAYED, "--engine", "pymunk:shipped", "--workers", "1"),
+        (0,),
+        "All 1 cells",
+    ),
     "a step twice": ((*PLAYED, "--dt", "0.02", "--workers", "1"), (0,), "All 1 cells"),
-    "an option twice": ((*PLAYED, "--workers", "9", "--workers", "1", "--seed", "1", "--seed", "2"), (0,), "1 cells"),
+    "an option twice": (
+        (*PLAYED, "--workers", "9", "--workers", "1", "--seed", "1", "--seed", "2"),
+        (0,),
+        "1 cells",
+    ),
     "a seed of 18 digits": (("truth", "two.toml", "--seed", "9" * 18), (0,), "horizon"),
     "a tenth of a second": (("truth", "two.toml", "--timeout", "0.1"), (0, 1), ""),
     "no words at all but help": (("--help",), (0,), "Commands"),
     "help after nonsense": (("run", "nonsense", "--help"), (0,), "Options"),
     "a list of everything": (("list",), (0,), "free_fall"),
-}  # fmt: skip
+}
 LINES = (
     *(Input(name, words, says=says) for name, (words, says) in REFUSED.items()),
-    *(Input(name, words, {"two.toml": TWO}, codes=codes, says=says, writes=("out", "out.part"))
-      for name, (words, codes, says) in DONE.items()),
-    *(Input(f"help of {command}", (command, "--help"), codes=(0,), says="Usage")
-      for command in ("run", "truth", "report", "replay", "diff", "check", "play", "lesson", "speed", "stability",
-                      "tune", "list")),
-)  # fmt: skip
+    *(
+        Input(name, words, {"two.toml": TWO}, codes=codes, says=says, writes=("out", "out.part"))
+        for name, (words, codes, says) in DONE.items()
+    ),
+    *(
+        Input(f"help of {command}", (command, "--help"), codes=(0,), says="Usage")
+        for command in (
+            "run",
+            "truth",
+            "report",
+            "replay",
+            "diff",
+            "check",
+            "play",
+            "lesson",
+            "speed",
+            "stability",
+            "tune",
+            "list",
+        )
+    ),
+)

@@ -29,14 +29,19 @@ FOREIGN: dict[str, dict[str, str | bytes]] = {
     "trajectories and nothing else": {"out/trajectories/mine.npz": b"years of work"},
     "a page of his own": {"out/report.html": "<html>mine</html>"},
     "tables as ours are called": {
-        "out/runs.csv": "mine", "out/speed.csv": "mine", "out/limits.csv": "mine", "out/matched.csv": "mine",
+        "out/runs.csv": "mine",
+        "out/speed.csv": "mine",
+        "out/limits.csv": "mine",
+        "out/matched.csv": "mine",
         "out/index.html": "mine",
     },
     "a journal that is a diary": {"out/journal.jsonl": '{"dear": "diary"}\n'},
-    "a made.json of another program": {"out/made.json": '{"command": "make", "finished": true, "files": {}}'},
+    "a made.json of another program": {
+        "out/made.json": '{"command": "make", "finished": true, "files": {}}'
+    },
     "a made.json that is no table": {"out/made.json": "[1, 2, 3]", "out/a.txt": "mine"},
     "a file that is hidden": {"out/.git/config": "[core]"},
-}  # fmt: skip
+}
 TAKEN = tuple(
     Input(f"{command} into a folder with {what}", (*words, "out"), SCENE | files, says=says(what))
     for what, files in FOREIGN.items()
@@ -77,12 +82,19 @@ PATHS: dict[str, tuple[str, Prepare | None]] = {
     "a socket": ("out", bound),
 }
 NO_PLACE = tuple(
-    Input(f"{command} into {what}", (*OUT[command], path), SCENE, prepare=prepare,
-          says=path.strip("./")[:20] or "where you are")
+    Input(
+        f"{command} into {what}",
+        (*OUT[command], path),
+        SCENE,
+        prepare=prepare,
+        says=path.strip("./")[:20] or "where you are",
+    )
     for number, (what, (path, prepare)) in enumerate(PATHS.items())
-    for command in [("run", "speed", "stability", "tune", "lesson")[number % 5],
-                    ("lesson", "run", "run", "stability", "run")[number % 5]]
-)  # fmt: skip
+    for command in [
+        ("run", "speed", "stability", "tune", "lesson")[number % 5],
+        ("lesson", "run", "run", "stability", "run")[number % 5],
+    ]
+)
 
 
 def note(name: str, here: Path) -> None:
@@ -116,87 +128,255 @@ def unfinished(here: Path) -> None:
     """The run was killed: it is where it was while it lasted, and not finished."""
     moved("out", "out.part", here)
     made = json.loads((here / "out.part" / "made.json").read_text())
-    (here / "out.part" / "made.json").write_text(json.dumps(made | {"finished": False}, indent=1) + "\n")
+    (here / "out.part" / "made.json").write_text(
+        json.dumps(made | {"finished": False}, indent=1) + "\n"
+    )
 
 
 AGAIN = (*RUN, "--out", "out")
 RESUME = ("run", "--resume", "out")
 OURS = (
-    *(Input(f"{what}, {words[1]}", words, prepare=copied("out", then=partial(note, f"out/{path}")), says="holds")
-      for what, path in {
-          "a run with a note": "notes.txt", "a run with a scene of the user's": "scenes/mine.toml",
-          "a run with a trajectory of the user's": "trajectories/mine.npz",
-          "a run with a folder of the user's": "trajectories/deeper/mine.txt",
-          "a run whose page was written over": "report.html", "a run whose table was edited": "deviations.csv",
-          "a run with a table of the user's": "compared/mine.csv",
-      }.items() for words in (AGAIN, RESUME)),
-    Input("a run whose trajectories are a link", AGAIN,
-          prepare=copied("out", then=partial(moved_and_linked, "out/trajectories")), says="holds trajectories"),
-    Input("a run that is a link to a run", AGAIN, prepare=copied("out", then=partial(moved_and_linked, "out")),
-          codes=(0,), writes=("elsewhere", "out"), says="All 2 cells"),
-    Input("a run that another process writes", RESUME, prepare=copied("out", then=held), says="another crosscheck"),
-    Input("a run into one that was broken off", AGAIN, prepare=copied("out", then=unfinished),
-          says="interrupted run"),
-    Input("a run whose part is somebody's folder", AGAIN,
-          prepare=copied("out", then=partial(note, "out.part/mine.txt")), says="out.part: holds mine.txt"),
-    Input("a run whose part is somebody's file", AGAIN, prepare=copied("out", then=partial(note, "out.part")),
-          says="out.part: is a file"),
-    Input("a run again", AGAIN, prepare=copied("out"), codes=(0,), writes=("out", "out.part"), says="All 2 cells"),
-    Input("a run into a folder that is empty", AGAIN, SCENE, prepare=lambda here: (here / "out").mkdir(),
-          codes=(0,), writes=("out", "out.part"), says="All 2 cells"),
-    Input("a run of a scene in the folder's own scenes", ("run", "out/scenes/a.toml", "--out", "out"),
-          {"out/scenes/a.toml": TWO}, says="holds scenes"),
-    Input("speed into a run", (*OUT["speed"], "out"), prepare=copied("out"), says="made by crosscheck run"),
-    Input("stability into a run", (*OUT["stability"], "out"), prepare=copied("out"), says="made by crosscheck run"),
-    Input("tune into a run", (*OUT["tune"], "out"), prepare=copied("out"), says="made by crosscheck run"),
-    Input("lessons into a run", (*OUT["lesson"], "out"), prepare=copied("out"), says="made by crosscheck run"),
-    Input("a run into where the current folder is", (*RUN, "--out", "../here"), SCENE, says="where you are"),
-)  # fmt: skip
+    *(
+        Input(
+            f"{what}, {words[1]}",
+            words,
+            prepare=copied("out", then=partial(note, f"out/{path}")),
+            says="holds",
+        )
+        for what, path in {
+            "a run with a note": "notes.txt",
+            "a run with a scene of the user's": "scenes/mine.toml",
+            "a run with a trajectory of the user's": "trajectories/mine.npz",
+            "a run with a folder of the user's": "trajectories/deeper/mine.txt",
+            "a run whose page was written over": "report.html",
+            "a run whose table was edited": "deviations.csv",
+            "a run with a table of the user's": "compared/mine.csv",
+        }.items()
+        for words in (AGAIN, RESUME)
+    ),
+    Input(
+        "a run whose trajectories are a link",
+        AGAIN,
+        prepare=copied("out", then=partial(moved_and_linked, "out/trajectories")),
+        says="holds trajectories",
+    ),
+    Input(
+        "a run that is a link to a run",
+        AGAIN,
+        prepare=copied("out", then=partial(moved_and_linked, "out")),
+        codes=(0,),
+        writes=("elsewhere", "out"),
+        says="All 2 cells",
+    ),
+    Input(
+        "a run that another process writes",
+        RESUME,
+        prepare=copied("out", then=held),
+        says="another crosscheck",
+    ),
+    Input(
+        "a run into one that was broken off",
+        AGAIN,
+        prepare=copied("out", then=unfinished),
+        says="interrupted run",
+    ),
+    Input(
+        "a run whose part is somebody's folder",
+        AGAIN,
+        prepare=copied("out", then=partial(note, "out.part/mine.txt")),
+        says="out.part: holds mine.txt",
+    ),
+    Input(
+        "a run whose part is somebody's file",
+        AGAIN,
+        prepare=copied("out", then=partial(note, "out.part")),
+        says="out.part: is a file",
+    ),
+    Input(
+        "a run again",
+        AGAIN,
+        prepare=copied("out"),
+        codes=(0,),
+        writes=("out", "out.part"),
+        says="All 2 cells",
+    ),
+    Input(
+        "a run into a folder that is empty",
+        AGAIN,
+        SCENE,
+        prepare=lambda here: (here / "out").mkdir(),
+        codes=(0,),
+        writes=("out", "out.part"),
+        says="All 2 cells",
+    ),
+    Input(
+        "a run of a scene in the folder's own scenes",
+        ("run", "out/scenes/a.toml", "--out", "out"),
+        {"out/scenes/a.toml": TWO},
+        says="holds scenes",
+    ),
+    Input(
+        "speed into a run",
+        (*OUT["speed"], "out"),
+        prepare=copied("out"),
+        says="made by crosscheck run",
+    ),
+    Input(
+        "stability into a run",
+        (*OUT["stability"], "out"),
+        prepare=copied("out"),
+        says="made by crosscheck run",
+    ),
+    Input(
+        "tune into a run",
+        (*OUT["tune"], "out"),
+        prepare=copied("out"),
+        says="made by crosscheck run",
+    ),
+    Input(
+        "lessons into a run",
+        (*OUT["lesson"], "out"),
+        prepare=copied("out"),
+        says="made by crosscheck run",
+    ),
+    Input(
+        "a run into where the current folder is",
+        (*RUN, "--out", "../here"),
+        SCENE,
+        says="where you are",
+    ),
+)
 
 NO_RUN: dict[str, tuple[tuple[str, ...], dict[str, str | bytes], str]] = {
     "resume: nothing there": (("run", "--resume", "out"), {}, "no run is there"),
     "resume: an empty name": (("run", "--resume", ""), {}, ""),
     "resume: a file": (("run", "--resume", "two.toml"), SCENE, "two.toml"),
-    "resume: a folder without a journal": (("run", "--resume", "out"), {"out/a.txt": "mine"}, "out"),
+    "resume: a folder without a journal": (
+        ("run", "--resume", "out"),
+        {"out/a.txt": "mine"},
+        "out",
+    ),
     "resume: an empty journal": (("run", "--resume", "out"), {"out/journal.jsonl": ""}, "out"),
-    "resume: a journal without a header": (("run", "--resume", "out"), {"out/journal.jsonl": "{}\n"}, "out"),
-    "resume: a part with a diary": (("run", "--resume", "out"), {"out.part/journal.jsonl": "dear diary"}, "out"),
-    "resume: with scenes beside it": (("run", "slow_collision", "--resume", "out"), {}, "takes no scenarios"),
-    "resume: with another place": (("run", "--resume", "out", "--out", "b"), {}, "takes no scenarios"),
+    "resume: a journal without a header": (
+        ("run", "--resume", "out"),
+        {"out/journal.jsonl": "{}\n"},
+        "out",
+    ),
+    "resume: a part with a diary": (
+        ("run", "--resume", "out"),
+        {"out.part/journal.jsonl": "dear diary"},
+        "out",
+    ),
+    "resume: with scenes beside it": (
+        ("run", "slow_collision", "--resume", "out"),
+        {},
+        "takes no scenarios",
+    ),
+    "resume: with another place": (
+        ("run", "--resume", "out", "--out", "b"),
+        {},
+        "takes no scenarios",
+    ),
     "speed --resume: somebody's part": (
-        ("speed", "free_fall", "--resume", "--out", "out"), {"out.part/journal.jsonl": "dear diary\n"}, "out.part",
+        ("speed", "free_fall", "--resume", "--out", "out"),
+        {"out.part/journal.jsonl": "dear diary\n"},
+        "out.part",
     ),
     "stability --resume: somebody's part": (
-        ("stability", "slow_collision", "--resume", "--out", "out"), {"out.part/journal.jsonl": "[1]\n"}, "out.part",
+        ("stability", "slow_collision", "--resume", "--out", "out"),
+        {"out.part/journal.jsonl": "[1]\n"},
+        "out.part",
     ),
     "report: nothing there": (("report", "out"), {}, "journal.jsonl"),
     "report: a file": (("report", "two.toml"), SCENE, "two.toml"),
-    "report: a folder of the user's": (("report", "out"), {"out/report.html": "mine"}, "journal.jsonl"),
+    "report: a folder of the user's": (
+        ("report", "out"),
+        {"out/report.html": "mine"},
+        "journal.jsonl",
+    ),
     "replay: nothing there": (("replay", "0123", "--out", "out"), {}, "journal.jsonl"),
-    "replay: a folder of the user's": (("replay", "0123", "--out", "out"), {"out/a": "mine"}, "journal.jsonl"),
+    "replay: a folder of the user's": (
+        ("replay", "0123", "--out", "out"),
+        {"out/a": "mine"},
+        "journal.jsonl",
+    ),
     "diff: nothing there": (("diff", "a", "b"), {}, "a"),
     "diff: two files": (("diff", "a", "b"), {"a": "1", "b": "2"}, "a"),
-    "diff: a folder of the user's": (("diff", "a", "a"), {"a/deviations.csv": "mine"}, "journal.jsonl"),
-    "check --page: another page": (("check", "plain.py", "--page", "a.html"), {"a.html": "mine"}, "no page"),
+    "diff: a folder of the user's": (
+        ("diff", "a", "a"),
+        {"a/deviations.csv": "mine"},
+        "journal.jsonl",
+    ),
+    "check --page: another page": (
+        ("check", "plain.py", "--page", "a.html"),
+        {"a.html": "mine"},
+        "no page",
+    ),
     "check --page: a folder": (("check", "plain.py", "--page", "a"), {"a/b": "mine"}, "a"),
-    "check --page: below a file": (("check", "plain.py", "--page", "plain.py/a.html"), {}, "plain.py/a.html"),
+    "check --page: below a file": (
+        ("check", "plain.py", "--page", "plain.py/a.html"),
+        {},
+        "plain.py/a.html",
+    ),
     "check --page: the solver itself": (("check", "plain.py", "--page", "plain.py"), {}, "no page"),
-    "check --page: a folder that is not there": (("check", "plain.py", "--page", "no/a.html"), {}, "no/a.html"),
-    "check --page: the page of the user's that is there": (("check", "plain.py"), {"check.html": "mine"}, "no page"),
-    "check --junit: another file": (("check", "plain.py", "--junit", "a.xml"), {"a.xml": "<mine/>"}, "no JUnit"),
-    "check --junit: a page of ours": (
-        ("check", "plain.py", "--junit", "a.xml"), {"a.xml": '<meta name="generator" content="crosscheck check">'},
+    "check --page: a folder that is not there": (
+        ("check", "plain.py", "--page", "no/a.html"),
+        {},
+        "no/a.html",
+    ),
+    "check --page: the page of the user's that is there": (
+        ("check", "plain.py"),
+        {"check.html": "mine"},
+        "no page",
+    ),
+    "check --junit: another file": (
+        ("check", "plain.py", "--junit", "a.xml"),
+        {"a.xml": "<mine/>"},
         "no JUnit",
     ),
-    "check --junit: where the page goes": (("check", "plain.py", "--junit", "a", "--page", "./a"), {}, "page goes"),
+    "check --junit: a page of ours": (
+        ("check", "plain.py", "--junit", "a.xml"),
+        {"a.xml": '<meta name="generator" content="crosscheck check">'},
+        "no JUnit",
+    ),
+    "check --junit: where the page goes": (
+        ("check", "plain.py", "--junit", "a", "--page", "./a"),
+        {},
+        "page goes",
+    ),
     "check: nothing there": (("check", "nothing.py"), {}, "nothing.py"),
-    "check: an empty folder's file": (("check", "a"), {"a/readme.md": "mine"}, "holds no .js and no .py"),
-    "lesson --export: another page": (("lesson", "order", "--export", "a.html"), {"a.html": "mine"}, "no page"),
-    "lesson --export: a folder for one lesson": (("lesson", "order", "--export", "a"), {"a/b": "1"}, "is a folder"),
-    "lesson --export: below a file": (("lesson", "order", "--export", "a/b.html"), {"a": "mine"}, "a/b.html"),
-    "lesson --export: a device that is full": (("lesson", "order", "--export", "/proc/a.html"), {}, "/proc/a.html"),
-}  # fmt: skip
+    "check: an empty folder's file": (
+        ("check", "a"),
+        {"a/readme.md": "mine"},
+        "holds no .js and no .py",
+    ),
+    "lesson --export: another page": (
+        ("lesson", "order", "--export", "a.html"),
+        {"a.html": "mine"},
+        "no page",
+    ),
+    "lesson --export: a folder for one lesson": (
+        ("lesson", "order", "--export", "a"),
+        {"a/b": "1"},
+        "is a folder",
+    ),
+    "lesson --export: below a file": (
+        ("lesson", "order", "--export", "a/b.html"),
+        {"a": "mine"},
+        "a/b.html",
+    ),
+    "lesson --export: a device that is full": (
+        ("lesson", "order", "--export", "/proc/a.html"),
+        {},
+        "/proc/a.html",
+    ),
+}
 FOLDERS = (
-    *TAKEN, *NO_PLACE, *OURS,
-    *(Input(name, words, {"plain.py": PLAIN} | files, says=says) for name, (words, files, says) in NO_RUN.items()),
-)  # fmt: skip
+    *TAKEN,
+    *NO_PLACE,
+    *OURS,
+    *(
+        Input(name, words, {"plain.py": PLAIN} | files, says=says)
+        for name, (words, files, says) in NO_RUN.items()
+    ),
+)

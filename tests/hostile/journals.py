@@ -15,7 +15,11 @@ import numpy as np
 from tests.hostile.played import Input
 from tests.hostile.small_run import CELL, copied, edited, lines_of, torn, write
 
-REPORT, DIFF, REPLAY = ("report", "out"), ("diff", "before", "out"), ("replay", CELL, "--out", "out")
+REPORT, DIFF, REPLAY = (
+    ("report", "out"),
+    ("diff", "before", "out"),
+    ("replay", CELL, "--out", "out"),
+)
 RESUME = ("run", "--resume", "out", "--workers", "1")
 ALL = (REPORT, DIFF, REPLAY, RESUME)
 NEXT = cycle(ALL)  # what is faulty is refused alike by all: each input asks the next
@@ -85,18 +89,31 @@ OTHERS: dict[str, tuple[str, tuple[Any, ...], Any]] = {
     "a footer that is text": ("footer", ("footer",), "the end"),
     "seconds before the beginning": ("footer", ("footer", "seconds"), -1.0),
 }
-# A sum that is another is no fault of the journal: the cell is as good as not played, which one says, or mends.
+# A sum that is another is no fault of the journal: the cell is as good as not played, which one
+# says, or mends.
 HEALED = {"a file with another sum": {REPORT: (0, 1), DIFF: (1,), REPLAY: (0, 1, 2), RESUME: (0,)}}
 WRITES = ("out", "out.part")
 
 
 def refused() -> list[Input]:
     """An edit each, and the next command."""
-    edits = [(f"header: {what}", "header", ("header", *at), value) for what, (at, value) in HEADER.items()]
-    edits += [(f"cell: {what}", "cell", at, value) for what, (at, value) in CELLS.items() if what not in HEALED]
+    edits = [
+        (f"header: {what}", "header", ("header", *at), value)
+        for what, (at, value) in HEADER.items()
+    ]
+    edits += [
+        (f"cell: {what}", "cell", at, value)
+        for what, (at, value) in CELLS.items()
+        if what not in HEALED
+    ]
     edits += [(what, *edit) for what, edit in OTHERS.items()]
     return [
-        Input(f"{what}, {words[0]}", words, prepare=edited(*edit), says="" if "a scene" in what else JOURNAL)
+        Input(
+            f"{what}, {words[0]}",
+            words,
+            prepare=edited(*edit),
+            says="" if "a scene" in what else JOURNAL,
+        )
         for (what, *edit), words in zip(edits, NEXT)
     ]
 
@@ -112,22 +129,35 @@ def _appended(line: bytes, journal: bytes) -> bytes:
 
 # Lines that are none, after all others.
 LINES: dict[str, bytes] = {
-    "a line that is no JSON": b"{ this is none }", "a line that is a number": b"42", "a line that is null": b"null",
-    "a line that is a list": b"[1, 2]", "a line that is an empty table": b"{}",
-    "a line that is two things": b'{"header": {}, "footer": {}}', "a line of brackets": b"[" * 100_000,
-    "a line that is not UTF-8": b'"\xff\xfe"', "a line of null bytes": bytes(50), "a line of a page": b"<html>",
-    "a line of 5 million letters": b'"' + b"x" * 5_000_000 + b'"', "a line that acts on a terminal": b"\x1b[31m\x07",
-}  # fmt: skip
+    "a line that is no JSON": b"{ this is none }",
+    "a line that is a number": b"42",
+    "a line that is null": b"null",
+    "a line that is a list": b"[1, 2]",
+    "a line that is an empty table": b"{}",
+    "a line that is two things": b'{"header": {}, "footer": {}}',
+    "a line of brackets": b"[" * 100_000,
+    "a line that is not UTF-8": b'"\xff\xfe"',
+    "a line of null bytes": bytes(50),
+    "a line of a page": b"<html>",
+    "a line of 5 million letters": b'"' + b"x" * 5_000_000 + b'"',
+    "a line that acts on a terminal": b"\x1b[31m\x07",
+}
 NO_LINES = [
     Input(f"{what}, {words[0]}", words, prepare=torn(appended(line)), says="line ")
     for (what, line), words in zip(LINES.items(), NEXT)
 ]
-# A line that was torn when the power went is left out, in whatever way it was torn; the run is gone on with.
+# A line that was torn when the power went is left out, in whatever way it was torn; the run is gone
+# on with.
 TORN = [
-    Input(f"a last line that is torn, {words[0]}", words, prepare=torn(lambda journal: journal[:-40]), codes=codes,
-          writes=WRITES)
+    Input(
+        f"a last line that is torn, {words[0]}",
+        words,
+        prepare=torn(lambda journal: journal[:-40]),
+        codes=codes,
+        writes=WRITES,
+    )
     for words, codes in zip(ALL, ((0,), (0, 1), (0,), (0,)))
-]  # fmt: skip
+]
 
 
 def shorter(data: bytes) -> bytes:
@@ -167,18 +197,30 @@ def zipped(arrays: dict[str, np.ndarray]) -> bytes:
 
 TRAJECTORY = f"trajectories/{CELL}.npz"
 BYTES: dict[str, Callable[[bytes], bytes]] = {
-    "an empty trajectory": nothing, "half a trajectory": shorter, "a trajectory with another byte": other_bits,
-    "a trajectory of another shape": other_shape, "a trajectory that is a program": a_program,
+    "an empty trajectory": nothing,
+    "half a trajectory": shorter,
+    "a trajectory with another byte": other_bits,
+    "a trajectory of another shape": other_shape,
+    "a trajectory that is a program": a_program,
     "a trajectory that is a text": lambda _: b"mine",
-}  # fmt: skip
+}
 SPOILT = [
-    Input(f"{what}, {words[0]}", words, prepare=torn(change, TRAJECTORY), codes=codes, writes=WRITES, says=says)
+    Input(
+        f"{what}, {words[0]}",
+        words,
+        prepare=torn(change, TRAJECTORY),
+        codes=codes,
+        writes=WRITES,
+        says=says,
+    )
     for what, change in BYTES.items()
     for words, codes, says in (
-        (REPORT, (1,), "1 error"), (DIFF, (1,), "is not what was written"),
-        (REPLAY, (0, 1, 2), ""), (RESUME, (0,), "All 2 cells have ended: 2 ok"),
+        (REPORT, (1,), "1 error"),
+        (DIFF, (1,), "is not what was written"),
+        (REPLAY, (0, 1, 2), ""),
+        (RESUME, (0,), "All 2 cells have ended: 2 ok"),
     )
-]  # fmt: skip
+]
 
 
 def gone(name: str, here: Path) -> None:
@@ -225,9 +267,11 @@ WHOLE: dict[str, tuple[Callable[[Path], None], tuple[str, ...], tuple[int, ...]]
     "lines that an editor has broken, diff": (indented, DIFF, (2,)),
     "another version, resume": (older, RESUME, (0, 1, 2)),
     "another version, diff": (older, DIFF, (0,)),
-}  # fmt: skip
+}
 TABLES = [
-    Input(f"{path} {what}, {words[0]}", words, prepare=torn(change, path), codes=codes, writes=WRITES)
+    Input(
+        f"{path} {what}, {words[0]}", words, prepare=torn(change, path), codes=codes, writes=WRITES
+    )
     for path, what, change, words, codes in (
         ("deviations.csv", "is empty", nothing, DIFF, (0, 1, 2)),
         ("deviations.csv", "is torn", shorter, DIFF, (0, 1, 2)),
@@ -244,13 +288,38 @@ TABLES = [
     )
 ]
 JOURNALS = (
-    *refused(), *NO_LINES, *TORN, *SPOILT, *TABLES,
-    *(Input(what, words, prepare=copied("before", "out", then=do), codes=codes, writes=WRITES)
-      for what, (do, words, codes) in WHOLE.items()),
-    *(Input(f"cell: {what}, {words[0]}", words, prepare=edited("cell", *CELLS[what]), codes=codes, writes=WRITES)
-      for what, by_command in HEALED.items() for words, codes in by_command.items()),
-    Input("replay: a cell that is not there", ("replay", "ffffffff", "--out", "out"), prepare=copied("out"), says="ff"),
-    Input("replay: a cell that climbs", ("replay", "../..", "--out", "out"), prepare=copied("out"), says="../.."),
+    *refused(),
+    *NO_LINES,
+    *TORN,
+    *SPOILT,
+    *TABLES,
+    *(
+        Input(what, words, prepare=copied("before", "out", then=do), codes=codes, writes=WRITES)
+        for what, (do, words, codes) in WHOLE.items()
+    ),
+    *(
+        Input(
+            f"cell: {what}, {words[0]}",
+            words,
+            prepare=edited("cell", *CELLS[what]),
+            codes=codes,
+            writes=WRITES,
+        )
+        for what, by_command in HEALED.items()
+        for words, codes in by_command.items()
+    ),
+    Input(
+        "replay: a cell that is not there",
+        ("replay", "ffffffff", "--out", "out"),
+        prepare=copied("out"),
+        says="ff",
+    ),
+    Input(
+        "replay: a cell that climbs",
+        ("replay", "../..", "--out", "out"),
+        prepare=copied("out"),
+        says="../..",
+    ),
     Input("replay: any cell", ("replay", "", "--out", "out"), prepare=copied("out")),
     Input("diff: a run with itself", ("diff", "out", "out"), prepare=copied("out"), codes=(0,)),
-)  # fmt: skip
+)

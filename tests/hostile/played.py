@@ -1,7 +1,8 @@
 """Plays one input in a folder of its own and says what became of it.
 
-The command runs in a process that is forked from one in which everything is imported: a start takes 0.05 s, not 1.5.
-Where the interpreter itself is asked something (its locale, its streams), it is started as a person does.
+The command runs in a process that is forked from one in which everything is imported: a start takes
+0.05 s, not 1.5. Where the interpreter itself is asked something (its locale, its streams), it is
+started as a person does.
 """
 
 from __future__ import annotations
@@ -22,23 +23,35 @@ from typing import Any, NamedTuple
 from tests.forks import crosscheck_in, start
 from tests.hostile.talks import NOT_ANY_MORE, free_port, hear
 
-SENTENCE, DONE, FINDINGS, STOPPED = "clear sentence", "done", "done, with findings", "stopped when signalled"
+SENTENCE, DONE, FINDINGS, STOPPED = (
+    "clear sentence",
+    "done",
+    "done, with findings",
+    "stopped when signalled",
+)
 TRACEBACK, HANG, LOST, STRAY = "traceback", "hang", "file lost", "file where none was asked for"
 LEFT, WRONG = "process left behind", "wrong exit code or sentence"
 GOOD, BAD = (SENTENCE, DONE, FINDINGS, STOPPED), (TRACEBACK, HANG, LOST, STRAY, LEFT, WRONG)
 BY_CODE = {0: DONE, 1: FINDINGS, 2: SENTENCE, 130: STOPPED, 143: STOPPED}
-SECONDS = 90.0  # that an input may take on a busy machine; what is bounded by its own --timeout takes a fraction of it
-LINES = 101  # of a refusal: one sentence a fault, as many as the reader of scenes lists, and one that there are more
+# that an input may take on a busy machine; what is bounded by its own --timeout takes a fraction of
+# it
+SECONDS = 90.0
+# of a refusal: one sentence a fault, as many as the reader of scenes lists, and one that there are
+# more
+LINES = 101
 GRACE = 3.0  # s in which a process that has been signalled to end is gone
 CROSSCHECK = Path(sys.executable).parent / "crosscheck"
 WIDE = {"COLUMNS": "400"}  # so that no sentence is broken where a line ends
-# What Python says by itself: an exception that nobody caught, or one in a destructor; a warning; a crash in C.
+# What Python says by itself: an exception that nobody caught, or one in a destructor; a warning; a
+# crash in C.
 RAW = re.compile(
-    r"Traceback \(most recent call last\)|^[\w.]+(Error|Exception|Interrupt|Exit)(: |$)|:\d+: \w*Warning: "
+    r"Traceback \(most recent call last\)|^[\w.]+(Error|Exception|Interrupt|Exit)(: |$)|:\d+:"
+    r" \w*Warning: "
     r"|Exception ignored|Fatal Python error|Segmentation fault|resource_tracker",
     re.MULTILINE,
 )
-# Line ends but for a newline, escape codes, what turns text round: nothing but a terminal's own progress may steer it.
+# Line ends but for a newline, escape codes, what turns text round: nothing but a terminal's own
+# progress may steer it.
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
 
@@ -48,16 +61,20 @@ class Input(NamedTuple):
     Attributes:
         name: in a few words, unlike every other of its family.
         words: the command line after `crosscheck`; the current folder is the input's own.
-        files: path in that folder -> what is in it; everything there is the user's, and must be there afterwards.
-        prepare: what else is done in the folder before; what it makes is the user's, too. It may give what some of the
-            `words` stand for.
-        writes: paths that the command may make, replace or take away; nothing else there may come or go.
+        files: path in that folder -> what is in it; everything there is the user's, and must be
+            there afterwards.
+        prepare: what else is done in the folder before; what it makes is the user's, too. It may
+            give what some of the `words` stand for.
+        writes: paths that the command may make, replace or take away; nothing else there may come
+            or go.
         codes: exit codes that are right.
         says: what its output must hold, stdout or stderr; "" for anything.
-        environment: variables that are set; then, and with `shell`, the interpreter is started anew.
-        shell: a line for sh in place of `words`, with `$crosscheck` in it: streams that are closed or full.
-        talk: of a command that serves: what is sent to the port, and gives what is heard, in which `says` is looked
-            for, too. Then it must serve on, until it is signalled to stop.
+        environment: variables that are set; then, and with `shell`, the interpreter is started
+            anew.
+        shell: a line for sh in place of `words`, with `$crosscheck` in it: streams that are closed
+            or full.
+        talk: of a command that serves: what is sent to the port, and gives what is heard, in which
+            `says` is looked for, too. Then it must serve on, until it is signalled to stop.
     """
 
     name: str
@@ -94,19 +111,37 @@ def outcome_of(tried: Input, folder: Path) -> Outcome:
     before = kept(user, tried.writes)
     code, heard = ended(tried, user, folder)
     left = left_behind(user)
-    stdout, stderr = ((folder / name).read_text("utf-8", "backslashreplace") for name in ("stdout", "stderr"))
+    stdout, stderr = (
+        (folder / name).read_text("utf-8", "backslashreplace") for name in ("stdout", "stderr")
+    )
     after = kept(user, tried.writes)
     lost = [name for name, what in before.items() if after.get(name) != what]
     stray = [name for name in after if name not in before]
-    stray += [path.name for path in folder.iterdir() if path.name not in ("here", "stdout", "stderr")]
+    stray += [
+        path.name for path in folder.iterdir() if path.name not in ("here", "stdout", "stderr")
+    ]
     printed = "\n".join(
-        [stdout, stderr, heard, *(f"{what}: {found}" for what, found in (("lost", lost), ("stray", stray)) if found)]
+        [
+            stdout,
+            stderr,
+            heard,
+            *(f"{what}: {found}" for what, found in (("lost", lost), ("stray", stray)) if found),
+        ]
     )
-    return Outcome(word_of(tried, code, stdout, stderr, heard, bool(lost), bool(stray), left), code, printed)
+    return Outcome(
+        word_of(tried, code, stdout, stderr, heard, bool(lost), bool(stray), left), code, printed
+    )
 
 
 def word_of(
-    tried: Input, code: int | None, stdout: str, stderr: str, heard: str, lost: bool, stray: bool, left: bool
+    tried: Input,
+    code: int | None,
+    stdout: str,
+    stderr: str,
+    heard: str,
+    lost: bool,
+    stray: bool,
+    left: bool,
 ) -> str:
     """The outcome, the worst first."""
     both = stdout + stderr
@@ -123,7 +158,8 @@ def word_of(
 
 
 def kept(user: Path, writes: tuple[str, ...]) -> dict[str, str]:
-    """What is in the user's folder, but for what may be written: path -> what shows whether it has changed."""
+    """What is in the user's folder, but for what may be written: path -> what shows whether it has
+    changed."""
     found = {}
     for path in sorted(user.rglob("*")):
         name = str(path.relative_to(user))
@@ -149,7 +185,13 @@ def ended(tried: Input, user: Path, folder: Path) -> tuple[int | None, str]:
         env = os.environ | {"crosscheck": str(CROSSCHECK)} | WIDE | dict(tried.environment)
         with (folder / "stdout").open("wb") as stdout, (folder / "stderr").open("wb") as stderr:
             process = subprocess.Popen(
-                line, cwd=user, env=env, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr, start_new_session=True
+                line,
+                cwd=user,
+                env=env,
+                stdin=subprocess.DEVNULL,
+                stdout=stdout,
+                stderr=stderr,
+                start_new_session=True,
             )
             try:
                 return process.wait(SECONDS), ""
@@ -190,7 +232,9 @@ def working_in(user: Path) -> list[int]:
     found = []
     for entry in Path("/proc").iterdir():
         try:
-            if entry.name.isdigit() and f"{os.readlink(entry / 'cwd')}/".startswith(f"{user.resolve()}/"):
+            if entry.name.isdigit() and f"{os.readlink(entry / 'cwd')}/".startswith(
+                f"{user.resolve()}/"
+            ):
                 found.append(int(entry.name))
         except OSError:
             continue  # it has ended, or is somebody else's

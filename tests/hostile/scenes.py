@@ -15,9 +15,14 @@ from tests.hostile.small_run import TWO
 FILE = "two.toml"
 # A faulty scene is refused alike by whoever reads it: each input asks another command.
 COMMANDS: tuple[tuple[str, ...], ...] = (
-    ("truth", FILE), ("run", FILE, "--out", "out"), ("stability", FILE, "--vary", "speed", "--out", "out"),
-    ("play", FILE), ("speed", FILE, "--out", "out"), ("truth", FILE, "--json"), ("run", "free_fall", FILE),
-)  # fmt: skip
+    ("truth", FILE),
+    ("run", FILE, "--out", "out"),
+    ("stability", FILE, "--vary", "speed", "--out", "out"),
+    ("play", FILE),
+    ("speed", FILE, "--out", "out"),
+    ("truth", FILE, "--json"),
+    ("run", "free_fall", FILE),
+)
 THRUST = "[[thrust]]\ndisk = 0\nstart = 0.0\nstop = 1.0\nforce = [{}, 0.0]\n"
 BOX = "[box]\nlow = [-3.0, -1.0]\nhigh = [3.0, 1.0]\n"
 
@@ -27,7 +32,11 @@ NUMBERS: dict[str, tuple[str, str, str]] = {
     "a negative radius": ("radius = 0.25", "radius = -1", "disk[0].radius = -1"),
     "a radius that is not a number": ("radius = 0.25", "radius = nan", "disk[0].radius = nan"),
     "an infinite radius": ("radius = 0.25", "radius = inf", "disk[0].radius = inf"),
-    "a radius smaller than float64 can square": ("radius = 0.25", "radius = 1e-200", "out of scale"),
+    "a radius smaller than float64 can square": (
+        "radius = 0.25",
+        "radius = 1e-200",
+        "out of scale",
+    ),
     "a radius of a light year": ("radius = 0.25", "radius = 1e16", "out of scale"),
     "a mass of zero": ("mass = 2.0", "mass = 0", "disk[1].mass = 0"),
     "a mass of the smallest float": ("mass = 2.0", "mass = 5e-324", "out of scale"),
@@ -35,7 +44,11 @@ NUMBERS: dict[str, tuple[str, str, str]] = {
     "a negative inertia": ("mass = 2.0", "mass = 2.0\ninertia = -1.0", "disk[1].inertia = -1.0"),
     "an inertia out of scale": ("mass = 2.0", "mass = 2.0\ninertia = 1e300", "out of scale"),
     "an angle out of scale": ("mass = 2.0", "mass = 2.0\nangle = 1e200", "out of scale"),
-    "an angular velocity out of scale": ("mass = 2.0", "mass = 2.0\nangular_velocity = -1e99", "out of scale"),
+    "an angular velocity out of scale": (
+        "mass = 2.0",
+        "mass = 2.0\nangular_velocity = -1e99",
+        "out of scale",
+    ),
     "a velocity faster than light": ("[1.0, 0.0]", "[1e10, 0.0]", "out of scale"),
     "a velocity that is not a number": ("[1.0, 0.0]", "[nan, nan]", "disk[0].velocity"),
     "a position out of scale": ("[-1.0, 0.0]", "[-1e300, 0.0]", "out of scale"),
@@ -55,28 +68,60 @@ NUMBERS: dict[str, tuple[str, str, str]] = {
     "too many samples": ("= 0.02", "= 1e-8", "samples"),
     "no substeps": ("= 0.02", "= 0.02\nsubsteps = []", "substeps = []"),
     "half a substep": ("= 0.02", "= 0.02\nsubsteps = [0.5]", "substeps[0] = 0.5"),
-    "a substep of a thousand million": ("= 0.02", "= 0.02\nsubsteps = [1000000000]", "more than 10000000 steps"),
+    "a substep of a thousand million": (
+        "= 0.02",
+        "= 0.02\nsubsteps = [1000000000]",
+        "more than 10000000 steps",
+    ),
     "substeps that fall": ("= 0.02", "= 0.02\nsubsteps = [2, 1]", "not increasing"),
     "the same substeps twice": ("= 0.02", "= 0.02\nsubsteps = [2, 2]", "not increasing"),
-    "a thrust that nothing can follow": ("[[wall]]", f"{THRUST.format('1e160')}[[wall]]", "out of scale"),
-    "a thrust on a disk that is not there": ("[[wall]]", f"{THRUST.format('1.0')}[[wall]]".replace(
-        "disk = 0", "disk = 7"), "no such disk"),
-    "a thrust that ends before it begins": ("[[wall]]", f"{THRUST.format('1.0')}[[wall]]".replace(
-        "start = 0.0", "start = 1.5"), "not after start"),
-    "a thrust without an end in text": ("[[wall]]", f"{THRUST.format('1.0')}[[wall]]".replace(
-        "stop = 1.0", 'stop = "never"'), "thrust[0].stop"),
+    "a thrust that nothing can follow": (
+        "[[wall]]",
+        f"{THRUST.format('1e160')}[[wall]]",
+        "out of scale",
+    ),
+    "a thrust on a disk that is not there": (
+        "[[wall]]",
+        f"{THRUST.format('1.0')}[[wall]]".replace("disk = 0", "disk = 7"),
+        "no such disk",
+    ),
+    "a thrust that ends before it begins": (
+        "[[wall]]",
+        f"{THRUST.format('1.0')}[[wall]]".replace("start = 0.0", "start = 1.5"),
+        "not after start",
+    ),
+    "a thrust without an end in text": (
+        "[[wall]]",
+        f"{THRUST.format('1.0')}[[wall]]".replace("stop = 1.0", 'stop = "never"'),
+        "thrust[0].stop",
+    ),
     "a wall without length": ("start = [-3.0, -1.0]", "start = [3.0, -1.0]", "no length"),
-    "a wall shorter than an atom": ("start = [-3.0, -1.0]", "start = [2.9999999999, -1.0]", "out of scale"),
+    "a wall shorter than an atom": (
+        "start = [-3.0, -1.0]",
+        "start = [2.9999999999, -1.0]",
+        "out of scale",
+    ),
     "a wall to infinity": ("start = [-3.0, -1.0]", "start = [-inf, -1.0]", "wall[0].start"),
-    "a box inside out": ("[[wall]]", f"{BOX.replace('3.0, 1.0', '-9.0, 1.0')}[[wall]]", "not above low"),
-    "a box with one corner": ("[[wall]]", f"{BOX.splitlines()[0]}\nlow = [-3.0, -1.0]\n[[wall]]", "box.high: missing"),
-}  # fmt: skip
+    "a box inside out": (
+        "[[wall]]",
+        f"{BOX.replace('3.0, 1.0', '-9.0, 1.0')}[[wall]]",
+        "not above low",
+    ),
+    "a box with one corner": (
+        "[[wall]]",
+        f"{BOX.splitlines()[0]}\nlow = [-3.0, -1.0]\n[[wall]]",
+        "box.high: missing",
+    ),
+}
 SHAPES: dict[str, tuple[str, str, str]] = {
     "disks that overlap": ("[-1.0, 0.0]", "[0.9, 0.0]", "overlaps disk[0]"),
     "one disk in another": ("[-1.0, 0.0]", "[1.0, 0.0]", "overlaps disk[0] by 0.5 m"),
     "a disk in a wall": ("[-1.0, 0.0]", "[-1.0, -0.9]", "overlaps wall[0]"),
-    "a disk outside of where it wraps": ("[[wall]]", f"{BOX.replace('box', 'wrap').replace('-3.0', '0.0')}[[wall]]",
-                                         "outside [wrap]"),
+    "a disk outside of where it wraps": (
+        "[[wall]]",
+        f"{BOX.replace('box', 'wrap').replace('-3.0', '0.0')}[[wall]]",
+        "outside [wrap]",
+    ),
     "a static disk that moves": ("mass = 2.0", "static = true", "the disk is static"),
     "a word for a number": ("mass = 2.0", 'mass = "two"', "of type string"),
     "a truth value for a number": ("mass = 2.0", "mass = true", "of type boolean"),
@@ -90,26 +135,30 @@ SHAPES: dict[str, tuple[str, str, str]] = {
     "a key that does not exist": ("asks =", "question =", "unknown key"),
     "a key that is misspelt": ("restitution =", "resitution =", "did you mean restitution?"),
     "a table that does not exist": ("[[wall]]", "[spring]\nk = 1\n[[wall]]", "unknown key"),
-    "no disks": (TWO[TWO.index("[[disk]]"):], "", "disk: missing"),
+    "no disks": (TWO[TWO.index("[[disk]]") :], "", "disk: missing"),
     "one table for all disks": ("[[disk]]", "[disk]", "two.toml: line"),
     "a name with spaces": ('"two-disks"', '"two disks"', "name = "),
     "a name that climbs": ('"two-disks"', '"../../../two"', "name = "),
     "a name of 300 letters": ('"two-disks"', f'"{"a" * 300}"', "name = "),
     "an empty name": ('"two-disks"', '""', "name = "),
     "a name that acts on a terminal": ('"two-disks"', '"\\u001b[2J\\u0007"', "name = "),
-    "a name in markup": ('"two-disks"', '"[/nope]"', "name = \"[/nope]\""),
+    "a name in markup": ('"two-disks"', '"[/nope]"', 'name = "[/nope]"'),
     "a key that acts on a terminal": ("asks =", '"\\u001b[31m" =', "unknown key"),
     "a question that is a number": ('"Does a head-on collision keep momentum?"', "42", "asks = 42"),
-}  # fmt: skip
+}
 
 
 def turned(number: int, name: str, old: str, new: str, says: str) -> Input:
     """A good scene in which one thing is another, put to the next command."""
     assert old in TWO, name
-    return Input(name, COMMANDS[number % len(COMMANDS)], {FILE: TWO.replace(old, new, 1)}, says=says)
+    return Input(
+        name, COMMANDS[number % len(COMMANDS)], {FILE: TWO.replace(old, new, 1)}, says=says
+    )
 
 
-FAULTY = [turned(number, name, *fault) for number, (name, fault) in enumerate((NUMBERS | SHAPES).items())]
+FAULTY = [
+    turned(number, name, *fault) for number, (name, fault) in enumerate((NUMBERS | SHAPES).items())
+]
 
 # Whole files, as they are.
 TEXTS: dict[str, tuple[str | bytes, str]] = {
@@ -164,11 +213,16 @@ def nobody(_: Path) -> None:
 
 
 NO_FILES: dict[str, Callable[[Path], None]] = {
-    "no file": nobody, "a folder as scene file": folder, "a pipe as scene file": fifo,
-    "a link to nothing": partial(linked, "nothing.toml"), "a link to itself": partial(linked, FILE),
-    "a link to a folder": partial(linked, "."), "a device without an end": partial(device, "/dev/zero"),
-    "a terminal that is none": partial(device, "/dev/tty"), "a file of the kernel": partial(device, "/proc/self/mem"),
-}  # fmt: skip
+    "no file": nobody,
+    "a folder as scene file": folder,
+    "a pipe as scene file": fifo,
+    "a link to nothing": partial(linked, "nothing.toml"),
+    "a link to itself": partial(linked, FILE),
+    "a link to a folder": partial(linked, "."),
+    "a device without an end": partial(device, "/dev/zero"),
+    "a terminal that is none": partial(device, "/dev/tty"),
+    "a file of the kernel": partial(device, "/proc/self/mem"),
+}
 READERS = cycle(COMMANDS[:4])
 NOT_FILES = [
     Input(f"{name}, {words[0]}", words, prepare=prepare, says="two.toml: ")

@@ -10,7 +10,10 @@ from tests.hostile.played import Input
 from tests.hostile.small_run import TWO
 from tests.hostile.talks import Talk, asks, says, sends
 
-PLAY, LESSON = ("play", "--engine", "pymunk:shipped", "--port", "PORT"), ("lesson", "--port", "PORT")
+PLAY, LESSON = (
+    ("play", "--engine", "pymunk:shipped", "--port", "PORT"),
+    ("lesson", "--port", "PORT"),
+)
 STOPPED = (143,)
 GET = b"GET %s HTTP/1.1\r\nHost: localhost:PORT\r\nConnection: close\r\n%s\r\n"
 UPGRADE = b"Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
@@ -46,7 +49,9 @@ REQUESTS: dict[str, tuple[Talk, str]] = {
     "a method nobody knows": (asks("JUMP", "/"), "405"),
     "a body of 5 MB": (asks("POST", "/lesson/order/shown?at=0", b"x" * 5_000_000), ""),
     "a body that is shorter than it says": (
-        sends(GET.replace(b"GET", b"POST") % (b"/", b"Content-Length: 9999999\r\n") + b"x"), "405"),
+        sends(GET.replace(b"GET", b"POST") % (b"/", b"Content-Length: 9999999\r\n") + b"x"),
+        "405",
+    ),
     "a length that is a word": (sends(GET % (b"/", b"Content-Length: long\r\n")), "400"),
     "a negative length": (sends(GET % (b"/", b"Content-Length: -1\r\n")), "400"),
     "a header of 200 kB": (sends(GET % (b"/", b"X: " + b"x" * 200_000 + b"\r\n")), ""),
@@ -56,24 +61,39 @@ REQUESTS: dict[str, tuple[Talk, str]] = {
     "nothing at all": (sends(), "silence"),
     "megabytes without a line end": (sends(b"x" * 65536, times=40), ""),
     "two requests in one": (
-        sends(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" + GET % (b"/nothing", b"")), "404"),
+        sends(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" + GET % (b"/nothing", b"")),
+        "404",
+    ),
     "a version of the future": (sends(b"GET / HTTP/9.9\r\nHost: localhost\r\n\r\n"), ""),
     "an upgrade to what does not exist": (sends(GET % (b"/", b"Upgrade: teapot\r\n")), ""),
-    "an upgrade without a key": (sends(GET.replace(b"Connection: close\r\n", b"") % (b"/fly", UPGRADE)), ""),
+    "an upgrade without a key": (
+        sends(GET.replace(b"Connection: close\r\n", b"") % (b"/fly", UPGRADE)),
+        "",
+    ),
     "an upgrade of a page": (says(path="/"), "403"),
     "an upgrade of a lesson": (says(path="/lesson"), ""),
     "another origin": (says(origin="http://evil.example"), "403"),
     "no origin": (says(origin=""), "403"),
     "an origin on another port": (says(origin="http://localhost:1"), "403"),
     "an origin that begins alike": (says(origin="http://localhost:PORT.evil.example"), "403"),
-}  # fmt: skip
+}
 # Messages of a tab: the answer must name the fault.
 FAULTY: dict[str, str | bytes] = {
-    "no JSON": "{", "an empty message": "", "a number": "1", "null": "null", "a list": "[1]", "an empty table": "{}",
-    "bytes": b"\xff\x00\xfe", "brackets": "[" * 4000, "a number of 4000 digits": "9" * 4000,
-    "not a number": '{"do": "frames", "count": NaN}', "half a letter": '"\\ud800"',
-    "an order that does not exist": message(do="jump"), "no frames": message(do="frames", count=0),
-    "a thousand million frames": message(do="frames", count=10**9), "frames in text": message(do="frames", count="1"),
+    "no JSON": "{",
+    "an empty message": "",
+    "a number": "1",
+    "null": "null",
+    "a list": "[1]",
+    "an empty table": "{}",
+    "bytes": b"\xff\x00\xfe",
+    "brackets": "[" * 4000,
+    "a number of 4000 digits": "9" * 4000,
+    "not a number": '{"do": "frames", "count": NaN}',
+    "half a letter": '"\\ud800"',
+    "an order that does not exist": message(do="jump"),
+    "no frames": message(do="frames", count=0),
+    "a thousand million frames": message(do="frames", count=10**9),
+    "frames in text": message(do="frames", count="1"),
     "a key that does not exist": message(do="key", key="escape", down=True),
     "a key that is a list": message(do="key", key=["w"], down=True),
     "a flight without engines": message(do="fly", engines=[]),
@@ -85,13 +105,16 @@ FAULTY: dict[str, str | bytes] = {
     "a restitution of two": message(do="fly", engines=["pymunk:shipped"], restitution=2.0),
     "no substeps": message(do="fly", engines=["pymunk:shipped"], substeps=0),
     "a field nobody asked for": message(do="save", path="/etc/passwd"),
-}  # fmt: skip
+}
 TABS: dict[str, tuple[Talk, str]] = {
     "a message of 10 MB": (says("x" * 10_000_000), "1009"),
     "a hundred faulty messages": (says(*["{"] * 100), "more than 50 faulty messages"),
-    "a thousand messages at once": (says(*[message(do="key", key="w", down=True)] * 1000, FRAME, wait=False), ""),
+    "a thousand messages at once": (
+        says(*[message(do="key", key="w", down=True)] * 1000, FRAME, wait=False),
+        "",
+    ),
     "a fault, and then a frame": (says("{", FRAME), '"frame":1'),
-}  # fmt: skip
+}
 
 
 def busy(_: Path) -> dict[str, str]:
@@ -104,26 +127,57 @@ def busy(_: Path) -> dict[str, str]:
 
 TAKEN: list[socket.socket] = []
 PORTS: dict[str, tuple[str, ...]] = {
-    "port zero": ("play", "--port", "0"), "a negative port": ("lesson", "--port", "-1"),
-    "a port that is too high": ("play", "--port", "65536"), "a port in text": ("lesson", "--port", "http"),
-    "half a port": ("play", "--port", "8000.5"), "an empty port": ("lesson", "order", "--port", ""),
-}  # fmt: skip
+    "port zero": ("play", "--port", "0"),
+    "a negative port": ("lesson", "--port", "-1"),
+    "a port that is too high": ("play", "--port", "65536"),
+    "a port in text": ("lesson", "--port", "http"),
+    "half a port": ("play", "--port", "8000.5"),
+    "an empty port": ("lesson", "order", "--port", ""),
+}
 SERVERS = (
-    *(Input(f"{words[0]}: {what}", words, codes=STOPPED, says=heard, talk=talk)
-      for number, (what, (talk, heard)) in enumerate(REQUESTS.items())
-      for words in [(PLAY, LESSON)[number % 2]]),
-    *(Input(f"a tab that sends {what}", PLAY, codes=STOPPED, says='"kind":"fault"', talk=says(text))
-      for what, text in FAULTY.items()),
-    *(Input(f"a tab that sends {what}", PLAY, codes=STOPPED, says=heard, talk=talk)
-      for what, (talk, heard) in TABS.items()),
+    *(
+        Input(f"{words[0]}: {what}", words, codes=STOPPED, says=heard, talk=talk)
+        for number, (what, (talk, heard)) in enumerate(REQUESTS.items())
+        for words in [(PLAY, LESSON)[number % 2]]
+    ),
+    *(
+        Input(
+            f"a tab that sends {what}", PLAY, codes=STOPPED, says='"kind":"fault"', talk=says(text)
+        )
+        for what, text in FAULTY.items()
+    ),
+    *(
+        Input(f"a tab that sends {what}", PLAY, codes=STOPPED, says=heard, talk=talk)
+        for what, (talk, heard) in TABS.items()
+    ),
     *(Input(name, words, says="--port") for name, words in PORTS.items()),
-    Input("a port that is taken", ("play", "--engine", "pymunk:shipped", "--port", "BUSY"), prepare=busy,
-          codes=STOPPED, says="is taken: this is on", talk=asks("GET", "/")),
-    Input("a flight of a scene in markup", ("play", "two.toml", "--engine", "pymunk:shipped", "--port", "PORT"),
-          {"two.toml": TWO.replace("Does a", "</script><script>alert(1)</script> [/nope] Does a")}, codes=STOPPED,
-          says="200 ", talk=asks("GET", "/")),
-    Input("a solver that hangs, in flight", ("play", "--engine", "mine.py"),
-          {"mine.py": "while True: pass\n"}, says="does not come back"),
-    Input("a browser that is not there", ("lesson", "--port", "PORT", "--open"), codes=STOPPED, talk=asks("GET", "/"),
-          says="200 "),
-)  # fmt: skip
+    Input(
+        "a port that is taken",
+        ("play", "--engine", "pymunk:shipped", "--port", "BUSY"),
+        prepare=busy,
+        codes=STOPPED,
+        says="is taken: this is on",
+        talk=asks("GET", "/"),
+    ),
+    Input(
+        "a flight of a scene in markup",
+        ("play", "two.toml", "--engine", "pymunk:shipped", "--port", "PORT"),
+        {"two.toml": TWO.replace("Does a", "</script><script>alert(1)</script> [/nope] Does a")},
+        codes=STOPPED,
+        says="200 ",
+        talk=asks("GET", "/"),
+    ),
+    Input(
+        "a solver that hangs, in flight",
+        ("play", "--engine", "mine.py"),
+        {"mine.py": "while True: pass\n"},
+        says="does not come back",
+    ),
+    Input(
+        "a browser that is not there",
+        ("lesson", "--port", "PORT", "--open"),
+        codes=STOPPED,
+        talk=asks("GET", "/"),
+        says="200 ",
+    ),
+)

@@ -1,4 +1,5 @@
-"""A small finished run, made once by the command, of which every input that needs one gets a copy."""
+"""A small finished run, made once by the command, of which every input that needs one gets a
+copy."""
 
 from __future__ import annotations
 
@@ -23,12 +24,19 @@ Prepare = Callable[[Path], dict[str, str]]
 
 
 def finished_run() -> Path:
-    """Its folder, made when it is first asked for, by this process or the one that has started this one."""
+    """Its folder, made when it is first asked for, by this process or the one that has started this
+    one."""
     if MADE not in os.environ:
         place = Path(tempfile.mkdtemp())
         atexit.register(shutil.rmtree, place, ignore_errors=True)
         (place / "two.toml").write_text(TWO)
-        subprocess.run([CROSSCHECK, *RUN, "--out", "out"], cwd=place, check=True, capture_output=True, timeout=300)
+        subprocess.run(
+            [CROSSCHECK, *RUN, "--out", "out"],
+            cwd=place,
+            check=True,
+            capture_output=True,
+            timeout=300,
+        )
         os.environ[MADE] = str(place / "out")
     return Path(os.environ[MADE])
 
@@ -61,7 +69,9 @@ def copied(*names: str, then: Callable[[Path], object] | None = None) -> Prepare
     return partial(_copied, names, then)
 
 
-def _copied(names: tuple[str, ...], then: Callable[[Path], object] | None, here: Path) -> dict[str, str]:
+def _copied(
+    names: tuple[str, ...], then: Callable[[Path], object] | None, here: Path
+) -> dict[str, str]:
     words = copy(here, *names)
     if then is not None:
         then(here)
@@ -69,7 +79,8 @@ def _copied(names: tuple[str, ...], then: Callable[[Path], object] | None, here:
 
 
 def edited(kind: str, at: tuple[Any, ...], value: Any) -> Prepare:
-    """A copy `out` of the run in which one thing in the first line of a kind is another, and a whole one, `before`."""
+    """A copy `out` of the run in which one thing in the first line of a kind is another, and a
+    whole one, `before`."""
     return partial(_edited, kind, at, value)
 
 
@@ -85,7 +96,8 @@ def _edited(kind: str, at: tuple[Any, ...], value: Any, here: Path) -> dict[str,
 
 
 def torn(change: Callable[[bytes], bytes], pattern: str = "journal.jsonl") -> Prepare:
-    """A copy `out` of the run in which the bytes of the first file of that pattern are others, and a whole one."""
+    """A copy `out` of the run in which the bytes of the first file of that pattern are others, and
+    a whole one."""
     return partial(_torn, change, pattern)
 
 

@@ -1,4 +1,5 @@
-"""Somebody's own solver that does everything but solve, as `check` is given it and as an engine of a run."""
+"""Somebody's own solver that does everything but solve, as `check` is given it and as an engine of
+a run."""
 
 from __future__ import annotations
 
@@ -12,8 +13,23 @@ from tests.hostile.small_run import TWO as WALLED
 CORRECT = Path(__file__).parent.parent / "solvers" / "correct"
 PY, JS = (CORRECT / "plain.py").read_text(), (CORRECT / "plain.js").read_text()
 TWO = WALLED[: WALLED.index("[[wall]]")]  # the exercise's functions know no walls
-PLAYED = ("run", "two.toml", "--dt", "0.02", "--workers", "1", "--timeout", "5", "--out", "out", "--engine")
-STEP, COLLISION = "def integrate(sphere, dt):\n", "def sphereSphereCollisionHandling(sphereA, sphereB):\n"
+PLAYED = (
+    "run",
+    "two.toml",
+    "--dt",
+    "0.02",
+    "--workers",
+    "1",
+    "--timeout",
+    "5",
+    "--out",
+    "out",
+    "--engine",
+)
+STEP, COLLISION = (
+    "def integrate(sphere, dt):\n",
+    "def sphereSphereCollisionHandling(sphereA, sphereB):\n",
+)
 JS_STEP = "function integrate(sphere, dt) {\n"
 
 
@@ -32,12 +48,20 @@ LOADING: dict[str, tuple[str, str | bytes, str]] = {
     "an endless loop": ("mine.py", "while True: pass\n", "does not come back"),
     "an endless loop in JavaScript": ("mine.js", "for (;;);\n", "does not come back"),
     "an endless loop that hears nothing": (
-        "mine.py", "import signal\nfor n in range(1, 65):\n  try: signal.signal(n, signal.SIG_IGN)\n"
-        "  except (OSError, ValueError): pass\nwhile True: pass\n", "",
+        "mine.py",
+        (
+            "import signal\nfor n in range(1, 65):\n  try: signal.signal(n, signal.SIG_IGN)\n"
+            "  except (OSError, ValueError): pass\nwhile True: pass\n"
+        ),
+        "",
     ),
     "sleep without end": ("mine.py", "import time\ntime.sleep(1e9)\n", "does not come back"),
     "all memory": ("mine.py", "x = bytearray(10**11)\n", "memory"),
-    "all memory in JavaScript": ("mine.js", "var a = []; for (;;) a.push(new Array(1e6).fill(1));", "memory"),
+    "all memory in JavaScript": (
+        "mine.js",
+        "var a = []; for (;;) a.push(new Array(1e6).fill(1));",
+        "memory",
+    ),
     "sys.exit with success": ("mine.py", "import sys\nsys.exit(0)\n", "SystemExit"),
     "sys.exit with words": ("mine.py", "raise SystemExit('\\x1b[31mno')\n", "SystemExit"),
     "os._exit with success": ("mine.py", "import os\nos._exit(0)\n", "ended its own process"),
@@ -45,39 +69,81 @@ LOADING: dict[str, tuple[str, str | bytes, str]] = {
     "a crash in C": ("mine.py", "import ctypes\nctypes.string_at(0)\n", "SIGSEGV"),
     "killing itself": ("mine.py", "import os\nos.kill(os.getpid(), 9)\n", "SIGKILL"),
     "killing its group": ("mine.py", "import os\nos.killpg(0, 9)\n", "SIGKILL"),
-    "an exception that is none": ("mine.py", "class E(BaseException): pass\nraise E('no')\n", "E: no"),
+    "an exception that is none": (
+        "mine.py",
+        "class E(BaseException): pass\nraise E('no')\n",
+        "E: no",
+    ),
     "an interrupt": ("mine.py", "raise KeyboardInterrupt\n", "KeyboardInterrupt"),
     "an exception that cannot be shown": (
-        "mine.py", "class E(Exception):\n  def __str__(self): raise self\nraise E\n", "",
+        "mine.py",
+        "class E(Exception):\n  def __str__(self): raise self\nraise E\n",
+        "",
     ),
-    "an exception with escape codes": ("mine.py", "raise ValueError('\\x1b[31m\\r\\n\\x07[/nope]')\n", "\\x1b[31m"),
+    "an exception with escape codes": (
+        "mine.py",
+        "raise ValueError('\\x1b[31m\\r\\n\\x07[/nope]')\n",
+        "\\x1b[31m",
+    ),
     "an exception of megabytes": ("mine.py", "raise ValueError('x' * 10**7)\n", "xxx ..."),
     "thousands of causes": (
-        "mine.py", "e = ValueError()\nfor k in range(5000):\n  n = ValueError(k); n.__cause__ = e; e = n\nraise e\n",
+        "mine.py",
+        (
+            "e = ValueError()\nfor k in range(5000):\n  n = ValueError(k); n.__cause__ = e; e ="
+            " n\nraise e\n"
+        ),
         "",
     ),
     "input": ("mine.py", "n = input('how many? ')\n", "nobody is there to answer"),
-    "a module that is not there": ("mine.py", "import nothing_of_the_kind\n", "nothing_of_the_kind"),
+    "a module that is not there": (
+        "mine.py",
+        "import nothing_of_the_kind\n",
+        "nothing_of_the_kind",
+    ),
     "a module that imports itself": ("mine.py", "import mine\nmine.integrate\n", "integrate"),
     "no function at all": ("mine.py", "x = 1\n", "no function integrate"),
-    "functions that are numbers": ("mine.py", "integrate = sphereSphereCollisionHandling = 7\n", "integrate"),
+    "functions that are numbers": (
+        "mine.py",
+        "integrate = sphereSphereCollisionHandling = 7\n",
+        "integrate",
+    ),
     "functions that take nothing": (
-        "mine.py", PY.replace(STEP, "def integrate():\n").replace(COLLISION, "def sphereSphereCollisionHandling():\n"), "",
+        "mine.py",
+        PY.replace(STEP, "def integrate():\n").replace(
+            COLLISION, "def sphereSphereCollisionHandling():\n"
+        ),
+        "",
     ),
     "page in JavaScript": ("mine.js", f"document.write('x');\n{JS}", "document is not defined"),
     "modules in JavaScript": ("mine.js", f"import {{ a }} from './b.js';\n{JS}", "no modules"),
-    "a regular expression without end": ("mine.js", "/(a+)+$/.test('a'.repeat(40) + 'b');\n", "does not come back"),
+    "a regular expression without end": (
+        "mine.js",
+        "/(a+)+$/.test('a'.repeat(40) + 'b');\n",
+        "does not come back",
+    ),
     "nothing thrown in JavaScript": ("mine.js", "throw undefined;\n", "undefined"),
-}  # fmt: skip
+}
 # It is called, and fails there.
 CALLED: dict[str, tuple[str, str, str]] = {
     "an endless loop in a call": ("mine.py", within("while True: pass"), "does not come back"),
-    "an endless loop in a call in JavaScript": ("mine.js", within("for (;;);", head=JS_STEP), "does not come back"),
-    "a call that calls itself": ("mine.py", within("integrate(sphere, dt)"), "calls itself without end"),
+    "an endless loop in a call in JavaScript": (
+        "mine.js",
+        within("for (;;);", head=JS_STEP),
+        "does not come back",
+    ),
+    "a call that calls itself": (
+        "mine.py",
+        within("integrate(sphere, dt)"),
+        "calls itself without end",
+    ),
     "os._exit in a call": ("mine.py", within("import os; os._exit(0)"), "ended its own process"),
     "abort in a call": ("mine.py", within("import os; os.abort()", head=COLLISION), "SIGABRT"),
     "all memory in a call": ("mine.py", within("x = [0] * 10**10"), "memory"),
-    "an exception that is none in a call": ("mine.py", within("raise KeyboardInterrupt"), "KeyboardInterrupt"),
+    "an exception that is none in a call": (
+        "mine.py",
+        within("raise KeyboardInterrupt"),
+        "KeyboardInterrupt",
+    ),
     "nan": ("mine.py", within("sphere.velocity.x = float('nan')"), "NaN"),
     "infinity": ("mine.py", within("sphere.position.y = float('inf')"), "infinite"),
     "a number of 400 digits": ("mine.py", within("sphere.velocity.x = 10**400"), ""),
@@ -90,53 +156,123 @@ CALLED: dict[str, tuple[str, str, str]] = {
     "megabytes that are printed": ("mine.py", within("print('x' * 10**5)"), ""),
     "escape codes that are printed": ("mine.py", within("print('\\x1b[2J\\x1b]0;mine\\x07')"), ""),
     "answers that are forged": (
-        "mine.py", within("import os", "for k in range(3, 30):", "    try: os.write(k, b'[]\\n')",
-                          "    except OSError: pass"), "",
+        "mine.py",
+        within(
+            "import os",
+            "for k in range(3, 30):",
+            "    try: os.write(k, b'[]\\n')",
+            "    except OSError: pass",
+        ),
+        "",
     ),
-    "threads without end": ("mine.py", within("import threading, time",
-                                              "threading.Thread(target=time.sleep, args=(600,)).start()"), ""),
-    "a process that goes on": ("mine.py", f"import subprocess\nsubprocess.Popen(['sleep', '600'])\n{PY}", ""),
+    "threads without end": (
+        "mine.py",
+        within(
+            "import threading, time", "threading.Thread(target=time.sleep, args=(600,)).start()"
+        ),
+        "",
+    ),
+    "a process that goes on": (
+        "mine.py",
+        f"import subprocess\nsubprocess.Popen(['sleep', '600'])\n{PY}",
+        "",
+    ),
     "warnings": ("mine.py", within("import warnings; warnings.warn('mine')"), ""),
-    "chance": ("mine.py", within("import random, time; sphere.position.x += random.Random(time.time()).random()"), ""),
-}  # fmt: skip
+    "chance": (
+        "mine.py",
+        within("import random, time; sphere.position.x += random.Random(time.time()).random()"),
+        "",
+    ),
+}
 WRITES = ("check.html", "out", "out.part")
 CHECKED = tuple(
     Input(f"check: {what}", ("check", name), {name: text}, codes=(1,), says=says, writes=WRITES)
     for what, (name, text, says) in LOADING.items()
 ) + tuple(
-    Input(f"check: {what}", ("check", name), {name: text}, says=says, writes=WRITES,
-          codes=(0, 1) if what.endswith("printed") or what in ("warnings", "threads without end",
-                                                               "a process that goes on") else (1,))
+    Input(
+        f"check: {what}",
+        ("check", name),
+        {name: text},
+        says=says,
+        writes=WRITES,
+        codes=(
+            (0, 1)
+            if what.endswith("printed")
+            or what in ("warnings", "threads without end", "a process that goes on")
+            else (1,)
+        ),
+    )
     for what, (name, text, says) in CALLED.items()
-)  # fmt: skip
+)
 
 # The same as an engine: a run goes on, and says what was not played.
-IN_A_RUN = ("a syntax error", "an endless loop", "all memory", "os._exit with success", "killing its group",
-            "an exception with escape codes", "no function at all", "an endless loop in a call", "nan",
-            "abort in a call", "megabytes that are printed", "answers that are forged")  # fmt: skip
+IN_A_RUN = (
+    "a syntax error",
+    "an endless loop",
+    "all memory",
+    "os._exit with success",
+    "killing its group",
+    "an exception with escape codes",
+    "no function at all",
+    "an endless loop in a call",
+    "nan",
+    "abort in a call",
+    "megabytes that are printed",
+    "answers that are forged",
+)
 ENGINES = tuple(
-    Input(f"run: {what}", (*PLAYED, name), {"two.toml": TWO, name: text}, writes=WRITES,
-          codes=(0, 1) if what.endswith("printed") else (1,))
+    Input(
+        f"run: {what}",
+        (*PLAYED, name),
+        {"two.toml": TWO, name: text},
+        writes=WRITES,
+        codes=(0, 1) if what.endswith("printed") else (1,),
+    )
     for what in IN_A_RUN
     for name, text, _ in [(LOADING | CALLED)[what]]
-)  # fmt: skip
+)
 
-# It does something to where it is: that stays the user's own doing, and what the program does is not changed by it.
+# It does something to where it is: that stays the user's own doing, and what the program does is
+# not changed by it.
 DELETES = within("import os", "if os.path.exists(__file__): os.remove(__file__)")
 WRITING = f"open('made_by_me.txt', 'w').write('x')\n{PY}"
 OWN_DOING = (
-    Input("check: deletes itself", ("check", "mine.py"), {"mine.py": DELETES}, codes=(0, 1),
-          writes=(*WRITES, "mine.py")),
-    Input("run: deletes itself", (*PLAYED, "mine.py"), {"two.toml": TWO, "mine.py": DELETES}, codes=(0, 1),
-          writes=(*WRITES, "mine.py")),
-    Input("check: writes into where one is", ("check", "mine.py"), {"mine.py": WRITING}, codes=(0, 1),
-          writes=(*WRITES, "made_by_me.txt")),
-    Input("run: writes over itself", (*PLAYED, "mine.py"),
-          {"two.toml": TWO, "mine.py": within("open(__file__, 'w').write('nonsense(')")}, codes=(0, 1),
-          writes=(*WRITES, "mine.py")),
-    Input("run: leaves where one is", (*PLAYED, "mine.py"),
-          {"two.toml": TWO, "mine.py": within("import os; os.chdir('/')")}, codes=(0, 1), writes=WRITES),
-)  # fmt: skip
+    Input(
+        "check: deletes itself",
+        ("check", "mine.py"),
+        {"mine.py": DELETES},
+        codes=(0, 1),
+        writes=(*WRITES, "mine.py"),
+    ),
+    Input(
+        "run: deletes itself",
+        (*PLAYED, "mine.py"),
+        {"two.toml": TWO, "mine.py": DELETES},
+        codes=(0, 1),
+        writes=(*WRITES, "mine.py"),
+    ),
+    Input(
+        "check: writes into where one is",
+        ("check", "mine.py"),
+        {"mine.py": WRITING},
+        codes=(0, 1),
+        writes=(*WRITES, "made_by_me.txt"),
+    ),
+    Input(
+        "run: writes over itself",
+        (*PLAYED, "mine.py"),
+        {"two.toml": TWO, "mine.py": within("open(__file__, 'w').write('nonsense(')")},
+        codes=(0, 1),
+        writes=(*WRITES, "mine.py"),
+    ),
+    Input(
+        "run: leaves where one is",
+        (*PLAYED, "mine.py"),
+        {"two.toml": TWO, "mine.py": within("import os; os.chdir('/')")},
+        codes=(0, 1),
+        writes=WRITES,
+    ),
+)
 
 NO_TEXT: dict[str, tuple[str, str | bytes | Callable[[Path], object] | None]] = {
     "a file that is not there": ("mine.py", None),
@@ -151,47 +287,142 @@ NO_TEXT: dict[str, tuple[str, str | bytes | Callable[[Path], object] | None]] = 
     "a device": ("mine.js", lambda here: (here / "mine.js").symlink_to("/dev/zero")),
     "a C file": ("mine.c", "int main() {}\n"),
     "no ending": ("mine", PY),
-}  # fmt: skip
+}
 REFUSED = tuple(
-    Input(f"{words[0]}: {what}", (*words, name), {} if content is None or callable(content) else {name: content},
-          prepare=content if callable(content) else None, says=name)
+    Input(
+        f"{words[0]}: {what}",
+        (*words, name),
+        {} if content is None or callable(content) else {name: content},
+        prepare=content if callable(content) else None,
+        says=name,
+    )
     for number, (what, (name, content)) in enumerate(NO_TEXT.items())
     for words in (("check",), (("run", "free_fall", "--engine"), ("play", "--engine"))[number % 2])
     if not (words == ("check",) and "folder" in what)
-)  # fmt: skip
+)
 
 # Files with the names of Python's own modules, and of ours: nothing imports them.
 TRAP = "open('trapped.txt', 'w').write('foreign code ran')\nraise SystemExit('trapped')\n"
-MODULES = ("random.py", "secrets.py", "numbers.py", "scenarios.py", "adapters/__init__.py", "numpy.py", "json.py",
-           "sitecustomize.py", "reports/__main__.py")  # fmt: skip
+MODULES = (
+    "random.py",
+    "secrets.py",
+    "numbers.py",
+    "scenarios.py",
+    "adapters/__init__.py",
+    "numpy.py",
+    "json.py",
+    "sitecustomize.py",
+    "reports/__main__.py",
+)
 TRAPS = dict.fromkeys(MODULES, TRAP)
 BESIDE = (
-    Input("check: beside modules of Python's names", ("check", "mine.py"), TRAPS | {"mine.py": PY}, codes=(0,),
-          writes=WRITES),
-    Input("run: beside modules of Python's names", (*PLAYED, "pymunk:shipped"), TRAPS | {"two.toml": TWO}, codes=(0,),
-          writes=WRITES, says="All 1 cells have ended: 1 ok"),
-    Input("truth: beside modules of Python's names", ("truth", "two.toml"), TRAPS | {"two.toml": TWO}, codes=(0,)),
-    Input("run with a shell: beside modules of Python's names", files=TRAPS | {"two.toml": TWO}, codes=(0,),
-          writes=WRITES, shell=f"$crosscheck {' '.join(PLAYED)} pymunk:shipped"),
-    Input("check: a folder of such modules", ("check", "."), {"a/random.py": TRAP, "a/mine.py": PY}, codes=(1,),
-          writes=(*WRITES, "trapped.txt"), says="trapped"),
-)  # fmt: skip
+    Input(
+        "check: beside modules of Python's names",
+        ("check", "mine.py"),
+        TRAPS | {"mine.py": PY},
+        codes=(0,),
+        writes=WRITES,
+    ),
+    Input(
+        "run: beside modules of Python's names",
+        (*PLAYED, "pymunk:shipped"),
+        TRAPS | {"two.toml": TWO},
+        codes=(0,),
+        writes=WRITES,
+        says="All 1 cells have ended: 1 ok",
+    ),
+    Input(
+        "truth: beside modules of Python's names",
+        ("truth", "two.toml"),
+        TRAPS | {"two.toml": TWO},
+        codes=(0,),
+    ),
+    Input(
+        "run with a shell: beside modules of Python's names",
+        files=TRAPS | {"two.toml": TWO},
+        codes=(0,),
+        writes=WRITES,
+        shell=f"$crosscheck {' '.join(PLAYED)} pymunk:shipped",
+    ),
+    Input(
+        "check: a folder of such modules",
+        ("check", "."),
+        {"a/random.py": TRAP, "a/mine.py": PY},
+        codes=(1,),
+        writes=(*WRITES, "trapped.txt"),
+        says="trapped",
+    ),
+)
 NAMES = (
-    Input("check: a name in capitals", ("check", "UPPER.PY"), {"UPPER.PY": PY}, codes=(0,), writes=WRITES),
-    Input("run: a name in capitals", (*PLAYED, "UPPER.PY"), {"two.toml": TWO, "UPPER.PY": PY}, codes=(0,),
-          writes=WRITES, says="All 1 cells have ended: 1 ok"),
-    Input("run: a name with a colon", ("run", "free_fall", "--engine", "a:b.py"), {"a:b.py": PY}, says="colon"),
-    Input("check: a name in markup", ("check", "[/nope].py"), {"[/nope].py": PY}, codes=(0,), writes=WRITES),
-    Input("check: a name with escape codes", ("check", "a\x1b[31m.py"), {"a\x1b[31m.py": PY}, codes=(0,),
-          writes=WRITES),
-    Input("check: a name with a line end", ("check", "a\nb.py"), {"a\nb.py": PY}, codes=(0,), writes=WRITES),
-    Input("check: a name like an option", ("check", "--", "--json.py"), {"--json.py": PY}, codes=(0,), writes=WRITES),
-    Input("check: letters of another encoding", ("check", "mine.py"),
-          {"mine.py": f"# {'ü' * 20}\n{PY}".encode("latin-1")}, codes=(0,), writes=WRITES),
-    Input("check: UTF-16 from an editor of Windows", ("check", "mine.py"), {"mine.py": PY.encode("utf-16")},
-          codes=(0,), writes=WRITES),
-    Input("check: a class of which nobody has a solver", ("check", "."),
-          {"a/mine.py": "x = (\n", "b/mine.js": "x = ;\n", "c/read.me": "later", "d/mine.py": ""}, codes=(1, 2),
-          writes=WRITES),
-)  # fmt: skip
+    Input(
+        "check: a name in capitals",
+        ("check", "UPPER.PY"),
+        {"UPPER.PY": PY},
+        codes=(0,),
+        writes=WRITES,
+    ),
+    Input(
+        "run: a name in capitals",
+        (*PLAYED, "UPPER.PY"),
+        {"two.toml": TWO, "UPPER.PY": PY},
+        codes=(0,),
+        writes=WRITES,
+        says="All 1 cells have ended: 1 ok",
+    ),
+    Input(
+        "run: a name with a colon",
+        ("run", "free_fall", "--engine", "a:b.py"),
+        {"a:b.py": PY},
+        says="colon",
+    ),
+    Input(
+        "check: a name in markup",
+        ("check", "[/nope].py"),
+        {"[/nope].py": PY},
+        codes=(0,),
+        writes=WRITES,
+    ),
+    Input(
+        "check: a name with escape codes",
+        ("check", "a\x1b[31m.py"),
+        {"a\x1b[31m.py": PY},
+        codes=(0,),
+        writes=WRITES,
+    ),
+    Input(
+        "check: a name with a line end",
+        ("check", "a\nb.py"),
+        {"a\nb.py": PY},
+        codes=(0,),
+        writes=WRITES,
+    ),
+    Input(
+        "check: a name like an option",
+        ("check", "--", "--json.py"),
+        {"--json.py": PY},
+        codes=(0,),
+        writes=WRITES,
+    ),
+    Input(
+        "check: letters of another encoding",
+        ("check", "mine.py"),
+        {"mine.py": f"# {'ü' * 20}\n{PY}".encode("latin-1")},
+        codes=(0,),
+        writes=WRITES,
+    ),
+    Input(
+        "check: UTF-16 from an editor of Windows",
+        ("check", "mine.py"),
+        {"mine.py": PY.encode("utf-16")},
+        codes=(0,),
+        writes=WRITES,
+    ),
+    Input(
+        "check: a class of which nobody has a solver",
+        ("check", "."),
+        {"a/mine.py": "x = (\n", "b/mine.js": "x = ;\n", "c/read.me": "later", "d/mine.py": ""},
+        codes=(1, 2),
+        writes=WRITES,
+    ),
+)
 SOLVERS = (*CHECKED, *ENGINES, *OWN_DOING, *REFUSED, *BESIDE, *NAMES)

@@ -1,4 +1,5 @@
-"""What a hostile page, or no page at all, says to a server on this machine, and what is heard of it."""
+"""What a hostile page, or no page at all, says to a server on this machine, and what is heard of
+it."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ def free_port() -> int:
 
 
 def hear(talk: Talk, server: BaseProcess, stdout: Path) -> str:
-    """Wait until it serves, talk to it, ask whether it still serves, and tell it to stop; "" if it never serves."""
+    """Wait until it serves, talk to it, ask whether it still serves, and tell it to stop; "" if it
+    never serves."""
     assert server.pid is not None
     end = time.monotonic() + STARTS
     while not (served := stdout.read_text() if stdout.exists() else "").count("\n"):
@@ -52,7 +54,12 @@ def asked(port: int, method: str, path: str, body: bytes = b"", **headers: str) 
     """Status and text of the answer to a request; in the names of headers a `_` stands for `-`."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=ANSWERS)
     try:
-        connection.request(method, path, body or None, {name.replace("_", "-"): text for name, text in headers.items()})
+        connection.request(
+            method,
+            path,
+            body or None,
+            {name.replace("_", "-"): text for name, text in headers.items()},
+        )
         answer = connection.getresponse()
         return f"{answer.status} {answer.read().decode('utf-8', 'backslashreplace')}"
     finally:
@@ -69,7 +76,8 @@ def _asks(method: str, path: str, body: bytes, headers: dict[str, str], port: in
 
 
 def sends(*what: bytes, times: int = 1) -> Talk:
-    """Bytes as they are, `times` times; what comes back until the other end closes, or says nothing for a second."""
+    """Bytes as they are, `times` times; what comes back until the other end closes, or says nothing
+    for a second."""
     return partial(_sends, what, times)
 
 
@@ -88,8 +96,14 @@ def _sends(what: tuple[bytes, ...], times: int, port: int) -> str:
     return heard.decode("utf-8", "backslashreplace")
 
 
-def says(*messages: str | bytes, path: str = "/fly", origin: str = "http://localhost:PORT", wait: bool = True) -> Talk:
-    """A tab of the game that sends these after its first answer; what it hears, and how it is closed."""
+def says(
+    *messages: str | bytes,
+    path: str = "/fly",
+    origin: str = "http://localhost:PORT",
+    wait: bool = True,
+) -> Talk:
+    """A tab of the game that sends these after its first answer; what it hears, and how it is
+    closed."""
     return partial(_says, messages, path, origin, wait)
 
 
@@ -97,9 +111,11 @@ def _says(messages: tuple[str | bytes, ...], path: str, origin: str, wait: bool,
     heard = []
     try:
         with connect(
-            f"ws://localhost:{port}{path}", origin=origin.replace("PORT", str(port)) or None,  # type: ignore[arg-type]
-            open_timeout=ANSWERS, max_size=None,
-        ) as tab:  # fmt: skip
+            f"ws://localhost:{port}{path}",
+            origin=origin.replace("PORT", str(port)) or None,  # type: ignore[arg-type]
+            open_timeout=ANSWERS,
+            max_size=None,
+        ) as tab:
             heard.append(str(tab.recv(timeout=STARTS)))
             for message in messages:
                 tab.send(message)

@@ -1,7 +1,8 @@
-"""Every hostile input ends in time, with a sentence or a result, and takes nothing of the user's away.
+"""Every hostile input ends in time, with a sentence or a result, and takes nothing of the user's
+away.
 
-The outcomes are kept in outcomes.csv: `uv run python -m tests.hostile.test_hostile` plays all and writes it anew; or
-the families and inputs that are named, as `scenes`, and writes their rows.
+The outcomes are kept in outcomes.csv: `uv run python -m tests.hostile.test_hostile` plays all and
+writes it anew; or the families and inputs that are named, as `scenes`, and writes their rows.
 """
 
 from __future__ import annotations
@@ -24,7 +25,19 @@ from tests.hostile.command_lines import LINES
 from tests.hostile.folders import FOLDERS
 from tests.hostile.journals import JOURNALS
 from tests.hostile.places import PLACES
-from tests.hostile.played import BAD, HANG, LEFT, LOST, SENTENCE, STRAY, TRACEBACK, WRONG, Input, Outcome, outcome_of
+from tests.hostile.played import (
+    BAD,
+    HANG,
+    LEFT,
+    LOST,
+    SENTENCE,
+    STRAY,
+    TRACEBACK,
+    WRONG,
+    Input,
+    Outcome,
+    outcome_of,
+)
 from tests.hostile.scenes import SCENES
 from tests.hostile.servers import SERVERS
 from tests.hostile.small_run import finished_run
@@ -33,9 +46,14 @@ from tests.hostile.solvers import SOLVERS
 FILE = Path(__file__).with_name("outcomes.csv")
 SHOWN = 2000  # characters of what a bad one printed
 FAMILIES: dict[str, tuple[Input, ...]] = {
-    "scenes": SCENES, "folders": FOLDERS, "journals": JOURNALS, "places": PLACES, "command lines": LINES,
-    "solvers": SOLVERS, "servers": SERVERS,
-}  # fmt: skip
+    "scenes": SCENES,
+    "folders": FOLDERS,
+    "journals": JOURNALS,
+    "places": PLACES,
+    "command lines": LINES,
+    "solvers": SOLVERS,
+    "servers": SERVERS,
+}
 ALL = {(family, tried.name): tried for family, inputs in FAMILIES.items() for tried in inputs}
 Key = tuple[str, str]  # family and name of an input
 
@@ -48,7 +66,8 @@ def play(key: Key) -> tuple[Key, Outcome, float]:
 
 
 def play_all(keys: Iterable[Key]) -> Iterator[tuple[Key, Outcome, float]]:
-    """Play these inputs, as many at once as there are cores; the slow ones, which start engines, are spread."""
+    """Play these inputs, as many at once as there are cores; the slow ones, which start engines,
+    are spread."""
     finished_run()  # once, before the processes of the pool look for it
     with ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context("spawn")) as pool:
         yield from pool.map(play, keys)
@@ -109,9 +128,13 @@ def test_a_program_that_ends_otherwise_is_noticed(
     monkeypatch.setattr(played, "SECONDS", 1.0)
     monkeypatch.setattr(played, "GRACE", 0.3)
     tried = Input(
-        "control", files={"mine.txt": "mine"}, prepare=lambda here: (here / "empty").mkdir(), writes=("asked.txt",),
-        says="" if word == TRACEBACK else "no", shell=shell,
-    )  # fmt: skip
+        "control",
+        files={"mine.txt": "mine"},
+        prepare=lambda here: (here / "empty").mkdir(),
+        writes=("asked.txt",),
+        says="" if word == TRACEBACK else "no",
+        shell=shell,
+    )
 
     assert outcome_of(tried, tmp_path / "input").word == word
 
@@ -119,22 +142,35 @@ def test_a_program_that_ends_otherwise_is_noticed(
 def outcomes() -> dict[Key, tuple[str, int | None]]:
     """What is kept: family and name -> the outcome and its exit code."""
     with FILE.open(newline="", encoding="utf-8") as file:
-        rows = [(row["family"], row["input"], row["outcome"], row["exit"]) for row in csv.DictReader(file)]
-    return {(family, name): (word, int(code) if code else None) for family, name, word, code in rows}
+        rows = [
+            (row["family"], row["input"], row["outcome"], row["exit"])
+            for row in csv.DictReader(file)
+        ]
+    return {
+        (family, name): (word, int(code) if code else None) for family, name, word, code in rows
+    }
 
 
 def main(named: list[str]) -> None:
-    """Play these families and inputs, all if none is named; print the bad ones, and write their rows anew."""
+    """Play these families and inputs, all if none is named; print the bad ones, and write their
+    rows anew."""
     rows, began, seconds_of = {}, perf_counter(), {}
     for key, outcome, seconds in play_all(key for key in ALL if not named or {*key} & {*named}):
         rows[key], seconds_of[key] = (outcome.word, outcome.code), seconds
         if outcome.word in BAD:
-            print(f"{': '.join(key)}: {outcome.word}, exit {outcome.code}\n{outcome.printed[:SHOWN]}\n", flush=True)
+            print(
+                f"{': '.join(key)}: {outcome.word}, exit"
+                f" {outcome.code}\n{outcome.printed[:SHOWN]}\n",
+                flush=True,
+            )
     slowest = sorted(seconds_of, key=seconds_of.__getitem__)[-12:]
     print(f"{len(seconds_of)} in {perf_counter() - began:.0f} s; the slowest (s):")
     print(*(f"{seconds_of[key]:.1f} {': '.join(key)}" for key in slowest), sep="\n")
     rows = {key: row for key, row in (outcomes() | rows).items() if key in ALL}
-    print(*sorted(Counter((family, word) for (family, _), (word, _) in rows.items()).items()), sep="\n")
+    print(
+        *sorted(Counter((family, word) for (family, _), (word, _) in rows.items()).items()),
+        sep="\n",
+    )
     with FILE.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("family", "input", "exit", "outcome"))

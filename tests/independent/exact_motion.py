@@ -1,12 +1,13 @@
 """The exact motion of hard disks, written from the definitions alone: event-driven, in 420 bits.
 
-A disk flies on a parabola until something happens. To know what happens first, every disk is asked of every other
-disk, of both faces and both ends of every wall, and of every edge of the wrapping box when it would get there; the
-earliest wins, and after it all are asked again. Nothing is remembered and nothing is sorted, so that there is nothing
-to get wrong but the physics. All of that is the first root of a polynomial in the time from now.
+A disk flies on a parabola until something happens. To know what happens first, every disk is asked
+of every other disk, of both faces and both ends of every wall, and of every edge of the wrapping
+box when it would get there; the earliest wins, and after it all are asked again. Nothing is
+remembered and nothing is sorted, so that there is nothing to get wrong but the physics. All of that
+is the first root of a polynomial in the time from now.
 
-It takes from the project the scene, and nothing else. It has no rule for contacts that last, nor for several
-collisions at one instant: see `Stop`.
+It takes from the project the scene, and nothing else. It has no rule for contacts that last, nor
+for several collisions at one instant: see `Stop`.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from scenarios.model import Scenario, Scene, Thrust
 BITS = 420
 TINY = mpfr(2) ** -380  # s: two times that are closer are the same; 420 bits hold 10 s to 2 ** -416
 OVERLAP = mpfr(2) ** -300  # m2: a gap below minus that is an overlap and no rounding of 420 bits
-ACCUMULATION = 1e-9  # s between two collisions of a pair: they follow each other ever faster, and never end
+# s between two collisions of a pair: they follow each other ever faster, and never end
+ACCUMULATION = 1e-9
 
 Number = mpfr
 Vector = mpc  # x + i y
@@ -46,7 +48,8 @@ class Disk(NamedTuple):
 
 
 class Event(NamedTuple):
-    """A collision at `t` s of disk `i` with disk `j`, or wall -1 - j: N s, and |v_n| / |v| of the approach."""
+    """A collision at `t` s of disk `i` with disk `j`, or wall -1 - j: N s, and |v_n| / |v| of the
+    approach."""
 
     t: Number
     i: int
@@ -56,7 +59,8 @@ class Event(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What comes first: `after` s from now disk `i` meets disk or wall `j` at `other`, or is `wrapped` to there."""
+    """What comes first: `after` s from now disk `i` meets disk or wall `j` at `other`, or is
+    `wrapped` to there."""
 
     after: Number
     i: int = -1
@@ -95,13 +99,18 @@ def marks(p: Polynomial, until: Number) -> list[Number]:
     if len(p) <= 2:
         return [mpfr(0), until]
     slope = derivative(p)
-    pieces = [(a, b) for a, b in pairwise(marks(slope, until)) if (value(slope, a) > 0) != (value(slope, b) > 0)]
+    pieces = [
+        (a, b)
+        for a, b in pairwise(marks(slope, until))
+        if (value(slope, a) > 0) != (value(slope, b) > 0)
+    ]
     turns = [root(slope, a, b) for a, b in pieces]
     return [mpfr(0), *turns, until]
 
 
 def root(p: Polynomial, low: Number, high: Number) -> Number:
-    """Where p, of opposite signs at both and monotone between, is 0: Newton's steps, or halves where they leave."""
+    """Where p, of opposite signs at both and monotone between, is 0: Newton's steps, or halves
+    where they leave."""
     slope, rising, t = derivative(p), value(p, high) > 0, (low + high) / 2
     while True:
         here, steepness = value(p, t), value(slope, t)
@@ -130,7 +139,13 @@ def first_fall(p: Polynomial, until: Number) -> Number | None:
 def distance_squared(p: Disk, q: Disk) -> Polynomial:
     """|x + v t + a t2 / 2|2 - (r + r)2 of two disks: above 0 while they are apart."""
     x, v, a, reach = q.x - p.x, q.v - p.v, q.a - p.a, p.radius + q.radius
-    return [dot(x, x) - reach * reach, 2 * dot(x, v), dot(v, v) + dot(x, a), dot(v, a), dot(a, a) / 4]
+    return [
+        dot(x, x) - reach * reach,
+        2 * dot(x, v),
+        dot(v, v) + dot(x, a),
+        dot(v, a),
+        dot(a, a) / 4,
+    ]
 
 
 def height(p: Disk, point: Vector, normal: Vector, least: Number) -> Polynomial:
@@ -166,8 +181,11 @@ def first(disks: Sequence[Disk], scene: Scene, until: Number) -> Found:
     return best
 
 
-def wall_contacts(p: Disk, start: Vector, end: Vector, until: Number) -> Iterator[tuple[Number, Vector]]:
-    """When a disk first touches each face and each end of a wall, and the point of the wall that it touches."""
+def wall_contacts(
+    p: Disk, start: Vector, end: Vector, until: Number
+) -> Iterator[tuple[Number, Vector]]:
+    """When a disk first touches each face and each end of a wall, and the point of the wall that it
+    touches."""
     along = end - start
     length = gmpy2.sqrt(dot(along, along))
     for normal in (mpc(0, 1) * along / length, mpc(0, -1) * along / length):
@@ -181,7 +199,8 @@ def wall_contacts(p: Disk, start: Vector, end: Vector, until: Number) -> Iterato
 
 
 def edges(low: Sequence[float], high: Sequence[float]) -> Iterator[tuple[Vector, Vector, Vector]]:
-    """Of each edge of the wrapping box: the way in, a point on it, and the point across from that."""
+    """Of each edge of the wrapping box: the way in, a point on it, and the point across from
+    that."""
     (left, bottom), (right, top) = low, high
     yield mpc(1, 0), exact((left, 0)), exact((right, 0))
     yield mpc(-1, 0), exact((right, 0)), exact((left, 0))
@@ -190,15 +209,19 @@ def edges(low: Sequence[float], high: Sequence[float]) -> Iterator[tuple[Vector,
 
 
 class Motion:
-    """The motion of a scenario, up to `end` s, where it is `reason` that stops it; "" at the end of the scenario.
+    """The motion of a scenario, up to `end` s, where it is `reason` that stops it; "" at the end of
+    the scenario.
 
-    `events` in order of time; `at(t)` the disks at any time before the end. `nudge` moves the start of each disk by
-    (dx, dv), m and m/s.
+    `events` in order of time; `at(t)` the disks at any time before the end. `nudge` moves the start
+    of each disk by (dx, dv), m and m/s.
     """
 
-    def __init__(self, scenario: Scenario, most: int, nudge: Sequence[tuple[Vector, Vector]] = ()) -> None:
+    def __init__(
+        self, scenario: Scenario, most: int, nudge: Sequence[tuple[Vector, Vector]] = ()
+    ) -> None:
         self.events: list[Event] = []
-        self.times: list[Number] = []  # when `disks` became what `states` says, each on a flight of its own from there
+        # when `disks` became what `states` says, each on a flight of its own from there
+        self.times: list[Number] = []
         self.states: list[list[Disk]] = []
         self.reason = ""
         with gmpy2.context(precision=BITS):
@@ -214,10 +237,19 @@ class Motion:
         scene, stop = scenario.scene, mpfr(scenario.duration)
         sizes = [(mpfr(float(r)), 1 / mpfr(float(m))) for r, m in zip(scene.radius, scene.mass)]
         starts = zip(scene.position, scene.velocity, nudge, sizes)
-        disks = [Disk(exact(x) + dx, exact(v) + dv, mpc(0), *size) for x, v, (dx, dv), size in starts]
-        breaks = {mpfr(t) for thrust in scenario.thrusts for t in (thrust.start, thrust.stop) if 0 < t < stop}
+        disks = [
+            Disk(exact(x) + dx, exact(v) + dv, mpc(0), *size) for x, v, (dx, dv), size in starts
+        ]
+        breaks = {
+            mpfr(t)
+            for thrust in scenario.thrusts
+            for t in (thrust.start, thrust.stop)
+            if 0 < t < stop
+        }
         for until in (*sorted(breaks), stop):
-            accelerations = [acceleration(scene, scenario.thrusts, i, self.now) for i in range(scene.n)]
+            accelerations = [
+                acceleration(scene, scenario.thrusts, i, self.now) for i in range(scene.n)
+            ]
             disks = [disk._replace(a=a) for disk, a in zip(disks, accelerations)]
             while self.now < until:
                 self.times.append(self.now)
@@ -233,7 +265,8 @@ class Motion:
                         raise Stop("enough events")
 
     def collide(self, disks: list[Disk], found: Found, restitution: Number) -> None:
-        """An impulse along the line of centres turns the closing speed around: Newton's law of restitution."""
+        """An impulse along the line of centres turns the closing speed around: Newton's law of
+        restitution."""
         i, j, p = found.i, found.j, disks[found.i]
         q = disks[j] if j >= 0 else found.other
         assert q is not None
@@ -256,9 +289,16 @@ class Motion:
 
 
 def acceleration(scene: Scene, thrusts: Sequence[Thrust], i: int, now: Number) -> Vector:
-    """m/s2 of disk i by gravity and by the thrusts that are on, which must be in the world's axes."""
+    """m/s2 of disk i by gravity and by the thrusts that are on, which must be in the world's
+    axes."""
     if scene.static[i]:
         return mpc(0)
     assert all(thrust.frame == "world" for thrust in thrusts)
-    on = [thrust for thrust in thrusts if thrust.disk == i and mpfr(thrust.start) <= now < mpfr(thrust.stop)]
-    return sum((exact(thrust.force) / mpfr(float(scene.mass[i])) for thrust in on), exact(scene.gravity))
+    on = [
+        thrust
+        for thrust in thrusts
+        if thrust.disk == i and mpfr(thrust.start) <= now < mpfr(thrust.stop)
+    ]
+    return sum(
+        (exact(thrust.force) / mpfr(float(scene.mass[i])) for thrust in on), exact(scene.gravity)
+    )

@@ -1,8 +1,9 @@
 """pymunk, Box2D 2.3 and Box2D 3.1, called directly, as their manuals say; no adapter is asked how.
 
-Each function plays a scenario in steps of `dt` and returns position (k, n, 2), velocity (k, n, 2), angle (k, n) and
-angular velocity (k, n) at the scenario's samples, SI. `asked` holds the settings that are not the engine's default, by
-the names and with the numbers under which the project records them; nothing else is taken from it.
+Each function plays a scenario in steps of `dt` and returns position (k, n, 2), velocity (k, n, 2),
+angle (k, n) and angular velocity (k, n) at the scenario's samples, SI. `asked` holds the settings
+that are not the engine's default, by the names and with the numbers under which the project records
+them; nothing else is taken from it.
 """
 
 from __future__ import annotations
@@ -25,8 +26,11 @@ Row = tuple[float, ...]  # x, y, vx, vy, angle, angular velocity of one disk
 Force = tuple[int, np.ndarray, float]
 
 
-def forces(scenario: Scenario, step: int, dt: float, angle: Callable[[int], float]) -> Iterator[Force]:
-    """Disk, force (2,) N and torque N m of every thrust in a step: its mean over that, so that the impulse is exact.
+def forces(
+    scenario: Scenario, step: int, dt: float, angle: Callable[[int], float]
+) -> Iterator[Force]:
+    """Disk, force (2,) N and torque N m of every thrust in a step: its mean over that, so that the
+    impulse is exact.
 
     A force in the axes of the disk is turned by the angle which that has at the start of the step.
     """
@@ -45,11 +49,16 @@ def across(scene: Scene, x: float, y: float) -> tuple[float, float] | None:
     if scene.wrap is None:
         return None
     (left, bottom), (right, top) = scene.wrap
-    there = (right if x < left else left if x > right else x), (top if y < bottom else bottom if y > top else y)
+    there = (
+        (right if x < left else left if x > right else x),
+        (top if y < bottom else bottom if y > top else y),
+    )
     return None if there == (x, y) else there
 
 
-def sampled(scenario: Scenario, dt: float, step: Callable[[int], None], read: Callable[[], list[Row]]) -> Samples:
+def sampled(
+    scenario: Scenario, dt: float, step: Callable[[int], None], read: Callable[[], list[Row]]
+) -> Samples:
     """Play all steps, and read where a sample is due."""
     rows = [read()]
     substeps = round(scenario.sample_interval / dt)
@@ -65,7 +74,13 @@ def play_pymunk(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples
     """pymunk: a space, a body a disk, circles and segments."""
     scene, space = scenario.scene, pymunk.Space()
     space.gravity = tuple(scene.gravity.tolist())
-    for name in ("iterations", "collision_slop", "collision_bias", "collision_persistence", "damping"):
+    for name in (
+        "iterations",
+        "collision_slop",
+        "collision_bias",
+        "collision_persistence",
+        "damping",
+    ):
         if name in asked:
             setattr(space, name, asked[name])
     elasticity, bodies = asked["elasticity"], []
@@ -96,16 +111,22 @@ def play_pymunk(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples
                 body.position = there
 
     def read() -> list[Row]:
-        return [(*body.position, *body.velocity, body.angle, body.angular_velocity) for body in bodies]
+        return [
+            (*body.position, *body.velocity, body.angle, body.angular_velocity) for body in bodies
+        ]
 
     return sampled(scenario, dt, step, read)
 
 
 def play_box2d(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
-    """Box2D 2.3: the scene in units of `length` m and `time` s, a body a disk, all walls as edges."""
+    """Box2D 2.3: the scene in units of `length` m and `time` s, a body a disk, all walls as
+    edges."""
     scene = scenario.scene
     # Units a metre, s a unit, units a m/s.
-    length, time = 1 / float(asked.get("unit of length in m", 1.0)), float(asked.get("unit of time in s", 1.0))
+    length, time = (
+        1 / float(asked.get("unit of length in m", 1.0)),
+        float(asked.get("unit of time in s", 1.0)),
+    )
     speed = length * time
     iterations = [int(word) for word in asked["velocity, position iterations"].split(",")]
     world = Box2D.b2World(gravity=tuple((scene.gravity * (length * time**2)).tolist()))
@@ -124,14 +145,19 @@ def play_box2d(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
         )
         position = tuple((scene.position[i] * length).tolist())
         if scene.static[i]:
-            body = world.CreateStaticBody(position=position, angle=float(scene.angle[i]), fixtures=circle)
+            body = world.CreateStaticBody(
+                position=position, angle=float(scene.angle[i]), fixtures=circle
+            )
         else:
             body = world.CreateDynamicBody(
-                position=position, angle=float(scene.angle[i]), allowSleep=sleeping, fixtures=circle,
+                position=position,
+                angle=float(scene.angle[i]),
+                allowSleep=sleeping,
+                fixtures=circle,
                 linearVelocity=tuple((scene.velocity[i] * speed).tolist()),
                 angularVelocity=float(scene.angular_velocity[i] * time),
                 bullet=asked.get("continuous collision between disks", False),
-            )  # fmt: skip
+            )
             body.massData = Box2D.b2MassData(
                 mass=float(scene.mass[i]), center=(0, 0), I=float(scene.inertia[i] * length**2)
             )
@@ -153,10 +179,16 @@ def play_box2d(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
 
     def read() -> list[Row]:
         return [
-            (b.position.x / length, b.position.y / length, b.linearVelocity.x / speed, b.linearVelocity.y / speed,
-             b.angle, b.angularVelocity / time)
+            (
+                b.position.x / length,
+                b.position.y / length,
+                b.linearVelocity.x / speed,
+                b.linearVelocity.y / speed,
+                b.angle,
+                b.angularVelocity / time,
+            )
             for b in bodies
-        ]  # fmt: skip
+        ]
 
     return sampled(scenario, dt, step, read)
 
@@ -176,7 +208,9 @@ def play_box2d_v3(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Sampl
         pyb2d3.set_length_units_per_meter(1.0)
 
 
-def played_box2d_v3(scene: Scene, scenario: Scenario, dt: float, asked: dict[str, Any], world: Any) -> Samples:
+def played_box2d_v3(
+    scene: Scene, scenario: Scenario, dt: float, asked: dict[str, Any], world: Any
+) -> Samples:
     """In a world that is made."""
     sleeping = asked.get("sleeping", True)
     world.sleeping_enabled = sleeping
@@ -188,7 +222,9 @@ def played_box2d_v3(scene: Scene, scenario: Scenario, dt: float, asked: dict[str
         surface["friction"] = asked["friction"]
     definition = pyb2d3.shape_def(density=1, material=pyb2d3.surface_material(**surface))
     for start, end in scene.walls.tolist():
-        world.create_static_body().create_segment_shape(definition, pyb2d3.segment(tuple(start), tuple(end)))
+        world.create_static_body().create_segment_shape(
+            definition, pyb2d3.segment(tuple(start), tuple(end))
+        )
     bodies = []
     for i in range(scene.n):
         turn = pyb2d3.make_rot(0)
@@ -200,13 +236,19 @@ def played_box2d_v3(scene: Scene, scenario: Scenario, dt: float, asked: dict[str
             body.create_circle_shape(definition, circle)
         else:
             body = world.create_dynamic_body(
-                **place, linear_velocity=tuple(scene.velocity[i].tolist()),
-                angular_velocity=float(scene.angular_velocity[i]), enable_sleep=sleeping,
+                **place,
+                linear_velocity=tuple(scene.velocity[i].tolist()),
+                angular_velocity=float(scene.angular_velocity[i]),
+                enable_sleep=sleeping,
                 is_bullet=asked.get("continuous collision between disks", False),
-            )  # fmt: skip
+            )
             body.create_circle_shape(definition, circle)
             mass = pyb2d3.MassData()
-            mass.mass, mass.rotational_inertia, mass.center = float(scene.mass[i]), float(scene.inertia[i]), (0, 0)
+            mass.mass, mass.rotational_inertia, mass.center = (
+                float(scene.mass[i]),
+                float(scene.inertia[i]),
+                (0, 0),
+            )
             body.mass_data = mass
         bodies.append(body)
     angles = scene.angle.copy()
@@ -230,18 +272,37 @@ def played_box2d_v3(scene: Scene, scenario: Scenario, dt: float, asked: dict[str
         follow()
 
     def read() -> list[Row]:
-        return [(*b.position, *b.linear_velocity, angles[i], b.angular_velocity) for i, b in enumerate(bodies)]
+        return [
+            (*b.position, *b.linear_velocity, angles[i], b.angular_velocity)
+            for i, b in enumerate(bodies)
+        ]
 
     return sampled(scenario, dt, step, read)
 
 
 PLAIN = {"pymunk": play_pymunk, "box2d": play_box2d, "box2d_v3": play_box2d_v3}
 KNOWN = {
-    "elasticity", "iterations", "collision_slop", "collision_bias", "collision_persistence", "damping",
-    "unit of length in m", "unit of time in s", "wall skin in m", "velocity, position iterations",
-    "friction", "restitution", "sleeping", "continuous collision", "continuous collision between disks",
-    "sub-stepping", "warm starting",
-    "length unit in m", "restitution threshold in m/s", "speed cap in m/s", "substeps",
+    "elasticity",
+    "iterations",
+    "collision_slop",
+    "collision_bias",
+    "collision_persistence",
+    "damping",
+    "unit of length in m",
+    "unit of time in s",
+    "wall skin in m",
+    "velocity, position iterations",
+    "friction",
+    "restitution",
+    "sleeping",
+    "continuous collision",
+    "continuous collision between disks",
+    "sub-stepping",
+    "warm starting",
+    "length unit in m",
+    "restitution threshold in m/s",
+    "speed cap in m/s",
+    "substeps",
     "contact tuning (hertz, damping ratio, push speed in m/s)",
-}  # fmt: skip
+}
 """The settings that are asked for here; what an adapter asks for beside them would go unnoticed."""

@@ -1,5 +1,5 @@
-"""Scenes that are random (seed n): disks in a box, in the open, in the wrapping box; with what else a scene may
-have."""
+"""Scenes that are random (seed n): disks in a box, in the open, in the wrapping box; with what else
+a scene may have."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ import numpy as np
 from scenarios.model import Scenario, Scene, Thrust
 
 RESTITUTIONS = (1.0, 0.9, 0.5, 0.1)
-WIDTH, HEIGHT = 9.0, 6.0  # m; no coordinate is 8 m or more but the walls', see `nudges` of the horizon
+# m; no coordinate is 8 m or more but the walls', see `nudges` of the horizon
+WIDTH, HEIGHT = 9.0, 6.0
 GAP = 0.02  # m, between any two bodies at the start: nothing touches
 
 
 def random_scene(seed: int) -> Scenario:
-    """Three to eight disks; in turn one of the four restitutions and one of the surroundings of `SURROUNDINGS`."""
+    """Three to eight disks; in turn one of the four restitutions and one of the surroundings of
+    `SURROUNDINGS`."""
     rng = np.random.default_rng(seed)
     surroundings = tuple(SURROUNDINGS)[seed // 4 % len(SURROUNDINGS)]
     walls, wrap = SURROUNDINGS[surroundings](rng)
@@ -25,9 +27,15 @@ def random_scene(seed: int) -> Scenario:
     velocity = np.where(np.isinf(mass)[:, None], 0.0, rng.normal(0, 2, (n, 2)))
     gravity = (0.0, 0.0) if seed % 3 == 0 else (rng.uniform(-1, 1), rng.uniform(-5, -1))
     scene = Scene(
-        position=position, velocity=velocity, radius=radius, mass=mass, walls=walls, wrap=wrap,
-        gravity=gravity, restitution=RESTITUTIONS[seed % 4],
-    )  # fmt: skip
+        position=position,
+        velocity=velocity,
+        radius=radius,
+        mass=mass,
+        walls=walls,
+        wrap=wrap,
+        gravity=gravity,
+        restitution=RESTITUTIONS[seed % 4],
+    )
     thrusts = []
     for _ in range(int(rng.integers(0, 3))):
         start = rng.uniform(0, 2)
@@ -50,7 +58,10 @@ def box(_rng: np.random.Generator) -> tuple[np.ndarray, None]:
 def free_walls(rng: np.random.Generator) -> tuple[np.ndarray, None]:
     """One to four segments anywhere, which may cross each other, and two that cross for certain."""
     cross = np.array([[[3.0, 2.0], [5.0, 4.0]], [[5.0, 2.5], [3.5, 4.0]]]) + rng.uniform(-1, 1, 2)
-    return np.concatenate([rng.uniform(0, 1, (rng.integers(1, 5), 2, 2)) * (WIDTH, HEIGHT), cross]), None
+    return (
+        np.concatenate([rng.uniform(0, 1, (rng.integers(1, 5), 2, 2)) * (WIDTH, HEIGHT), cross]),
+        None,
+    )
 
 
 def cluttered_box(rng: np.random.Generator) -> tuple[np.ndarray, None]:

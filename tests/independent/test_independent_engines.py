@@ -1,4 +1,5 @@
-"""Runs of pymunk and both Box2Ds by their adapters against the engines called directly: `plain_engines`."""
+"""Runs of pymunk and both Box2Ds by their adapters against the engines called directly:
+`plain_engines`."""
 
 from __future__ import annotations
 
@@ -19,10 +20,25 @@ pytestmark = pytest.mark.independent
 Record = Callable[[str, object], None]
 
 SCENES = (
-    "free_fall", "head_on_equal_e09", "oblique_e05", "mass_ratios", "slow_collision", "near_miss", "bouncing_ball_e09",
-    "box_billiard", "disk_between_static_disks", "slide_on_incline", "column_of_ten", "galperin_31", "cradle_touching",
-    "spin_under_torque", "body_frame_thrust", "ship_thrust", "asteroids", "falling_box",
-)  # fmt: skip
+    "free_fall",
+    "head_on_equal_e09",
+    "oblique_e05",
+    "mass_ratios",
+    "slow_collision",
+    "near_miss",
+    "bouncing_ball_e09",
+    "box_billiard",
+    "disk_between_static_disks",
+    "slide_on_incline",
+    "column_of_ten",
+    "galperin_31",
+    "cradle_touching",
+    "spin_under_torque",
+    "body_frame_thrust",
+    "ship_thrust",
+    "asteroids",
+    "falling_box",
+)
 PLAYED = [f"{engine}:{profile}" for engine in PLAIN for profile in ("shipped", "matched")]
 NAMES = ("position", "velocity", "angle", "angular_velocity")
 
@@ -39,23 +55,31 @@ def unequal(run: Run, samples: Samples) -> list[str]:
     """Which of the four arrays are not the same, bit for bit, and by how much."""
     assert run.trajectory is not None
     pairs = zip(NAMES, (getattr(run.trajectory, name) for name in NAMES), samples)
-    return [f"{name} by {np.abs(a - b).max():.2g}" for name, a, b in pairs if not np.array_equal(a, b)]
+    return [
+        f"{name} by {np.abs(a - b).max():.2g}" for name, a, b in pairs if not np.array_equal(a, b)
+    ]
 
 
 @pytest.mark.parametrize("engine", PLAYED)
-def test_an_adapter_plays_what_its_engine_plays_when_called_directly(engine: str, record_property: Record):
+def test_an_adapter_plays_what_its_engine_plays_when_called_directly(
+    engine: str, record_property: Record
+):
     """Bit for bit, with the settings that it says it asked for, and no others."""
     wrong, played = [], 0
     for name in SCENES:
         scenario = catalogue.scenario(name)
         run, asked = by_the_adapter(engine, scenario)
         assert run.status == "ok" or run.status == "unsupported", run.reason
-        assert set(asked) <= KNOWN, f"plain_engines.py does not know the setting {set(asked) - KNOWN}"
+        assert set(asked) <= KNOWN, (
+            f"plain_engines.py does not know the setting {set(asked) - KNOWN}"
+        )
         if run.status == "ok":
             played += 1
             samples = PLAIN[run.engine](scenario, run.dt, asked)
             wrong += [f"{name}: {fault}" for fault in unequal(run, samples)]
-    record_property("found", f"engines: {engine}, {played} of {len(SCENES)} scenes, {len(wrong)} arrays differ")
+    record_property(
+        "found", f"engines: {engine}, {played} of {len(SCENES)} scenes, {len(wrong)} arrays differ"
+    )
 
     assert not wrong
     assert played > len(SCENES) / 2
@@ -72,7 +96,9 @@ def test_an_adapter_plays_what_its_engine_plays_when_called_directly(engine: str
         ("box2d_v3:matched", "near_miss", "length unit in m", 1.0),
     ],
 )
-def test_a_setting_that_is_not_the_one_recorded_is_noticed(engine: str, scene: str, setting: str, value: Any):
+def test_a_setting_that_is_not_the_one_recorded_is_noticed(
+    engine: str, scene: str, setting: str, value: Any
+):
     """So the record of settings is what was played with."""
     scenario = catalogue.scenario(scene)
     run, asked = by_the_adapter(engine, scenario)

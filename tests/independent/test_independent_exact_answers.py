@@ -1,4 +1,5 @@
-"""The oracle's record against a motion that asks every pair for its next collision, in 420 bits: `exact_motion`."""
+"""The oracle's record against a motion that asks every pair for its next collision, in 420 bits:
+`exact_motion`."""
 
 from __future__ import annotations
 
@@ -22,16 +23,22 @@ Record = Callable[[str, object], None]
 
 SCENES, MOST_EVENTS = 320, 60
 ACCURACY = 1e-12  # m, and s: what the project says that its exact answers are certain to
-LEAST = 1e-4  # s: of bounces that die out on a wall those that last less are not in the record's list, as it says
-SHORT = 1e-9  # s: no event so close to the end is compared, for it is in one list and may be just beyond the other
+# s: of bounces that die out on a wall those that last less are not in the record's list, as it says
+LEAST = 1e-4
+# s: no event so close to the end is compared, for it is in one list and may be just beyond the
+# other
+SHORT = 1e-9
 NEAR = (
-    1e-8  # s: where collisions follow each other within 1e-9 s, the accumulation is nearer than that for all of our e
+    # s: where collisions follow each other within 1e-9 s, the accumulation is nearer than that for
+    # all of our e
+    1e-8
 )
 
 
 @dataclass
 class Compared:
-    """What a scene's comparison found: events compared, the largest distance in m, and every disagreement."""
+    """What a scene's comparison found: events compared, the largest distance in m, and every
+    disagreement."""
 
     events: int
     distance: float
@@ -42,24 +49,38 @@ def compared(scenario: Scenario, motion: Motion, record: TruthRecord) -> Compare
     """Both up to the end of either."""
     faults = []
     if record.horizon < float(motion.end) - (NEAR if motion.reason == "accumulation" else ACCURACY):
-        faults.append(f"the record ends at {record.horizon} s, the motion goes on to {float(motion.end)} s")
+        faults.append(
+            f"the record ends at {record.horizon} s, the motion goes on to {float(motion.end)} s"
+        )
     end = min(float(motion.end), record.horizon)
     own = [(float(e.t), e.i, e.j, float(e.impulse), float(e.cosine)) for e in motion.events]
-    unlisted = {e[:3] for e in own if any(e[1:3] == f[1:3] and e[2] < 0 < abs(e[0] - f[0]) < LEAST for f in own)}
+    unlisted = {
+        e[:3]
+        for e in own
+        if any(e[1:3] == f[1:3] and e[2] < 0 < abs(e[0] - f[0]) < LEAST for f in own)
+    }
     own = [e for e in own if e[0] < end - SHORT and e[:3] not in unlisted]
     theirs = [tuple(row) for row in record.events if row[0] < end - SHORT and row[3] > 0]
-    theirs = [f for f in theirs if not any(f[1:3] == u[1:3] and abs(f[0] - u[0]) < ACCURACY for u in unlisted)]
+    theirs = [
+        f
+        for f in theirs
+        if not any(f[1:3] == u[1:3] and abs(f[0] - u[0]) < ACCURACY for u in unlisted)
+    ]
     if len(own) != len(theirs):
         faults.append(f"{len(own)} events, the record has {len(theirs)}")
     for e, row in zip(own, theirs):
         if e[1:3] != row[1:3] or abs(e[0] - row[0]) > ACCURACY:
             faults.append(f"{e} is {row} in the record")
             break
-        if not np.allclose(e[3:], row[3:], rtol=1e-10, atol=ACCURACY):  # a cosine near 0 is certain to less
+        # a cosine near 0 is certain to less
+        if not np.allclose(e[3:], row[3:], rtol=1e-10, atol=ACCURACY):
             faults.append(f"impulse or angle: {e} is {row} in the record")
-    # The record is asked past its horizon, too: that is about engines of float64, not about the record.
+    # The record is asked past its horizon, too: that is about engines of float64, not about the
+    # record.
     times = np.linspace(0, end, 17)[:-1]
-    sampled = replace(record, float64_horizon=np.inf).sampled(scenario.scene, scenario.thrusts, times)
+    sampled = replace(record, float64_horizon=np.inf).sampled(
+        scenario.scene, scenario.thrusts, times
+    )
     if len(sampled) < len(times):
         faults.append(f"{len(sampled)} of {len(times)} samples")
     distance = 0.0
@@ -86,12 +107,15 @@ def test_the_oracle_gives_the_events_and_positions_of_a_motion_that_asks_all_pai
             continue
         result = compared(scenario, motion, record)
         found.append((scenario.name, result))
-        ends[" ".join(word for word in motion.reason.split() if not word.isdigit()) or "duration"] += 1
+        ends[
+            " ".join(word for word in motion.reason.split() if not word.isdigit()) or "duration"
+        ] += 1
     faults = [f"{name}: {fault}" for name, result in found for fault in result.faults]
     record_property(
         "found",
-        f"exact answers: {len(found)} scenes, {sum(r.events for _, r in found)} events, positions within "
-        f"{max(r.distance for _, r in found):.1e} m, {len(faults)} disagreements; compared up to: {dict(ends)}",
+        f"exact answers: {len(found)} scenes, {sum(r.events for _, r in found)} events, positions"
+        f" within {max(r.distance for _, r in found):.1e} m, {len(faults)} disagreements; compared"
+        f" up to: {dict(ends)}",
     )
 
     assert not refused
@@ -105,14 +129,18 @@ def test_every_restitution_meets_all_surroundings():
     met = {(s.scene.restitution, s.name.split("-")[0]) for s in scenes}
 
     assert len(met) == len(RESTITUTIONS) * len(SURROUNDINGS)
-    for feature in ([bool(s.scene.gravity.any()) for s in scenes], [bool(s.thrusts) for s in scenes]):
+    for feature in (
+        [bool(s.scene.gravity.any()) for s in scenes],
+        [bool(s.thrusts) for s in scenes],
+    ):
         assert set(feature) == {True, False}
     assert {bool(s.scene.static.any()) for s in scenes} == {True, False}
 
 
 @pytest.mark.parametrize("seed", [4, 21])
 def test_a_record_that_is_wrong_in_one_thing_is_noticed(seed: int):
-    """An event dropped, spurious, 2e-12 s late or of another pair; a disk off by 2e-12 m; an end that is too early."""
+    """An event dropped, spurious, 2e-12 s late or of another pair; a disk off by 2e-12 m; an end
+    that is too early."""
     scenario = random_scene(seed)
     motion, record = Motion(scenario, MOST_EVENTS), computed(scenario)
     assert len(record.events) > 5

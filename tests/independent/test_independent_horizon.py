@@ -1,14 +1,16 @@
-"""The oracle's horizon against starts moved by a rounding, each simulated in 420 bits: `exact_motion`.
+"""The oracle's horizon against starts moved by a rounding, each simulated in 420 bits:
+`exact_motion`.
 
-The definition: every number of the start is off by a rounding, each on its own: float64's relative 2 ** -52 of the
-largest coordinate, or speed. The horizon is when the standard deviation of some disk's position reaches a billionth of
-its radius.
+The definition: every number of the start is off by a rounding, each on its own: float64's relative
+2 ** -52 of the largest coordinate, or speed. The horizon is when the standard deviation of some
+disk's position reaches a billionth of its radius.
 
-How far draws can be held to it: the motion stretches one direction far more than all others, so that a disk's
-distance in a draw is about a normal number times its standard deviation. The mean square of eight draws over its
-expectation is then chi squared with 8 degrees of freedom over 8, which is between 0.107 and 3.27 but for one in a
-thousand either side: their root mean square at the horizon must be 0.33 to 1.81 billionths, and below before it. Over
-all scenes the mean of those squares has a standard deviation of sqrt(2 / (8 scenes)): it must be 1 within three.
+How far draws can be held to it: the motion stretches one direction far more than all others, so
+that a disk's distance in a draw is about a normal number times its standard deviation. The mean
+square of eight draws over its expectation is then chi squared with 8 degrees of freedom over 8,
+which is between 0.107 and 3.27 but for one in a thousand either side: their root mean square at the
+horizon must be 0.33 to 1.81 billionths, and below before it. Over all scenes the mean of those
+squares has a standard deviation of sqrt(2 / (8 scenes)): it must be 1 within three.
 """
 
 from __future__ import annotations
@@ -46,22 +48,28 @@ def gas(seed: int) -> Scenario:
     radius = rng.uniform(0.25, 0.45, 10)
     walls, _ = box(rng)
     scene = Scene(
-        position=placed(rng, radius, walls), velocity=rng.normal(0, 2, (10, 2)), radius=radius,
-        mass=rng.uniform(0.5, 4.0, 10), walls=walls, gravity=(0, -4.0 * (seed // 2 % 2)),
+        position=placed(rng, radius, walls),
+        velocity=rng.normal(0, 2, (10, 2)),
+        radius=radius,
+        mass=rng.uniform(0.5, 4.0, 10),
+        walls=walls,
+        gravity=(0, -4.0 * (seed // 2 % 2)),
         restitution=(1.0, 0.9)[seed % 2],
-    )  # fmt: skip
+    )
     return scenario(f"gas-{seed}", scene, 8.0, [])
 
 
 def nudges(scene: Scene, rng: np.random.Generator) -> list[tuple[Vector, Vector]]:
-    """A rounding of the largest coordinate and speed, up or down, for each of the four numbers of a moving disk."""
+    """A rounding of the largest coordinate and speed, up or down, for each of the four numbers of a
+    moving disk."""
     length, speed = EPS * np.abs(scene.position).max(), EPS * np.abs(scene.velocity).max()
     signs = rng.choice([-1, 1], (scene.n, 4)) * ~scene.static[:, None]
     return [(mpc(*map(float, s[:2] * length)), mpc(*map(float, s[2:] * speed))) for s in signs]
 
 
 def distances(one: Scenario, end: float, draws: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times (k,) s up to `end`, and (k,) the largest root mean square distance over the draws of any disk, in radii."""
+    """Times (k,) s up to `end`, and (k,) the largest root mean square distance over the draws of
+    any disk, in radii."""
     short = Scenario(one.name, "?", "?", one.scene, end, end, thrusts=one.thrusts)
     rng = np.random.default_rng(seed)
     exact = Motion(short, FAR)
@@ -91,8 +99,11 @@ def crossing(times: np.ndarray, distance: np.ndarray) -> float:
 
 
 def mean_square(gases: list[tuple[np.ndarray, np.ndarray, float]], share: float) -> float:
-    """Over gases (times, distance, horizon): of the distance at a share of the horizon, in billionths of a radius."""
-    return float(np.mean([(np.interp(share * horizon, t, d) / BILLIONTH) ** 2 for t, d, horizon in gases]))
+    """Over gases (times, distance, horizon): of the distance at a share of the horizon, in
+    billionths of a radius."""
+    return float(
+        np.mean([(np.interp(share * horizon, t, d) / BILLIONTH) ** 2 for t, d, horizon in gases])
+    )
 
 
 def test_at_the_horizon_starts_a_rounding_apart_are_a_billionth_of_a_radius_apart(

@@ -1,8 +1,9 @@
-"""Numbers of the table from the trajectories alone, each as its line in `crosscheck list metrics` says.
+"""Numbers of the table from the trajectories alone, each as its line in `crosscheck list metrics`
+says.
 
-Left out: what is judged in collision-free samples (velocity, energy error and loss, deviation of momentum and energy),
-the collisions that are matched to those of another (missed, spurious, delay), and disks through walls. To add one,
-write it from its line and give it a row in `OWN`.
+Left out: what is judged in collision-free samples (velocity, energy error and loss, deviation of
+momentum and energy), the collisions that are matched to those of another (missed, spurious, delay),
+and disks through walls. To add one, write it from its line and give it a row in `OWN`.
 """
 
 from __future__ import annotations
@@ -25,13 +26,35 @@ pytestmark = pytest.mark.independent
 Record = Callable[[str, object], None]
 
 SCENES = (
-    "free_fall", "ping_pong", "head_on_equal_e1", "head_on_unequal_e05", "oblique_e09", "mass_ratios", "slow_collision",
-    "wall_to_wall", "bouncing_ball_e09", "disk_between_static_disks", "column_of_ten", "galperin_31",
-    "cradle_touching", "spin_under_torque", "ship_thrust", "asteroids", "falling_box",
-)  # fmt: skip
-PLAYED = ("reference:exercise", "pymunk:matched", "box2d:shipped", "box2d_v3:matched", "event_driven:float64")
+    "free_fall",
+    "ping_pong",
+    "head_on_equal_e1",
+    "head_on_unequal_e05",
+    "oblique_e09",
+    "mass_ratios",
+    "slow_collision",
+    "wall_to_wall",
+    "bouncing_ball_e09",
+    "disk_between_static_disks",
+    "column_of_ten",
+    "galperin_31",
+    "cradle_touching",
+    "spin_under_torque",
+    "ship_thrust",
+    "asteroids",
+    "falling_box",
+)
+PLAYED = (
+    "reference:exercise",
+    "pymunk:matched",
+    "box2d:shipped",
+    "box2d_v3:matched",
+    "event_driven:float64",
+)
 ROUNDING = 1e-12  # relative: sums of thousands of terms in another order
-FLOAT64 = 1e-13  # of energies and momenta over their whole: what is left of them is a difference, rounded at the whole
+# of energies and momenta over their whole: what is left of them is a difference, rounded at the
+# whole
+FLOAT64 = 1e-13
 WITH = {"time_to_1pct_s": "bouncing_ball_e09", "restitution": "head_on_unequal_e05"}
 
 
@@ -93,7 +116,8 @@ def on_for(scenario: Scenario, t: np.ndarray) -> list[np.ndarray]:
 def momentum_error(one: Trajectory, _: None, scenario: Scenario) -> float | None:
     """From P(t) - P(0) - M g t - sum of F times how long it has acted.
 
-    Over the sum of m|v| that the scene can have without collisions: at the start, and all impulses from outside.
+    Over the sum of m|v| that the scene can have without collisions: at the start, and all impulses
+    from outside.
     """
     if not alone(scenario) or any(thrust.frame == "body" for thrust in scenario.thrusts):
         return None
@@ -103,17 +127,28 @@ def momentum_error(one: Trajectory, _: None, scenario: Scenario) -> float | None
         outside = outside + thrust.force * on[:, None]
     momentum = (mass * one.velocity).sum(axis=1)
     end = np.array([scenario.duration])
-    scale = (mass[:, 0] * norm(scenario.scene.velocity)).sum() + norm(mass.sum() * scenario.scene.gravity * end)
-    scale += sum(norm(thrust.force) * on[0] for thrust, on in zip(scenario.thrusts, on_for(scenario, end)))
+    scale = (mass[:, 0] * norm(scenario.scene.velocity)).sum() + norm(
+        mass.sum() * scenario.scene.gravity * end
+    )
+    scale += sum(
+        norm(thrust.force) * on[0] for thrust, on in zip(scenario.thrusts, on_for(scenario, end))
+    )
     return float(norm(momentum - momentum[0] - outside).max() / scale)
 
 
 def angular_momentum_error(one: Trajectory, _: None, scenario: Scenario) -> float | None:
-    """Of x cross m v + I w about the centre of mass of the scene, where nothing from outside turns it.
+    """Of x cross m v + I w about the centre of mass of the scene, where nothing from outside turns
+    it.
 
-    Over the sum of m|x||v| + I|w| that the scene can have: with the speeds of the start, and as far as they carry.
+    Over the sum of m|x||v| + I|w| that the scene can have: with the speeds of the start, and as far
+    as they carry.
     """
-    if not alone(scenario) or scenario.scene.gravity.any() or scenario.thrusts or scenario.scene.wrap is not None:
+    if (
+        not alone(scenario)
+        or scenario.scene.gravity.any()
+        or scenario.thrusts
+        or scenario.scene.wrap is not None
+    ):
         return None
     mass, inertia = moving(scenario), scenario.scene.inertia
     centre = (mass[:, None] * scenario.scene.position).sum(axis=0) / mass.sum()
@@ -127,7 +162,8 @@ def angular_momentum_error(one: Trajectory, _: None, scenario: Scenario) -> floa
 
 
 def energy_created(one: Trajectory, _: None, scenario: Scenario) -> float | None:
-    """From kinetic energy, without gravity and thrust: so the energy at hand is that of the start."""
+    """From kinetic energy, without gravity and thrust: so the energy at hand is that of the
+    start."""
     if scenario.scene.gravity.any() or scenario.thrusts:
         return None
     mass = moving(scenario)
@@ -153,7 +189,8 @@ def penetration(one: Trajectory, _: None, scenario: Scenario) -> float:
 
 
 def restitution(one: Trajectory, _: None, scenario: Scenario) -> float | None:
-    """From the samples beside it, where two disks on a line along x meet once and nothing else happens."""
+    """From the samples beside it, where two disks on a line along x meet once and nothing else
+    happens."""
     if one.position[..., 1].any() or scenario.scene.gravity.any() or scenario.scene.n != 2:
         return None
     if one.collisions.j.tolist() != [1]:
@@ -179,7 +216,9 @@ OWN: dict[str, Callable[..., float | None]] = {
 }
 
 
-def differences(table: pd.DataFrame, known: dict[str, Trajectory], scenario: Scenario) -> tuple[int, list[str]]:
+def differences(
+    table: pd.DataFrame, known: dict[str, Trajectory], scenario: Scenario
+) -> tuple[int, list[str]]:
     """How many rows of a table were computed again, and those that came out otherwise."""
     count, wrong = 0, []
     for row in table[table.metric.isin(OWN)].itertuples():
@@ -193,7 +232,8 @@ def differences(table: pd.DataFrame, known: dict[str, Trajectory], scenario: Sce
         count += 1
         if own != row.value and abs(own - row.value) > ROUNDING * abs(row.value) + FLOAT64:
             wrong.append(
-                f"{scenario.name} {row.engine}:{row.profile} {row.metric} {row.versus}: {row.value}, not {own}"
+                f"{scenario.name} {row.engine}:{row.profile} {row.metric} {row.versus}:"
+                f" {row.value}, not {own}"
             )
     return count, wrong
 
@@ -207,7 +247,10 @@ def first(trajectory: Trajectory, k: int) -> Trajectory:
 def compared(name: str) -> tuple[pd.DataFrame, dict[str, Trajectory], Scenario]:
     """The table of a scene at its second step size, and what it was made from."""
     scenario = catalogue.scenario(name)
-    runs = [play(ENGINES[engine].make(), engine, scenario, scenario.dt(scenario.substeps[1])) for engine in PLAYED]
+    runs = [
+        play(ENGINES[engine].make(), engine, scenario, scenario.dt(scenario.substeps[1]))
+        for engine in PLAYED
+    ]
     known = {run.name: run.trajectory for run in runs if run.trajectory is not None}
     known["truth"] = scenario.truth(scenario.times)
     return compare(scenario, runs).table, known, scenario
@@ -220,7 +263,10 @@ def test_the_metrics_come_out_again_from_the_trajectories(record_property: Recor
         table, known, scenario = compared(name)
         of_scene, wrong_of_scene = differences(table, known, scenario)
         count, wrong, met = count + of_scene, wrong + wrong_of_scene, met | set(table.metric)
-    record_property("found", f"metrics: {count} numbers of {len(SCENES)} scenes, {len(wrong)} come out otherwise")
+    record_property(
+        "found",
+        f"metrics: {count} numbers of {len(SCENES)} scenes, {len(wrong)} come out otherwise",
+    )
 
     assert not wrong
     assert set(OWN) <= met

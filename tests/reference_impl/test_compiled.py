@@ -11,13 +11,15 @@ SCENE = """
 import sys, numpy as np
 from reference_impl import verlet_list, exercise, lesson, ordered
 from reference_impl.state import World, make_disks
-for solver, side, steps in ((exercise, 4, 600), (lesson, 4, 600), (ordered, 4, 600), (verlet_list, 9, 200)):
+SOLVERS = ((exercise, 4, 600), (lesson, 4, 600), (ordered, 4, 600), (verlet_list, 9, 200))
+for solver, side, steps in SOLVERS:
     grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2)
     n = np.arange(side**2)
     mass = np.where(n == 5, np.inf, 1 + n % 3)
     velocity = np.where(n == 5, 0, 1)[:, None] * np.stack([np.sin(1.0 + n), np.cos(2.0 * n)], -1)
     world = World(
-        gravity=np.array([0.1, -0.7]), walls=np.array([[[-0.5, -0.5], [2.0, -0.5]], [[3.5, -0.5], [3.2, 3.0]]]),
+        gravity=np.array([0.1, -0.7]),
+        walls=np.array([[[-0.5, -0.5], [2.0, -0.5]], [[3.5, -0.5], [3.2, 3.0]]]),
         low=np.array([-0.9, -0.9]), high=np.array([side - 0.1, side - 0.1]),
     )
     disks = make_disks(grid, velocity, 0.3 + 0.1 * np.sin(n), mass, angular_velocity=np.cos(n))
@@ -25,18 +27,23 @@ for solver, side, steps in ((exercise, 4, 600), (lesson, 4, 600), (ordered, 4, 6
     collisions = solver.advance(disks, world, 0.01, steps)
     assert {min(j, 0) for _, _, j, _ in collisions} == {0, -1, -2} and len(collisions) > 100
     assert solver is not verlet_list or len(n) >= verlet_list.LISTED_FROM
-    sys.stdout.buffer.write(b"".join(array.tobytes() for array in disks) + np.array(collisions).tobytes())
+    played = b"".join(array.tobytes() for array in disks)
+    sys.stdout.buffer.write(played + np.array(collisions).tobytes())
 """
 
 
 def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
-    """A crowd with collisions, two walls, gravity, wrap, spin, forces and a static disk, through every variant."""
+    """A crowd with collisions, two walls, gravity, wrap, spin, forces and a static disk, through
+    every variant."""
     outputs = [
         subprocess.run(
-            [sys.executable, "-c", SCENE], capture_output=True, check=True, cwd=Path(__file__).parents[2],
+            [sys.executable, "-c", SCENE],
+            capture_output=True,
+            check=True,
+            cwd=Path(__file__).parents[2],
             env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
         ).stdout
         for disabled in ("0", "1")
-    ]  # fmt: skip
+    ]
     assert len(outputs[0]) > 2 * 16 * 13 * 8
     assert outputs[0] == outputs[1]

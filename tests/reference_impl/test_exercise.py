@@ -22,16 +22,20 @@ masses = st.floats(1e-3, 1e3)
 
 @st.composite
 def overlapping_pairs(draw):
-    """Two disks of random masses that overlap by a tenth, from any side, at any velocities, and any e."""
+    """Two disks of random masses that overlap by a tenth, from any side, at any velocities, and any
+    e."""
     angle = draw(st.floats(0, 2 * np.pi))
     away = 0.9 * np.array([np.cos(angle), np.sin(angle)])
     velocity = [[draw(speeds), draw(speeds)] for _ in range(2)]
-    disks = make_disks([-0.3 * away, 0.7 * away], velocity, [0.6, 0.4], [draw(masses), draw(masses)])
+    disks = make_disks(
+        [-0.3 * away, 0.7 * away], velocity, [0.6, 0.4], [draw(masses), draw(masses)]
+    )
     return disks, World(restitution=draw(st.floats(0, 1)))
 
 
 def before_and_after(solver, disks, world, pair=(0, 1)):
-    """Velocities before and after one collision, the unit normal from the first disk to the second, and the impulse."""
+    """Velocities before and after one collision, the unit normal from the first disk to the second,
+    and the impulse."""
     apart = disks.position[1] - disks.position[0]
     before = disks.velocity.copy()
     impulse = solver.collide(disks, *pair, world)
@@ -39,8 +43,8 @@ def before_and_after(solver, disks, world, pair=(0, 1)):
 
 
 def tolerance(disks, velocity):
-    """m/s: a collision rounds about 16 times, and what is little to the heavy disk is more to the light one by the
-    ratio."""
+    """m/s: a collision rounds about 16 times, and what is little to the heavy disk is more to the
+    light one by the ratio."""
     ratio = disks.mass.max() / disks.mass.min()
     return 16 * ROUNDING * (np.abs(velocity).max() + 1e-300) * ratio
 
@@ -68,9 +72,12 @@ def test_head_on_collisions_of_the_textbook(solver, mass, e, before, after):
     assert (disks.velocity[:, 1] == 0).all()
 
 
-@pytest.mark.parametrize(("solver", "way"), [(exercise, 1.0), (lesson, 0.0)], ids=["exercise", "lesson"])
+@pytest.mark.parametrize(
+    ("solver", "way"), [(exercise, 1.0), (lesson, 0.0)], ids=["exercise", "lesson"]
+)
 def test_one_step_from_rest_tells_the_order_of_the_updates(solver, way):
-    """Symplectic Euler moves by a dt2 in its first step, explicit Euler not at all; gravity, force and torque alike."""
+    """Symplectic Euler moves by a dt2 in its first step, explicit Euler not at all; gravity, force
+    and torque alike."""
     disks = make_disks([[0, 0], [9, 9]], np.zeros((2, 2)), [1, 1], [2, 2], inertia=[4, 4])
     disks.force[0], disks.torque[0] = [4.0, 8.0], 2.0
     solver.advance(disks, World(gravity=np.array([0.0, -1.0])), 0.5, 1)
@@ -114,9 +121,12 @@ def test_a_collision_reverses_the_normal_speed_by_e_and_leaves_the_tangential(so
 @steady
 @given(pair=overlapping_pairs())
 def test_the_order_of_the_two_disks_does_not_matter(solver, pair):
-    """Numbered the other way round, the same disks end up in the same places at the same velocities."""
+    """Numbered the other way round, the same disks end up in the same places at the same
+    velocities."""
     disks, world = pair
-    swapped = make_disks(disks.position[::-1], disks.velocity[::-1], disks.radius[::-1], disks.mass[::-1])
+    swapped = make_disks(
+        disks.position[::-1], disks.velocity[::-1], disks.radius[::-1], disks.mass[::-1]
+    )
     bound = tolerance(disks, disks.velocity)
     solver.collide(disks, 0, 1, world)
     solver.collide(swapped, 0, 1, world)
@@ -158,16 +168,20 @@ def test_the_formula_as_printed_draws_a_separating_pair_together():
     """It has no condition on the sign of the speed; ours acts on approaching pairs only."""
     for approaching_only, after in ((True, [-1.0, 1.0]), (False, [0.9, -0.9])):
         disks = make_disks([[0, 0], [0.9, 0]], [[-1, 0], [1, 0]], [0.5, 0.5], [1, 1])
-        impulse = exercise.collide(disks, 0, 1, World(restitution=0.9, approaching_only=approaching_only))
+        impulse = exercise.collide(
+            disks, 0, 1, World(restitution=0.9, approaching_only=approaching_only)
+        )
         assert disks.velocity[:, 0] == pytest.approx(after, abs=4 * ROUNDING)  # 1.9 is rounded
         assert impulse == (0.0 if approaching_only else pytest.approx(-1.9, rel=4 * ROUNDING))
-        assert disks.position[:, 0] == pytest.approx([-0.05, 0.95], abs=4 * ROUNDING)  # separated in either case
+        # separated in either case
+        assert disks.position[:, 0] == pytest.approx([-0.05, 0.95], abs=4 * ROUNDING)
 
 
 @steady
 @given(pair=overlapping_pairs())
 def test_the_equations_of_the_lesson_equal_the_impulse_of_the_exercise(pair):
-    """V1 = (m1 v1 + m2 v2 - m2 (v1 - v2) e)/(m1 + m2) as printed, ours divided by m1 m2, and J/m: one law."""
+    """V1 = (m1 v1 + m2 v2 - m2 (v1 - v2) e)/(m1 + m2) as printed, ours divided by m1 m2, and J/m:
+    one law."""
     disks, world = pair
     m1, m2 = disks.mass
     bound = tolerance(disks, disks.velocity)
@@ -212,7 +226,8 @@ def test_a_wall_reflects_as_a_static_disk_does(solver, e, vx, vy):
     log = solver.advance(by_wall, wall, 0.0, 1)
     by_disk = make_disks([[0, 0.9], [0, -1]], [[vx, -vy], [0, 0]], [1, 1], [2, np.inf])
     impulse = solver.collide(by_disk, 0, 1, World(restitution=e))
-    assert by_wall.velocity[0] == pytest.approx(by_disk.velocity[0], abs=8 * ROUNDING * 10)  # of at most 10 m/s
+    # of at most 10 m/s
+    assert by_wall.velocity[0] == pytest.approx(by_disk.velocity[0], abs=8 * ROUNDING * 10)
     assert by_wall.velocity[0] == pytest.approx([vx, e * vy], abs=8 * ROUNDING * 10)
     assert log == [(0, 0, -1, pytest.approx(impulse, rel=8 * ROUNDING))]
 
@@ -228,7 +243,8 @@ def test_only_the_exercise_sets_a_disk_back_onto_the_wall():
 
 @both
 def test_a_wall_ends_where_it_ends(solver):
-    """Beside its end nothing is struck; over its end the normal points from the end to the centre."""
+    """Beside its end nothing is struck; over its end the normal points from the end to the
+    centre."""
     world = World(restitution=1.0, walls=np.array([[[0.0, 0.0], [-1.0, 0.0]]]))
     past = make_disks([[1.5, 0.5]], [[0, -1]], [1], [1])
     assert solver.advance(past, world, 0.25, 4) == []
@@ -239,10 +255,14 @@ def test_a_wall_ends_where_it_ends(solver):
 
 @both
 def test_a_centre_beyond_an_edge_is_set_onto_the_opposite_edge(solver):
-    """Onto the edge, however far it was beyond; velocity and the other coordinate stay; a centre on the edge stays."""
+    """Onto the edge, however far it was beyond; velocity and the other coordinate stay; a centre on
+    the edge stays."""
     box = World(low=np.array([-5.0, -3.0]), high=np.array([5.0, 3.0]))
     disks = make_disks(
-        [[4.75, 1], [1, -2.75], [-4.75, 2.75], [4.5, -1]], [[1, 0], [0, -1], [-1, 1], [0.5, 0]], [0.25] * 4, [1] * 4
+        [[4.75, 1], [1, -2.75], [-4.75, 2.75], [4.5, -1]],
+        [[1, 0], [0, -1], [-1, 1], [0.5, 0]],
+        [0.25] * 4,
+        [1] * 4,
     )
     velocity = disks.velocity.copy()
     solver.advance(disks, box, 1.0, 1)
@@ -252,7 +272,8 @@ def test_a_centre_beyond_an_edge_is_set_onto_the_opposite_edge(solver):
 
 @both
 def test_coincident_centres_give_no_nan(solver):
-    """There is no normal to be had; the solver goes on with finite numbers, and the exercise parts them along x."""
+    """There is no normal to be had; the solver goes on with finite numbers, and the exercise parts
+    them along x."""
     disks = make_disks([[1, 1], [1, 1]], [[1, 0], [-1, 0]], [0.5, 0.5], [1, 1])
     world = World(walls=np.array([[[1.0, 1.0], [2.0, 1.0]]]))
     solver.advance(disks, world._replace(walls=np.zeros((0, 2, 2))), 0.0, 1)
@@ -266,6 +287,8 @@ def test_coincident_centres_give_no_nan(solver):
 @both
 def test_a_collision_leaves_the_spin_alone(solver):
     """The exercise has no friction and no coupling of spin to collisions."""
-    disks = make_disks([[0, 0.1], [0.9, 0]], [[1, 0], [-1, 0]], [0.5, 0.5], [1, 3], angular_velocity=[4.0, -7.0])
+    disks = make_disks(
+        [[0, 0.1], [0.9, 0]], [[1, 0], [-1, 0]], [0.5, 0.5], [1, 3], angular_velocity=[4.0, -7.0]
+    )
     assert solver.advance(disks, World(), 0.01, 5)
     assert disks.angular_velocity.tolist() == [4.0, -7.0]

@@ -1,4 +1,5 @@
-"""The neighbour list changes what is asked, never an answer: to the bit as all pairs, however wild the scene."""
+"""The neighbour list changes what is asked, never an answer: to the bit as all pairs, however wild
+the scene."""
 
 from __future__ import annotations
 
@@ -19,17 +20,22 @@ DT = 1 / 60
 
 @st.composite
 def scenes(draw):
-    """From a thin gas to disks heaped upon each other; at rest or many boxes a step; with static disks, walls, wrap."""
+    """From a thin gas to disks heaped upon each other; at rest or many boxes a step; with static
+    disks, walls, wrap."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     n = draw(
         st.integers(2, 90) | st.integers(verlet_list.REBUILD, 3 * verlet_list.REBUILD)
     )  # from there on it may rebuild again in a step
-    fill = draw(st.sampled_from([0.05, 0.3, 0.8, 2.0, 8.0, 100.0]))  # area of all disks over that of the box
+    # area of all disks over that of the box
+    fill = draw(st.sampled_from([0.05, 0.3, 0.8, 2.0, 8.0, 100.0]))
     radius = rng.uniform(draw(st.sampled_from([0.05, 0.9])), 1.0, n)
     side = np.sqrt(np.pi * (radius**2).sum() / fill)
     speed = draw(st.sampled_from([0.0, 0.1, 3.0, 100.0, 1e5]))
-    mass = np.where(rng.random(n) < draw(st.sampled_from([0.0, 0.2])), np.inf, rng.uniform(0.5, 2.0, n))
-    velocity = speed * rng.normal(size=(n, 2))  # of static disks, too, which nevertheless do not move
+    mass = np.where(
+        rng.random(n) < draw(st.sampled_from([0.0, 0.2])), np.inf, rng.uniform(0.5, 2.0, n)
+    )
+    # of static disks, too, which nevertheless do not move
+    velocity = speed * rng.normal(size=(n, 2))
     spin = rng.normal(size=n) * rng.choice([-0.0, 1.0], n)
     disks = make_disks(rng.uniform(0, side, (n, 2)), velocity, radius, mass, angular_velocity=spin)
     forced = rng.random(n) < draw(st.sampled_from([0.0, 0.1, 1.0]))
@@ -56,8 +62,8 @@ def copy_of(disks):
 
 @njit
 def by_list(disks, world, dt, count):
-    """As `verlet_list.advance`, however few the disks are; the collisions, and in how many steps all pairs had to be
-    asked."""
+    """As `verlet_list.advance`, however few the disks are; the collisions, and in how many steps
+    all pairs had to be asked."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
     return collisions, verlet_list.advance_listed(disks, world, dt, count, collisions)
 
@@ -67,7 +73,16 @@ def until_beyond_skin(disks, world, near):
     """In which step of one the list of near pairs ends to hold: 0, or 1 if it lasts."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
     return verlet_list.play(
-        disks, world, DT, 1, collisions, verlet_list.accelerations_of(disks, world, DT), near, 0, 0, 0
+        disks,
+        world,
+        DT,
+        1,
+        collisions,
+        verlet_list.accelerations_of(disks, world, DT),
+        near,
+        0,
+        0,
+        0,
     )[0]
 
 
@@ -84,7 +99,10 @@ def test_a_list_gives_the_bits_and_the_collisions_of_all_pairs(scene, count):
     other = copy_of(disks)
     collisions = exercise.advance(disks, world, DT, count)
     reported, unlisted = by_list(other, world, DT, count)
-    event(f"by list: {np.sign(count - unlisted)}, by all pairs: {np.sign(unlisted)}, collisions: {len(collisions) > 0}")
+    event(
+        f"by list: {np.sign(count - unlisted)}, by all pairs: {np.sign(unlisted)}, collisions:"
+        f" {len(collisions) > 0}"
+    )
     assert same(disks, other)
     assert reported == collisions
 
@@ -98,7 +116,8 @@ def heap(n=300, fill=3.0):
 
 
 def test_a_disk_moved_beyond_the_skin_in_mid_step_rebuilds_the_list_at_once():
-    """In a heap the list is out of date before the first step ends; kept to its end, it would miss pairs."""
+    """In a heap the list is out of date before the first step ends; kept to its end, it would miss
+    pairs."""
     world, first, other, stale = World(), heap(), heap(), heap()
     collisions = exercise.advance(first, world, DT, 1)
     exercise.integrate(other, world, DT)
@@ -133,10 +152,13 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
 
 
 def test_a_list_is_made_for_the_steps_that_are_left_but_not_for_more_than_it_pays():
-    """Its skin is as thick as the fastest disk needs; thicker, a call of few steps would ask many pairs in vain."""
+    """Its skin is as thick as the fastest disk needs; thicker, a call of few steps would ask many
+    pairs in vain."""
     scene, dt = boxed_gas(500, 0.3), DT / 4
     disks, world = make_disks(scene.position, scene.velocity, scene.radius, scene.mass), World()
-    half_skin = {left: build_list(disks, world, dt, left).half_skin for left in (2, 4, 8, LASTS, 2 * LASTS)}
+    half_skin = {
+        left: build_list(disks, world, dt, left).half_skin for left in (2, 4, 8, LASTS, 2 * LASTS)
+    }
     assert half_skin[8] == 2 * half_skin[4] == 4 * half_skin[2] > 0.0
     assert half_skin[LASTS] == half_skin[2 * LASTS] == 2 * half_skin[8]
 
@@ -165,8 +187,12 @@ def test_disks_all_in_one_place_are_not_listed():
 def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_list_begins(n):
     """As the harness plays it: in several calls."""
     scene = boxed_gas(n, 0.3)
-    first, other = (make_disks(scene.position, 5 * scene.velocity, scene.radius, scene.mass) for _ in range(2))
+    first, other = (
+        make_disks(scene.position, 5 * scene.velocity, scene.radius, scene.mass) for _ in range(2)
+    )
     world = World(restitution=1.0, walls=scene.walls)
     for count in (1, 7, 30):
-        assert verlet_list.advance(other, world, DT, count) == exercise.advance(first, world, DT, count)
+        assert verlet_list.advance(other, world, DT, count) == exercise.advance(
+            first, world, DT, count
+        )
         assert same(first, other)

@@ -1,5 +1,5 @@
-"""`reference:ordered` against exact answers: right to rounding where collisions can be distinguished, bounded
-elsewhere."""
+"""`reference:ordered` against exact answers: right to rounding where collisions can be
+distinguished, bounded elsewhere."""
 
 from __future__ import annotations
 
@@ -31,27 +31,38 @@ def exact(scene, t):
     """Positions (n, 2) m at t s by the oracle, in many digits."""
     record = computed(Scenario("probe", "Where?", "here", scene, t, t))
     assert record.horizon >= t
-    return replace(record, float64_horizon=np.inf).sampled(scene, (), np.array([0.0, t])).position[-1]
+    return (
+        replace(record, float64_horizon=np.inf).sampled(scene, (), np.array([0.0, t])).position[-1]
+    )
 
 
 def off(scene, t, rate, variant=ordered):
-    """m: the largest distance of a coordinate from the exact answer after t s at so many steps a second."""
-    return np.abs(played(scene, 1 / rate, round(t * rate), variant).read().position - exact(scene, t)).max()
+    """m: the largest distance of a coordinate from the exact answer after t s at so many steps a
+    second."""
+    return np.abs(
+        played(scene, 1 / rate, round(t * rate), variant).read().position - exact(scene, t)
+    ).max()
 
 
 CASES = [(1.0, 0.0, 10.0, 60), (0.9, -1.0, 4.0, 120)]
 
 
 @pytest.mark.parametrize(("e", "gravity", "t", "rate"), CASES)
-@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(20), marks=pytest.mark.slow)], ids=["3", "20"])
+@pytest.mark.parametrize(
+    "seeds", [range(3), pytest.param(range(20), marks=pytest.mark.slow)], ids=["3", "20"]
+)
 def test_the_asteroids_in_a_box_are_followed_to_rounding(e, gravity, t, rate, seeds):
-    """No 2^-53 of a metre stays one: it grows e-fold in about a second, so 1e-6 is what is left of 16 digits at 10 s.
+    """No 2^-53 of a metre stays one: it grows e-fold in about a second, so 1e-6 is what is left of
+    16 digits at 10 s.
 
     By projection (`exercise`) the same scenes are off by a disk.
     """
     scenes = [boxed_asteroids(seed, e, gravity) for seed in seeds]
     errors = [off(scene, t, rate) for scene in scenes]
-    print(f"e = {e}, g = {gravity}, {rate} Hz: median {np.median(errors):.2g} m, largest {max(errors):.2g} m")
+    print(
+        f"e = {e}, g = {gravity}, {rate} Hz: median {np.median(errors):.2g} m, largest"
+        f" {max(errors):.2g} m"
+    )
     assert max(errors) < 1e-6
     assert gravity or len(errors) < 20 or np.median(errors) < 1e-9
     assert off(scenes[0], t, rate, verlet_list) > 1e-2
@@ -62,14 +73,17 @@ def dense_box():
     return Scene(
         position=[[0.6, 0.6], [2.0, 0.9], [3.3, 0.7], [0.7, 2.2], [2.1, 2.3], [3.4, 2.2]],
         velocity=[[3.0, 1.0], [-2.0, 2.0], [1.0, -3.0], [2.5, 0.4], [0.0, 0.0], [-1.0, -2.0]],
-        radius=[0.5, 0.4, 0.45, 0.5, 0.3, 0.4], mass=[1.0, 2.0, 1.5, 1.0, np.inf, 3.0],
-        restitution=0.9, walls=box([0, 0], [4, 3]),
-    )  # fmt: skip
+        radius=[0.5, 0.4, 0.45, 0.5, 0.3, 0.4],
+        mass=[1.0, 2.0, 1.5, 1.0, np.inf, 3.0],
+        restitution=0.9,
+        walls=box([0, 0], [4, 3]),
+    )
 
 
 @pytest.mark.parametrize("gravity", [0.0, -2.0])
 def test_all_the_collisions_of_one_long_step_come_in_their_order(gravity):
-    """One step of 0.6 s: a collision, whom it sends where, and the walls, a static disk and a curved flight besides."""
+    """One step of 0.6 s: a collision, whom it sends where, and the walls, a static disk and a
+    curved flight besides."""
     scene = replace(dense_box(), gravity=np.array([0.0, gravity]))
     events = EventEngine(scene)
     events.advance(0.6)
@@ -88,22 +102,28 @@ def test_all_the_collisions_of_one_long_step_come_in_their_order(gravity):
 def test_a_disk_that_passes_through_another_a_wall_or_its_end_within_a_step_has_struck_it(gravity):
     """At the end of the step they are far apart again, so the end alone would show nothing."""
     scene = Scene(
-        position=[[0.0, 0.0], [1.0, 0.1], [0.0, 5.0], [0.0, 9.0]], 
+        position=[[0.0, 0.0], [1.0, 0.1], [0.0, 5.0], [0.0, 9.0]],
         velocity=[[40.0, 0.0], [0.0, 0.0], [40.0, 0.0], [40.0, 0.0]],
-        radius=[0.2, 0.1, 0.1, 0.1], mass=[1.0, np.inf, 1.0, 1.0], restitution=1.0, gravity=[0.0, gravity],
+        radius=[0.2, 0.1, 0.1, 0.1],
+        mass=[1.0, np.inf, 1.0, 1.0],
+        restitution=1.0,
+        gravity=[0.0, gravity],
         walls=[[[1.0, 4.0], [1.0, 6.0]], [[1.0, 9.05], [3.0, 9.5]]],
-    )  # fmt: skip
+    )
     events = EventEngine(scene)
     events.advance(0.1)
     engine = played(scene, 0.1, 1)
     assert sorted(collision[1:3] for collision in engine.collisions()) == [(0, 1), (2, -1), (3, -2)]
-    # A place rounds at 10 m; over a radius of 0.1 m that turns the normal, and with it 4 m of flight: 400 times it.
+    # A place rounds at 10 m; over a radius of 0.1 m that turns the normal, and with it 4 m of
+    # flight: 400 times it.
     assert np.abs(engine.read().position - events.look(0.1)[0]).max() < 400 * 10 * ROUNDING
 
 
 def test_a_centre_that_leaves_the_box_enters_it_opposite_at_that_instant():
     """As the exact answer has it: the asteroids of the exercise, which wrap, for 2 s."""
-    scene = replace(boxed_asteroids(1), walls=np.zeros((0, 2, 2)), wrap=np.array([[-5.0, -3.0], [5.0, 3.0]]))
+    scene = replace(
+        boxed_asteroids(1), walls=np.zeros((0, 2, 2)), wrap=np.array([[-5.0, -3.0], [5.0, 3.0]])
+    )
     events = EventEngine(scene)
     events.advance(2.0)
     # Rounding of 120 steps at 5 m, grown e-fold in about a second.
@@ -113,9 +133,14 @@ def test_a_centre_that_leaves_the_box_enters_it_opposite_at_that_instant():
 def falling(height=1.0, e=0.5, gravity=-10.0):
     """A ball above a floor."""
     return Scene(
-        position=[[0.0, 0.25 + height]], velocity=[[0.0, 0.0]], radius=[0.25], mass=[2.0], restitution=e,
-        gravity=[0.0, gravity], walls=[[[-3.0, 0.0], [3.0, 0.0]]],
-    )  # fmt: skip
+        position=[[0.0, 0.25 + height]],
+        velocity=[[0.0, 0.0]],
+        radius=[0.25],
+        mass=[2.0],
+        restitution=e,
+        gravity=[0.0, gravity],
+        walls=[[[-3.0, 0.0], [3.0, 0.0]]],
+    )
 
 
 def test_a_ball_that_bounces_ever_lower_comes_to_rest_when_it_should_and_carries_its_weight():
@@ -126,7 +151,8 @@ def test_a_ball_that_bounces_ever_lower_comes_to_rest_when_it_should_and_carries
     engine.step(100)
     state = engine.read()
     assert 5 < bounces < 30
-    # The last bounce is 1/16 of a step long at most, so it is g (dt / 32)2 / 2 high, and is cut off.
+    # The last bounce is 1/16 of a step long at most, so it is g (dt / 32)2 / 2 high, and is cut
+    # off.
     assert abs(state.position[0, 1] - 0.25) < 10 * (dt / 32) ** 2 / 2
     assert abs(state.velocity[0, 1]) < 10 * dt / 32
     weights = [collision.impulse for collision in engine.collisions()[bounces:]]
@@ -134,16 +160,22 @@ def test_a_ball_that_bounces_ever_lower_comes_to_rest_when_it_should_and_carries
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_heap_takes_a_bounded_number_of_collisions_a_step_and_shows_what_it_leaves_as_overlap(seed):
-    """Thirty disks that fall onto each other: no order of collisions has an end; nothing blows up, and nothing is
-    hidden."""
+def test_a_heap_takes_a_bounded_number_of_collisions_a_step_and_shows_what_it_leaves_as_overlap(
+    seed,
+):
+    """Thirty disks that fall onto each other: no order of collisions has an end; nothing blows up,
+    and nothing is hidden."""
     rng = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(np.arange(6), np.arange(5)), -1).reshape(-1, 2)
     scene = Scene(
-        position=0.6 + grid * 1.05 + rng.uniform(0, 0.02, (30, 2)), velocity=rng.normal(size=(30, 2)),
-        radius=np.full(30, 0.5), mass=np.ones(30), restitution=0.5, gravity=[0.0, -10.0],
+        position=0.6 + grid * 1.05 + rng.uniform(0, 0.02, (30, 2)),
+        velocity=rng.normal(size=(30, 2)),
+        radius=np.full(30, 0.5),
+        mass=np.ones(30),
+        restitution=0.5,
+        gravity=[0.0, -10.0],
         walls=box([0.0, 0.0], [6.6, 20.0]),
-    )  # fmt: skip
+    )
     engine = played(scene, 1 / 60, 300)
     a_step = np.bincount([collision.step for collision in engine.collisions()])
     state = engine.read()
@@ -155,24 +187,33 @@ def test_a_heap_takes_a_bounded_number_of_collisions_a_step_and_shows_what_it_le
 
 
 def sliding_past(speed):
-    """A disk that touches a static one and slides past it, while it is pressed against it by 7.3 m/s2."""
+    """A disk that touches a static one and slides past it, while it is pressed against it by 7.3
+    m/s2."""
     return Scene(
-        position=[[1.0, 2.0], [1.5, 2.0]], velocity=[[0.0, speed], [0.0, 0.0]], radius=[0.25] * 2, mass=[1.7, np.inf],
-        gravity=[7.3, 0.6], restitution=0.99,
-    )  # fmt: skip
+        position=[[1.0, 2.0], [1.5, 2.0]],
+        velocity=[[0.0, speed], [0.0, 0.0]],
+        radius=[0.25] * 2,
+        mass=[1.7, np.inf],
+        gravity=[7.3, 0.6],
+        restitution=0.99,
+    )
 
 
 @pytest.mark.parametrize("speed", [2.7, 5.7])
 def test_two_that_touch_and_slide_past_each_other_part_at_every_step_size(speed):
-    """They part as v2 / d = 14.6 m/s2 and more opens the gap, though rounding may say at first that it closes.
+    """They part as v2 / d = 14.6 m/s2 and more opens the gap, though rounding may say at first that
+    it closes.
 
     The control slides with 4.5 m/s2 of it: it is held where it is.
     """
     rates = [20 * 1.01**k for k in range(300)]
 
     def pressed(speed):
-        """(300,) m, how much farther the disk is from the static one than in free flight, after a step of each size."""
-        x = np.array([played(sliding_past(speed), 1 / rate, 1).read().position[0, 0] for rate in rates])
+        """(300,) m, how much farther the disk is from the static one than in free flight, after a
+        step of each size."""
+        x = np.array(
+            [played(sliding_past(speed), 1 / rate, 1).read().position[0, 0] for rate in rates]
+        )
         return np.abs(x - (1.0 + 7.3 / 2 / np.square(rates)))
 
     assert pressed(speed).max() < 8 * ROUNDING  # a few roundings of a coordinate of 1 m

@@ -1,4 +1,5 @@
-"""The exercise's ship and twenty asteroids between walls instead of the wrap: the scene of the oracle's figures."""
+"""The exercise's ship and twenty asteroids between walls instead of the wrap: the scene of the
+oracle's figures."""
 
 from __future__ import annotations
 
@@ -12,17 +13,22 @@ COUNT = 20
 
 
 def boxed(seed: int, restitution: float = 1.0, gravity: float = 0.0) -> Scene:
-    """Twenty-one disks in a box of 10 m by 6 m; sizes, speeds and masses as the exercise draws them."""
+    """Twenty-one disks in a box of 10 m by 6 m; sizes, speeds and masses as the exercise draws
+    them."""
     rng = np.random.default_rng(seed)
     size = rng.uniform(0.08, 0.3, COUNT)
     radius, room = np.append(SHIP_RADIUS, size), np.array([SHIP_RADIUS, SHIP_RADIUS])
     position = scatter(rng, (LOW + room).tolist(), (HIGH - room).tolist(), radius, first=SHIP)
     velocity = rng.uniform(0.25, 0.5, (COUNT, 2)) * rng.choice([-1.0, 1.0], (COUNT, 2))
     return lay_out(
-        position=position, velocity=np.vstack([[0.0, 0.0], velocity]), radius=radius,
-        mass=np.append(SHIP_MASS, 30 * np.pi * size**2), restitution=restitution, walls=box(LOW, HIGH),
+        position=position,
+        velocity=np.vstack([[0.0, 0.0], velocity]),
+        radius=radius,
+        mass=np.append(SHIP_MASS, 30 * np.pi * size**2),
+        restitution=restitution,
+        walls=box(LOW, HIGH),
         gravity=[0.0, -gravity],
-    )  # fmt: skip
+    )
 
 
 def lasting(scene: Scene, duration: float) -> Scenario:

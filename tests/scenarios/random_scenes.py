@@ -1,4 +1,5 @@
-"""Random scenes that fall, pile up, wedge themselves into corners and touch: what every computation must get through.
+"""Random scenes that fall, pile up, wedge themselves into corners and touch: what every computation
+must get through.
 
 A scene depends on the seed and its own number only, so that the first of many are the same as few.
 """
@@ -31,7 +32,9 @@ def random_scenario(seed: int, number: int) -> Scenario:
     draw = np.random.default_rng([seed, number])
     layout = list(LAYOUTS)[number % len(LAYOUTS)]
     walls = LAYOUTS[layout](draw)
-    position, radius = (lattice if layout == "touching" else scattered)(draw, walls, int(draw.integers(1, 7)))
+    position, radius = (lattice if layout == "touching" else scattered)(
+        draw, walls, int(draw.integers(1, 7))
+    )
     n = len(radius)
     fixed = draw.random(n) < 0.15
     fixed[draw.integers(n)] = False
@@ -39,10 +42,14 @@ def random_scenario(seed: int, number: int) -> Scenario:
     restitution = RESTITUTIONS[draw.integers(len(RESTITUTIONS))]
     mass = np.where(fixed, np.inf, draw.uniform(0.3, 5, n))
     scene = Scene(
-        position=position, velocity=np.where(fixed[:, None], 0.0, speed * draw.normal(size=(n, 2))),
-        radius=radius, mass=mass, restitution=draw.random() if restitution is None else restitution,
-        walls=walls, gravity=gravity(draw),
-    )  # fmt: skip
+        position=position,
+        velocity=np.where(fixed[:, None], 0.0, speed * draw.normal(size=(n, 2))),
+        radius=radius,
+        mass=mass,
+        restitution=draw.random() if restitution is None else restitution,
+        walls=walls,
+        gravity=gravity(draw),
+    )
     duration = float(draw.integers(1, 4))
     return Scenario(
         name=f"random_{layout}_{seed}_{number}",
@@ -95,10 +102,17 @@ def scattered(draw: Draw, walls: Array, count: int) -> tuple[Array, Array]:
 
 
 def lattice(draw: Draw, _walls: Array, count: int) -> tuple[Array, Array]:
-    """The same of equal disks that fill places of a square lattice from the corner on, touching exactly."""
+    """The same of equal disks that fill places of a square lattice from the corner on, touching
+    exactly."""
     radius = GRID * draw.choice([1, 2])
     places = np.array([(column, row) for row in range(2) for column in range(4)])
-    kept = places[np.sort(draw.choice(len(places), count, replace=False, p=np.array([8, 6, 4, 2, 4, 2, 1, 1]) / 28))]
+    kept = places[
+        np.sort(
+            draw.choice(
+                len(places), count, replace=False, p=np.array([8, 6, 4, 2, 4, 2, 1, 1]) / 28
+            )
+        )
+    ]
     return np.array(CORNER) + radius * (2 * kept + 1), np.full(count, radius)
 
 
@@ -129,12 +143,19 @@ def upright_box(_draw: Draw) -> Array:
 
 def tilted_box(draw: Draw) -> Array:
     """Right angles, but for rounding."""
-    return ring(draw.uniform(1.6, 2.4) * toward(draw.uniform(0, np.pi / 2) + np.pi / 2 * np.arange(4)))
+    return ring(
+        draw.uniform(1.6, 2.4) * toward(draw.uniform(0, np.pi / 2) + np.pi / 2 * np.arange(4))
+    )
 
 
 def triangle(draw: Draw) -> Array:
     """Three corners, most of them acute."""
-    return ring(2.2 * toward(draw.uniform(0, 2 * np.pi) + np.array([0.0, 2.0, 4.0]) + draw.uniform(-0.7, 0.7, 3)))
+    return ring(
+        2.2
+        * toward(
+            draw.uniform(0, 2 * np.pi) + np.array([0.0, 2.0, 4.0]) + draw.uniform(-0.7, 0.7, 3)
+        )
+    )
 
 
 def floor(draw: Draw) -> Array:
@@ -148,7 +169,9 @@ def crossing(draw: Draw) -> Array:
     one = draw.uniform(0, np.pi)
     other = one + draw.choice([np.pi / 2, draw.uniform(0.3, 2.8)])
     place = draw.uniform(-0.4, 0.4, 2)
-    return np.array([[place - 2 * toward(angle), place + 2 * toward(angle)] for angle in (one, other)])
+    return np.array(
+        [[place - 2 * toward(angle), place + 2 * toward(angle)] for angle in (one, other)]
+    )
 
 
 def wedge(draw: Draw) -> Array:
@@ -169,6 +192,13 @@ def nothing(_draw: Draw) -> Array:
 
 
 LAYOUTS: dict[str, Callable[[Draw], Array]] = {
-    "box": upright_box, "touching": upright_box, "tilted_box": tilted_box, "crossing": crossing, "wedge": wedge,
-    "triangle": triangle, "floor": floor, "loose": loose, "open": nothing,
-}  # fmt: skip
+    "box": upright_box,
+    "touching": upright_box,
+    "tilted_box": tilted_box,
+    "crossing": crossing,
+    "wedge": wedge,
+    "triangle": triangle,
+    "floor": floor,
+    "loose": loose,
+    "open": nothing,
+}

@@ -18,14 +18,33 @@ FAULTS = [
         "disk[0].radius = true: of type boolean; must be positive and finite (m)",
     ),
     ("radius = 0.25", "", "disk[0].radius: missing; must be positive and finite (m)"),
-    ("radius = 0.25", "radius = 1e-200", "disk[0].radius = 1e-200: out of scale; must be from 1e-09 to 1e+09 (SI)"),
-    ("mass = 2.0", "mass = nan", "disk[1].mass = nan: must be positive and finite (kg); left out if static"),
-    ("mass = 2.0", "mass = inf", "disk[1].mass = inf: must be positive and finite (kg); left out if static"),
-    ("mass = 2.0", "", "disk[1].mass: missing; must be positive and finite (kg); left out if static"),
+    (
+        "radius = 0.25",
+        "radius = 1e-200",
+        "disk[0].radius = 1e-200: out of scale; must be from 1e-09 to 1e+09 (SI)",
+    ),
+    (
+        "mass = 2.0",
+        "mass = nan",
+        "disk[1].mass = nan: must be positive and finite (kg); left out if static",
+    ),
+    (
+        "mass = 2.0",
+        "mass = inf",
+        "disk[1].mass = inf: must be positive and finite (kg); left out if static",
+    ),
+    (
+        "mass = 2.0",
+        "",
+        "disk[1].mass: missing; must be positive and finite (kg); left out if static",
+    ),
     (
         "mass = 2.0",
         'mass = "2 kg"',
-        'disk[1].mass = "2 kg": of type string; must be positive and finite (kg); left out if static',
+        (
+            'disk[1].mass = "2 kg": of type string; must be positive and finite (kg); left out if'
+            " static"
+        ),
     ),
     (
         "mass = 2.0",
@@ -37,13 +56,21 @@ FAULTS = [
         "static = true",
         "disk[1].velocity = [-1.0, 0.0]: the disk is static; must be zero or left out",
     ),
-    ("mass = 2.0", "mass = 2.0\nstatic = 1", "disk[1].static = 1: of type integer; must be true or false"),
+    (
+        "mass = 2.0",
+        "mass = 2.0\nstatic = 1",
+        "disk[1].static = 1: of type integer; must be true or false",
+    ),
     (
         "radius = 0.25",
         "raduis = 0.25\nradius = 1",
         "disk[0].raduis = 0.25: unknown key; did you mean radius?",
     ),
-    ("velocity = [1.0, 0.0]", "", "disk[0].velocity: missing; must be two finite numbers [x, y] (m/s)"),
+    (
+        "velocity = [1.0, 0.0]",
+        "",
+        "disk[0].velocity: missing; must be two finite numbers [x, y] (m/s)",
+    ),
     (
         "[-1.0, 0.0]",
         "[-1.0]",
@@ -54,7 +81,11 @@ FAULTS = [
         "[-1.0, 0.0, 0.0]",
         "disk[0].position = [-1.0, 0.0, 0.0]: 3 items; must be two finite numbers [x, y] (m)",
     ),
-    ("[-1.0, 0.0]", "[nan, 0.0]", "disk[0].position[0] = nan: must be two finite numbers [x, y] (m)"),
+    (
+        "[-1.0, 0.0]",
+        "[nan, 0.0]",
+        "disk[0].position[0] = nan: must be two finite numbers [x, y] (m)",
+    ),
     (
         "[-1.0, 0.0]",
         '"left"',
@@ -71,9 +102,17 @@ FAULTS = [
         "disk[0].position = 2020-01-01: of type date; must be two finite numbers [x, y] (m)",
     ),
     ('name = "two-disks"', "", "name: missing; must be at most 100 of a-z, 0-9, '_' and '-'"),
-    ('"two-disks"', '"Two disks"', "name = \"Two disks\": must be at most 100 of a-z, 0-9, '_' and '-'"),
+    (
+        '"two-disks"',
+        '"Two disks"',
+        "name = \"Two disks\": must be at most 100 of a-z, 0-9, '_' and '-'",
+    ),
     ('"two-disks"', '"two\\n"', "name = \"two\\n\": must be at most 100 of a-z, 0-9, '_' and '-'"),
-    ("asks = ", "ask = ", 'ask = "Does a head-on collision keep momentum?": unknown key; did you mean asks?'),
+    (
+        "asks = ",
+        "ask = ",
+        'ask = "Does a head-on collision keep momentum?": unknown key; did you mean asks?',
+    ),
     ("asks = ", "a.b = ", "a = {...}: unknown key; must be one of name, asks, duration,"),
     ("restitution = 0.9", "restitution = 1.5", "restitution = 1.5: must be from 0 to 1"),
     ("restitution = 0.9", "restitution = -0.1", "restitution = -0.1: must be from 0 to 1"),
@@ -87,30 +126,55 @@ FAULTS = [
     (
         "sample_interval = 0.02",
         "sample_interval = 0.03",
-        "sample_interval = 0.03: does not divide the duration 2.0 s; "
-        "must go into it a whole number of times, as 0.0298507462686567 does",
+        (
+            "sample_interval = 0.03: does not divide the duration 2.0 s; "
+            "must go into it a whole number of times, as 0.0298507462686567 does"
+        ),
     ),
     (
         "sample_interval = 0.02",
         "sample_interval = 5.0",
-        "sample_interval = 5.0: does not divide the duration 2.0 s; must go into it a whole number of times, as 2 does",
+        (
+            "sample_interval = 5.0: does not divide the duration 2.0 s; must go into it a whole"
+            " number of times, as 2 does"
+        ),
     ),
-    ("= 0.02", "= 1e-300", "sample_interval = 1e-300: out of scale; must be from 1e-09 to 1e+09 (SI)"),
+    (
+        "= 0.02",
+        "= 1e-300",
+        "sample_interval = 1e-300: out of scale; must be from 1e-09 to 1e+09 (SI)",
+    ),
     ("= 0.02", "= 1e-9", "sample_interval = 1e-09: 2e+09 samples; must give at most 10000000"),
-    ("[1.0, 0.0]", "[1e160, 0.0]", "disk[0].velocity[0] = 1e+160: out of scale; must be from -1e+09 to 1e+09 (SI)"),
+    (
+        "[1.0, 0.0]",
+        "[1e160, 0.0]",
+        "disk[0].velocity[0] = 1e+160: out of scale; must be from -1e+09 to 1e+09 (SI)",
+    ),
     (
         "= 0.02",
         "= 0.02\nsubsteps = [1000000000]",
         "substeps = [1000000000]: more than 10000000 steps in all; must give at most 10000000",
     ),
-    ("= 0.02", "= 2e-6", "substeps = [1, 2, 4, 8]: 15000000 steps in all; must give at most 10000000"),
-    ("= 0.02", "= 0.02\nsubsteps = []", "substeps = []: 0 items; must be whole numbers from 1, increasing"),
+    (
+        "= 0.02",
+        "= 2e-6",
+        "substeps = [1, 2, 4, 8]: 15000000 steps in all; must give at most 10000000",
+    ),
+    (
+        "= 0.02",
+        "= 0.02\nsubsteps = []",
+        "substeps = []: 0 items; must be whole numbers from 1, increasing",
+    ),
     (
         "= 0.02",
         "= 0.02\nsubsteps = [1, 2.5]",
         "substeps[1] = 2.5: of type float; must be whole numbers from 1, increasing",
     ),
-    ("= 0.02", "= 0.02\nsubsteps = [0, 1]", "substeps[0] = 0: must be whole numbers from 1, increasing"),
+    (
+        "= 0.02",
+        "= 0.02\nsubsteps = [0, 1]",
+        "substeps[0] = 0: must be whole numbers from 1, increasing",
+    ),
     (
         "= 0.02",
         "= 0.02\nsubsteps = [4, 2]",
@@ -127,7 +191,11 @@ FAULTS = [
         "wall[0].end = [3.0, -1.0]: the wall has no length; must differ",
     ),
     ("start = [-3.0, -1.0]", "", "wall[0].start: missing; must be two finite numbers [x, y] (m)"),
-    ("[[wall]]", "[thrust]\ndisk = 0\n[[wall]]", "thrust = {...}: of type table; must be [[thrust]] tables"),
+    (
+        "[[wall]]",
+        "[thrust]\ndisk = 0\n[[wall]]",
+        "thrust = {...}: of type table; must be [[thrust]] tables",
+    ),
     ("= 0.02", "= 0.02\nbox = 4", "box = 4: of type integer; must be a table"),
     ("= 0.02", "= 0.02\nthrust = 4", "thrust = 4: of type integer; must be [[thrust]] tables"),
     ("= 0.02", "= 0.02\ndisk = 4", "line 9, column 7: cannot overwrite a value; must be TOML"),
@@ -136,11 +204,18 @@ FAULTS = [
         "[box]\nlow = [-3, -3]\nhigh = [3, -4]\n[[wall]]",
         "box.high = [3, -4]: not above low = [-3.0, -3.0]; must be greater in both x and y (m)",
     ),
-    ("[[wall]]", "[box]\nlow = [-3, -3]\n[[wall]]", "box.high: missing; must be the upper right corner"),
+    (
+        "[[wall]]",
+        "[box]\nlow = [-3, -3]\n[[wall]]",
+        "box.high: missing; must be the upper right corner",
+    ),
     (
         "[[wall]]",
         "[wrap]\nlow = [0, -4]\nhigh = [8, 4]\n[[wall]]",
-        "disk[0].position = [-1.0, 0.0]: outside [wrap]; must be from [0.0, -4.0] to [8.0, 4.0] (m)",
+        (
+            "disk[0].position = [-1.0, 0.0]: outside [wrap]; must be from [0.0, -4.0] to [8.0,"
+            " 4.0] (m)"
+        ),
     ),
     (
         "[[wall]]",
@@ -162,26 +237,42 @@ FAULTS = [
         THRUST.replace("0.5", "-1") + "[[wall]]",
         "thrust[0].start = -1: must be finite and at least 0 (s)",
     ),
-    ("[[wall]]", THRUST + 'frame = "up"\n[[wall]]', 'thrust[0].frame = "up": must be "world" or "body"'),
+    (
+        "[[wall]]",
+        THRUST + 'frame = "up"\n[[wall]]',
+        'thrust[0].frame = "up": must be "world" or "body"',
+    ),
     (
         "[-1.0, 0.0]",
         "[0.6, 0.0]",
-        "disk[1].position = [1.0, 0.0]: overlaps disk[0] by 0.1 m; must be shifted by [0.1, 0] m or more",
+        (
+            "disk[1].position = [1.0, 0.0]: overlaps disk[0] by 0.1 m; must be shifted by [0.1, 0]"
+            " m or more"
+        ),
     ),
     (
         "[-1.0, 0.0]",
         "[1.0, 0.0]",
-        "disk[1].position = [1.0, 0.0]: overlaps disk[0] by 0.5 m; must be shifted by [0.5, 0] m or more",
+        (
+            "disk[1].position = [1.0, 0.0]: overlaps disk[0] by 0.5 m; must be shifted by [0.5, 0]"
+            " m or more"
+        ),
     ),
     (
         "[-1.0, 0.0]",
         "[-1.0, -0.9]",
-        "disk[0].position = [-1.0, -0.9]: overlaps wall[0] by 0.15 m; must be shifted by [0, 0.15] m or more",
+        (
+            "disk[0].position = [-1.0, -0.9]: overlaps wall[0] by 0.15 m; must be shifted by [0,"
+            " 0.15] m or more"
+        ),
     ),
     (
         "[[wall]]",
         "[box]\nlow = [-9, -9]\nhigh = [1.125, 9]\n[[wall]]",
-        "disk[1].position = [1.0, 0.0]: overlaps the right of [box] by 0.125 m; must be shifted by [-0.125,",
+        (
+            "disk[1].position = [1.0, 0.0]: overlaps the right of [box] by 0.125 m; must be shifted"
+            " by [-0.125,"
+        ),
     ),
     (
         "duration = 2.0",

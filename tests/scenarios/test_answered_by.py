@@ -1,4 +1,5 @@
-"""Each scene names the cheapest model that answers it, and the harness takes that one for its truth."""
+"""Each scene names the cheapest model that answers it, and the harness takes that one for its
+truth."""
 
 from __future__ import annotations
 
@@ -49,7 +50,9 @@ def test_every_scene_names_a_model():
     assert NOTHING not in MODELS.values()
 
 
-@pytest.mark.parametrize("name", ["head_on_unequal_e09", "bouncing_ball_e1", "cradle_with_gaps", "line_gas"])
+@pytest.mark.parametrize(
+    "name", ["head_on_unequal_e09", "bouncing_ball_e1", "cradle_with_gaps", "line_gas"]
+)
 def test_the_closed_form_is_cheaper_than_following_the_collisions(name: str):
     """By more than a busy machine can hide: each at its fastest of three."""
     one = scenario(name)

@@ -49,7 +49,8 @@ ONE = scenario("oblique_e09")
 
 
 def test_a_record_is_computed_once(folder: Path, made: list[str]):
-    """The second time it is read, the same to the bit; nothing but the record lies in the folder."""
+    """The second time it is read, the same to the bit; nothing but the record lies in the
+    folder."""
     first, second = record_of(ONE), record_of(ONE)
 
     assert made == [ONE.name]
@@ -140,7 +141,8 @@ def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 @pytest.mark.slow
 def test_an_answer_with_any_bit_turned_is_what_was_written_or_none(tmp_path: Path):
-    """Nothing but the answer is ever read, and no bit ends in an error: its sums tell, or its header cannot be read."""
+    """Nothing but the answer is ever read, and no bit ends in an error: its sums tell, or its
+    header cannot be read."""
     path = tmp_path / "answer.npz"
     put_answer(path, Answer(record_of(scenario("slow_collision")), "ok", "", 60.0))
     whole, data = read_answer(path), path.read_bytes()
@@ -163,5 +165,6 @@ def same(one: Answer, other: Answer) -> bool:
         return False
     mine, its = vars(one.record), vars(other.record)
     return one[1:] == other[1:] and all(
-        np.array_equal(mine[name], its[name]) or repr(mine[name]) == repr(its[name]) for name in mine
+        np.array_equal(mine[name], its[name]) or repr(mine[name]) == repr(its[name])
+        for name in mine
     )

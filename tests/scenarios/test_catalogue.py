@@ -9,13 +9,21 @@ from scenarios.catalogue import RANDOM, SCENARIOS, scenario
 
 ANSWERED = [name for name in SCENARIOS if scenario(name).truth]
 # Among the hundreds of collisions of a drawn scene some fall on a step, in every draw.
-MOVING = [name for name in ANSWERED if name not in (*RANDOM, "rest_on_floor", "slide_on_incline", "column_of_ten")]
+MOVING = [
+    name
+    for name in ANSWERED
+    if name not in (*RANDOM, "rest_on_floor", "slide_on_incline", "column_of_ten")
+]
 
 
 def smallest_gap(scene, position):
     """The smallest gap (k,) m of disk to disk or wall, at each of the positions (k, n, 2)."""
     a, b = np.triu_indices(scene.n, 1)
-    apart = np.hypot(*np.moveaxis(position[:, a] - position[:, b], -1, 0)) - scene.radius[a] - scene.radius[b]
+    apart = (
+        np.hypot(*np.moveaxis(position[:, a] - position[:, b], -1, 0))
+        - scene.radius[a]
+        - scene.radius[b]
+    )
     gaps = [np.full(len(position), np.inf), *apart.T]
     for start, end in scene.walls:
         along = end - start
@@ -60,7 +68,8 @@ def test_truth_starts_as_the_scene(name):
     run = scenario(name)
     state, start = run.truth(run.times).at(0), run.scene.state
     for field in ("position", "velocity", "angle", "angular_velocity"):
-        # Positions come back from other coordinates (free room, weighted): the last place of 3 m, times 100.
+        # Positions come back from other coordinates (free room, weighted): the last place of 3 m,
+        # times 100.
         np.testing.assert_allclose(getattr(state, field), getattr(start, field), rtol=0, atol=5e-14)
 
 
@@ -78,7 +87,10 @@ def test_truth_has_one_state_a_sample_up_to_its_horizon(name):
     collisions = truth.collisions
     assert ((collisions.t >= 0) & (collisions.t <= truth.t[-1])).all()
     assert (
-        (collisions.i >= 0) & (collisions.i < n) & (collisions.j < n) & (collisions.j >= -len(run.scene.walls))
+        (collisions.i >= 0)
+        & (collisions.i < n)
+        & (collisions.j < n)
+        & (collisions.j >= -len(run.scene.walls))
     ).all()
     assert (collisions.impulse >= 0).all()
 

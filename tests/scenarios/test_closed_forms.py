@@ -11,32 +11,42 @@ from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Scene
 from scenarios.truth.exact import OracleTruth
 
-ANSWERED = [name for name in SCENARIOS if (truth := scenario(name).truth) and not isinstance(truth, OracleTruth)]
+ANSWERED = [
+    name
+    for name in SCENARIOS
+    if (truth := scenario(name).truth) and not isinstance(truth, OracleTruth)
+]
 THRUST = [name for name in ANSWERED if scenario(name).thrusts]
 RESTING = ["rest_on_floor", "slide_on_incline", "column_of_ten"]
 FLYING = [name for name in ANSWERED if name not in (*THRUST, *RESTING)]
 
 
 def exact(name):
-    """A scenario, its truth, and until when collisions can be distinguished (a ball settles after infinitely many)."""
+    """A scenario, its truth, and until when collisions can be distinguished (a ball settles after
+    infinitely many)."""
     run = scenario(name)
     truth = run.truth(run.times)
     return run, truth, 8.0 if name == "bouncing_ball_e09" else truth.t[-1]
 
 
 def between(collisions, until):
-    """An instant between each two collisions, those that coincide (49 balls on one floor) taken as one."""
+    """An instant between each two collisions, those that coincide (49 balls on one floor) taken as
+    one."""
     apart = np.append(0, collisions)[np.diff(np.append(0, collisions), append=np.inf) > 1e-6]
     return (apart + np.append(apart[1:], until)) / 2
 
 
-# An event-by-event simulation over all pairs, written here so that it shares nothing with the closed forms.
+# An event-by-event simulation over all pairs, written here so that it shares nothing with the
+# closed forms.
 
 
 def wall_frames(scene):
     """A point of each wall and its unit normal, (w, 2) each."""
     along = scene.walls[:, 1] - scene.walls[:, 0]
-    return scene.walls[:, 0], np.stack([-along[:, 1], along[:, 0]], -1) / np.hypot(*along.T)[:, None]
+    return (
+        scene.walls[:, 0],
+        np.stack([-along[:, 1], along[:, 0]], -1) / np.hypot(*along.T)[:, None],
+    )
 
 
 def next_events(scene: Scene, x, v):
@@ -59,17 +69,28 @@ def next_events(scene: Scene, x, v):
         for i in np.flatnonzero(np.isfinite(scene.mass)):
             if acceleration[i] < 0:
                 root = np.sqrt(speed[i] ** 2 - 2 * acceleration[i] * gap[i])
-                t = 2 * gap[i] / (root - speed[i]) if speed[i] < 0 else (speed[i] + root) / -acceleration[i]
+                t = (
+                    2 * gap[i] / (root - speed[i])
+                    if speed[i] < 0
+                    else (speed[i] + root) / -acceleration[i]
+                )
                 found.append((t, i, -1 - w))
             elif speed[i] < 0 and speed[i] ** 2 > 2 * acceleration[i] * gap[i]:
                 found.append(
-                    (2 * gap[i] / (np.sqrt(speed[i] ** 2 - 2 * acceleration[i] * gap[i]) - speed[i]), i, -1 - w)
+                    (
+                        2
+                        * gap[i]
+                        / (np.sqrt(speed[i] ** 2 - 2 * acceleration[i] * gap[i]) - speed[i]),
+                        i,
+                        -1 - w,
+                    )
                 )
     return min(found)
 
 
 def simulate(scene: Scene, until):
-    """State after each collision up to `until`: a list of (t, position, velocity), the first one at 0."""
+    """State after each collision up to `until`: a list of (t, position, velocity), the first one at
+    0."""
     t, x, v = 0.0, np.array(scene.position), np.array(scene.velocity)
     g, w = np.where(scene.static[:, None], 0.0, scene.gravity), 1 / scene.mass
     path = [(t, x, v)]
@@ -79,7 +100,12 @@ def simulate(scene: Scene, until):
             return path
         t, x, v = t + after, x + v * after + g * after**2 / 2, v + g * after
         n = wall_frames(scene)[1][-1 - j] if j < 0 else (x[j] - x[i]) / np.hypot(*(x[j] - x[i]))
-        kick = (1 + scene.restitution) * ((v[j] if j >= 0 else 0) - v[i]) @ n / (w[i] + (w[j] if j >= 0 else 0))
+        kick = (
+            (1 + scene.restitution)
+            * ((v[j] if j >= 0 else 0) - v[i])
+            @ n
+            / (w[i] + (w[j] if j >= 0 else 0))
+        )
         v[i] += kick * w[i] * n
         if j >= 0:
             v[j] -= kick * w[j] * n
@@ -92,8 +118,8 @@ def test_truth_is_what_an_event_by_event_simulation_finds(name):
     run, truth, until = exact(name)
     path = simulate(run.scene, until)
     collisions = truth.collisions.t[truth.collisions.t <= until]
-    # Rounding of the simulation, 1e-16 a collision over hundreds of collisions; on the two-disk orbit it grows to 1e-9
-    # m.
+    # Rounding of the simulation, 1e-16 a collision over hundreds of collisions; on the two-disk
+    # orbit it grows to 1e-9 m.
     tolerance = 1e-8 if name == "disk_between_static_disks" else 1e-10
     np.testing.assert_allclose([t for t, _, _ in path[1:]], collisions, rtol=0, atol=tolerance)
     times = between(collisions, until)
@@ -103,11 +129,14 @@ def test_truth_is_what_an_event_by_event_simulation_finds(name):
     for k, (start, x, v) in enumerate(path[i] for i in last):
         since = times[k] - start
         np.testing.assert_allclose(answer.velocity[k], v + g * since, rtol=0, atol=tolerance)
-        np.testing.assert_allclose(answer.position[k], x + v * since + g * since**2 / 2, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(
+            answer.position[k], x + v * since + g * since**2 / 2, rtol=0, atol=tolerance
+        )
 
 
 def contact(scene, position, i, j):
-    """Gap m and unit normal (2,) from disk i to disk j or to wall -1 - j, at the positions (n, 2) m."""
+    """Gap m and unit normal (2,) from disk i to disk j or to wall -1 - j, at the positions (n, 2)
+    m."""
     if j < 0:
         point, across = (a[-1 - j] for a in wall_frames(scene))
         offset = (point - position[i]) @ across
@@ -127,9 +156,12 @@ def test_collisions_lie_at_touching_distance_and_their_impulse_is_the_change_of_
     for k in np.flatnonzero(collisions.t <= until):
         i, j, step = collisions.i[k], collisions.j[k], np.searchsorted(times, collisions.t[k])
         gap, normal = contact(scene, at.position[k], i, j)
-        # Positions and paths of 10 m have a last place of 2e-15; Galperin's weighted axis adds two digits.
+        # Positions and paths of 10 m have a last place of 2e-15; Galperin's weighted axis adds two
+        # digits.
         assert abs(gap) < 1e-13
-        before, after = (around.velocity[s] + gravity * (collisions.t[k] - times[s]) for s in (step - 1, step))
+        before, after = (
+            around.velocity[s] + gravity * (collisions.t[k] - times[s]) for s in (step - 1, step)
+        )
         approach, separating = (((v[j] if j >= 0 else 0) - v[i]) @ normal for v in (before, after))
         # The same of velocities up to 25 m/s.
         assert separating == pytest.approx(-scene.restitution * approach, abs=1e-13)
@@ -145,10 +177,13 @@ def test_velocity_is_the_derivative_of_position(name):
     run, truth, until = exact(name)
     h = 1e-4
     times = np.linspace(0.01, until - 0.01, 301)
-    edges = np.concatenate([truth.collisions.t, *([thrust.start, thrust.stop] for thrust in run.thrusts), [-1]])
+    edges = np.concatenate(
+        [truth.collisions.t, *([thrust.start, thrust.stop] for thrust in run.thrusts), [-1]]
+    )
     times = times[np.abs(times[:, None] - edges).min(axis=1) > 2 * h]
     before, now, after = (run.truth(times + shift) for shift in (-h, 0, h))
-    # Central differences: jerk h2 / 6 < 5 m/s3 1e-8 / 6 = 1e-8 (0 in a parabola), rounding 15 m 1e-16 / h = 3e-11.
+    # Central differences: jerk h2 / 6 < 5 m/s3 1e-8 / 6 = 1e-8 (0 in a parabola), rounding 15 m
+    # 1e-16 / h = 3e-11.
     for moved, rate in (("position", "velocity"), ("angle", "angular_velocity")):
         slope = (getattr(after, moved) - getattr(before, moved)) / (2 * h)
         np.testing.assert_allclose(slope, getattr(now, rate), rtol=0, atol=1e-8)
@@ -170,11 +205,15 @@ def test_velocity_and_spin_change_by_the_thrusts_as_quadrature_has_it(name):
                 continue
             turn = np.exp(1j * angle[:, thrust.disk]) if thrust.frame == "body" else np.ones(8)
             force = (complex(*thrust.force) * turn * weights).sum() * width / 2
-            gained[k + 1, thrust.disk] += np.array([force.real, force.imag]) / run.scene.mass[thrust.disk]
+            gained[k + 1, thrust.disk] += (
+                np.array([force.real, force.imag]) / run.scene.mass[thrust.disk]
+            )
             turned[k + 1, thrust.disk] += thrust.torque * width / run.scene.inertia[thrust.disk]
     # Eight nodes per 1/60 s are exact to rounding: some hundreds of sums of 1e-16.
     np.testing.assert_allclose(truth.velocity, run.scene.velocity + gained, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(truth.angular_velocity, run.scene.angular_velocity + turned, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        truth.angular_velocity, run.scene.angular_velocity + turned, rtol=0, atol=1e-13
+    )
 
 
 @pytest.mark.parametrize(
@@ -235,7 +274,9 @@ def test_galperin_is_within_its_error_bound_of_rational_arithmetic(name):
             since = Fraction(truth.t[sample]) - now
             right = [x[0] + v[0] * since + r[0], x[1] + v[1] * since + 2 * r[0] + r[1]]
             # The start data are rounded on their own: 2.4 m to the last place.
-            error = [abs(float(a - Fraction(b))) for a, b in zip(right, truth.position[sample, :, 0])]
+            error = [
+                abs(float(a - Fraction(b))) for a, b in zip(right, truth.position[sample, :, 0])
+            ]
             assert max(error) < truth.error_bound + 1e-15 * max(2.4, truth.position[sample].max())
             sample += 1
         if ahead is None:
@@ -268,9 +309,16 @@ def test_an_offset_grows_between_static_disks_as_the_horizon_assumes():
     along = np.array([0.8, 0.6])
     start = np.array(scene.position)
     start[0] += 1e-7 * np.array([-0.6, 0.8])
-    moved = Scene(position=start, velocity=scene.velocity, radius=scene.radius, mass=scene.mass, restitution=1.0)
+    moved = Scene(
+        position=start,
+        velocity=scene.velocity,
+        radius=scene.radius,
+        mass=scene.mass,
+        restitution=1.0,
+    )
     offset = [abs(along[0] * x[0, 1] - along[1] * x[0, 0]) for _, x, _ in simulate(moved, 7.0)][1:]
-    # q = 1 + 0.75 / 1.5; after a few bounces only the growing direction is left, while 1e-7 m is still small.
+    # q = 1 + 0.75 / 1.5; after a few bounces only the growing direction is left, while 1e-7 m is
+    # still small.
     assert offset[7] / offset[6] == pytest.approx(1.5 + np.sqrt(1.25), rel=1e-3)
     assert truth.horizon < run.duration
     assert truth.t[-1] <= truth.horizon

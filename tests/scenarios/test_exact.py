@@ -22,23 +22,35 @@ from tests.scenarios.exercise_box import boxed, lasting
 
 def under_thrust(force: float, away: float = 0.0, duration: float = 2.0) -> Scenario:
     """A disk of 1 kg under a thrust, `away` m from the origin."""
-    scene = lay_out(position=[[away, 0.0]], velocity=[[2.0, 0.0]], radius=[0.25], mass=[1.0], restitution=0.9)
-    return with_oracle(Scenario("thrust", "?", "", scene, duration, 0.02, thrusts=[Thrust(0, 0.0, 1.0, [force, 0.0])]))
+    scene = lay_out(
+        position=[[away, 0.0]], velocity=[[2.0, 0.0]], radius=[0.25], mass=[1.0], restitution=0.9
+    )
+    return with_oracle(
+        Scenario(
+            "thrust", "?", "", scene, duration, 0.02, thrusts=[Thrust(0, 0.0, 1.0, [force, 0.0])]
+        )
+    )
 
 
 def keeps_its_promise(one: Scenario, record: TruthRecord) -> bool:
-    """Whether the error bound is what engines are held to at most; a last place for the sum that it is."""
+    """Whether the error bound is what engines are held to at most; a last place for the sum that it
+    is."""
     return record.error_bound <= DIVERGED * one.scene.radius.min() * (1 + 1e-12)
 
 
-@pytest.mark.parametrize(("force", "away"), [(1e6, 0.0), (9e5, 1e3), (1.0, 1e5), (0.0, 1e5), (1e3, 2e5)])
+@pytest.mark.parametrize(
+    ("force", "away"), [(1e6, 0.0), (9e5, 1e3), (1.0, 1e5), (0.0, 1e5), (1e3, 2e5)]
+)
 def test_an_answer_ends_where_float64_cannot_tell_it_any_more(force: float, away: float):
     """After a long way, or far from the origin; before that it is what was promised."""
     one = under_thrust(force, away, 20.0)
     record = record_of(one)
     assert keeps_its_promise(one, record)
     if record.horizon < one.duration:
-        assert "the rounding of float64 is more than 1e-09 of the smallest radius from t = " in record.reason
+        assert (
+            "the rounding of float64 is more than 1e-09 of the smallest radius from t = "
+            in record.reason
+        )
 
 
 def test_where_nothing_can_be_proved_there_is_no_answer():
@@ -63,15 +75,24 @@ def test_a_thrust_out_of_scale_is_refused_at_once(force: float):
 
 @settings(max_examples=60, deadline=None)
 @given(
-    st.floats(-1e6, 1e6), st.floats(-1e5, 1e5), st.floats(1e-4, 10.0), st.floats(0.1, 1e4),
+    st.floats(-1e6, 1e6),
+    st.floats(-1e5, 1e5),
+    st.floats(1e-4, 10.0),
+    st.floats(0.1, 1e4),
     st.tuples(st.floats(-30, 30), st.floats(-30, 30)),
-)  # fmt: skip
-def test_no_record_breaks_its_promise(force: float, away: float, radius: float, duration: float, gravity: tuple):
+)
+def test_no_record_breaks_its_promise(
+    force: float, away: float, radius: float, duration: float, gravity: tuple
+):
     """Whatever the sizes, ways and times: it ends, or there is none."""
     scene = lay_out(
-        position=[[away, 0.0], [away, 40.0]], velocity=[[1.0, 0.0], [0.0, -1.0]], radius=[radius] * 2,
-        mass=[1.0, 2.0], restitution=1.0, gravity=gravity,
-    )  # fmt: skip
+        position=[[away, 0.0], [away, 40.0]],
+        velocity=[[1.0, 0.0], [0.0, -1.0]],
+        radius=[radius] * 2,
+        mass=[1.0, 2.0],
+        restitution=1.0,
+        gravity=gravity,
+    )
     thrust = Thrust(0, 0.0, duration / 2, [force, 0.0])
     one = with_oracle(Scenario("any", "?", "", scene, duration, duration / 10, thrusts=[thrust]))
     try:
@@ -94,11 +115,13 @@ UNITS = {
 @pytest.mark.parametrize("units", UNITS)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_horizon_and_the_end_of_an_answer_are_the_same_in_other_units(units: str, seed: int):
-    """As are the collisions, to what the rounding of the new numbers of the scene becomes by then."""
+    """As are the collisions, to what the rounding of the new numbers of the scene becomes by
+    then."""
     change, one = UNITS[units], with_oracle(lasting(boxed(seed), 12.0))
     new = with_oracle(replace(change.scenario(replace(one, truth=None)), truth=None))
     before, after = computed(one), computed(new)
-    # The derivatives of a motion whose start is off by 1e-16, and that is followed until this is 1e-9.
+    # The derivatives of a motion whose start is off by 1e-16, and that is followed until this is
+    # 1e-9.
     assert after.float64_horizon == pytest.approx(change.time * before.float64_horizon, rel=1e-6)
     assert after.horizon == pytest.approx(change.time * before.horizon)
     assert after.reason == before.reason == ""
@@ -107,7 +130,9 @@ def test_the_horizon_and_the_end_of_an_answer_are_the_same_in_other_units(units:
     found = after.events[: early.sum()]
     np.testing.assert_array_equal(found[:, 1:3], before.events[early][:, 1:3])
     np.testing.assert_allclose(found[:, 0], change.time * times, rtol=1e-8)
-    np.testing.assert_allclose(found[:, 3], change.mass * change.length / change.time * impulses, rtol=1e-7)
+    np.testing.assert_allclose(
+        found[:, 3], change.mass * change.length / change.time * impulses, rtol=1e-7
+    )
     assert before.float64_horizon < 12.0
     assert keeps_its_promise(new, after)
 
@@ -125,7 +150,8 @@ def test_a_horizon_by_metres_is_caught(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_the_answer_up_to_the_bound_of_work_is_kept_and_says_so(monkeypatch: pytest.MonkeyPatch):
-    """One disk in a box for a million seconds: the first collisions are exact, and the rest is not asked for."""
+    """One disk in a box for a million seconds: the first collisions are exact, and the rest is not
+    asked for."""
     scene = lay_out(
         position=[[0, 0]],
         velocity=[[-2.19, 2.08]],

@@ -1,4 +1,5 @@
-"""The horizon: the derivative that it carries along is that of the motion, and it ends where moved starts part."""
+"""The horizon: the derivative that it carries along is that of the motion, and it ends where moved
+starts part."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from scenarios.truth.record import record_of
 from tests.scenarios.exercise_box import boxed, lasting
 
 NEAR = 1e-7
-"""m, m/s: how far starts are moved to measure a derivative; the second order is as much smaller than the first."""
+"""m, m/s: how far starts are moved to measure a derivative; the second order is as much smaller
+than the first."""
 
 
 def path_of(one: Scenario) -> Path:
@@ -37,7 +39,11 @@ def asked(scene: Scene, duration: float, thrusts: tuple[Thrust, ...] = ()) -> Sc
 
 def moved(scene: Scene, by: tuple[Array, Array], k: int, scale: float) -> Scene:
     """The scene with what number k of the roundings moves, times `scale`."""
-    return replace(scene, position=scene.position + scale * by[0][:, k], velocity=scene.velocity + scale * by[1][:, k])
+    return replace(
+        scene,
+        position=scene.position + scale * by[0][:, k],
+        velocity=scene.velocity + scale * by[1][:, k],
+    )
 
 
 def carried(one: Scenario) -> Array:
@@ -62,7 +68,12 @@ def ends(one: Scenario) -> Array:
 FLOOR = [[[-9.0, 0.0], [9.0, 0.0]]]
 DOWN = [0.0, -9.8125]
 RAMP = [[[-1.0, 0.5], [1.0, -0.25]]]
-TWO = dict(position=[[-1, 0.125], [1, 0]], velocity=[[2, 0.25], [-1.5, 0]], radius=[0.25, 0.375], mass=[1.0, 2.5])
+TWO = dict(
+    position=[[-1, 0.125], [1, 0]],
+    velocity=[[2, 0.25], [-1.5, 0]],
+    radius=[0.25, 0.375],
+    mass=[1.0, 2.5],
+)
 ALONE = dict(position=[[0.25, 1.5]], velocity=[[0.75, -0.5]], radius=[0.25], mass=[1.5])
 CHANGES: dict[str, Scenario] = {
     "a flight": asked(lay_out(**ALONE, gravity=DOWN, restitution=1.0), 0.5),
@@ -71,35 +82,64 @@ CHANGES: dict[str, Scenario] = {
     "two falling disks": asked(lay_out(**TWO, restitution=0.75, gravity=DOWN), 1.5),
     "a static disk under gravity": asked(
         lay_out(
-            position=[[0.125, 1.5], [0, 0]], velocity=[[0.0, 0.5], [0, 0]], radius=[0.25, 0.5], mass=[1, np.inf],
-            gravity=DOWN, restitution=1.0,
-        ), 1.0,
+            position=[[0.125, 1.5], [0, 0]],
+            velocity=[[0.0, 0.5], [0, 0]],
+            radius=[0.25, 0.5],
+            mass=[1, np.inf],
+            gravity=DOWN,
+            restitution=1.0,
+        ),
+        1.0,
     ),
     "a wall": asked(lay_out(**ALONE, gravity=DOWN, walls=RAMP, restitution=0.5), 1.0),
-    "the end of a wall": asked(lay_out(**ALONE, walls=[[[1.0, -1.0], [1.0, 0.875]]], restitution=0.5), 1.5),
+    "the end of a wall": asked(
+        lay_out(**ALONE, walls=[[[1.0, -1.0], [1.0, 0.875]]], restitution=0.5), 1.5
+    ),
     "a corner": asked(
-        lay_out(**ALONE, gravity=DOWN, walls=[*FLOOR, [[1.5, -1.0], [1.5, 3.0]]], restitution=0.875), 1.25
+        lay_out(
+            **ALONE, gravity=DOWN, walls=[*FLOOR, [[1.5, -1.0], [1.5, 3.0]]], restitution=0.875
+        ),
+        1.25,
     ),
     "bounces that die out on a ramp": asked(
         lay_out(**ALONE, gravity=DOWN, walls=[[[-9, 4], [9, -5]]], restitution=0.25), 1.2
     ),
     "a slide over the end of a wall": asked(
-        lay_out(**ALONE | {"velocity": [[4, 0]]}, gravity=DOWN, walls=[[[-9, 0], [4.5, 0]]], restitution=0.25), 1.5
+        lay_out(
+            **ALONE | {"velocity": [[4, 0]]},
+            gravity=DOWN,
+            walls=[[[-9, 0], [4.5, 0]]],
+            restitution=0.25,
+        ),
+        1.5,
     ),
     "a disk that is thrust off the floor": asked(
-        lay_out(**ALONE, gravity=DOWN, walls=FLOOR, restitution=0.125), 2.0, (Thrust(0, 1.25, 1.75, [1.0, 30.0]),),
+        lay_out(**ALONE, gravity=DOWN, walls=FLOOR, restitution=0.125),
+        2.0,
+        (Thrust(0, 1.25, 1.75, [1.0, 30.0]),),
     ),
     "a collision on a disk that lies": asked(
         lay_out(
-            position=[[-0.125, 1.5], [0, 0.5]], velocity=[[0, -1], [0, 0]], radius=[0.25, 0.5], mass=[1, 1],
-            gravity=DOWN, walls=FLOOR, restitution=0.9375,
-        ), 0.75,
+            position=[[-0.125, 1.5], [0, 0.5]],
+            velocity=[[0, -1], [0, 0]],
+            radius=[0.25, 0.5],
+            mass=[1, 1],
+            gravity=DOWN,
+            walls=FLOOR,
+            restitution=0.9375,
+        ),
+        0.75,
     ),
     "a wrap": asked(
-        lay_out(**TWO | {"position": [[-1, 0.125], [1, -0.25]]}, wrap=[[-2, -3], [2, 3]], restitution=1.0), 1.6
+        lay_out(
+            **TWO | {"position": [[-1, 0.125], [1, -0.25]]},
+            wrap=[[-2, -3], [2, 3]],
+            restitution=1.0,
+        ),
+        1.6,
     ),
     "many": asked(boxed(3), 3.0),
-}  # fmt: skip
+}
 LYING = {"a collision on a disk that lies": 1}
 
 
@@ -112,28 +152,42 @@ def test_what_a_rounding_becomes_is_the_derivative_of_the_motion(name: str):
         if name in LYING and (by[0][LYING[name], k, 1] or by[1][LYING[name], k, 1]):
             continue  # it is kept on the floor
         size = NEAR / max(by[0][:, k].max(), by[1][:, k].max())
-        there, here = (ends(replace(one, scene=moved(one.scene, by, k, sign * size))) for sign in (1, -1))
+        there, here = (
+            ends(replace(one, scene=moved(one.scene, by, k, sign * size))) for sign in (1, -1)
+        )
         expected, off = (there - here) / (2 * size), found[:, k]
         largest = max(np.abs(expected).max(), EPS)
-        np.testing.assert_allclose(off / largest, expected / largest, rtol=0, atol=1e-4, err_msg=f"number {k}")
+        np.testing.assert_allclose(
+            off / largest, expected / largest, rtol=0, atol=1e-4, err_msg=f"number {k}"
+        )
 
 
 def test_the_derivatives_of_these_motions_pass_every_kind_of_change():
-    """Else the test above says less than it seems to: collisions, rest, release, wrap, thrust all happen in them."""
+    """Else the test above says less than it seems to: collisions, rest, release, wrap, thrust all
+    happen in them."""
     paths = {name: path_of(one) for name, one in CHANGES.items()}
     assert {name for name, path in paths.items() if not path.events} == {"a flight"}
     assert any(leg.y == -3 for leg in paths["a wrap"].legs[0])
     assert any(leg.hop for leg in paths["bounces that die out on a ramp"].legs[0])
-    assert [bool(leg.held) for leg in paths["a slide over the end of a wall"].legs[0]][-2:] == [True, False]
-    assert [bool(leg.held) for leg in paths["a disk that is thrust off the floor"].legs[0]].count(True) == 1
+    assert [bool(leg.held) for leg in paths["a slide over the end of a wall"].legs[0]][-2:] == [
+        True,
+        False,
+    ]
+    assert [bool(leg.held) for leg in paths["a disk that is thrust off the floor"].legs[0]].count(
+        True
+    ) == 1
     assert not all(event.new for event in paths["a collision on a disk that lies"].events)
     assert len(paths["many"].events) > 10
 
 
-@pytest.mark.parametrize(("name", "seed"), [("asteroids", 0), ("gas_of_100", 0), ("falling_box", 0)])
+@pytest.mark.parametrize(
+    ("name", "seed"), [("asteroids", 0), ("gas_of_100", 0), ("falling_box", 0)]
+)
 def test_at_the_horizon_moved_starts_are_as_far_off_as_it_says(name: str, seed: int):
-    """Twelve starts in many digits, each number a unit in the last place up or down: the disk that is off the most is
-    off by `DIVERGED` radii, root mean square. Twelve draws tell that to 20 %, and the largest of many is taken."""
+    """Twelve starts in many digits, each number a unit in the last place up or down: the disk that
+    is off the most is off by `DIVERGED` radii, root mean square. Twelve draws tell that to 20 %,
+    and the largest of many is taken.
+    """
     one = scenario(name, seed)
     until = float(computed(one).float64_horizon)
     one = replace(one, duration=until, sample_interval=until)
@@ -141,7 +195,9 @@ def test_at_the_horizon_moved_starts_are_as_far_off_as_it_says(name: str, seed: 
     for number in range(12):
         signs = np.random.default_rng(number).choice([-1.0, 1.0], dx[0].shape[1])
         there = replace(
-            one.scene, position=one.scene.position + signs @ dx[0], velocity=one.scene.velocity + signs @ dx[1]
+            one.scene,
+            position=one.scene.position + signs @ dx[0],
+            velocity=one.scene.velocity + signs @ dx[1],
         )
         off.append(((ends(replace(one, scene=there)) - here) ** 2).sum(axis=1))
     assert 0.5 < (np.sqrt(np.mean(off, axis=0)) / (DIVERGED * one.scene.radius)).max() < 2
@@ -150,14 +206,21 @@ def test_at_the_horizon_moved_starts_are_as_far_off_as_it_says(name: str, seed: 
 ROW = lay_out(
     position=[[-3, 0.125], [-1.5, 0.0], [-0.5, 0.0], [0.5, 0.0], [2.5, 0.25], [2.5, -1.0]],
     velocity=[[3, 0.125], [0, 0], [0, 0], [0, 0], [-1, -0.5], [0.25, 1]],
-    radius=[0.5, 0.5, 0.5, 0.5, 0.375, 0.25], mass=np.ones(6), restitution=1.0, walls=box([-4, -2], [4, 2]),
-)  # fmt: skip
+    radius=[0.5, 0.5, 0.5, 0.5, 0.375, 0.25],
+    mass=np.ones(6),
+    restitution=1.0,
+    walls=box([-4, -2], [4, 2]),
+)
 
 
 def test_what_touches_at_the_start_has_the_horizon_of_small_gaps():
     """A row of three: it used to have none, since a start moved by a rounding overlaps."""
     touching = computed(asked(ROW, 12.0)).float64_horizon
-    apart = replace(ROW, position=ROW.position + np.outer(np.arange(6) > 1, [1e-9, 0]) * [[0], [0], [1], [2], [0], [0]])
+    apart = replace(
+        ROW,
+        position=ROW.position
+        + np.outer(np.arange(6) > 1, [1e-9, 0]) * [[0], [0], [1], [2], [0], [0]],
+    )
 
     assert 2.0 < touching < 12.0
     assert computed(asked(apart, 12.0)).float64_horizon == pytest.approx(touching, rel=0.02)
@@ -165,20 +228,32 @@ def test_what_touches_at_the_start_has_the_horizon_of_small_gaps():
 
 def test_motions_that_are_not_chaotic_are_followed_to_their_end():
     """Rows, single balls, what comes to rest."""
-    for name in ("bouncing_ball_e09", "rest_on_floor", "column_of_ten", "galperin_31", "cradle_touching", "line_gas"):
+    for name in (
+        "bouncing_ball_e09",
+        "rest_on_floor",
+        "column_of_ten",
+        "galperin_31",
+        "cradle_touching",
+        "line_gas",
+    ):
         one = scenario(name)
         assert float64_horizon(one, path_of(one)) == np.inf
 
 
 def test_the_horizon_does_not_depend_on_the_units_of_length_and_time():
-    """Lengths times 1024, times divided by 8: powers of two, so that nothing is rounded otherwise."""
+    """Lengths times 1024, times divided by 8: powers of two, so that nothing is rounded
+    otherwise."""
     one = lasting(boxed(1), 12.0)
     until = computed(one).float64_horizon
     scene = one.scene
     wide = replace(
-        scene, position=scene.position * 1024, velocity=scene.velocity * 1024, radius=scene.radius * 1024,
-        inertia=scene.inertia * 1024**2, walls=scene.walls * 1024,
-    )  # fmt: skip
+        scene,
+        position=scene.position * 1024,
+        velocity=scene.velocity * 1024,
+        radius=scene.radius * 1024,
+        inertia=scene.inertia * 1024**2,
+        walls=scene.walls * 1024,
+    )
     fast = replace(scene, velocity=scene.velocity * 8)
 
     assert until < 12.0
@@ -188,7 +263,8 @@ def test_the_horizon_does_not_depend_on_the_units_of_length_and_time():
 
 
 def test_the_horizon_is_shorter_beside_a_disk_far_away_that_nothing_meets():
-    """As the rounding is that of the largest coordinate in the scene (horizon.py); the control moves no farther."""
+    """As the rounding is that of the largest coordinate in the scene (horizon.py); the control
+    moves no farther."""
     position = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-0.7, 0.8)])
     velocity = np.random.default_rng(4).normal(0, 3, (6, 2))
     walls = [[[-2, -2], [2, -2]], [[2, -2], [2, 2]], [[2, 2], [-2, 2]], [[-2, 2], [-2, -2]]]
@@ -196,9 +272,13 @@ def test_the_horizon_is_shorter_beside_a_disk_far_away_that_nothing_meets():
     def followed(far: float, y: float = 0.0) -> float:
         """s, with a disk at rest at x = `far` m, outside of the box."""
         scene = Scene(
-            position=[*position, [far, y]], velocity=[*velocity, [0.0, 0.0]], radius=[0.3] * 7, mass=[1] * 7,
-            walls=walls, restitution=1,
-        )  # fmt: skip
+            position=[*position, [far, y]],
+            velocity=[*velocity, [0.0, 0.0]],
+            radius=[0.3] * 7,
+            mass=[1] * 7,
+            walls=walls,
+            restitution=1,
+        )
         return computed(asked(scene, 10.0)).float64_horizon
 
     near, middle, far = map(followed, (3.0, 30.0, 300.0))
@@ -207,7 +287,8 @@ def test_the_horizon_is_shorter_beside_a_disk_far_away_that_nothing_meets():
 
 
 def test_the_exact_answer_shares_no_code_with_the_event_engine():
-    """Nothing of the oracle or of its horizon imports what the scored engine `event_driven` is made of."""
+    """Nothing of the oracle or of its horizon imports what the scored engine `event_driven` is made
+    of."""
     folder = File(of_horizon.__file__).parent
     ours = list(folder.rglob("*.py"))
     imported = {
@@ -217,4 +298,6 @@ def test_the_exact_answer_shares_no_code_with_the_event_engine():
         if isinstance(node, ast.ImportFrom)
     }
     assert len(ours) > 10
-    assert not {name for name in imported if name and name.startswith(("adapters", "reference_impl"))}
+    assert not {
+        name for name in imported if name and name.startswith(("adapters", "reference_impl"))
+    }

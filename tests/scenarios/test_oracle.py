@@ -1,4 +1,5 @@
-"""The oracle against closed forms, a float64 simulation, and itself in other numbers; and where it refuses."""
+"""The oracle against closed forms, a float64 simulation, and itself in other numbers; and where it
+refuses."""
 
 from __future__ import annotations
 
@@ -38,10 +39,15 @@ def drawn(seed: int, n: int = 5, restitution: float = 1.0, gravity: float = 0.0,
     rng = np.random.default_rng(seed)
     radius = rng.uniform(0.05, 0.2, n)
     return lay_out(
-        position=scatter(rng, [-0.8, -0.8], [0.8, 0.8], radius), velocity=rng.normal(size=(n, 2)), radius=radius,
-        mass=rng.uniform(0.5, 5, n), restitution=restitution, walls=box([-1, -1], [1, 1]), gravity=[0, gravity],
+        position=scatter(rng, [-0.8, -0.8], [0.8, 0.8], radius),
+        velocity=rng.normal(size=(n, 2)),
+        radius=radius,
+        mass=rng.uniform(0.5, 5, n),
+        restitution=restitution,
+        walls=box([-1, -1], [1, 1]),
+        gravity=[0, gravity],
         **fields,
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -63,12 +69,18 @@ def test_it_finds_what_the_closed_form_says(name: str):
     )  # an accumulation ends the oracle, not the closed form; an unstable orbit the latter
     np.testing.assert_allclose(found.position[:k], expected.position[:k], rtol=0, atol=ACCURACY)
     np.testing.assert_allclose(found.angle[:k], expected.angle[:k], rtol=0, atol=ACCURACY)
-    collisions, others = (sorted(zip(c.collisions.i, c.collisions.j, c.collisions.t, c.collisions.impulse)) for c in
-                    (found, expected))  # fmt: skip
-    if name in ("bouncing_ball_e09", "disk_between_static_disks"):  # one lists no bounces below 1e-4 s, one ends early
-        until = min(max(collision[2] for collision in each) for each in (collisions, others)) + ACCURACY
+    collisions, others = (
+        sorted(zip(c.collisions.i, c.collisions.j, c.collisions.t, c.collisions.impulse))
+        for c in (found, expected)
+    )
+    # one lists no bounces below 1e-4 s, one ends early
+    if name in ("bouncing_ball_e09", "disk_between_static_disks"):
+        until = (
+            min(max(collision[2] for collision in each) for each in (collisions, others)) + ACCURACY
+        )
         collisions, others = (
-            [collision for collision in each if collision[2] <= until] for each in (collisions, others)
+            [collision for collision in each if collision[2] <= until]
+            for each in (collisions, others)
         )
     assert [collision[:2] for collision in collisions] == [collision[:2] for collision in others]
     # The closed form of Galperin's collisions divides by tangents of up to pi.
@@ -76,7 +88,9 @@ def test_it_finds_what_the_closed_form_says(name: str):
     np.testing.assert_allclose(*times, rtol=2e-13 if name == "galperin_314" else 0, atol=ACCURACY)
     # Impulses of 2e6 N s in the heaviest lane.
     np.testing.assert_allclose(
-        [collision[3] for collision in collisions], [collision[3] for collision in others], rtol=1e-12
+        [collision[3] for collision in collisions],
+        [collision[3] for collision in others],
+        rtol=1e-12,
     )
 
 
@@ -94,11 +108,19 @@ def test_the_drawn_scenes_are_answered_to_their_end(name: str, records: dict[str
     assert ((record.events[:, 4] > 0) & (record.events[:, 4] < 1 + 1e-15)).all()
 
 
-@given(seed=st.integers(0, 10**6), restitution=st.sampled_from([1.0, 0.9, 0.5]), gravity=st.sampled_from([0.0, -3]))
+@given(
+    seed=st.integers(0, 10**6),
+    restitution=st.sampled_from([1.0, 0.9, 0.5]),
+    gravity=st.sampled_from([0.0, -3]),
+)
 @settings(max_examples=25, deadline=None)
-def test_it_finds_the_collisions_of_a_float64_simulation(seed: int, restitution: float, gravity: float):
-    """All pairs, no records, no filter: the same first ten collisions, before float64 loses its digits."""
-    gravity = gravity if restitution > 0.5 else 0.0  # what comes to rest stops the clock of the simulation
+def test_it_finds_the_collisions_of_a_float64_simulation(
+    seed: int, restitution: float, gravity: float
+):
+    """All pairs, no records, no filter: the same first ten collisions, before float64 loses its
+    digits."""
+    # what comes to rest stops the clock of the simulation
+    gravity = gravity if restitution > 0.5 else 0.0
     one = asked(drawn(seed, 4, restitution, gravity), 1.0)
     found = states(one, computed(one)).collisions.t[:10]
     path = simulate(one.scene, float(found[-1]) + 1e-9 if len(found) else 1.0)[1:]
@@ -108,7 +130,8 @@ def test_it_finds_the_collisions_of_a_float64_simulation(seed: int, restitution:
 
 
 def test_all_numbers_give_the_same(records: dict[str, TruthRecord]):
-    """Decimals and mpfr, at one and at two precisions, agree in every leg; gravity and a static disk included."""
+    """Decimals and mpfr, at one and at two precisions, agree in every leg; gravity and a static
+    disk included."""
     walled = drawn(3, 5, 0.9, -2.0)
     mass = np.append(walled.mass[:-1], np.inf)
     velocity = np.vstack([walled.velocity[:-1], [[0, 0]]])
@@ -117,13 +140,17 @@ def test_all_numbers_give_the_same(records: dict[str, TruthRecord]):
         with_mpfr, with_decimals = computed(each, mpfr), computed(each, decimals)
         np.testing.assert_allclose(with_mpfr.legs, with_decimals.legs, rtol=0, atol=1e-14)
         np.testing.assert_allclose(with_mpfr.events, with_decimals.events, rtol=0, atol=1e-14)
-    np.testing.assert_array_equal(records["asteroids"].legs, computed(scenario("asteroids"), mpfr).legs)
+    np.testing.assert_array_equal(
+        records["asteroids"].legs, computed(scenario("asteroids"), mpfr).legs
+    )
 
 
 @pytest.mark.skipif(not has_balls(), reason="python-flint is an extra")
 def test_interval_arithmetic_proves_every_comparison(records: dict[str, TruthRecord]):
     """The drawn scenes are certified; balls that are too wide say so instead of guessing."""
-    assert {name: record.method for name, record in records.items()} == dict.fromkeys(RANDOM, "certified")
+    assert {name: record.method for name, record in records.items()} == dict.fromkeys(
+        RANDOM, "certified"
+    )
     one = scenario("gas_of_100")
     with pytest.raises(ArithmeticError):
         trace(one.scene, [], one.duration, balls(64))
@@ -147,7 +174,12 @@ def test_the_order_of_the_disks_does_not_matter():
 def test_a_mirrored_scene_moves_as_the_mirror_image():
     """Left and right swapped, bit for bit."""
     scene, flip = drawn(6, 6, 0.9, -1.0), np.array([-1.0, 1.0])
-    mirrored = replace(scene, position=scene.position * flip, velocity=scene.velocity * flip, walls=scene.walls * flip)
+    mirrored = replace(
+        scene,
+        position=scene.position * flip,
+        velocity=scene.velocity * flip,
+        walls=scene.walls * flip,
+    )
     here, there = (last_of(trace(each, [], 2.0, mpfr(256))) for each in (scene, mirrored))
 
     np.testing.assert_array_equal(here * [1, -1, 1, -1, 1, -1, 1], there)
@@ -167,11 +199,17 @@ def test_time_runs_backwards_at_restitution_one():
 
 
 def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
-    """The static side does not fall: contact times of fourth order, checked by the gap they leave."""
+    """The static side does not fall: contact times of fourth order, checked by the gap they
+    leave."""
     bumper = lay_out(
-        position=[[0.3, 2.0], [0, 0.5]], velocity=[[-0.2, 0], [0, 0]], radius=[0.25, 0.5], mass=[1, np.inf],
-        walls=[[[1, -3], [2, -3]]], gravity=[0, -9.81], restitution=1.0,
-    )  # fmt: skip
+        position=[[0.3, 2.0], [0, 0.5]],
+        velocity=[[-0.2, 0], [0, 0]],
+        radius=[0.25, 0.5],
+        mass=[1, np.inf],
+        walls=[[[1, -3], [2, -3]]],
+        gravity=[0, -9.81],
+        restitution=1.0,
+    )
     one = asked(bumper, 1.5)
     assert computed(one).method == ("certified" if has_balls() else "two-precision")
     truth = states(one, computed(one))
@@ -191,7 +229,12 @@ def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
 def test_thrusts_carry_a_disk_into_a_wall():
     """From rest, s = F t2 / 2m; the thrust ends, the disk flies on."""
     scene = lay_out(
-        position=[[0, 0]], velocity=[[0, 0]], radius=[0.5], mass=[2], walls=[[[2, -1], [2, 1]]], restitution=1
+        position=[[0, 0]],
+        velocity=[[0, 0]],
+        radius=[0.5],
+        mass=[2],
+        walls=[[[2, -1], [2, 1]]],
+        restitution=1,
     )
     one = asked(scene, 4.0, thrusts=[Thrust(0, 0.0, 1.0, [3.0, 0.0], 0.5)])
     record = computed(one)
@@ -204,7 +247,12 @@ def test_thrusts_carry_a_disk_into_a_wall():
 def test_an_edge_of_the_wrap_sets_the_centre_onto_the_other():
     """Period 4 s over a box of 4 m at 1 m/s, velocity kept."""
     scene = lay_out(
-        position=[[1, 0]], velocity=[[1, 0]], radius=[0.1], mass=[1], restitution=1, wrap=[[-2, -2], [2, 2]]
+        position=[[1, 0]],
+        velocity=[[1, 0]],
+        radius=[0.1],
+        mass=[1],
+        restitution=1,
+        wrap=[[-2, -2], [2, 2]],
     )
     one = asked(scene, 10.0)
     truth = states(one, computed(one))
@@ -223,16 +271,22 @@ def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):
     assert "used up" in record.reason
     whole = one.truth(one.times)
     k = len(states(one, record))
-    np.testing.assert_allclose(states(one, record).position, whole.position[:k], rtol=0, atol=2 * ACCURACY)
+    np.testing.assert_allclose(
+        states(one, record).position, whole.position[:k], rtol=0, atol=2 * ACCURACY
+    )
 
 
-def test_a_stale_record_taken_for_fresh_is_caught(monkeypatch: pytest.MonkeyPatch, records: dict[str, TruthRecord]):
-    """The bug of the first prototype: two precisions agree on a wrong motion, the gaps and the collisions do not."""
+def test_a_stale_record_taken_for_fresh_is_caught(
+    monkeypatch: pytest.MonkeyPatch, records: dict[str, TruthRecord]
+):
+    """The bug of the first prototype: two precisions agree on a wrong motion, the gaps and the
+    collisions do not."""
     monkeypatch.setattr(oracle_events.Motion, "stale", lambda _self, _record: False)
     one = scenario("asteroids")
     wrong = computed(one, mpfr)
 
     assert (
-        smallest_gap(one.scene, states(one, wrong).position).min() < -ACCURACY or len(wrong.events) != COUNTS[one.name]
+        smallest_gap(one.scene, states(one, wrong).position).min() < -ACCURACY
+        or len(wrong.events) != COUNTS[one.name]
     )
     assert not np.array_equal(wrong.events[:, :3], records[one.name].events[:, :3])

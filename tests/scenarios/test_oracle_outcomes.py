@@ -1,5 +1,5 @@
-"""Where contacts come at once: one outcome is the truth, several are all reported; and where the oracle has no
-answer."""
+"""Where contacts come at once: one outcome is the truth, several are all reported; and where the
+oracle has no answer."""
 
 from __future__ import annotations
 
@@ -20,8 +20,13 @@ from scenarios.truth.oracle.ties import Contact, Matter, Touch
 from scenarios.truth.record import TruthRecord
 from tests.scenarios.test_oracle import asked, states
 
-ROW = lay_out(position=[[-2, 0], [0, 0], [0.5, 0], [1, 0]], velocity=[[1, 0], [0, 0], [0, 0], [0, 0]],
-              radius=[0.25] * 4, mass=[1] * 4, restitution=1.0)  # fmt: skip
+ROW = lay_out(
+    position=[[-2, 0], [0, 0], [0.5, 0], [1, 0]],
+    velocity=[[1, 0], [0, 0], [0, 0], [0, 0]],
+    radius=[0.25] * 4,
+    mass=[1] * 4,
+    restitution=1.0,
+)
 
 
 def test_contacts_that_touch_are_resolved_one_after_the_other_where_only_one_approaches():
@@ -30,13 +35,20 @@ def test_contacts_that_touch_are_resolved_one_after_the_other_where_only_one_app
     truth = states(one, computed(one))
 
     assert truth.collisions.t.tolist() == [1.5, 1.5, 1.5]
-    np.testing.assert_allclose(truth.velocity[-1], [[0, 0], [0, 0], [0, 0], [1, 0]], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        truth.velocity[-1], [[0, 0], [0, 0], [0, 0], [1, 0]], rtol=0, atol=1e-15
+    )
 
 
 def test_a_corner_at_a_right_angle_has_one_outcome():
     """Both walls at once, e = 0.5, either order."""
     scene = lay_out(
-        position=[[0, 0]], velocity=[[1, 1]], radius=[0.5], mass=[1], walls=box([-2, -2], [2, 2]), restitution=0.5
+        position=[[0, 0]],
+        velocity=[[1, 1]],
+        radius=[0.5],
+        mass=[1],
+        walls=box([-2, -2], [2, 2]),
+        restitution=0.5,
     )
     one = asked(scene, 2.5)
     truth = states(one, computed(one))
@@ -45,12 +57,30 @@ def test_a_corner_at_a_right_angle_has_one_outcome():
     assert truth.velocity[-1, 0].tolist() == [-0.5, -0.5]
 
 
-BREAK = lay_out(position=[[-2, 0], [np.sqrt(0.75), 0.5], [np.sqrt(0.75), -0.5]], velocity=[[1, 0], [0, 0], [0, 0]],
-                radius=[0.5] * 3, mass=[1] * 3, restitution=1.0)  # fmt: skip
-BALL = lay_out(position=[[0, 1], [0, 2]], velocity=[[0, 0], [0, 0]], radius=[0.25, 0.25], mass=[1, 1],
-               walls=[[[-9, 0], [9, 0]]], gravity=[0, -9.81], restitution=0.1)  # fmt: skip
-SEAM = lay_out(position=[[1.5, 0], [-1.8, 0.1]], velocity=[[1, 0], [0, 0]], radius=[0.3, 0.3], mass=[1, 1],
-               restitution=1, wrap=[[-2, -2], [2, 2]])  # fmt: skip
+BREAK = lay_out(
+    position=[[-2, 0], [np.sqrt(0.75), 0.5], [np.sqrt(0.75), -0.5]],
+    velocity=[[1, 0], [0, 0], [0, 0]],
+    radius=[0.5] * 3,
+    mass=[1] * 3,
+    restitution=1.0,
+)
+BALL = lay_out(
+    position=[[0, 1], [0, 2]],
+    velocity=[[0, 0], [0, 0]],
+    radius=[0.25, 0.25],
+    mass=[1, 1],
+    walls=[[[-9, 0], [9, 0]]],
+    gravity=[0, -9.81],
+    restitution=0.1,
+)
+SEAM = lay_out(
+    position=[[1.5, 0], [-1.8, 0.1]],
+    velocity=[[1, 0], [0, 0]],
+    radius=[0.3, 0.3],
+    mass=[1, 1],
+    restitution=1,
+    wrap=[[-2, -2], [2, 2]],
+)
 
 
 @pytest.mark.parametrize(
@@ -59,9 +89,13 @@ SEAM = lay_out(position=[[1.5, 0], [-1.8, 0.1]], velocity=[[1, 0], [0, 0]], radi
         (
             BREAK,
             2.0,
-            "disks 0, 1, 2 touch at once and the outcome depends on the order of their collisions (2 outcomes)",
+            (
+                "disks 0, 1, 2 touch at once and the outcome depends on the order of their"
+                " collisions (2 outcomes)"
+            ),
         ),
-        # The upper one falls 1.25 m onto the lower one, which rests since sqrt(1.5 / 9.81) 1.1 / 0.9 s.
+        # The upper one falls 1.25 m onto the lower one, which rests since sqrt(1.5 / 9.81) 1.1 /
+        # 0.9 s.
         (BALL, np.sqrt(2.5 / 9.81), "disks 0, 1 touch at once and their collisions do not end"),
         (SEAM, 0.5, "disk 0 re-enters over the edge of the wrap onto disk 1 at t = 0.5 s"),
     ],
@@ -85,12 +119,21 @@ CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201,
 @pytest.mark.parametrize(
     ("one", "reason"),
     [
-        (asked(replace(ROW, position=ROW.position * [0.9, 1])), "disk 1 and disk 2 overlap by 0.05 m at the start"),
-        (asked(replace(BALL, position=[[0, 0.1], [0, 2]])), "disk 0 and wall 0 overlap by 0.15 m at the start"),
+        (
+            asked(replace(ROW, position=ROW.position * [0.9, 1])),
+            "disk 1 and disk 2 overlap by 0.05 m at the start",
+        ),
+        (
+            asked(replace(BALL, position=[[0, 0.1], [0, 2]])),
+            "disk 0 and wall 0 overlap by 0.15 m at the start",
+        ),
         (asked(ROW, thrusts=BODY), "a thrust that turns with its disk"),
         (asked(CROWD), "201 disks are more than the 200"),
         (asked(replace(SEAM, radius=[1e-9, 1])), "a radius of 1e-09 m is below 1e-06 m"),
-        (asked(replace(BALL, velocity=[[1e9, 0], [0, 0]])), r"the largest velocity is 1e\+09 \(SI\), above 1e\+06"),
+        (
+            asked(replace(BALL, velocity=[[1e9, 0], [0, 0]])),
+            r"the largest velocity is 1e\+09 \(SI\), above 1e\+06",
+        ),
     ],
 )
 def test_what_it_cannot_do_is_refused(one: Scenario, reason: str):
@@ -107,14 +150,19 @@ def ends(record: TruthRecord) -> list[dict[int, tuple[float, float]]]:
     ]
 
 
-def row(speeds: list[float], mass: list[float], restitution: float = 1.0, gaps: tuple[float, ...] = ()) -> Scene:
+def row(
+    speeds: list[float], mass: list[float], restitution: float = 1.0, gaps: tuple[float, ...] = ()
+) -> Scene:
     """Disks of radius 0.25 on a line, touching but for `gaps` before the second, the third ..."""
     steps = 0.5 + np.array([*gaps, *[0.0] * (len(speeds) - 1 - len(gaps))])
     x = np.append(0.0, np.cumsum(steps))
     return lay_out(
-        position=np.stack([x, 0 * x], -1), velocity=np.stack([speeds, 0 * x], -1), radius=[0.25] * len(x), mass=mass,
+        position=np.stack([x, 0 * x], -1),
+        velocity=np.stack([speeds, 0 * x], -1),
+        radius=[0.25] * len(x),
+        mass=mass,
         restitution=restitution,
-    )  # fmt: skip
+    )
 
 
 def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_collisions():
@@ -127,9 +175,16 @@ def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_collisions():
     for end, mirror, first in zip(found, (1, -1), (1, 2)):
         np.testing.assert_allclose(end[0], (-1 / 8, -mirror * np.sqrt(3) / 8), rtol=0, atol=1e-15)
         np.testing.assert_allclose(end[first], (0.75, mirror * np.sqrt(3) / 4), rtol=0, atol=1e-15)
-        np.testing.assert_allclose(end[3 - first], (0.375, -mirror * np.sqrt(3) / 8), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(
+            end[3 - first], (0.375, -mirror * np.sqrt(3) / 8), rtol=0, atol=1e-15
+        )
     for k in (0, 1):
-        assert {*map(tuple, record.orders[record.orders[:, 0] == k, 1:].tolist())} <= {(0, 1), (0, 2), (1, 0), (2, 0)}
+        assert {*map(tuple, record.orders[record.orders[:, 0] == k, 1:].tolist())} <= {
+            (0, 1),
+            (0, 2),
+            (1, 0),
+            (2, 0),
+        }
     assert states(one, record).t[-1] < record.horizon  # none of them is scored
 
 
@@ -143,7 +198,8 @@ def test_a_squeeze_of_unequal_masses_has_two_outcomes():
 
 @pytest.mark.parametrize(("coming", "outcomes"), [(1, (8, 8)), (2, (22, 24))])
 def test_a_cradle_that_loses_energy_has_many_outcomes(coming: int, outcomes: tuple[int, int]):
-    """Five at e = 0.9: 8 with one disk coming in, 22 to 24 with two; they differ by 3e-5 and 4e-3 m/s."""
+    """Five at e = 0.9: 8 with one disk coming in, 22 to 24 with two; they differ by 3e-5 and 4e-3
+    m/s."""
     gaps = tuple(float(k + 1 == coming) for k in range(coming))
     record = computed(asked(row([1.0] * coming + [0.0] * (5 - coming), [1] * 5, 0.9, gaps), 2.0))
     spread = np.ptp([[end[i][0] for i in end] for end in ends(record)], axis=0).max()
@@ -153,7 +209,8 @@ def test_a_cradle_that_loses_energy_has_many_outcomes(coming: int, outcomes: tup
 
 
 def test_taking_the_collisions_of_a_chain_as_they_come_is_caught(monkeypatch: pytest.MonkeyPatch):
-    """The planted bug: each collision by itself. It ends in one of the eight, as if there were no others."""
+    """The planted bug: each collision by itself. It ends in one of the eight, as if there were no
+    others."""
     one = asked(row([1.0, 0, 0, 0, 0], [1] * 5, 0.9, (1.0,)), 2.0)
     assert len(ends(computed(one))) == 8
     monkeypatch.setattr(oracle_ahead.Ahead, "alone", lambda *_: True)
@@ -173,10 +230,21 @@ def test_a_cradle_that_keeps_its_energy_has_one(coming: int):
 
 @pytest.mark.parametrize(
     ("degrees", "restitution", "outcomes"),
-    [(90, 0.5, 1), (90, 1.0, 1), (60, 1.0, 1), (45, 1.0, 1), (72, 1.0, 2), (50, 1.0, 2), (60, 0.5, 2)],
+    [
+        (90, 0.5, 1),
+        (90, 1.0, 1),
+        (60, 1.0, 1),
+        (45, 1.0, 1),
+        (72, 1.0, 2),
+        (50, 1.0, 2),
+        (60, 0.5, 2),
+    ],
 )
-def test_a_wedge_of_a_whole_part_of_180_degrees_has_one_outcome(degrees: int, restitution: float, outcomes: int):
-    """A disk between two walls: at 180 / k degrees one for e = 1, at 90 degrees for every e, else two."""
+def test_a_wedge_of_a_whole_part_of_180_degrees_has_one_outcome(
+    degrees: int, restitution: float, outcomes: int
+):
+    """A disk between two walls: at 180 / k degrees one for e = 1, at 90 degrees for every e, else
+    two."""
     k = mpfr(256)
     with k.precise():
         angle = gmpy2.const_pi() * degrees / 180
@@ -185,28 +253,41 @@ def test_a_wedge_of_a_whole_part_of_180_degrees_has_one_outcome(degrees: int, re
             Touch(Contact("wall", 0, 0, 1), zero, -one),
             Touch(Contact("wall", 0, 1, 1), -gmpy2.sin(angle), gmpy2.cos(angle)),
         ]
-        found = Matter(k, [one], k.exact(restitution), False).outcomes(touches, {0: (k.exact(-1.0), k.exact(-0.3))})[0]
+        found = Matter(k, [one], k.exact(restitution), False).outcomes(
+            touches, {0: (k.exact(-1.0), k.exact(-0.3))}
+        )[0]
 
     assert len(found) == outcomes
     assert all(end.velocities for end in found)
 
 
-TILTED = lay_out(position=[[0, 1]], velocity=[[0, 0]], radius=[0.5], mass=[1], gravity=[0, -9.81], restitution=0.5,
-                 walls=[[[-3, 2.25], [0, 0]], [[0, 0], [3, 2.25]]])  # fmt: skip
+TILTED = lay_out(
+    position=[[0, 1]],
+    velocity=[[0, 0]],
+    radius=[0.5],
+    mass=[1],
+    gravity=[0, -9.81],
+    restitution=0.5,
+    walls=[[[-3, 2.25], [0, 0]], [[0, 0], [3, 2.25]]],
+)
 
 
 def test_what_can_still_be_said_is_said():
     """Momentum along the floor, energy; on a wedge, where no direction is free, energy alone."""
     flat, wedge = (computed(asked(scene, 4.0)) for scene in (BALL, TILTED))
 
-    assert any("lie along (1, 0), so their momentum that way, 0 N s, stays" in said for said in flat.remains)
+    assert any(
+        "lie along (1, 0), so their momentum that way, 0 N s, stays" in said
+        for said in flat.remains
+    )
     assert any("their kinetic energy" in said and "can only fall" in said for said in flat.remains)
     assert wedge.reason
     assert len(wedge.remains) == 1
 
 
 def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
-    """`truth_at` names the time, the horizon and the reason; `truth` gives what is known, be it nothing."""
+    """`truth_at` names the time, the horizon and the reason; `truth` gives what is known, be it
+    nothing."""
     for one, reason in (
         (with_oracle(asked(BREAK, 4.0)), "(2 outcomes)"),
         (scenario("disk_between_static_disks"), "the unstable orbit"),
@@ -216,7 +297,9 @@ def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
 
         assert len(truth_at(one, before)) == 2
         assert len(one.truth(after)) == 0
-        with pytest.raises(NoTruth, match=r"the truth of .* ends at its horizon at .* s") as refusal:
+        with pytest.raises(
+            NoTruth, match=r"the truth of .* ends at its horizon at .* s"
+        ) as refusal:
             truth_at(one, np.append(before, after))
         assert f"t = {after[0]:.9g} s" in str(refusal.value)
         assert reason in str(refusal.value)

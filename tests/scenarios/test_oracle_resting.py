@@ -1,4 +1,5 @@
-"""What comes to rest, what rests, and collisions on what rests: against closed forms, simulations, and symmetries."""
+"""What comes to rest, what rests, and collisions on what rests: against closed forms, simulations,
+and symmetries."""
 
 from __future__ import annotations
 
@@ -31,10 +32,12 @@ def rests(record: TruthRecord) -> list[tuple[float, int, int]]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", ["bouncing_ball_e09", "rest_on_floor", "slide_on_incline", "column_of_ten"])
+@pytest.mark.parametrize(
+    "name", ["bouncing_ball_e09", "rest_on_floor", "slide_on_incline", "column_of_ten"]
+)
 def test_what_has_a_closed_form_is_found_to_the_bound_claimed(name: str, kind):
-    """To its end, states and collisions, in digits and in balls; every contact at rest begins at the start or is
-    reported."""
+    """To its end, states and collisions, in digits and in balls; every contact at rest begins at
+    the start or is reported."""
     one = scenario(name)
     record = computed(one, kind)
     expected, found = one.truth(one.times), states(one, record)
@@ -44,28 +47,46 @@ def test_what_has_a_closed_form_is_found_to_the_bound_claimed(name: str, kind):
     # The closed form of a geometric series rounds as often as it has terms.
     np.testing.assert_allclose(found.velocity, expected.velocity, rtol=0, atol=1e-13)
     np.testing.assert_allclose(found.collisions.t, expected.collisions.t, rtol=0, atol=1e-14)
-    np.testing.assert_allclose(found.collisions.impulse, expected.collisions.impulse, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        found.collisions.impulse, expected.collisions.impulse, rtol=0, atol=1e-14
+    )
     if has_balls() and kind is None:
         assert record.method == "certified"
 
 
-@given(restitution=st.floats(0.0, 0.99), height=st.floats(0.01, 5), slope=st.floats(-1.2, 1.2), speed=st.floats(-2, 2))
+@given(
+    restitution=st.floats(0.0, 0.99),
+    height=st.floats(0.01, 5),
+    slope=st.floats(-1.2, 1.2),
+    speed=st.floats(-2, 2),
+)
 @settings(max_examples=25, deadline=None)
-def test_a_ball_on_a_slope_rests_when_its_bounces_end_and_slides_from_then_on(restitution, height, slope, speed):
-    """At t_1 (1 + e) / (1 - e) with g cos(slope), along the slope with g sin(slope) all the time."""
+def test_a_ball_on_a_slope_rests_when_its_bounces_end_and_slides_from_then_on(
+    restitution, height, slope, speed
+):
+    """At t_1 (1 + e) / (1 - e) with g cos(slope), along the slope with g sin(slope) all the
+    time."""
     along, up = np.array([np.cos(slope), np.sin(slope)]), np.array([-np.sin(slope), np.cos(slope)])
     scene = lay_out(
-        position=[(0.5 + height) * up], velocity=[speed * along], radius=[0.5], mass=[2.0], gravity=[0, -9.81],
-        walls=[[-5000 * along, 5000 * along]], restitution=restitution,
-    )  # fmt: skip
+        position=[(0.5 + height) * up],
+        velocity=[speed * along],
+        radius=[0.5],
+        mass=[2.0],
+        gravity=[0, -9.81],
+        walls=[[-5000 * along, 5000 * along]],
+        restitution=restitution,
+    )
     fall, slide = 9.81 * np.cos(slope), -9.81 * np.sin(slope)
     still = np.sqrt(2 * height / fall) * (1 + restitution) / (1 - restitution)
     one = asked(scene, min(still * 1.3, 12.0))
     record = computed(one)
     truth, t = states(one, record), one.times
 
-    # The walls are 5 km long: their float64 ends turn the slope by 1e-16, and that by 1 km is 1e-13 m.
-    np.testing.assert_allclose(truth.position[:, 0] @ along, speed * t + slide * t**2 / 2, rtol=0, atol=1e-9)
+    # The walls are 5 km long: their float64 ends turn the slope by 1e-16, and that by 1 km is 1e-13
+    # m.
+    np.testing.assert_allclose(
+        truth.position[:, 0] @ along, speed * t + slide * t**2 / 2, rtol=0, atol=1e-9
+    )
     assert (truth.position[:, 0] @ up).min() > 0.5 - 1e-11
     if still < one.duration:
         assert rests(record) == [(pytest.approx(still, rel=1e-9), 0, -1)]
@@ -79,29 +100,42 @@ def test_a_ball_on_a_slope_rests_when_its_bounces_end_and_slides_from_then_on(re
 def test_a_collision_on_a_resting_disk_is_the_limit_of_small_gaps(
     restitution: float, heavy: int, upper: float, lower: float
 ):
-    """The two alternate with the floor until they part; speeds in those of the collision (ground truth, section 5)."""
+    """The two alternate with the floor until they part; speeds in those of the collision (ground
+    truth, section 5)."""
     scene = lay_out(
-        position=[[0, 0.25], [0, 1.5]], velocity=[[0, 0], [0, -1]], radius=[0.25, 0.25], mass=[1, heavy],
-        restitution=restitution, walls=FLOOR, gravity=[0, -1e-3],
-    )  # fmt: skip
+        position=[[0, 0.25], [0, 1.5]],
+        velocity=[[0, 0], [0, -1]],
+        radius=[0.25, 0.25],
+        mass=[1, heavy],
+        restitution=restitution,
+        walls=FLOOR,
+        gravity=[0, -1e-3],
+    )
     record = computed(asked(scene, 1.0))
     collision = record.events[record.events[:, 3] > 0][0, 0]
-    after = [record.legs[(record.legs[:, 0] == i) & (record.legs[:, 1] >= collision - 1e-9)][0] for i in range(2)]
+    after = [
+        record.legs[(record.legs[:, 0] == i) & (record.legs[:, 1] >= collision - 1e-9)][0]
+        for i in range(2)
+    ]
     speed = np.sqrt(1 + 2 * 1e-3 * 0.75)
 
     assert rests(record)[0] == (0.0, 0, -1)
-    np.testing.assert_allclose([leg[5] + leg[10] for leg in after], [lower * speed, upper * speed], rtol=0, atol=1e-15)
-    # The same with a gap of 1e-9 m and nothing to accelerate the lower disk downwards: event by event, no
-    # contact lasts.
+    np.testing.assert_allclose(
+        [leg[5] + leg[10] for leg in after], [lower * speed, upper * speed], rtol=0, atol=1e-15
+    )
+    # The same with a gap of 1e-9 m and nothing to accelerate the lower disk downwards: event by
+    # event, no contact lasts.
     gapped = asked(replace(scene, position=[[0, 0.25 + 1e-9], [0, 1.5]], gravity=[0, 0]), 1.0)
     limit = states(gapped, computed(gapped))
     np.testing.assert_allclose(limit.velocity[-1, :, 1], [lower, upper], rtol=0, atol=1e-15)
 
 
 def hopping(scene: Scene, until: float, least: float) -> np.ndarray:
-    """(n, 2) m at `until` s of a float64 simulation in which nothing rests: it hops on at `least` m/s instead.
+    """(n, 2) m at `until` s of a float64 simulation in which nothing rests: it hops on at `least`
+    m/s instead.
 
-    All pairs, floor at y = 0 only, gravity; times of contact by bisection on a grid finer than any pass.
+    All pairs, floor at y = 0 only, gravity; times of contact by bisection on a grid finer than any
+    pass.
     """
     x, v, t = np.array(scene.position), np.array(scene.velocity), 0.0
     g, step = scene.gravity, 2e-4
@@ -119,60 +153,90 @@ def hopping(scene: Scene, until: float, least: float) -> np.ndarray:
             d = np.hypot(*n)
             closing = (v[j] - v[i]) @ n / d
             if d < scene.radius[i] + scene.radius[j] and closing < 0:
-                kick = (1 + scene.restitution) * closing / d / (1 / scene.mass[i] + 1 / scene.mass[j])
+                kick = (
+                    (1 + scene.restitution) * closing / d / (1 / scene.mass[i] + 1 / scene.mass[j])
+                )
                 v[i] += kick / scene.mass[i] * n
                 v[j] -= kick / scene.mass[j] * n
     return x
 
 
 def test_a_simulation_that_never_rests_comes_near_as_its_hops_shrink():
-    """A disk lands on a resting one beside its middle; hops of 0.05 m/s and less, steps of 0.2 ms."""
+    """A disk lands on a resting one beside its middle; hops of 0.05 m/s and less, steps of 0.2
+    ms."""
     scene = lay_out(
-        position=[[0, 0.4], [-0.2, 2.6]], velocity=[[0.5, 0], [0.4, 0]], radius=[0.3, 0.25], mass=[2, 1],
-        restitution=0.6, walls=FLOOR, gravity=[0, -9.81],
-    )  # fmt: skip
+        position=[[0, 0.4], [-0.2, 2.6]],
+        velocity=[[0.5, 0], [0.4, 0]],
+        radius=[0.3, 0.25],
+        mass=[2, 1],
+        restitution=0.6,
+        walls=FLOOR,
+        gravity=[0, -9.81],
+    )
     one = asked(scene, 1.0)
     record = computed(one)
     truth = states(one, record)
     assert [i for _, i, _ in rests(record)][:1] == [0]
     assert truth.collisions.t[truth.collisions.j == 1].min() > rests(record)[0][0]
-    errors = [np.abs(hopping(scene, 1.0, least) - truth.position[-1]).max() for least in (0.05, 0.01)]
+    errors = [
+        np.abs(hopping(scene, 1.0, least) - truth.position[-1]).max() for least in (0.05, 0.01)
+    ]
 
-    # Late by a step of 2e-4 s at 5 m/s is 1 mm; the larger hops lift the lower disk by up to 0.1 mm, turning the
-    # collision.
+    # Late by a step of 2e-4 s at 5 m/s is 1 mm; the larger hops lift the lower disk by up to 0.1
+    # mm, turning the collision.
     assert errors[1] < 5e-3
     assert errors[1] <= errors[0] + 1e-3
 
 
 @given(seed=st.integers(0, 10**6), restitution=st.sampled_from([0.3, 0.5, 0.7]))
 @settings(max_examples=8, deadline=None)
-def test_energy_falls_nothing_overlaps_and_mirror_and_order_do_not_matter(seed: int, restitution: float):
+def test_energy_falls_nothing_overlaps_and_mirror_and_order_do_not_matter(
+    seed: int, restitution: float
+):
     """Three disks fall in a box and settle; up to where the answer ends."""
     scene = drawn(seed, 3, restitution, -9.81)
     one = asked(scene, 2.0)
     record = computed(one)
     truth = states(one, record)
-    energy = (scene.mass * ((truth.velocity**2).sum(-1) / 2 + 9.81 * truth.position[..., 1])).sum(axis=1)
+    energy = (scene.mass * ((truth.velocity**2).sum(-1) / 2 + 9.81 * truth.position[..., 1])).sum(
+        axis=1
+    )
 
     assert (np.diff(energy) < 1e-11).all()
     assert smallest_gap(scene, truth.position).min() > -ACCURACY
     flip, order = np.array([-1.0, 1.0]), [2, 0, 1]
-    mirrored = replace(scene, position=scene.position * flip, velocity=scene.velocity * flip, walls=scene.walls * flip)
+    mirrored = replace(
+        scene,
+        position=scene.position * flip,
+        velocity=scene.velocity * flip,
+        walls=scene.walls * flip,
+    )
     names = ("position", "velocity", "radius", "mass", "inertia", "angle", "angular_velocity")
     permuted = replace(scene, **{name: getattr(scene, name)[order] for name in names})
-    for other, back, turn in ((mirrored, [0, 1, 2], flip), (permuted, np.argsort(order), [1.0, 1.0])):
+    for other, back, turn in (
+        (mirrored, [0, 1, 2], flip),
+        (permuted, np.argsort(order), [1.0, 1.0]),
+    ):
         found = states(asked(other, 2.0), computed(asked(other, 2.0)))
         k = min(len(found), len(truth))
         assert k >= len(truth) - 1
-        np.testing.assert_allclose(found.position[:k, back] * turn, truth.position[:k], rtol=0, atol=1e-11)
+        np.testing.assert_allclose(
+            found.position[:k, back] * turn, truth.position[:k], rtol=0, atol=1e-11
+        )
 
 
 def test_a_tail_that_something_can_reach_is_not_cut_short(monkeypatch: pytest.MonkeyPatch):
-    """The planted bug: rule Z1 taken for granted. Another disk falls through the one that is asleep."""
+    """The planted bug: rule Z1 taken for granted. Another disk falls through the one that is
+    asleep."""
     scene = lay_out(
-        position=[[0, 0.5], [0.1, 1.2]], velocity=[[0, 0], [0, 0]], radius=[0.25, 0.25], mass=[1, 1],
-        restitution=0.9, walls=FLOOR, gravity=[0, -9.81],
-    )  # fmt: skip
+        position=[[0, 0.5], [0.1, 1.2]],
+        velocity=[[0, 0], [0, 0]],
+        radius=[0.25, 0.25],
+        mass=[1, 1],
+        restitution=0.9,
+        walls=FLOOR,
+        gravity=[0, -9.81],
+    )
     one = asked(scene, 1.0)
     right = states(one, computed(one))
     monkeypatch.setattr(oracle_resting, "untouched", lambda *_: True)
@@ -185,16 +249,26 @@ def test_a_tail_that_something_can_reach_is_not_cut_short(monkeypatch: pytest.Mo
 def test_a_resting_disk_slides_off_its_wall_or_on_to_the_next():
     """At 2 m/s over a seam of two walls in line, then off the edge: a parabola, as 4 > r g."""
     scene = lay_out(
-        position=[[-1, 0.25]], velocity=[[2, 0]], radius=[0.25], mass=[1], gravity=[0, -9.81], restitution=0.5,
+        position=[[-1, 0.25]],
+        velocity=[[2, 0]],
+        radius=[0.25],
+        mass=[1],
+        gravity=[0, -9.81],
+        restitution=0.5,
         walls=[[[-3, 0], [0, 0]], [[1, 0], [0, 0]], [[-9, -9], [9, -9]]],
-    )  # fmt: skip
+    )
     one = asked(scene, 1.5)
     truth, t = states(one, computed(one)), one.times
     fallen = np.where(t > 1, 9.81 * (t - 1) ** 2 / 2, 0)
 
-    np.testing.assert_allclose(truth.position[:, 0], np.stack([2 * t - 1, 0.25 - fallen], -1), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        truth.position[:, 0], np.stack([2 * t - 1, 0.25 - fallen], -1), rtol=0, atol=1e-14
+    )
     slow = asked(replace(scene, velocity=[[1.5, 0]]), 1.5)
-    assert "disk 0 turns about the end of wall 1, off which it slides at t = 1.33333333 s" in computed(slow).reason
+    assert (
+        "disk 0 turns about the end of wall 1, off which it slides at t = 1.33333333 s"
+        in computed(slow).reason
+    )
 
 
 def test_a_floor_of_pieces_is_a_floor():
@@ -202,9 +276,14 @@ def test_a_floor_of_pieces_is_a_floor():
     pieces = [[[x, 0], [x + 1, 0]] if x % 2 else [[x + 1, 0], [x, 0]] for x in range(-4, 4)]
     for x, u in ((0.0, 0.0), (-1.25, 0.75)):
         scene = lay_out(
-            position=[[x, 1.25]], velocity=[[u, 0]], radius=[0.25], mass=[1], gravity=[0, -9.81], restitution=0.5,
+            position=[[x, 1.25]],
+            velocity=[[u, 0]],
+            radius=[0.25],
+            mass=[1],
+            gravity=[0, -9.81],
+            restitution=0.5,
             walls=FLOOR,
-        )  # fmt: skip
+        )
         whole, apart = (asked(replace(scene, walls=walls), 2.0) for walls in (FLOOR, pieces))
         expected, found = states(whole, computed(whole)), states(apart, computed(apart))
 
@@ -215,13 +294,22 @@ def test_a_floor_of_pieces_is_a_floor():
 def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
     """Held by two walls, or balanced straight above a disk that cannot move."""
     wedge = lay_out(
-        position=[[0, 0.625]], velocity=[[0, 0]], radius=[0.5], mass=[1], gravity=[0, -9.81], restitution=0.5,
+        position=[[0, 0.625]],
+        velocity=[[0, 0]],
+        radius=[0.5],
+        mass=[1],
+        gravity=[0, -9.81],
+        restitution=0.5,
         walls=[[[-4, 3], [0, 0]], [[0, 0], [4, 3]]],
-    )  # fmt: skip
+    )
     balanced = lay_out(
-        position=[[0, 0], [0, 0.75], [0, 1.5]], velocity=np.zeros((3, 2)), radius=[0.5, 0.25, 0.5], mass=[np.inf, 1, 1],
-        gravity=[0, -9.81], restitution=0.5,
-    )  # fmt: skip
+        position=[[0, 0], [0, 0.75], [0, 1.5]],
+        velocity=np.zeros((3, 2)),
+        radius=[0.5, 0.25, 0.5],
+        mass=[np.inf, 1, 1],
+        gravity=[0, -9.81],
+        restitution=0.5,
+    )
     for scene in (wedge, balanced):
         record = computed(asked(scene, 2.0))
         assert (record.reason, len(rests(record))) == ("", 2)
@@ -234,53 +322,79 @@ def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
 def test_a_thrust_lifts_a_resting_disk_and_lets_it_fall():
     """Twice its weight for half a second from 1 s on."""
     scene = lay_out(
-        position=[[0, 0.25]], velocity=[[0, 0]], radius=[0.25], mass=[2], gravity=[0, -9.81], restitution=0.5,
+        position=[[0, 0.25]],
+        velocity=[[0, 0]],
+        radius=[0.25],
+        mass=[2],
+        gravity=[0, -9.81],
+        restitution=0.5,
         walls=FLOOR,
-    )  # fmt: skip
+    )
     one = asked(scene, 5.0, thrusts=[Thrust(0, 1.0, 1.5, [0.0, 4 * 9.81])])
     record = computed(one)
     truth, t = states(one, record), one.times
     up = (t > 1) & (t < 1.5)
 
-    np.testing.assert_allclose(truth.position[up, 0, 1], 0.25 + 9.81 * (t[up] - 1) ** 2 / 2, rtol=0, atol=1e-14)
-    # It rises 9.81 / 8 m at 9.81 / 2 m/s, comes down at 9.81 / sqrt 2 m/s, and bounces for twice as long as that takes.
+    np.testing.assert_allclose(
+        truth.position[up, 0, 1], 0.25 + 9.81 * (t[up] - 1) ** 2 / 2, rtol=0, atol=1e-14
+    )
+    # It rises 9.81 / 8 m at 9.81 / 2 m/s, comes down at 9.81 / sqrt 2 m/s, and bounces for twice as
+    # long as that takes.
     landing = 1.5 + 0.5 + np.sqrt(2 * (9.81 / 8 + 9.81 / 8) / 9.81)
     assert rests(record)[-1] == (pytest.approx(landing + 2 * np.sqrt(0.5), rel=1e-12), 0, -1)
 
 
 def test_a_disk_in_the_corner_of_a_tilted_box_rests_on_both_walls_or_is_refused():
-    """Along one wall it bounces off the other to rest, as the two stand at right angles; at 100 degrees it may not."""
+    """Along one wall it bounces off the other to rest, as the two stand at right angles; at 100
+    degrees it may not."""
     square = lay_out(
-        position=[[0, 2.25]], velocity=[[0, 0]], radius=[0.5], mass=[1], gravity=[0, -9.81], restitution=0.5,
+        position=[[0, 2.25]],
+        velocity=[[0, 0]],
+        radius=[0.5],
+        mass=[1],
+        gravity=[0, -9.81],
+        restitution=0.5,
         walls=[[[-4, 3], [0, 0]], [[0, 0], [3, 4]]],
-    )  # fmt: skip
+    )
     record = computed(asked(square, 8.0))
     assert record.reason == ""
     assert {j for _, _, j in rests(record)} == {-1, -2}
     at = states(asked(square, 8.0), record)
     np.testing.assert_allclose(at.position[-1, 0], [-0.1, 0.7], rtol=0, atol=1e-14)
     assert not at.velocity[-1].any()
-    blunt = computed(asked(replace(square, velocity=[[0.1, 0]], walls=[[[-4, 3], [0, 0]], [[0, 0], [4, 3]]]), 8.0))
+    blunt = computed(
+        asked(
+            replace(square, velocity=[[0.1, 0]], walls=[[[-4, 3], [0, 0]], [[0, 0], [4, 3]]]), 8.0
+        )
+    )
     assert "the collisions of disk 0 on wall 0 and wall 1 accumulate" in blunt.reason
 
 
 def test_a_settling_box_is_answered_far_beyond_its_first_rest():
-    """Twenty-one disks at e = 0.5 and g = 10: one after the other comes to rest, until two pile up on each other."""
+    """Twenty-one disks at e = 0.5 and g = 10: one after the other comes to rest, until two pile up
+    on each other."""
     record = computed(lasting(boxed(2, 0.5, 10.0), 2.0), mpfr)
     first = rests(record)[0][0]
 
     assert first == pytest.approx(0.670262, abs=1e-6)
     assert record.horizon > 2 * first
     assert len(rests(record)) == 26
-    assert "the collisions of disk 9 on disk 17 and wall 1 accumulate at t = 1.57837" in record.reason
+    assert (
+        "the collisions of disk 9 on disk 17 and wall 1 accumulate at t = 1.57837" in record.reason
+    )
 
 
 def test_round_the_end_of_a_wall_no_momentum_is_said_to_stay():
     """There the normal of the wall turns with the disk: only its energy is known on."""
     scene = Scene(
-        position=np.array([[0.0, 0.5]]), velocity=np.array([[2.0, 0.0]]), radius=np.array([0.5]), mass=np.ones(1),
-        restitution=0.0, gravity=np.array([0.0, -9.81]), walls=np.array([[[-10.0, 0.0], [1.0, 0.0]]]),
-    )  # fmt: skip
+        position=np.array([[0.0, 0.5]]),
+        velocity=np.array([[2.0, 0.0]]),
+        radius=np.array([0.5]),
+        mass=np.ones(1),
+        restitution=0.0,
+        gravity=np.array([0.0, -9.81]),
+        walls=np.array([[[-10.0, 0.0], [1.0, 0.0]]]),
+    )
     record = computed(asked(scene, 2.0))
 
     assert record.horizon == pytest.approx(0.5)

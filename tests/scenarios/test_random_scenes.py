@@ -1,4 +1,5 @@
-"""Random scenes end, each within its limit, and say what the exact answer says; or they are refused by name."""
+"""Random scenes end, each within its limit, and say what the exact answer says; or they are refused
+by name."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ def played(one: Scenario) -> Run:
 
 
 def sweep(asked: list[Scenario]) -> None:
-    """Each ends within the limit, played to its end or refused in a sentence that says who and when."""
+    """Each ends within the limit, played to its end or refused in a sentence that says who and
+    when."""
     runs = each_within(LIMIT, played, asked)
 
     assert [one.name for one, run in zip(asked, runs) if run is None] == []
@@ -52,9 +54,11 @@ def sweep(asked: list[Scenario]) -> None:
 
 
 def departure(one: Scenario) -> tuple[float, int]:
-    """How far the engine is from the exact answer at most, m, while that can be followed; and at how many samples.
+    """How far the engine is from the exact answer at most, m, while that can be followed; and at
+    how many samples.
 
-    Where disks touch exactly they glide along each other, and a rounding becomes a collision: until the third only.
+    Where disks touch exactly they glide along each other, and a rounding becomes a collision: until
+    the third only.
     """
     run = played(one)
     try:
@@ -66,11 +70,16 @@ def departure(one: Scenario) -> tuple[float, int]:
     if "touching" in one.name:
         third = np.append(record.events[record.events[:, 3] > 0, 0], [np.inf] * 3)[2]
         k = min(k, int((one.times < third).sum()))
-    return float(np.abs(exact.position[:k] - run.trajectory.position[:k]).max(initial=0.0)) if k else 0.0, k
+    return (
+        float(np.abs(exact.position[:k] - run.trajectory.position[:k]).max(initial=0.0))
+        if k
+        else 0.0
+    ), k
 
 
 def agree(asked: list[Scenario]) -> None:
-    """Within 1e-9 m. But a graze is a double root: a rounding of 1e-16 m makes 1e-8 m/s, and some 1e-7 m in 3 s."""
+    """Within 1e-9 m. But a graze is a double root: a rounding of 1e-16 m makes 1e-8 m/s, and some
+    1e-7 m in 3 s."""
     found = each_within(20 * LIMIT, departure, asked)
 
     assert [one.name for one, each in zip(asked, found) if each is None] == []
@@ -105,7 +114,8 @@ def test_all_random_scenes_are_as_the_exact_answer_has_them(chunk):
 
 
 def test_scenes_depend_on_their_seed_and_number_only():
-    """The first of many are the same as few, another seed has others, and every kind of scene is there."""
+    """The first of many are the same as few, another seed has others, and every kind of scene is
+    there."""
     few, many = random_scenarios(5, seed=3), random_scenarios(200, seed=3)
     assert all((one.scene.position == other.scene.position).all() for one, other in zip(few, many))
     assert len({one.name for one in [*many, *random_scenarios(200, seed=4)]}) == 400

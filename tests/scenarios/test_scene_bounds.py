@@ -1,4 +1,5 @@
-"""What is read of a scene file is bounded, and a number that Python itself refuses is named by line and key."""
+"""What is read of a scene file is bounded, and a number that Python itself refuses is named by line
+and key."""
 
 from __future__ import annotations
 
@@ -23,7 +24,9 @@ def faults(path: Path, text: str) -> list[str]:
     return refused.value.faults
 
 
-def test_more_walls_than_can_be_measured_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_more_walls_than_can_be_measured_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """By their number, and by how many disks each is to be measured against."""
     path = tmp_path / "many.toml"
     disks = "".join(DISK.format(y=k + 1) for k in range(3))
@@ -31,7 +34,9 @@ def test_more_walls_than_can_be_measured_are_refused(tmp_path: Path, monkeypatch
     assert any(f"must be at most {MOST_WALLS}" in fault for fault in said), said
 
     monkeypatch.setattr(tables, "MOST_PAIRS", 10)
-    assert any("must be at most 3" in fault for fault in faults(path, HEAD + disks + WALL.format(y=1) * 4))
+    assert any(
+        "must be at most 3" in fault for fault in faults(path, HEAD + disks + WALL.format(y=1) * 4)
+    )
     path.write_text(HEAD + disks + WALL.format(y=1) * 3)
     assert len(read_scene_file(path).scene.walls) == 3
 
@@ -43,5 +48,6 @@ def test_a_number_of_too_many_digits_is_named_by_line_and_key(tmp_path: Path, di
     [said] = faults(tmp_path / "long.toml", text)
 
     assert said.endswith(
-        f'long.toml: line 3: "duration": an integer of {digits} digits; must be a number of at most 4300'
+        f'long.toml: line 3: "duration": an integer of {digits} digits; must be a number of at most'
+        " 4300"
     ), said

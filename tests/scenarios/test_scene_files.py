@@ -1,4 +1,5 @@
-"""A scene file is read exactly, refused with every fault named, and written to read back bit for bit."""
+"""A scene file is read exactly, refused with every fault named, and written to read back bit for
+bit."""
 
 import itertools
 import re
@@ -71,20 +72,31 @@ def test_a_file_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
 
 def test_every_fault_is_reported_at_once(tmp_path: Path) -> None:
     """Faults in one key hide none in another, not even where a check looks at both."""
-    text = TWO.replace("radius = 0.25", "radius = -1").replace("= 0.02", "= 0.03").replace("0.9", "2")
-    text += "[[wall]]\nstart = [0, 0]\nend = [0, 0]\n" + THRUST.replace("= 0\n", "= 7\n") + "when = 1\n"
+    text = (
+        TWO.replace("radius = 0.25", "radius = -1").replace("= 0.02", "= 0.03").replace("0.9", "2")
+    )
+    text += (
+        "[[wall]]\nstart = [0, 0]\nend = [0, 0]\n" + THRUST.replace("= 0\n", "= 7\n") + "when = 1\n"
+    )
     keys = [fault.split(" = ")[0] for fault in faults_of(text, tmp_path)]
     assert keys == [
-        "sample_interval", "restitution", "disk[0].radius", "disk[1].radius", "wall[2].end",
-        "thrust[0].disk", "thrust[0].when",
-    ]  # fmt: skip
+        "sample_interval",
+        "restitution",
+        "disk[0].radius",
+        "disk[1].radius",
+        "wall[2].end",
+        "thrust[0].disk",
+        "thrust[0].when",
+    ]
 
 
 def test_no_disk_is_a_fault_whether_left_out_or_empty(tmp_path: Path) -> None:
     """A scene holds at least one disk."""
     head = 'name = "none"\nduration = 1\nsample_interval = 1\nrestitution = 1\n'
     assert faults_of(head, tmp_path) == ["disk: missing; must be 1 to 100000 [[disk]] tables"]
-    assert faults_of(head + "disk = []", tmp_path) == ["disk = []: 0 items; must be 1 to 100000 [[disk]] tables"]
+    assert faults_of(head + "disk = []", tmp_path) == [
+        "disk = []: 0 items; must be 1 to 100000 [[disk]] tables"
+    ]
     one = "{position = [0, 0], radius = 1, static = 1},"
     (fault,) = faults_of(head + f"disk = [{one * 100_001}]", tmp_path)
     assert fault.endswith("100001 items; must be 1 to 100000 [[disk]] tables")
@@ -114,15 +126,20 @@ def test_touching_disks_are_no_overlap(tmp_path: Path) -> None:
     floor = [[[200.0, -0.1], [210.0, -0.1]]]
     n = len(rows)
     scene = Scene(
-        position=position, velocity=np.zeros((n, 2)), radius=np.full(n, 0.1), mass=np.ones(n),
-        restitution=0.5, walls=np.array(floor),
-    )  # fmt: skip
+        position=position,
+        velocity=np.zeros((n, 2)),
+        radius=np.full(n, 0.1),
+        mass=np.ones(n),
+        restitution=0.5,
+        walls=np.array(floor),
+    )
     write_scene_file(Scenario("heap", "?", "here", scene, 1.0, 0.1), path)
     assert read_scene_file(path).scene.n == n
 
 
 def test_a_file_reads_as_it_is_written() -> None:
-    """Integers are numbers, a static disk is of infinite mass, the box comes after the free walls."""
+    """Integers are numbers, a static disk is of infinite mass, the box comes after the free
+    walls."""
     bumper = read_scene_file(SCENES / "bumper.toml")
     assert (bumper.name, bumper.source, bumper.substeps) == ("bumper", "bumper.toml", (2, 6))
     assert bumper.asks == "What do the engines make of bumper?"
@@ -176,21 +193,27 @@ def scenarios(draw: st.DrawFn) -> Scenario:
 
 
 @given(scenarios())
-def test_what_is_written_reads_back_bit_for_bit(tmp_path_factory: pytest.TempPathFactory, first: Scenario) -> None:
-    """Every array has the same bytes after a round through a file; truth, seed and source stay behind."""
+def test_what_is_written_reads_back_bit_for_bit(
+    tmp_path_factory: pytest.TempPathFactory, first: Scenario
+) -> None:
+    """Every array has the same bytes after a round through a file; truth, seed and source stay
+    behind."""
     path = tmp_path_factory.getbasetemp() / "round.toml"
     write_scene_file(first, path)
     second = read_scene_file(path)
     for key in ("name", "asks", "duration", "sample_interval", "substeps"):
         assert getattr(second, key) == getattr(first, key)
-    for one, two in zip([first.scene, *first.thrusts], [second.scene, *second.thrusts], strict=True):
+    for one, two in zip(
+        [first.scene, *first.thrusts], [second.scene, *second.thrusts], strict=True
+    ):
         for key, value in vars(one).items():
             same = np.array(value).tobytes() == np.array(getattr(two, key)).tobytes()
             assert same, f"{key}: {value} became {getattr(two, key)}"
 
 
 @given(x=st.floats(-0.6, 0.6), y=st.floats(-0.6, 0.6), tilt=st.floats(-1, 1), wall=st.booleans())
-@example(x=1.5e-6, y=0.0, tilt=1.5e-6, wall=True)  # its centre lies behind the wall by less than rounding can tell
+# its centre lies behind the wall by less than rounding can tell
+@example(x=1.5e-6, y=0.0, tilt=1.5e-6, wall=True)
 def test_the_shift_that_is_named_removes_the_overlap(
     tmp_path_factory: pytest.TempPathFactory, x: float, y: float, tilt: float, wall: bool
 ) -> None:
@@ -199,7 +222,9 @@ def test_the_shift_that_is_named_removes_the_overlap(
     head = 'name = "shift"\nduration = 1\nsample_interval = 1\nrestitution = 1\n'
     head += "[[disk]]\nradius = 0.25\nstatic = true\n"
     other = (
-        f"[[wall]]\nstart = [-2, {-tilt}]\nend = [2, {tilt}]\n" if wall else "[[disk]]\nradius = 0.3\nstatic = true\n"
+        f"[[wall]]\nstart = [-2, {-tilt}]\nend = [2, {tilt}]\n"
+        if wall
+        else "[[disk]]\nradius = 0.3\nstatic = true\n"
     )
     first = f"position = [{x}, {y}]\n"
     path.write_text(head + first + other + ("" if wall else "position = [0, 0]\n"))
@@ -215,12 +240,18 @@ def test_the_shift_that_is_named_removes_the_overlap(
         read_scene_file(path)
 
 
-@given(st.lists(st.tuples(st.floats(0, 3), st.floats(0, 9), st.floats(0.1, 2)), min_size=2, max_size=9))
-def test_every_overlap_is_found(tmp_path_factory: pytest.TempPathFactory, disks: list[tuple]) -> None:
+@given(
+    st.lists(st.tuples(st.floats(0, 3), st.floats(0, 9), st.floats(0.1, 2)), min_size=2, max_size=9)
+)
+def test_every_overlap_is_found(
+    tmp_path_factory: pytest.TempPathFactory, disks: list[tuple]
+) -> None:
     """The search by left edges finds the same pairs as a look at every pair."""
     path = tmp_path_factory.getbasetemp() / "pairs.toml"
     rows = "".join(f"{{position = [{x}, {y}], radius = {r}, static = true}}," for x, y, r in disks)
-    path.write_text(f'name = "p"\nduration = 1\nsample_interval = 1\nrestitution = 1\ndisk = [{rows}]')
+    path.write_text(
+        f'name = "p"\nduration = 1\nsample_interval = 1\nrestitution = 1\ndisk = [{rows}]'
+    )
     expected = [
         (i, j)
         for i, j in itertools.combinations(range(len(disks)), 2)

@@ -1,4 +1,5 @@
-"""One rule of scale for every number of a scene file, and no file that is none keeps a command waiting."""
+"""One rule of scale for every number of a scene file, and no file that is none keeps a command
+waiting."""
 
 import os
 import re
@@ -63,14 +64,20 @@ def said(text: str, folder: Path) -> list[str]:
 
 def replaced(key: str, value: str) -> str:
     """The full scene with one number (of a pair the first) replaced."""
-    text, count = re.subn(rf"^{key} = (\[?)[-\d.]+", rf"{key} = \g<1>{value}", FULL, count=1, flags=re.MULTILINE)
+    text, count = re.subn(
+        rf"^{key} = (\[?)[-\d.]+", rf"{key} = \g<1>{value}", FULL, count=1, flags=re.MULTILINE
+    )
     assert count
     return text
 
 
-@pytest.mark.parametrize("key", [key for key in dict.fromkeys(KEYS) if key not in ("disk", "substeps")])
+@pytest.mark.parametrize(
+    "key", [key for key in dict.fromkeys(KEYS) if key not in ("disk", "substeps")]
+)
 @pytest.mark.parametrize("value", ["1e28", "-1e28", "1e154", "1e160", "1.7e308"])
-def test_what_is_too_large_is_refused_whatever_it_is_of(key: str, value: str, tmp_path: Path) -> None:
+def test_what_is_too_large_is_refused_whatever_it_is_of(
+    key: str, value: str, tmp_path: Path
+) -> None:
     """One line that names the key and the value."""
     faults = said(replaced(key, value), tmp_path)
     assert len(faults) == 1
@@ -95,14 +102,19 @@ def test_what_has_a_size_must_not_vanish_and_what_has_none_may(value: str, tmp_p
 def test_walls_and_boxes_have_a_size(tmp_path: Path) -> None:
     """What is as long as a rounding has no direction."""
     wall = FULL.replace("end = [3.0, -1.0]", "end = [-3.0, -0.9999999999]")
-    assert said(wall, tmp_path)[0].startswith("wall[0].end = [-3.0, -0.9999999999]: out of scale: a wall of 1e-10 m;")
+    assert said(wall, tmp_path)[0].startswith(
+        "wall[0].end = [-3.0, -0.9999999999]: out of scale: a wall of 1e-10 m;"
+    )
     for table, low, high in (("box", "-4.0", "4.0"), ("wrap", "-5.0", "5.0")):
         thin = FULL.replace(f"high = [{high}, ", f"high = [{float(low) + 1e-10!r}, ")
         assert said(thin, tmp_path)[0].startswith(f"{table}.high = ")
         assert "out of scale: too near to low" in said(thin, tmp_path)[0]
 
 
-@given(st.sampled_from(KEYS), st.floats(allow_nan=True) | st.sampled_from([1e9, 1e-9, 5e-324, 1e154, -1e-300]))
+@given(
+    st.sampled_from(KEYS),
+    st.floats(allow_nan=True) | st.sampled_from([1e9, 1e-9, 5e-324, 1e154, -1e-300]),
+)
 def test_any_number_anywhere_is_read_or_refused_in_a_sentence(
     tmp_path_factory: pytest.TempPathFactory, key: str, value: float
 ) -> None:
@@ -119,7 +131,8 @@ def test_too_many_substeps_are_blamed_for_being_too_many(count: int, tmp_path: P
 
 
 def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
-    """A pipe into which nobody writes, a socket, a device that never ends, a folder; linked to or not."""
+    """A pipe into which nobody writes, a socket, a device that never ends, a folder; linked to or
+    not."""
     os.mkfifo(pipe := tmp_path / "pipe.toml")
     (zero := tmp_path / "zero.toml").symlink_to("/dev/zero")
     (linked := tmp_path / "linked.toml").symlink_to(pipe)
@@ -151,7 +164,11 @@ def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
     asked=st.floats(1e-12, 99),
 )
 def test_the_step_that_is_suggested_is_accepted(
-    tmp_path_factory: pytest.TempPathFactory, interval: float, samples: int, substeps: int, asked: float
+    tmp_path_factory: pytest.TempPathFactory,
+    interval: float,
+    samples: int,
+    substeps: int,
+    asked: float,
 ) -> None:
     """Digits as printed: six of them stood for another step, which was refused as well."""
     path = tmp_path_factory.getbasetemp() / "steps.toml"

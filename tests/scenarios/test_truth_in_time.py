@@ -1,4 +1,5 @@
-"""`crosscheck truth --timeout`: an answer that takes longer is given up to where it got, exact so far, and not kept."""
+"""`crosscheck truth --timeout`: an answer that takes longer is given up to where it got, exact so
+far, and not kept."""
 
 import json
 from collections.abc import Callable
@@ -47,15 +48,20 @@ mass = 1.0
 def boxed(speed: float = 1.1) -> Scenario:
     """Two disks that cross a box for some hundred collisions."""
     scene = lay_out(
-        position=[[0.3, 0.4], [0.7, 0.6]], velocity=[[speed, 0.7], [-0.4, 0.9]], radius=[0.05, 0.05], mass=[1.0, 1.0],
-        walls=box([0.0, 0.0], [1.0, 1.0]), restitution=1.0,
-    )  # fmt: skip
+        position=[[0.3, 0.4], [0.7, 0.6]],
+        velocity=[[speed, 0.7], [-0.4, 0.9]],
+        radius=[0.05, 0.05],
+        mass=[1.0, 1.0],
+        walls=box([0.0, 0.0], [1.0, 1.0]),
+        restitution=1.0,
+    )
     return with_oracle(Scenario("boxed", "?", "", scene, 12.0, 0.05))
 
 
 @pytest.fixture
 def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A clock that is looked at gets on by a second, so that the same step is the last on every machine."""
+    """A clock that is looked at gets on by a second, so that the same step is the last on every
+    machine."""
     ticks = count()
     monkeypatch.setattr(oracle_work, "monotonic", lambda: float(next(ticks)))
 
@@ -71,7 +77,8 @@ def begins_as(short: TruthRecord, whole: TruthRecord) -> bool:
 @pytest.mark.usefixtures("ticking")
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_answer_that_time_ends_is_the_beginning_of_the_whole_one(kind: Callable):
-    """To the bit, in the numbers that prove and in those of two precisions; it says what ended it, and when."""
+    """To the bit, in the numbers that prove and in those of two precisions; it says what ended it,
+    and when."""
     clock = Clock(CUT, REASON)
     short, whole = computed(boxed(), kind, clock), computed(boxed(), kind)
 
@@ -96,7 +103,8 @@ def test_a_last_place_in_the_start_is_another_beginning():
 @pytest.mark.parametrize("seconds", [3.0, 30.0, 300.0, 3000.0])
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: float):
-    """Whichever attempt in how many bits the time ended: it is within the error bounds of the whole answer."""
+    """Whichever attempt in how many bits the time ended: it is within the error bounds of the whole
+    answer."""
     one = scenario("line_gas")
     short, whole = computed(one, kind, Clock(seconds, REASON)), computed(one, kind)
     until = min(short.horizon, whole.horizon, one.duration)
@@ -114,7 +122,10 @@ def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: flo
 def test_more_time_never_gives_less():
     """Of several attempts the one that got farthest counts, not the one that was under way."""
     one = scenario("line_gas")
-    reached = [min(computed(one, None, Clock(float(s), REASON)).horizon, one.duration) for s in range(20, 380, 60)]
+    reached = [
+        min(computed(one, None, Clock(float(s), REASON)).horizon, one.duration)
+        for s in range(20, 380, 60)
+    ]
 
     assert reached == sorted(reached)
     assert reached[0] < reached[-1]
@@ -122,7 +133,8 @@ def test_more_time_never_gives_less():
 
 @pytest.mark.skipif(not has_balls(), reason="needs python-flint")
 def test_an_answer_ends_before_its_balls_are_too_wide():
-    """In few bits a chaotic motion is soon lost: it is cut to where it is exact, to the last place."""
+    """In few bits a chaotic motion is soon lost: it is cut to where it is exact, to the last
+    place."""
     one, accuracy = scenario("line_gas"), 1e-12
     with pytest.raises(Undecided) as lost:
         trace(one.scene, [], one.duration, balls(56))
@@ -149,7 +161,9 @@ def test_what_depends_on_the_machine_is_not_kept(tmp_path: Path, monkeypatch: py
 
 
 @pytest.mark.usefixtures("ticking")
-def test_where_time_ends_before_the_first_sample_there_is_no_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_where_time_ends_before_the_first_sample_there_is_no_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """And that is said."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
     with pytest.raises(NoTruth, match=REASON):
@@ -157,8 +171,11 @@ def test_where_time_ends_before_the_first_sample_there_is_no_answer(tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_an_endless_scene_is_answered_up_to_the_limit_of_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A disk in a box for 10^6 s: exit 0, and how far it got; half the limit is for following it."""
+def test_an_endless_scene_is_answered_up_to_the_limit_of_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """A disk in a box for 10^6 s: exit 0, and how far it got; half the limit is for following
+    it."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     (tmp_path / "long.toml").write_text(LONG)
     done = crosscheck("truth", "long.toml", "--timeout", "10", "--json", cwd=tmp_path)

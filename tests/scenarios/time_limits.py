@@ -12,11 +12,14 @@ Item = TypeVar("Item")
 Made = TypeVar("Made")
 
 
-def each_within(limit: float, work: Callable[[Item], Made], items: Iterable[Item]) -> list[Made | None]:
-    """work(item) of all items; None where it took more than `limit` s of processor time, or its process died.
+def each_within(
+    limit: float, work: Callable[[Item], Made], items: Iterable[Item]
+) -> list[Made | None]:
+    """work(item) of all items; None where it took more than `limit` s of processor time, or its
+    process died.
 
-    The kernel's timer ends a compiled loop, too, which no Python handler would. What is compiled already need not be
-    so again: a child is a copy of this process.
+    The kernel's timer ends a compiled loop, too, which no Python handler would. What is compiled
+    already need not be so again: a child is a copy of this process.
     """
     left, made = list(items), list[Made | None]()
     fork = multiprocessing.get_context("fork")
@@ -35,7 +38,9 @@ def each_within(limit: float, work: Callable[[Item], Made], items: Iterable[Item
     return made
 
 
-def send_each(to: Connection, limit: float, work: Callable[[Item], Made], items: list[Item]) -> None:
+def send_each(
+    to: Connection, limit: float, work: Callable[[Item], Made], items: list[Item]
+) -> None:
     """In the child: one result after the other, each in a tuple; the timer starts anew for each."""
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     for item in items:

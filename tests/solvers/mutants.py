@@ -9,11 +9,16 @@ from typing import NamedTuple
 
 HERE = Path(__file__).parent
 GL_MATRIX = HERE / "correct" / "gl-matrix.js"  # lies beside those that call it, and is no solver
-CORRECT = sorted(path for path in GL_MATRIX.parent.iterdir() if path.suffix in (".js", ".py") and path != GL_MATRIX)
+CORRECT = sorted(
+    path
+    for path in GL_MATRIX.parent.iterdir()
+    if path.suffix in (".js", ".py") and path != GL_MATRIX
+)
 
 
 class Mutant(NamedTuple):
-    """A patch: in the correct file `base`, `old` becomes `new`; task and a piece of the cause that must come first."""
+    """A patch: in the correct file `base`, `old` becomes `new`; task and a piece of the cause that
+    must come first."""
 
     name: str
     base: str

@@ -1,4 +1,5 @@
-"""What a body touches next and what it touches now, in many digits where float64 bounds leave a doubt."""
+"""What a body touches next and what it touches now, in many digits where float64 bounds leave a
+doubt."""
 
 from __future__ import annotations
 
@@ -22,9 +23,12 @@ class Ahead:
         self.bodies, self.k, self.scene = bodies, bodies.k, bodies.scene
         most = len(bodies.legs) + 2 * len(bodies.walls)
         self.bounds, self.codes = np.empty(most), np.empty(most, np.int64)
-        # Ends of walls that lie on the line of each wall: what rests on it slides over them, or off them.
+        # Ends of walls that lie on the line of each wall: what rests on it slides over them, or off
+        # them.
         ends = range(self.scene.n, len(bodies.legs))
-        self.in_line = [{j for j in ends if collinear(wall, bodies.table[j, :2])} for wall in self.scene.walls]
+        self.in_line = [
+            {j for j in ends if collinear(wall, bodies.table[j, :2])} for wall in self.scene.walls
+        ]
 
     def contact(self, i: int, code: int) -> Contact:
         """The contact of disk i of that code, see `soonest`."""
@@ -32,14 +36,28 @@ class Ahead:
         return Contact("wall", i, wall, 1 - 2 * right) if wall >= 0 else Contact("body", i, code)
 
     def candidates(self, i: int, now: float, left: float) -> Iterator[tuple[float, Contact]]:
-        """What disk i may touch within `left` s, with the s from now before which it cannot, soonest first."""
+        """What disk i may touch within `left` s, with the s from now before which it cannot,
+        soonest first."""
         bodies = self.bodies
         if self.scene.wrap is not None:
             yield from ((0.0, edge) for edge in self._edges(i))
         held = bodies.held[i]
-        yield from ((0.0, Contact("end", i, c.j, side)) for c in held if c.kind == "wall" for side in (1, -1))
+        yield from (
+            (0.0, Contact("end", i, c.j, side))
+            for c in held
+            if c.kind == "wall"
+            for side in (1, -1)
+        )
         count = soonest(
-            bodies.table, bodies.radii, bodies.asleep, self.scene.walls, i, now, left, self.bounds, self.codes
+            bodies.table,
+            bodies.radii,
+            bodies.asleep,
+            self.scene.walls,
+            i,
+            now,
+            left,
+            self.bounds,
+            self.codes,
         )
         for bound, code in zip(self.bounds[:count].tolist(), self.codes[:count].tolist()):
             contact = self.contact(i, code)
@@ -58,11 +76,14 @@ class Ahead:
         """Whether this contact is what disk i rests on, or an end in its line."""
         held = self.bodies.held[contact.i]
         if contact.kind == "body":
-            return contact in held or any(c.kind == "wall" and contact.j in self.in_line[c.j] for c in held)
+            return contact in held or any(
+                c.kind == "wall" and contact.j in self.in_line[c.j] for c in held
+            )
         return any(c.kind == "wall" and c.j == contact.j for c in held)
 
     def time_to(self, contact: Contact, now: Number, limit: float) -> Number | None:
-        """s from `now` to this contact, or None if it does not come within `limit` s. Raises `Pressed`."""
+        """s from `now` to this contact, or None if it does not come within `limit` s. Raises
+        `Pressed`."""
         if contact.kind == "edge":
             return self._time_to_edge(contact, now)
         if contact.kind == "end":
@@ -93,7 +114,11 @@ class Ahead:
     def _time_to_wall(self, contact: Contact, now: Number) -> Number | None:
         bodies, i, leg = self.bodies, contact.i, self.bodies.legs[contact.i]
         x, y, u, v = bodies.state_at(i, now)
-        fall = self.k.exact(0.0) if bodies.kind[i] == STATIC else bodies.outward(contact, leg.ax, leg.ay)
+        fall = (
+            self.k.exact(0.0)
+            if bodies.kind[i] == STATIC
+            else bodies.outward(contact, leg.ax, leg.ay)
+        )
         leans = contact in bodies.leaning[i] and leg.t is now
         gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.radius[i]
         try:
@@ -110,7 +135,8 @@ class Ahead:
         return None if beside else after
 
     def _above(self, wall: int, x: Number, y: Number, u: Number, v: Number) -> bool:
-        """Whether a point (x, y) with velocity (u, v) is beside the wall and not about to leave over its ends."""
+        """Whether a point (x, y) with velocity (u, v) is beside the wall and not about to leave
+        over its ends."""
         frame, foot = self.bodies.walls[wall], self.bodies.foot(wall, x, y)
         heading = frame.tx * u + frame.ty * v
         for left, leaving in ((foot, -heading), (frame.length - foot, heading)):
@@ -119,11 +145,16 @@ class Ahead:
         return True
 
     def _time_to_end(self, contact: Contact, now: Number) -> Number | None:
-        """s until the point at which a disk rests on a wall comes to the wall's end (side 1) or start."""
+        """s until the point at which a disk rests on a wall comes to the wall's end (side 1) or
+        start."""
         bodies, leg, wall = self.bodies, self.bodies.legs[contact.i], self.bodies.walls[contact.j]
         x, y, u, v = bodies.state_at(contact.i, now)
         foot, speed = bodies.foot(contact.j, x, y), wall.tx * u + wall.ty * v
-        acceleration = self.k.exact(0.0) if bodies.kind[contact.i] == STATIC else wall.tx * leg.ax + wall.ty * leg.ay
+        acceleration = (
+            self.k.exact(0.0)
+            if bodies.kind[contact.i] == STATIC
+            else wall.tx * leg.ax + wall.ty * leg.ay
+        )
         left = wall.length - foot if contact.side > 0 else foot
         return crossing(self.k, left, -contact.side * speed, -contact.side * acceleration)
 
@@ -132,7 +163,9 @@ class Ahead:
         assert self.scene.wrap is not None
         edge = self.k.exact(float(self.scene.wrap[1 if side > 0 else 0, axis]))
         state, leg = self.bodies.state_at(i, now), self.bodies.legs[i]
-        acceleration = self.k.exact(0.0) if self.bodies.kind[i] == STATIC else -side * (leg.ax, leg.ay)[axis]
+        acceleration = (
+            self.k.exact(0.0) if self.bodies.kind[i] == STATIC else -side * (leg.ax, leg.ay)[axis]
+        )
         gap, speed = side * (edge - state[axis]), -side * state[2 + axis]
         # A centre that stands on an edge is not beyond it.
         if self.k.sign(gap) == 0 and self.k.sign(speed) == 0:
@@ -154,17 +187,22 @@ class Ahead:
         bodies, walls = self.bodies, self.scene.walls
         for i in contact.disks:
             count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, now, self.codes)
-            others = {key(self.contact(i, code)) for code in self.codes[:count].tolist()} - {key(contact)}
+            others = {key(self.contact(i, code)) for code in self.codes[:count].tolist()} - {
+                key(contact)
+            }
             if others or bodies.held[i]:
                 return False
         return True
 
     def near(self, i: int, now: Number, sure: Sequence[Contact] = ()) -> list[tuple[Contact, int]]:
-        """What disk i touches (0) or overlaps (-1) now; contacts that surely touch are not asked about."""
+        """What disk i touches (0) or overlaps (-1) now; contacts that surely touch are not asked
+        about."""
         bodies, found = self.bodies, list[tuple[Contact, int]]()
         x, y, _, _ = bodies.state_at(i, now)
         walls, known = self.scene.walls, {key(contact) for contact in sure}
-        count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, float(now), self.codes)
+        count = touching(
+            bodies.table, bodies.radii, bodies.asleep, walls, i, float(now), self.codes
+        )
         for contact in [self.contact(i, code) for code in self.codes[:count].tolist()]:
             if key(contact) in known:
                 continue
@@ -173,8 +211,13 @@ class Ahead:
                 gap = self.k.sign(touch.dx * touch.dx + touch.dy * touch.dy - reach * reach)
                 beside = False
             else:
-                gap, foot = self.k.sign(bodies.height(contact, x, y) - bodies.radius[i]), bodies.foot(contact.j, x, y)
-                beside = self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
+                gap, foot = (
+                    self.k.sign(bodies.height(contact, x, y) - bodies.radius[i]),
+                    bodies.foot(contact.j, x, y),
+                )
+                beside = (
+                    self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
+                )
             found += [(contact, gap)] if gap <= 0 and not beside else []
         return found
 

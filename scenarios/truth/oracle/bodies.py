@@ -1,4 +1,5 @@
-"""Disks and the ends of walls in many digits: the leg each is on, what holds it, and which contacts touch exactly."""
+"""Disks and the ends of walls in many digits: the leg each is on, what holds it, and which contacts
+touch exactly."""
 
 from __future__ import annotations
 
@@ -13,8 +14,8 @@ from scenarios.truth.oracle.numbers import Number, Numbers
 from scenarios.truth.oracle.ties import Contact, Matter, Touch, Velocity
 
 STATIC, FALLING = 0, 1
-"""Kinds of acceleration: none, gravity; each disk under a thrust is a kind of its own, from 2 on; below 0: slides on a
-wall."""
+"""Kinds of acceleration: none, gravity; each disk under a thrust is a kind of its own, from 2 on;
+below 0: slides on a wall."""
 
 
 STILL, STRAIGHT, CURVED = range(3)
@@ -22,7 +23,8 @@ STILL, STRAIGHT, CURVED = range(3)
 
 
 class Hop(NamedTuple):
-    """Bounces across a wall from the start of a leg on: normal (nx, ny), speed m/s, fall m/s2 towards the wall."""
+    """Bounces across a wall from the start of a leg on: normal (nx, ny), speed m/s, fall m/s2
+    towards the wall."""
 
     nx: Number
     ny: Number
@@ -31,8 +33,8 @@ class Hop(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2; with a hop, the part of it along the wall; and on what the
-    disk rests meanwhile."""
+    """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2; with a hop, the part of it along the
+    wall; and on what the disk rests meanwhile."""
 
     t: Number
     x: Number
@@ -84,7 +86,10 @@ class Bodies:
         positions = np.concatenate([scene.position, ends])
         velocities = np.concatenate([scene.velocity, np.zeros_like(ends)])
         accelerations = np.concatenate([still[:, None] * scene.gravity, np.zeros_like(ends)])
-        rows = [[nought, *map(exact, row)] for row in np.hstack([positions, velocities, accelerations]).tolist()]
+        rows = [
+            [nought, *map(exact, row)]
+            for row in np.hstack([positions, velocities, accelerations]).tolist()
+        ]
         self.legs = [Leg(*row) for row in rows]
         self.kind = [FALLING if moves else STATIC for moves in still] + [STATIC] * len(ends)
         if not scene.gravity.any():
@@ -131,14 +136,20 @@ class Bodies:
         if self.shape[i] == STRAIGHT:
             return leg.x + leg.vx * s, leg.y + leg.vy * s, leg.vx, leg.vy
         ux, uy = leg.ax * s, leg.ay * s
-        return leg.x + (leg.vx + ux / 2) * s, leg.y + (leg.vy + uy / 2) * s, leg.vx + ux, leg.vy + uy
+        return (
+            leg.x + (leg.vx + ux / 2) * s,
+            leg.y + (leg.vy + uy / 2) * s,
+            leg.vx + ux,
+            leg.vy + uy,
+        )
 
     def velocity_at(self, i: int, now: Number) -> Velocity:
         """vx, vy m/s."""
         return self.state_at(i, now)[2:]
 
     def fly(self, i: int, now: Number, v: Velocity, beside: Contact | None = None) -> None:
-        """Body i goes on from here with velocity v, held by what holds it; set exactly beside a wall it has struck."""
+        """Body i goes on from here with velocity v, held by what holds it; set exactly beside a
+        wall it has struck."""
         x, y, _, _ = self.state_at(i, now)
         if beside is not None:
             x, y = self.beside(beside, x, y)
@@ -161,13 +172,18 @@ class Bodies:
             a = [each + exact(float(force)) * inverse for each, force in zip(a, thrust.force)]
         kind = 2 + i if thrusts else (FALLING if self.scene.gravity.any() else STATIC)
         self.free[i] = kind, a[0], a[1]
-        held = tuple(c for c in self.held[i] if c.kind == "wall" and self.k.sign(self.outward(c, a[0], a[1])) < 0)
+        held = tuple(
+            c
+            for c in self.held[i]
+            if c.kind == "wall" and self.k.sign(self.outward(c, a[0], a[1])) < 0
+        )
         self.hold(i, now, held, self.velocity_at(i, now))
         # What held it still touches.
         self.leaning[i] = {c for c in self.held[i] if c.kind == "wall"}
 
     def hold(self, i: int, now: Number, contacts: tuple[Contact, ...], v: Velocity) -> None:
-        """Body i goes on with velocity v, resting on these contacts: the end of what it did before."""
+        """Body i goes on with velocity v, resting on these contacts: the end of what it did
+        before."""
         self.asleep[i] = False
         self.held[i] = contacts
         x, y, _, _ = self.state_at(i, now)
@@ -198,7 +214,8 @@ class Bodies:
         return ax, ay
 
     def remember(self, touches: Sequence[Touch], collision: set[int]) -> None:
-        """After the collisions of one instant: these contacts touch, exactly, and do not approach."""
+        """After the collisions of one instant: these contacts touch, exactly, and do not
+        approach."""
         for contact, _, _ in touches:
             if contact.kind == "body":
                 i, j = sorted((contact.i, contact.j))
@@ -254,7 +271,8 @@ def rational(vector: Array) -> tuple[Fraction, Fraction]:
 
 
 def square_to(wall: Array, tip: Array, foot: Array | None = None) -> bool:
-    """Whether a wall stands at right angles to the vector from `foot` (default 0, 0) to `tip`, in rationals."""
+    """Whether a wall stands at right angles to the vector from `foot` (default 0, 0) to `tip`, in
+    rationals."""
     (px, py), (qx, qy) = rational(wall[0]), rational(wall[1])
     (x, y), (ox, oy) = rational(tip), rational(np.zeros(2) if foot is None else foot)
     return (qx - px) * (x - ox) + (qy - py) * (y - oy) == 0

@@ -1,4 +1,5 @@
-"""When two bodies touch next: roots of polynomials in t, in any numbers, without subtracting what is nearly equal."""
+"""When two bodies touch next: roots of polynomials in t, in any numbers, without subtracting what
+is nearly equal."""
 
 from __future__ import annotations
 
@@ -9,18 +10,21 @@ from scenarios.truth.oracle.filter import fall
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 
 EPS = 2.0**-52
-HALVINGS = 12  # of a bracket, before Newton is tried: enough to leave the neighbours of a simple root
+# of a bracket, before Newton is tried: enough to leave the neighbours of a simple root
+HALVINGS = 12
 
 
 class Pressed(ArithmeticError):
-    """Two bodies touch, do not approach, and are pressed together: a contact that lasts, no collision."""
+    """Two bodies touch, do not approach, and are pressed together: a contact that lasts, no
+    collision."""
 
 
 def meeting(k: Numbers, c: Number, b: Number, a2: Number) -> Number | None:
     """s until two bodies of equal acceleration touch, or None.
 
     c = dr.dr - R^2 m2, b = dr.dv m2/s, a2 = dv.dv m2/s2: the first root of c + 2 b t + a2 t^2 as
-    c / (-b + sqrt(b^2 - a2 c)), where (-b - sqrt) / a2 would cancel (Press et al., Numerical Recipes, 5.6).
+    c / (-b + sqrt(b^2 - a2 c)), where (-b - sqrt) / a2 would cancel (Press et al., Numerical
+    Recipes, 5.6).
     """
     if k.sign(b) >= 0:
         return None
@@ -36,7 +40,8 @@ def meeting(k: Numbers, c: Number, b: Number, a2: Number) -> Number | None:
 def crossing(k: Numbers, s: Number, v: Number, a: Number) -> Number | None:
     """s until s + v t + a t^2 / 2 (m, m/s, m/s2) next falls through 0, or None.
 
-    s < 0 is a point already behind the line: it must come out again before it can cross. Raises `Pressed`.
+    s < 0 is a point already behind the line: it must come out again before it can cross. Raises
+    `Pressed`.
     """
     side, going, curving = k.sign(s), k.sign(v), k.sign(a)
     if side == 0 and going < 0:
@@ -58,10 +63,12 @@ def crossing(k: Numbers, s: Number, v: Number, a: Number) -> Number | None:
 
 
 def falling_meeting(k: Numbers, gap: Sequence[Number], limit: float) -> Number | None:
-    """s until the gap c0 + c1 t + ... + c4 t^4 (m2) of two bodies that accelerate differently closes, or None.
+    """s until the gap c0 + c1 t + ... + c4 t^4 (m2) of two bodies that accelerate differently
+    closes, or None.
 
-    Only up to `limit` s. float64 finds between which times, by margins far above its rounding; many digits find the
-    time. Raises `Pressed`, and `Undecided` for balls where float64 cannot decide: the two graze.
+    Only up to `limit` s. float64 finds between which times, by margins far above its rounding; many
+    digits find the time. Raises `Pressed`, and `Undecided` for balls where float64 cannot decide:
+    the two graze.
     """
     touching = k.sign(gap[0]) <= 0
     approach = k.sign(gap[1] / 2) if touching else 0
@@ -89,8 +96,8 @@ def falling_meeting(k: Numbers, gap: Sequence[Number], limit: float) -> Number |
 def sharpened(k: Numbers, p: Sequence[Number], low: float, high: float) -> Number:
     """The one root of sum p[i] t^i between two times where it falls, by Newton's method.
 
-    For balls the interval Newton method (Moore, Kearfott & Cloud, Introduction to Interval Analysis, 2009, 8.1): the
-    root lies in m - p(m) / p'(T) if it lies in T and m is T's middle.
+    For balls the interval Newton method (Moore, Kearfott & Cloud, Introduction to Interval
+    Analysis, 2009, 8.1): the root lies in m - p(m) / p'(T) if it lies in T and m is T's middle.
     """
     slope, t = _slope(p), k.between(low, high)
     for _ in range(HALVINGS + k.bits.bit_length()):
@@ -110,15 +117,17 @@ def sharpened(k: Numbers, p: Sequence[Number], low: float, high: float) -> Numbe
 def first_changes(k: Numbers, p: Sequence[Number], low: Number, high: Number) -> list[Number]:
     """The roots of sum p[i] t^i between `low` and `high` at which it changes sign, increasing.
 
-    Between two roots of its derivative a polynomial is monotone: one root at most in each piece, found by
-    halving and Newton's steps kept inside the bracket.
+    Between two roots of its derivative a polynomial is monotone: one root at most in each piece,
+    found by halving and Newton's steps kept inside the bracket.
     """
     if len(p) < 2:
         return []
     ends = [low, *first_changes(k, _slope(p), low, high), high]
     values = [_value(p, t) for t in ends]
     return [
-        _root(k, p, ends[i], ends[i + 1], values[i] < 0) for i in range(len(ends) - 1) if values[i] * values[i + 1] < 0
+        _root(k, p, ends[i], ends[i + 1], values[i] < 0)
+        for i in range(len(ends) - 1)
+        if values[i] * values[i + 1] < 0
     ]
 
 

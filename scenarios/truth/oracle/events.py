@@ -1,8 +1,9 @@
 """The event loop: exact flights between collisions, in any numbers, from one next event per disk.
 
-Each body keeps its motion since its own last event; each moving disk keeps a record of what it touches first. A
-record is stale when a partner has had an event since; it is then made anew when its turn comes. Every pair is covered
-by whichever of the two was predicted last (Lubachevsky, J. Comput. Phys. 94, 255, 1991).
+Each body keeps its motion since its own last event; each moving disk keeps a record of what it
+touches first. A record is stale when a partner has had an event since; it is then made anew when
+its turn comes. Every pair is covered by whichever of the two was predicted last (Lubachevsky, J.
+Comput. Phys. 94, 255, 1991).
 """
 
 from __future__ import annotations
@@ -25,9 +26,12 @@ MOST_IDLE = 100  # contacts on end without a collision: their signs contradict e
 
 
 class Motion:
-    """A scene on its way to `until` s, in the numbers `k`, for so much `work`; arithmetic only within `k.precise()`."""
+    """A scene on its way to `until` s, in the numbers `k`, for so much `work`; arithmetic only
+    within `k.precise()`."""
 
-    def __init__(self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work) -> None:
+    def __init__(
+        self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work
+    ) -> None:
         self.k, self.until, self.scene, self.work = k, until, scene, work
         self.bodies = Bodies(scene, k)
         self.ahead = Ahead(self.bodies)
@@ -37,7 +41,9 @@ class Motion:
         self.path = Path([[self.bodies.legs[i]] for i in range(scene.n)])
         self.recent = Recent(scene.n)
         # From the last to the first, so that the next one can be popped.
-        self.switches = sorted(((t, p.disk) for p in thrusts for t in (p.start, p.stop) if t < until), reverse=True)
+        self.switches = sorted(
+            ((t, p.disk) for p in thrusts for t in (p.start, p.stop) if t < until), reverse=True
+        )
         self.thrusts = thrusts
         self.idle = 0
 
@@ -50,7 +56,9 @@ class Motion:
         except Ends as end:
             self.path.end, self.path.reason = end.t, str(end)
             self.path.disks, self.path.outcomes = end.disks, end.outcomes
-            self.path.named = [[self.bodies.pair(blow.contact) for blow in one.blows] for one in end.outcomes]
+            self.path.named = [
+                [self.bodies.pair(blow.contact) for blow in one.blows] for one in end.outcomes
+            ]
         except Undecided:
             raise Undecided(float(self.now), self.path) from None
         return self.path
@@ -84,7 +92,8 @@ class Motion:
         return True
 
     def next_contacts(self, soonest: float) -> tuple[int, list[Contact]]:
-        """The first disk and the contacts of its event; none if its record is stale and must be made anew.
+        """The first disk and the contacts of its event; none if its record is stale and must be
+        made anew.
 
         float64 clocks only tell which records are worth comparing.
         """
@@ -117,11 +126,14 @@ class Motion:
         return record
 
     def order(self, one: Record, other: Record) -> int:
-        """-1, 0 or 1 as `one` comes before, with or after `other`; balls that overlap are the same time if the same."""
+        """-1, 0 or 1 as `one` comes before, with or after `other`; balls that overlap are the same
+        time if the same."""
         try:
             return self.k.sign(one.t - other.t)
         except Undecided:
-            mine, theirs = (set().union(*(c.disks for c in record.contacts)) for record in (one, other))
+            mine, theirs = (
+                set().union(*(c.disks for c in record.contacts)) for record in (one, other)
+            )
             if mine == theirs or not mine & theirs:
                 return 0
             raise
@@ -129,7 +141,10 @@ class Motion:
     def stale(self, record: Record) -> bool:
         """Whether a partner has had an event since the record was made."""
         counts = self.bodies.count
-        return any(c.kind == "body" and counts[c.j] != then for c, then in zip(record.contacts, record.counts))
+        return any(
+            c.kind == "body" and counts[c.j] != then
+            for c, then in zip(record.contacts, record.counts)
+        )
 
     def predict(self, i: int) -> None:
         """Find what disk i touches first from now on."""
@@ -145,7 +160,13 @@ class Motion:
                 if (after := self.ahead.time_to(contact, self.now, limit)) is None:
                     continue
                 place = k.sign(after - best[0][0]) if best else -1
-                best = [(after, contact)] if place < 0 else [*best, (after, contact)] if place == 0 else best
+                best = (
+                    [(after, contact)]
+                    if place < 0
+                    else [*best, (after, contact)]
+                    if place == 0
+                    else best
+                )
         except Pressed:
             self.press(contact)
             return
@@ -158,7 +179,9 @@ class Motion:
     def expect(self, i: int, t: Number, contacts: tuple[Contact, ...]) -> None:
         """Put down what disk i does next."""
         counts = self.bodies.count
-        self.records[i] = Record(t, contacts, tuple(counts[c.j] if c.kind == "body" else 0 for c in contacts))
+        self.records[i] = Record(
+            t, contacts, tuple(counts[c.j] if c.kind == "body" else 0 for c in contacts)
+        )
         self.due[i] = float(t) if float(t) <= self.until else np.inf
 
     def press(self, contact: Contact) -> None:
@@ -176,10 +199,18 @@ class Motion:
         """Resolve the contacts of one instant; where their order matters there is no answer."""
         bodies, now = self.bodies, float(self.now)
         if odd := [contact for contact in contacts if contact.kind in ("edge", "end")]:
-            where = "the edge of the wrap" if odd[0].kind == "edge" else f"the end of wall {odd[0].j}"
-            raise Ends(now, f"disk {odd[0].i} comes to {where} while it touches another", [odd[0].i])
+            where = (
+                "the edge of the wrap" if odd[0].kind == "edge" else f"the end of wall {odd[0].j}"
+            )
+            raise Ends(
+                now, f"disk {odd[0].i} comes to {where} while it touches another", [odd[0].i]
+            )
         alone = len(contacts) == 1 and self.ahead.alone(contacts[0], now)
-        touches = [self.ahead.touch(c, self.now) for c in contacts] if alone else self.ahead.cluster(contacts, self.now)
+        touches = (
+            [self.ahead.touch(c, self.now) for c in contacts]
+            if alone
+            else self.ahead.cluster(contacts, self.now)
+        )
         disks = sorted({i for touch in touches for i in touch.contact.disks})
         v = {i: bodies.velocity_at(i, self.now) for i in disks}
         if alone:
@@ -191,7 +222,9 @@ class Motion:
             self.work.left -= tried
             if len(ends) != 1 or not ends[0].velocities:
                 names = ", ".join(str(i) for i in disks if i < self.scene.n)
-                raise Ends(now, ambiguous(names, ends), disks, [end for end in ends if end.velocities])
+                raise Ends(
+                    now, ambiguous(names, ends), disks, [end for end in ends if end.velocities]
+                )
             outcome = ends[0]
         arriving = {key(contact) for contact in contacts}
         for blow in outcome.blows:
@@ -204,7 +237,8 @@ class Motion:
         self.go_on(outcome, touches, touched)
 
     def go_on(self, outcome: Outcome, touches: Sequence[Touch], touched: set[int]) -> None:
-        """New legs after the collisions of one instant; a bounce off a wall may be the first of the last ones."""
+        """New legs after the collisions of one instant; a bounce off a wall may be the first of the
+        last ones."""
         bodies = self.bodies
         walls = [blow.contact for blow in outcome.blows if blow.contact.kind == "wall"]
         bounce = walls[0] if len(outcome.blows) == 1 and walls else None
@@ -216,7 +250,11 @@ class Motion:
             bodies.fly(i, self.now, v, bounce)
         bodies.remember(touches, touched)
         # What was carried by a disk that is struck is carried no longer.
-        dropped = {i for i, held in enumerate(bodies.held) if i not in touched and any(c.disks & touched for c in held)}
+        dropped = {
+            i
+            for i, held in enumerate(bodies.held)
+            if i not in touched and any(c.disks & touched for c in held)
+        }
         for i in sorted(dropped):
             bodies.hold(i, self.now, (), bodies.velocity_at(i, self.now))
         stop = None
@@ -229,14 +267,18 @@ class Motion:
     def log(self, blow: Blow, new: bool) -> None:
         """Write a collision down; refuse where those of a disk pile up."""
         contact, j = blow.contact, self.bodies.partner(blow.contact)
-        self.path.events.append(Event(self.now, contact.i, j, blow.impulse, float(blow.cosine), new))
+        self.path.events.append(
+            Event(self.now, contact.i, j, blow.impulse, float(blow.cosine), new)
+        )
         self.recent.add(contact.i, float(self.now), self.bodies.name(contact))
         if j >= 0:
             self.recent.add(j, float(self.now), f"disk {contact.i}")
 
     def rest(self, contact: Contact) -> None:
         """Write down that a disk comes to rest: a contact begins, with no impulse."""
-        self.path.events.append(Event(self.now, contact.i, self.bodies.partner(contact), self.k.exact(0.0), 0.0))
+        self.path.events.append(
+            Event(self.now, contact.i, self.bodies.partner(contact), self.k.exact(0.0), 0.0)
+        )
 
     def stop(self, contact: Contact) -> None:
         """The bounces of a disk on a wall have died out: it rests."""
@@ -247,32 +289,45 @@ class Motion:
         self.follow_up({i})
 
     def leave(self, contact: Contact) -> None:
-        """A disk slides off the end of the wall it rests on: on to the next in line, or into the air."""
+        """A disk slides off the end of the wall it rests on: on to the next in line, or into the
+        air."""
         bodies, i, k = self.bodies, contact.i, self.k
         held = [c for c in bodies.held[i] if c.j == contact.j]
-        v, end = bodies.velocity_at(i, self.now), self.scene.walls[contact.j, 1 if contact.side > 0 else 0]
+        v, end = (
+            bodies.velocity_at(i, self.now),
+            self.scene.walls[contact.j, 1 if contact.side > 0 else 0],
+        )
         following = next_in_line(self.ahead, held[0], contact.side)
         if following is None:
             _, ax, ay = bodies.free[i]
             slow = v[0] * v[0] + v[1] * v[1] + bodies.radius[i] * bodies.outward(held[0], ax, ay)
             if k.sign(slow) <= 0 or len(bodies.held[i]) > 1:
                 raise Ends(
-                    float(self.now), f"disk {i} turns about the end of wall {contact.j}, off which it slides", [i]
+                    float(self.now),
+                    f"disk {i} turns about the end of wall {contact.j}, off which it slides",
+                    [i],
                 )
             bodies.hold(i, self.now, (), v)
-            corner = next(j for j in range(self.scene.n, len(bodies.legs)) if (bodies.table[j, :2] == end).all())
+            corner = next(
+                j
+                for j in range(self.scene.n, len(bodies.legs))
+                if (bodies.table[j, :2] == end).all()
+            )
             bodies.remember([self.ahead.touch(Contact("body", i, corner), self.now)], set())
         else:
             bodies.hold(i, self.now, (following,), v)
         self.follow_up({i})
 
     def wrap(self, contact: Contact) -> None:
-        """Set a disk onto the opposite edge; where another stands there, the exercise gives no answer."""
+        """Set a disk onto the opposite edge; where another stands there, the exercise gives no
+        answer."""
         i = contact.i
         self.bodies.across(contact, self.now)
         for other, gap in self.ahead.near(i, self.now):
             if gap < 0:
-                reason = f"disk {i} re-enters over the edge of the wrap onto {self.bodies.name(other)}"
+                reason = (
+                    f"disk {i} re-enters over the edge of the wrap onto {self.bodies.name(other)}"
+                )
                 raise Ends(float(self.now), reason, sorted(other.disks))
         self.follow_up({i})
 
@@ -291,7 +346,10 @@ class Motion:
                 self.predict(i)
 
 
-def trace(scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work | None = None) -> Path:
-    """The motion of `scene` under `thrusts` up to `until` s, as far as `work` goes. Raises what `Bodies` raises."""
+def trace(
+    scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work | None = None
+) -> Path:
+    """The motion of `scene` under `thrusts` up to `until` s, as far as `work` goes. Raises what
+    `Bodies` raises."""
     with k.precise():
         return Motion(scene, thrusts, until, k, work or Work()).run()

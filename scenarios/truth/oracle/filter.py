@@ -1,7 +1,9 @@
-"""What a disk may touch next, and not before when: float64 bounds, so that few contacts need many digits.
+"""What a disk may touch next, and not before when: float64 bounds, so that few contacts need many
+digits.
 
-Every bound is lowered by far more than float64 rounds, so nothing is left out; what it lets through is only slower.
-A row of a table (b, 7) is a leg: x, y, vx, vy, ax, ay, t. Bodies that are asleep cannot be touched.
+Every bound is lowered by far more than float64 rounds, so nothing is left out; what it lets through
+is only slower. A row of a table (b, 7) is a leg: x, y, vx, vy, ax, ay, t. Bodies that are asleep
+cannot be touched.
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ def soonest(
     bounds: Array,
     codes: Codes,
 ) -> int:
-    """How many contacts disk i may have within `left` s of `now`, written into `bounds` (s) and `codes`, soonest first.
+    """How many contacts disk i may have within `left` s of `now`, written into `bounds` (s) and
+    `codes`, soonest first.
 
     A code is a body, or from len(table) on twice the wall, plus 1 for its right side (side -1).
     """
@@ -55,7 +58,12 @@ def soonest(
     for j in range(len(table)):
         if j != i and not asleep[j]:
             count = insert(
-                pair_bound(one, moved(table[j], now), radius[i] + radius[j], left), j, left, bounds, codes, count
+                pair_bound(one, moved(table[j], now), radius[i] + radius[j], left),
+                j,
+                left,
+                bounds,
+                codes,
+                count,
             )
     for w in range(len(walls)):
         for right in range(2):
@@ -79,7 +87,8 @@ def insert(bound: float, code: int, left: float, bounds: Array, codes: Codes, co
 
 @kernel
 def pair_bound(one: Row, other: Row, reach: float, left: float) -> float:
-    """s before which two bodies cannot touch, at centres `reach` m apart; inf: not within `left` s."""
+    """s before which two bodies cannot touch, at centres `reach` m apart; inf: not within `left`
+    s."""
     dx, dy, du, dv = other[X] - one[X], other[Y] - one[Y], other[VX] - one[VX], other[VY] - one[VY]
     ax, ay = other[AX] - one[AX], other[AY] - one[AY]
     far = max(max(abs(one[X]), abs(one[Y])), max(abs(other[X]), abs(other[Y])))
@@ -87,23 +96,33 @@ def pair_bound(one: Row, other: Row, reach: float, left: float) -> float:
     speed, blur = sqrt(speed2), SLACK * reach + BLUR * (far + distance)
     gap, closing = (distance - reach) * (distance + reach), dx * du + dy * dv
     if ax != 0.0 or ay != 0.0:
-        f = (gap, 2 * closing, speed2 + dx * ax + dy * ay, du * ax + dv * ay, (ax * ax + ay * ay) / 4)
+        f = (
+            gap,
+            2 * closing,
+            speed2 + dx * ax + dy * ay,
+            du * ax + dv * ay,
+            (ax * ax + ay * ay) / 4,
+        )
         return fall(f, left * (1 + 1e-6), BLUR * far * (distance + reach))[0]
     # c / (-b + sqrt(b^2 - a2 c)), each part blurred so that the time comes out too early.
     closing -= blur * speed
     under = closing * closing - speed2 * max(gap, 0.0)
     if closing >= 0.0 or under < -8 * blur * (distance + reach) * speed2:
         return inf
-    time = max(gap - 3 * blur * distance, 0.0) / (sqrt(max(under, 0.0) + blur * distance * speed2) - closing)
+    time = max(gap - 3 * blur * distance, 0.0) / (
+        sqrt(max(under, 0.0) + blur * distance * speed2) - closing
+    )
     return time * (1 - SLACK)
 
 
 @kernel
 def fall(f: Quartic, end: float, blur: float) -> tuple[float, float]:
-    """Between which two times f[0] + ... + f[4] t^4 first falls through 0, up to `end`; (inf, inf): never.
+    """Between which two times f[0] + ... + f[4] t^4 first falls through 0, up to `end`; (inf, inf):
+    never.
 
-    (t, 0): float64 cannot tell what happens from t on. blur: how far f[0] may be off. Piece by piece, the Taylor
-    series bounds f from below, or its slope from above; all by margins far above the rounding.
+    (t, 0): float64 cannot tell what happens from t on. blur: how far f[0] may be off. Piece by
+    piece, the Taylor series bounds f from below, or its slope from above; all by margins far above
+    the rounding.
     """
     a, h = 0.0, end
     for _ in range(20 * HALVINGS):
@@ -172,12 +191,17 @@ def wall_bound(one: Row, wall: Array, radius: float, side: float) -> float:
         under = speed * speed - 2 * acceleration * gap * (1 - SLACK)
         return inf if speed >= 0.0 or under < 0.0 else 2 * gap / (sqrt(under) - speed) * (1 - SLACK)
     root = sqrt(speed * speed - 2 * acceleration * gap)
-    return (2 * gap / (root - speed) if speed < 0.0 else (speed + root) / -acceleration) * (1 - SLACK)
+    return (2 * gap / (root - speed) if speed < 0.0 else (speed + root) / -acceleration) * (
+        1 - SLACK
+    )
 
 
 @kernel
-def touching(table: Array, radius: Array, asleep: Array, walls: Array, i: int, now: float, codes: Codes) -> int:
-    """How many contacts of disk i may have no gap at `now` s, written into `codes`; see `soonest`."""
+def touching(
+    table: Array, radius: Array, asleep: Array, walls: Array, i: int, now: float, codes: Codes
+) -> int:
+    """How many contacts of disk i may have no gap at `now` s, written into `codes`; see
+    `soonest`."""
     one, count = moved(table[i], now), 0
     far = max(abs(one[X]), abs(one[Y])) + radius[i]
     for j in range(len(table)):

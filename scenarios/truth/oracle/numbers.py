@@ -1,8 +1,10 @@
-"""Numbers of as many digits as asked for, under one set of verbs: gmpy2's mpfr, the library's decimal, arb's balls.
+"""Numbers of as many digits as asked for, under one set of verbs: gmpy2's mpfr, the library's
+decimal, arb's balls.
 
-A kind makes numbers out of float64 (exactly), takes roots and determines signs. What lies below its `tie` counts as
-zero: no precision can tell an exact equality from a small difference, and half the digits are far more than chance
-needs. Balls never guess: where zero lies inside one, they raise `Undecided`.
+A kind makes numbers out of float64 (exactly), takes roots and determines signs. What lies below its
+`tie` counts as
+zero: no precision can tell an exact equality from a small difference, and half the digits are far
+more than chance needs. Balls never guess: where zero lies inside one, they raise `Undecided`.
 """
 
 from __future__ import annotations
@@ -16,11 +18,13 @@ from math import ceil, log10
 from typing import Any
 
 Number = Any
-"""What a kind makes: mpfr, Decimal, arb. They share the operators of arithmetic and nothing else."""
+"""What a kind makes: mpfr, Decimal, arb. They share the operators of arithmetic and nothing
+else."""
 
 
 class Undecided(ArithmeticError):
-    """A ball holds zero, so its sign is not proven; at `t` s of a motion, of which `path` is what was found."""
+    """A ball holds zero, so its sign is not proven; at `t` s of a motion, of which `path` is what
+    was found."""
 
     def __init__(self, t: float = 0.0, path: Any = None) -> None:
         super().__init__(t)
@@ -72,12 +76,24 @@ def mpfr(bits: int) -> Numbers:
         # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.
         return gmpy2.mpfr(x, 53)
 
-    return Numbers("mpfr", bits, exact, gmpy2.sqrt, sign, precise, tie, lambda a, b: exact((a + b) / 2), _nothing)
+    return Numbers(
+        "mpfr",
+        bits,
+        exact,
+        gmpy2.sqrt,
+        sign,
+        precise,
+        tie,
+        lambda a, b: exact((a + b) / 2),
+        _nothing,
+    )
 
 
 def decimals(bits: int) -> Numbers:
     """The standard library's decimal numbers, of the same accuracy."""
-    context = decimal.Context(prec=ceil(bits * log10(2)) + 1, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX)
+    context = decimal.Context(
+        prec=ceil(bits * log10(2)) + 1, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX
+    )
     tie = decimal.Decimal(2) ** -(bits // 2)
 
     def sign(x: Number) -> int:
@@ -87,13 +103,21 @@ def decimals(bits: int) -> Numbers:
         return decimal.Decimal((a + b) / 2)
 
     return Numbers(
-        "decimal", bits, decimal.Decimal, lambda x: x.sqrt(context), sign, lambda: decimal.localcontext(context), tie,
-        between, _nothing,
-    )  # fmt: skip
+        "decimal",
+        bits,
+        decimal.Decimal,
+        lambda x: x.sqrt(context),
+        sign,
+        lambda: decimal.localcontext(context),
+        tie,
+        between,
+        _nothing,
+    )
 
 
 def balls(bits: int) -> Numbers:
-    """Arb's real balls, which hold the right number for certain. Raises ImportError where python-flint is missing."""
+    """Arb's real balls, which hold the right number for certain. Raises ImportError where
+    python-flint is missing."""
     import flint
 
     nought = flint.arb(0)
@@ -121,7 +145,18 @@ def balls(bits: int) -> Numbers:
     def spread(x: Number) -> float:
         return float(x.rad())
 
-    return Numbers("arb", bits, flint.arb, lambda x: x.sqrt(), sign, precise, nought, between, spread, proves=True)
+    return Numbers(
+        "arb",
+        bits,
+        flint.arb,
+        lambda x: x.sqrt(),
+        sign,
+        precise,
+        nought,
+        between,
+        spread,
+        proves=True,
+    )
 
 
 def _nothing(_x: Number) -> float:
@@ -129,7 +164,8 @@ def _nothing(_x: Number) -> float:
 
 
 def digits(bits: int) -> Numbers:
-    """mpfr where gmpy2 is installed, else decimal: the same answers, nearly as fast up to a few hundred bits."""
+    """mpfr where gmpy2 is installed, else decimal: the same answers, nearly as fast up to a few
+    hundred bits."""
     return mpfr(bits) if find_spec("gmpy2") else decimals(bits)
 
 

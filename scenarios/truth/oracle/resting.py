@@ -1,8 +1,9 @@
-"""What comes to rest: bounces that die out in finite time (rule Z1), what lies still from the start, what slides.
+"""What comes to rest: bounces that die out in finite time (rule Z1), what lies still from the
+start, what slides.
 
-A disk that leaves a line at the speed v and is accelerated back at g bounces infinitely often within 2 v / (g (1 - e)),
-and rests from then on (any textbook of mechanics, under "bouncing ball"). If nothing can touch it before, that is
-exact.
+A disk that leaves a line at the speed v and is accelerated back at g bounces infinitely often
+within 2 v / (g (1 - e)), and rests from then on (any textbook of mechanics, under "bouncing ball").
+If nothing can touch it before, that is exact.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ FAR = 1e-12  # of the largest coordinate, the same
 
 
 def settle(ahead: Ahead, contact: Contact, now: Number, thrusts: Sequence[Thrust]) -> Number | None:
-    """Let a disk that has just struck a wall bounce on for good, if nothing can touch it; when it rests (s), or None.
+    """Let a disk that has just struck a wall bounce on for good, if nothing can touch it; when it
+    rests (s), or None.
 
     It must be on its leg after the collision, e < 1.
     """
@@ -51,14 +53,18 @@ def settle(ahead: Ahead, contact: Contact, now: Number, thrusts: Sequence[Thrust
 
 
 def along(bodies: Bodies, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
-    """The part of a vector (x, y) along the wall of a contact; none where the disk rests on another wall, too."""
+    """The part of a vector (x, y) along the wall of a contact; none where the disk rests on another
+    wall, too."""
     if bodies.held[contact.i]:
         return bodies.k.exact(0.0), bodies.k.exact(0.0)
     return bodies.slide(contact, x, y)
 
 
-def untouched(ahead: Ahead, contact: Contact, leg: Leg, stop: float, thrusts: Sequence[Thrust]) -> bool:
-    """Rule Z1: whether the disk on `leg` meets nothing but its wall until `stop` s, whatever the others do.
+def untouched(
+    ahead: Ahead, contact: Contact, leg: Leg, stop: float, thrusts: Sequence[Thrust]
+) -> bool:
+    """Rule Z1: whether the disk on `leg` meets nothing but its wall until `stop` s, whatever the
+    others do.
 
     None can be faster than all energy there is, with what gravity and thrusts may add, makes it:
     d sqrt(K) / dt <= a sqrt(M / 2), K <= sum m v^2 / 2, |v_j| <= sqrt(2 K / m_j).
@@ -84,10 +90,14 @@ def untouched(ahead: Ahead, contact: Contact, leg: Leg, stop: float, thrusts: Se
     room, in_line = stretch(ahead, contact, float(bodies.foot(w, leg.x, leg.y)))
     if not clear.all() or not own * SAFE + slack < room:
         return False
-    if scene.wrap is not None and (scene.n > 1 or not (np.abs(scene.wrap - [x, y]) > own * SAFE + slack).all()):
+    if scene.wrap is not None and (
+        scene.n > 1 or not (np.abs(scene.wrap - [x, y]) > own * SAFE + slack).all()
+    ):
         return False
     known = in_line | {c.j for c in bodies.held[i] if c.kind == "wall"}
-    walls = np.array([wall for k, wall in enumerate(scene.walls) if k not in known]).reshape(-1, 2, 2)
+    walls = np.array([wall for k, wall in enumerate(scene.walls) if k not in known]).reshape(
+        -1, 2, 2
+    )
     span = walls[:, 1] - walls[:, 0]
     share = np.clip((([x, y] - walls[:, 0]) * span).sum(axis=1) / (span**2).sum(axis=1), 0, 1)
     away = np.hypot(*(walls[:, 0] + share[:, None] * span - [x, y]).T) - bodies.radii[i]
@@ -95,7 +105,8 @@ def untouched(ahead: Ahead, contact: Contact, leg: Leg, stop: float, thrusts: Se
 
 
 def stretch(ahead: Ahead, contact: Contact, foot: float) -> tuple[float, set[int]]:
-    """How far a disk may slide either way, m, from `foot` m along its wall; and that wall with all in line with it."""
+    """How far a disk may slide either way, m, from `foot` m along its wall; and that wall with all
+    in line with it."""
     rooms, walls = [], {contact.j}
     for side in (1, -1):
         here: Contact | None = contact
@@ -117,11 +128,14 @@ def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:
     (x, y, _, _), (px, py, _, _) = bodies.state_at(i, now), bodies.state_at(j, now)
     dx, dy, reach = px - x, py - y, bodies.radius[i] + bodies.radius[j]
     gap = dx * dx + dy * dy - reach * reach
-    return float(gap / (bodies.k.sqrt(dx * dx + dy * dy) + reach)) - bodies.k.spread(gap) / float(reach)
+    return float(gap / (bodies.k.sqrt(dx * dx + dy * dy) + reach)) - bodies.k.spread(gap) / float(
+        reach
+    )
 
 
 def travel(bodies: Bodies, states: Array, left: float, thrusts: Sequence[Thrust]) -> Array:
-    """(b,) m, how far each body gets within `left` s at most, from states (b, 6) as of `moved`; see `untouched`."""
+    """(b,) m, how far each body gets within `left` s at most, from states (b, 6) as of `moved`; see
+    `untouched`."""
     mass = np.append(bodies.scene.mass, np.full(len(states) - bodies.scene.n, np.inf))
     moves = np.isfinite(mass)
     accelerations = [float(np.hypot(*thrust.force)) / mass[thrust.disk] for thrust in thrusts]
@@ -138,9 +152,11 @@ def hop_height(leg: Leg) -> float:
 
 
 def press(ahead: Ahead, contact: Contact, now: Number) -> bool:
-    """Let a disk that is accelerated onto a wall it touches, with no speed across it, rest on it; False if it cannot.
+    """Let a disk that is accelerated onto a wall it touches, with no speed across it, rest on it;
+    False if it cannot.
 
-    On a second wall it rests if that stands at right angles to the first, or if it lies still between the two.
+    On a second wall it rests if that stands at right angles to the first, or if it lies still
+    between the two.
     """
     bodies, i = ahead.bodies, contact.i
     if contact.kind != "wall":
@@ -151,7 +167,9 @@ def press(ahead: Ahead, contact: Contact, now: Number) -> bool:
         _, ax, ay = bodies.free[i]
         if len(held) > 1 or held[0].kind != "wall":
             return False
-        wedged = still and bodies.k.sign(bodies.outward(held[0], *bodies.slide(contact, ax, ay))) < 0
+        wedged = (
+            still and bodies.k.sign(bodies.outward(held[0], *bodies.slide(contact, ax, ay))) < 0
+        )
         if not wedged and not bodies.upright(held[0], contact):
             return False
     bodies.hold(i, now, (*held, contact), along(bodies, contact, *v))
@@ -159,21 +177,32 @@ def press(ahead: Ahead, contact: Contact, now: Number) -> bool:
 
 
 def lie_down(ahead: Ahead) -> list[Contact]:
-    """Rest what lies still at the start: disks on walls, and disks straight above each other on those. The contacts."""
+    """Rest what lies still at the start: disks on walls, and disks straight above each other on
+    those. The contacts."""
     bodies, now = ahead.bodies, ahead.bodies.k.exact(0.0)
     found = start(ahead)
-    lying = [c for c, approach in found if c.kind == "wall" and approach == 0 and _pressed(bodies, c)]
+    lying = [
+        c for c, approach in found if c.kind == "wall" and approach == 0 and _pressed(bodies, c)
+    ]
     rested = [c for c in lying if press(ahead, c, now)]
-    pairs = [Contact("body", *ends) for c, _ in found if c.kind == "body" for ends in ((c.i, c.j), (c.j, c.i))]
+    pairs = [
+        Contact("body", *ends)
+        for c, _ in found
+        if c.kind == "body"
+        for ends in ((c.i, c.j), (c.j, c.i))
+    ]
     still = [not row.any() for row in bodies.table[:, 2:4]]
-    while upper := next((c for c in pairs if still[c.i] and not bodies.held[c.i] and _carries(bodies, c)), None):
+    while upper := next(
+        (c for c in pairs if still[c.i] and not bodies.held[c.i] and _carries(bodies, c)), None
+    ):
         bodies.hold(upper.i, now, (upper,), bodies.velocity_at(upper.i, now))
         rested.append(upper)
     return rested
 
 
 def next_in_line(ahead: Ahead, contact: Contact, side: int) -> Contact | None:
-    """The wall that goes on where this one ends (side 1) or starts (-1), in line with it, as a contact; or None."""
+    """The wall that goes on where this one ends (side 1) or starts (-1), in line with it, as a
+    contact; or None."""
     walls, w = ahead.scene.walls, contact.j
     tip, heading = walls[w, 1 if side > 0 else 0], side * (walls[w, 1] - walls[w, 0])
     for other, wall in enumerate(walls):
@@ -186,13 +215,15 @@ def next_in_line(ahead: Ahead, contact: Contact, side: int) -> Contact | None:
 
 
 def _pressed(bodies: Bodies, contact: Contact) -> bool:
-    """Whether its acceleration presses the disk of a contact onto the wall, when nothing holds it."""
+    """Whether its acceleration presses the disk of a contact onto the wall, when nothing holds
+    it."""
     _, ax, ay = bodies.free[contact.i]
     return bodies.k.sign(bodies.outward(contact, ax, ay)) < 0
 
 
 def _carries(bodies: Bodies, contact: Contact) -> bool:
-    """Whether contact.j lies still and exactly below contact.i, so that gravity alone keeps the two together."""
+    """Whether contact.j lies still and exactly below contact.i, so that gravity alone keeps the two
+    together."""
     scene, i, j = bodies.scene, contact.i, contact.j
     if bodies.free[i][0] != FALLING or scene.static[i]:
         return False
@@ -205,7 +236,8 @@ def _carries(bodies: Bodies, contact: Contact) -> bool:
 
 
 def start(ahead: Ahead) -> list[tuple[Contact, Fraction]]:
-    """The contacts that touch at the start, exactly, and dr.dv of each (up to a positive factor); facts are noted.
+    """The contacts that touch at the start, exactly, and dr.dv of each (up to a positive factor);
+    facts are noted.
 
     Raises:
         NoTruth: bodies overlap.
@@ -213,12 +245,17 @@ def start(ahead: Ahead) -> list[tuple[Contact, Fraction]]:
     bodies, scene = ahead.bodies, ahead.scene
     faults, found = [], dict[tuple, tuple[Contact, Fraction]]()
     for i in np.flatnonzero(~scene.static).tolist():
-        count = touching(bodies.table, bodies.radii, bodies.asleep, scene.walls, i, 0.0, ahead.codes)
+        count = touching(
+            bodies.table, bodies.radii, bodies.asleep, scene.walls, i, 0.0, ahead.codes
+        )
         for contact in [ahead.contact(i, code) for code in ahead.codes[:count].tolist()]:
             gap, approach, overlap = at_start(bodies, contact)
             if gap < 0 and key(contact) not in found:
                 name = bodies.name(contact)
-                faults.append(f"disk {i} and {name} overlap by {overlap:.3g} m at the start: move them apart by that")
+                faults.append(
+                    f"disk {i} and {name} overlap by {overlap:.3g} m at the start: move them apart"
+                    " by that"
+                )
             if gap <= 0:
                 found[key(contact)] = contact, approach
     if faults:
@@ -230,9 +267,14 @@ def start(ahead: Ahead) -> list[tuple[Contact, Fraction]]:
 
 
 def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, float]:
-    """The gap (up to a positive factor), dr.dv (the same) and the overlap, m, of a contact; all but the last exact."""
+    """The gap (up to a positive factor), dr.dv (the same) and the overlap, m, of a contact; all but
+    the last exact."""
     rows, scene, i = bodies.table, bodies.scene, contact.i
-    (x, y), (u, v), r = rational(rows[i, :2]), rational(rows[i, 2:4]), Fraction(float(bodies.radii[i]))
+    (x, y), (u, v), r = (
+        rational(rows[i, :2]),
+        rational(rows[i, 2:4]),
+        Fraction(float(bodies.radii[i])),
+    )
     if contact.kind == "body":
         (px, py), (pu, pv) = rational(rows[contact.j, :2]), rational(rows[contact.j, 2:4])
         r += Fraction(float(bodies.radii[contact.j]))
@@ -241,7 +283,11 @@ def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, floa
         return square - r * r, dx * (pu - u) + dy * (pv - v), float(r) - float(square) ** 0.5
     (px, py), (qx, qy) = (rational(end) for end in scene.walls[contact.j])
     tx, ty = qx - px, qy - py
-    across, foot, square = tx * (y - py) - ty * (x - px), tx * (x - px) + ty * (y - py), tx * tx + ty * ty
+    across, foot, square = (
+        tx * (y - py) - ty * (x - px),
+        tx * (x - px) + ty * (y - py),
+        tx * tx + ty * ty,
+    )
     if not 0 <= foot <= square:
         return Fraction(1), Fraction(0), 0.0
     overlap = float(r) - abs(float(across)) / float(square) ** 0.5

@@ -1,4 +1,5 @@
-"""Collisions: one contact at a time, and contacts that touch at the same instant, resolved in every order there is."""
+"""Collisions: one contact at a time, and contacts that touch at the same instant, resolved in every
+order there is."""
 
 from __future__ import annotations
 
@@ -14,8 +15,9 @@ LONGEST = 200  # collisions of one order at one instant; more do not end
 
 
 class Contact(NamedTuple):
-    """What disk `i` comes to: kind "body", a disk j or an end point (j from n on); "wall", a side of wall j; "edge" of
-    the wrap across axis j; "end" of the wall j it rests on; "rest", where its bounces on a side of wall j die out.
+    """What disk `i` comes to: kind "body", a disk j or an end point (j from n on); "wall", a side
+    of wall j; "edge" of the wrap across axis j; "end" of the wall j it rests on; "rest", where its
+    bounces on a side of wall j die out.
     """
 
     kind: str
@@ -30,7 +32,8 @@ class Contact(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """A contact at its instant: the direction (dx, dy) from the centre of i to the other, any length but 0."""
+    """A contact at its instant: the direction (dx, dy) from the centre of i to the other, any
+    length but 0."""
 
     contact: Contact
     dx: Number
@@ -38,7 +41,8 @@ class Touch(NamedTuple):
 
 
 class Blow(NamedTuple):
-    """A collision that was carried out: its impulse N s, and the cosine of the impact angle, |v_n| / |v|."""
+    """A collision that was carried out: its impulse N s, and the cosine of the impact angle, |v_n|
+    / |v|."""
 
     contact: Contact
     impulse: Number
@@ -51,8 +55,8 @@ Velocities = dict[int, Velocity]
 
 
 class Outcome(NamedTuple):
-    """How a simultaneous contact may end: velocities, the collisions in one order, contacts with no speed across,
-    exactly."""
+    """How a simultaneous contact may end: velocities, the collisions in one order, contacts with no
+    speed across, exactly."""
 
     velocities: Velocities
     blows: list[Blow]
@@ -61,8 +65,8 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Matter:
-    """What a collision needs to know of the bodies: 1 / mass (b,) 1/kg and the restitution, in numbers; whether that is
-    0."""
+    """What a collision needs to know of the bodies: 1 / mass (b,) 1/kg and the restitution, in
+    numbers; whether that is 0."""
 
     numbers: Numbers
     inverse_mass: Sequence[Number]
@@ -75,7 +79,8 @@ class Matter:
         return self.numbers.sqrt(self.numbers.tie)
 
     def approach(self, touch: Touch, v: Mapping[int, Velocity]) -> Number:
-        """dr.dv m2/s (m/s at a wall, where the direction has length 1); negative: the two approach."""
+        """dr.dv m2/s (m/s at a wall, where the direction has length 1); negative: the two
+        approach."""
         (ux, uy), (px, py) = self._pair(touch, v)
         return touch.dx * (px - ux) + touch.dy * (py - uy)
 
@@ -87,7 +92,8 @@ class Matter:
     def collision(self, touch: Touch, v: Velocities) -> tuple[Velocities, Blow]:
         """The velocities after the collision, and the collision.
 
-        q = -(1 + e) b / (dr.dr (w_i + w_j)) times dr: no root, which in float64 would make energy drift.
+        q = -(1 + e) b / (dr.dr (w_i + w_j)) times dr: no root, which in float64 would make energy
+        drift.
         """
         contact, dx, dy = touch
         (ux, uy), (px, py) = self._pair(touch, v)
@@ -108,12 +114,13 @@ class Matter:
         still: frozenset[Contact] = frozenset(),
         upright: Callable[[Contact, Contact], bool] = lambda _one, _other: False,
     ) -> tuple[list[Outcome], int]:
-        """Every different end that resolving the approaching contacts in some order can have, with one such order.
+        """Every different end that resolving the approaching contacts in some order can have, with
+        one such order.
 
         And how many collisions were tried for that.
 
-        still: contacts with no speed across, exactly. upright: whether a collision on one contact leaves the other so.
-        The last element has no velocities where some order does not end.
+        still: contacts with no speed across, exactly. upright: whether a collision on one contact
+        leaves the other so. The last element has no velocities where some order does not end.
         """
         sign, ends = self.numbers.sign, list[Outcome]()
         waiting = [Outcome(v, [], still)]
@@ -123,13 +130,26 @@ class Matter:
             now, blows, still = waiting.pop()
             if len(blows) > LONGEST:
                 break
-            closing = [touch for touch in touches if touch.contact not in still and sign(self.approach(touch, now)) < 0]
-            # Collisions that die out towards the tie do not end: with more digits there would be more of them.
-            if blows and not self.numbers.proves and any(abs(self.approach(t, now)) < self.faint for t in closing):
+            closing = [
+                touch
+                for touch in touches
+                if touch.contact not in still and sign(self.approach(touch, now)) < 0
+            ]
+            # Collisions that die out towards the tie do not end: with more digits there would be
+            # more of them.
+            if (
+                blows
+                and not self.numbers.proves
+                and any(abs(self.approach(t, now)) < self.faint for t in closing)
+            ):
                 break
             for touch in closing:
                 after, blow = self.collision(touch, now)
-                kept = {c for c in still if not c.disks & touch.contact.disks or upright(c, touch.contact)}
+                kept = {
+                    c
+                    for c in still
+                    if not c.disks & touch.contact.disks or upright(c, touch.contact)
+                }
                 kept |= {touch.contact} if self.sticks else set()
                 waiting.append(Outcome(after, [*blows, blow], frozenset(kept)))
             if not closing and not any(self._same(now, end.velocities) for end in ends):

@@ -1,4 +1,5 @@
-"""What an answer may cost: steps, which are the same everywhere, and the time of somebody who waits for it."""
+"""What an answer may cost: steps, which are the same everywhere, and the time of somebody who waits
+for it."""
 
 from __future__ import annotations
 
@@ -7,7 +8,8 @@ from time import monotonic
 
 from scenarios.truth.oracle.path import Ends
 
-MOST_STEPS = 60_000  # collisions, edges crossed, records made anew, orders of simultaneous collisions tried
+# collisions, edges crossed, records made anew, orders of simultaneous collisions tried
+MOST_STEPS = 60_000
 
 
 class Clock:
@@ -28,12 +30,15 @@ class Clock:
 class Work:
     """What one attempt may cost: so many steps, and a share of the time that its clock has left."""
 
-    def __init__(self, left: int = MOST_STEPS, clock: Clock | None = None, share: float = 1.0) -> None:
+    def __init__(
+        self, left: int = MOST_STEPS, clock: Clock | None = None, share: float = 1.0
+    ) -> None:
         self.left, self.clock, now = left, clock or Clock(), monotonic()
         self.stop = now + share * (self.clock.end - now)
 
     def step(self, t: float, bits: int) -> None:
-        """Count a step that led to `t` s in numbers of so many bits; raises `Ends` where none is left."""
+        """Count a step that led to `t` s in numbers of so many bits; raises `Ends` where none is
+        left."""
         self.left -= 1
         if self.left < 0:
             raise Ends(t, f"the work allowed for an answer in {bits} bits is used up")

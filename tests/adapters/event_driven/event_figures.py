@@ -1,8 +1,8 @@
-"""The long validations of the event engine as a table: `uv run python tests/adapters/event_driven/event_figures.py`
-writes it anew.
+"""The long validations of the event engine as a table: `uv run python
+tests/adapters/event_driven/event_figures.py` writes it anew.
 
-Ten million collisions of 1024 disks on a torus, e = 1, at each packing; `test_event_gases` plays them again and
-compares.
+Ten million collisions of 1024 disks on a torus, e = 1, at each packing; `test_event_gases` plays
+them again and compares.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ DISKS, COLLISIONS, BLOCKS = 1024, 10_000_000, 50
 def measured(
     packing: float, disks: int = DISKS, collisions: int = COLLISIONS, blocks: int = BLOCKS
 ) -> dict[str, float]:
-    """One row: Z from the virial of the collisions, their rate, their errors from blocks, and what must not drift.
+    """One row: Z from the virial of the collisions, their rate, their errors from blocks, and what
+    must not drift.
 
-    Z = 1 + sum of impulses / (2 N kT t), kT = K / (N - 1); rate = 4 / sqrt(pi) (Z - 1) (Enskog), in units of the
-    disks' diameter, mass and kT. The first 200 collisions of each disk are left out.
+    Z = 1 + sum of impulses / (2 N kT t), kT = K / (N - 1); rate = 4 / sqrt(pi) (Z - 1) (Enskog), in
+    units of the disks' diameter, mass and kT. The first 200 collisions of each disk are left out.
     """
     scene, torus = gas(disks, packing)
     engine, z = EventEngine(scene, torus), compressibility(packing)
@@ -47,14 +48,19 @@ def measured(
     found, rates = 1 + impulses / (2 * disks * kinetic * span), 2 * counts / disks / span
     v2 = (end**2).sum(axis=1)
     return {
-        "packing": packing, "disks": disks, "collisions": int(counts.sum()),
-        "Z": found.mean(), "Z_error": found.std(ddof=1) / np.sqrt(blocks), "Z_reference": z - (z - 1) / disks,
-        "rate": rates.mean(), "rate_error": rates.std(ddof=1) / np.sqrt(blocks),
+        "packing": packing,
+        "disks": disks,
+        "collisions": int(counts.sum()),
+        "Z": found.mean(),
+        "Z_error": found.std(ddof=1) / np.sqrt(blocks),
+        "Z_reference": z - (z - 1) / disks,
+        "rate": rates.mean(),
+        "rate_error": rates.std(ddof=1) / np.sqrt(blocks),
         "rate_reference": rate * (1 - 1 / disks),
         "v4_over_v2_squared": (v2**2).mean() / v2.mean() ** 2,
         "energy_drift": abs((end**2).sum() / (start**2).sum() - 1),
         "momentum_drift": np.abs(end.sum(axis=0) - start.sum(axis=0)).max() / np.abs(end).sum(),
-    }  # fmt: skip
+    }
 
 
 def read() -> dict[float, dict[str, float]]:
@@ -70,7 +76,9 @@ def main() -> None:
     with TABLE.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows({name: float(f"{value:.9g}") for name, value in row.items()} for row in rows)
+        writer.writerows(
+            {name: float(f"{value:.9g}") for name, value in row.items()} for row in rows
+        )
     print(TABLE.read_text())
 
 

@@ -1,4 +1,5 @@
-"""The float64 event engine beside the oracle: its answer up to where its own rounding would begin to show."""
+"""The float64 event engine beside the oracle: its answer up to where its own rounding would begin
+to show."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from scenarios.no_truth import NoTruth
 from scenarios.truth.closed_forms import Motion, answer, world_thrusts
 
 ERROR_BOUND = 1e-9  # m
-SAFETY = 10.0  # a perturbed run may stray so many times less than the bound, since the run itself is as far off
+# a perturbed run may stray so many times less than the bound, since the run itself is as far off
+SAFETY = 10.0
 PERTURBATIONS = 3
 EPS = float(np.finfo(float).eps)
 
@@ -21,8 +23,9 @@ EPS = float(np.finfo(float).eps)
 class EventTruth:
     """Times (k,) s -> the `Trajectory` of a scenario by the event engine, cut at `horizon` s.
 
-    It is valid up to the last sample at which all runs from starts a unit in the last place away agree with it, and
-    to where the motion has no single continuation; `reason` says which, or is "" if it holds for the duration.
+    It is valid up to the last sample at which all runs from starts a unit in the last place away
+    agree with it, and to where the motion has no single continuation; `reason` says which, or is ""
+    if it holds for the duration.
 
     Raises:
         NoTruth: the scene has no answer at all, or thrusts that turn with their disk.
@@ -63,26 +66,35 @@ class EventTruth:
         for seed in range(PERTURBATIONS):
             try:
                 (other, _), _, _, _ = self.play(perturbed(scene, seed), times[:agree])
-            except NoTruth:  # disks that touch may overlap when they are moved by a unit in the last place
+            except (
+                NoTruth
+            ):  # disks that touch may overlap when they are moved by a unit in the last place
                 return 0.0, "the start itself is decided by rounding: disks or walls touch"
             agree = min(agree, len(other))
-            diverged = np.abs(other[:agree] - position[:agree]).max(axis=(1, 2)) > ERROR_BOUND / SAFETY
+            diverged = (
+                np.abs(other[:agree] - position[:agree]).max(axis=(1, 2)) > ERROR_BOUND / SAFETY
+            )
             agree = int(diverged.argmax()) if diverged.any() else agree
         if agree == len(times):
             return float(times[-1]), ""
         if agree == len(position):
             return float(min(end, times[agree])), reason
-        return float(times[agree - 1]), "float64 cannot decide: a start one unit in the last place away leads elsewhere"
+        return (
+            float(times[agree - 1]),
+            "float64 cannot decide: a start one unit in the last place away leads elsewhere",
+        )
 
     def play(self, scene: Scene, t: Array) -> tuple[Motion, Array, float, str]:
-        """Position and velocity (k, n, 2) at as many of the times as are reached, collisions (h, 4); when and why it
-        ends."""
+        """Position and velocity (k, n, 2) at as many of the times as are reached, collisions (h,
+        4); when and why it ends."""
         engine = EventEngine(scene)
         edges = {edge for thrust in self.scenario.thrusts for edge in (thrust.start, thrust.stop)}
         seen: list[tuple[Array, Array]] = []
         end, reason = np.inf, ""
         try:
-            for at in sorted({*t.tolist(), *(edge for edge in edges if edge <= t[-1])} if len(t) else ()):
+            for at in sorted(
+                {*t.tolist(), *(edge for edge in edges if edge <= t[-1])} if len(t) else ()
+            ):
                 engine.advance(at)
                 if at in edges:
                     self.set_accelerations(engine, scene, at)
@@ -90,26 +102,33 @@ class EventTruth:
         except NoTruth as refusal:
             end, reason = refusal.at, str(refusal)
         shape = (len(seen), scene.n, 2)
-        position, velocity = (np.array([look[part] for look in seen]).reshape(shape) for part in range(2))
+        position, velocity = (
+            np.array([look[part] for look in seen]).reshape(shape) for part in range(2)
+        )
         return (position, velocity), engine.collisions, end, reason
 
     def set_accelerations(self, engine: EventEngine, scene: Scene, at: float) -> None:
         """Give every disk under a thrust the acceleration it has from `at` s on."""
         for disk in sorted({thrust.disk for thrust in self.scenario.thrusts}):
-            on = [p.force for p in self.scenario.thrusts if p.disk == disk and p.start <= at < p.stop]
+            on = [
+                p.force for p in self.scenario.thrusts if p.disk == disk and p.start <= at < p.stop
+            ]
             if not scene.static[disk]:
                 engine.accelerate(disk, at, scene.gravity + sum(on, np.zeros(2)) / scene.mass[disk])
 
 
 def float64_truth(scenario: Scenario) -> EventTruth:
-    """The scenario's answer by float64 events; raises `NoTruth` if its start or its thrusts allow none."""
+    """The scenario's answer by float64 events; raises `NoTruth` if its start or its thrusts allow
+    none."""
     return EventTruth(scenario)
 
 
 def perturbed(scene: Scene, seed: int) -> Scene:
-    """The scene with every moving disk off by a unit in the last place of the largest coordinate and speed.
+    """The scene with every moving disk off by a unit in the last place of the largest coordinate
+    and speed.
 
-    Where all centres lie on one line along an axis and nothing moves across it, nothing is rounded across it either.
+    Where all centres lie on one line along an axis and nothing moves across it, nothing is rounded
+    across it either.
     """
     draw = np.random.default_rng(seed)
     position, velocity = scene.position, scene.velocity

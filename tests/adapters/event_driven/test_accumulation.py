@@ -1,4 +1,5 @@
-"""Collisions without an end in the event engine: rest in a corner, a refusal by name, and never an endless loop."""
+"""Collisions without an end in the event engine: rest in a corner, a refusal by name, and never an
+endless loop."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ CROSS = [[[-1.0, -1.0], [1.0, 1.0]], [[-1.0, 1.0], [1.0, -1.0]]]
 def disk(position, velocity=(0.0, 0.0), restitution=0.0, **fields):
     """One disk of radius 0.25 and mass 1 above crossing walls, unless said otherwise."""
     arrays = {"radius": [0.25], "mass": [1.0], "walls": CROSS, "gravity": [0.0, -2.0]}
-    return Scene(position=[position], velocity=[velocity], restitution=restitution, **(arrays | fields))
+    return Scene(
+        position=[position], velocity=[velocity], restitution=restitution, **(arrays | fields)
+    )
 
 
 def after(scene, until):
@@ -56,9 +59,12 @@ def test_a_disk_comes_to_rest_in_a_wedge(half, e):
 
 
 def test_into_a_right_angle_both_axes_bounce_on_their_own():
-    """Each as a ball above a floor, in closed form, also when the other has come to rest already."""
+    """Each as a ball above a floor, in closed form, also when the other has come to rest
+    already."""
     e, acceleration = 0.5, np.array([3.0, 8.0])
-    engine = EventEngine(disk([1.25, 1.75], [0.0, 0.0], e, walls=box([0, 0], [9, 9]), gravity=-acceleration))
+    engine = EventEngine(
+        disk([1.25, 1.75], [0.0, 0.0], e, walls=box([0, 0], [9, 9]), gravity=-acceleration)
+    )
     for at in np.linspace(0.02, 6.0, 300):
         engine.advance(at)
         x, _ = engine.look(at)
@@ -78,8 +84,11 @@ def test_into_a_right_angle_both_axes_bounce_on_their_own():
     ],
 )
 def test_a_change_of_acceleration_takes_a_disk_out_of_its_corner(acceleration, moves):
-    """Which wall still bears it decides how it goes: a t2 / 2 along what is left of the acceleration."""
-    engine = EventEngine(disk([0.25, 0.25], walls=box([0, 0], [20, 20]), gravity=[-3.0, -8.0], restitution=0.5))
+    """Which wall still bears it decides how it goes: a t2 / 2 along what is left of the
+    acceleration."""
+    engine = EventEngine(
+        disk([0.25, 0.25], walls=box([0, 0], [20, 20]), gravity=[-3.0, -8.0], restitution=0.5)
+    )
     engine.advance(1.0)
     assert engine.look(1.0)[1].tolist() == [[0.0, 0.0]]
     engine.accelerate(0, 1.0, np.array(acceleration))
@@ -89,8 +98,8 @@ def test_a_change_of_acceleration_takes_a_disk_out_of_its_corner(acceleration, m
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_in_an_obtuse_wedge_a_disk_slides_up_the_wall_that_holds_it_no_more(side):
-    """Of 120 degrees: turned by 45 degrees, the acceleration still presses it onto both walls, but drives it up one of
-    them."""
+    """Of 120 degrees: turned by 45 degrees, the acceleration still presses it onto both walls, but
+    drives it up one of them."""
     walls = [[[0.0, 0.0], [3 * way * np.sin(np.pi / 3), 3 * np.cos(np.pi / 3)]] for way in (1, -1)]
     engine = EventEngine(disk([0.01, 1.0], walls=walls, gravity=[0.0, -8.0], restitution=0.5))
     engine.advance(5.0)
@@ -102,13 +111,20 @@ def test_in_an_obtuse_wedge_a_disk_slides_up_the_wall_that_holds_it_no_more(side
     assert engine.look(5.5)[0][0] == pytest.approx([0.0, 0.25 / np.sin(np.pi / 3)] + way, abs=1e-12)
 
 
-@pytest.mark.parametrize(("place", "speed"), [((2.0, 0.25), (-3.0, 0.0)), ((0.25, 2.25), (0.0, -2.5))])
+@pytest.mark.parametrize(
+    ("place", "speed"), [((2.0, 0.25), (-3.0, 0.0)), ((0.25, 2.25), (0.0, -2.5))]
+)
 def test_a_collision_takes_a_disk_out_of_its_corner_as_the_exact_answer_has_it(place, speed):
     """Along the floor, and along the side wall; one lies in the corner at the start, e = 0.8."""
     scene = Scene(
-        position=[[0.25, 0.25], place], velocity=[[0.0, 0.0], speed],
-        radius=[0.25, 0.25], mass=[1.0, 2.0], restitution=0.8, walls=box([0, 0], [9, 9]), gravity=[-0.5, -4.0],
-    )  # fmt: skip
+        position=[[0.25, 0.25], place],
+        velocity=[[0.0, 0.0], speed],
+        radius=[0.25, 0.25],
+        mass=[1.0, 2.0],
+        restitution=0.8,
+        walls=box([0, 0], [9, 9]),
+        gravity=[-0.5, -4.0],
+    )
     one = Scenario("cornered", "?", "", scene, 1.0, 1 / 16)
     exact, engine = computed(one).sampled(scene, (), one.times), EventEngine(scene)
     assert len(exact) == 17
@@ -129,24 +145,33 @@ def test_at_restitution_one_what_lies_at_the_start_stays():
 
 SETTLING = Scene(
     position=[
-        [0.22170989031017796, 0.6013981985012808], [-0.424888005478246, 0.7941739535426513],
-        [-1.5862809070458073, -1.0599378169489908], [-1.0797970968313831, 0.8208738459921847],
+        [0.22170989031017796, 0.6013981985012808],
+        [-0.424888005478246, 0.7941739535426513],
+        [-1.5862809070458073, -1.0599378169489908],
+        [-1.0797970968313831, 0.8208738459921847],
     ],
     velocity=[
-        [-2.6618486511730426, 0.20747975734562682], [0.8698842186396099, 0.6954040844930676],
-        [-0.2561115136170485, -2.937868626715388], [1.046069020054338, -1.4544114048545322],
+        [-2.6618486511730426, 0.20747975734562682],
+        [0.8698842186396099, 0.6954040844930676],
+        [-0.2561115136170485, -2.937868626715388],
+        [1.046069020054338, -1.4544114048545322],
     ],
     radius=[0.17519097523155064, 0.26211645165017655, 0.20488243366158748, 0.19370006047168187],
     mass=[2.7591325550447965, 2.003588078050509, 2.1215280851993, 0.510568267924179],
-    restitution=0.5, gravity=[0.0, -7.713535421586903], walls=box([-2.0, -1.5], [2.0, 1.5]),
-)  # fmt: skip
+    restitution=0.5,
+    gravity=[0.0, -7.713535421586903],
+    walls=box([-2.0, -1.5], [2.0, 1.5]),
+)
 
 
 def test_collisions_that_accumulate_are_refused_where_the_exact_answer_ends_too():
-    """A disk on the floor under another that settles on it: the same disks and wall, the same instant."""
+    """A disk on the floor under another that settles on it: the same disks and wall, the same
+    instant."""
     record = computed(Scenario("settling", "?", "", SETTLING, 3.0, 0.05))
     engine = EventEngine(SETTLING)
-    with pytest.raises(NoTruth, match=r"the collisions of disk \d on disk \d and wall 1 accumulate at") as refusal:
+    with pytest.raises(
+        NoTruth, match=r"the collisions of disk \d on disk \d and wall 1 accumulate at"
+    ) as refusal:
         engine.advance(3.0)
     assert "accumulate" in record.reason
     # A bounce that rounding hides takes some 1e-7 s.
@@ -157,19 +182,28 @@ def test_collisions_that_accumulate_are_refused_where_the_exact_answer_ends_too(
 def test_a_disk_driven_into_a_wall_by_another_is_refused():
     """One without acceleration, between the wall and one that is."""
     scene = Scene(
-        position=[[0.25, 0.0], [1.2, 0.0]], velocity=np.zeros((2, 2)), radius=[0.25, 0.25], mass=[1.0, 1.0],
-        restitution=0.6, walls=[[[0.0, -5.0], [0.0, 5.0]]],
-    )  # fmt: skip
+        position=[[0.25, 0.0], [1.2, 0.0]],
+        velocity=np.zeros((2, 2)),
+        radius=[0.25, 0.25],
+        mass=[1.0, 1.0],
+        restitution=0.6,
+        walls=[[[0.0, -5.0], [0.0, 5.0]]],
+    )
     engine = EventEngine(scene)
     engine.accelerate(1, 0.0, np.array([-5.0, 0.0]))
-    with pytest.raises(NoTruth, match=r"the collisions of disk 0 on disk 1( and wall 0)? accumulate at 0\.\d+ s"):
+    with pytest.raises(
+        NoTruth, match=r"the collisions of disk 0 on disk 1( and wall 0)? accumulate at 0\.\d+ s"
+    ):
         engine.advance(9.0)
     assert engine.spent < 10_000
 
 
 def test_a_bounce_off_the_end_of_a_wall_is_not_one_off_its_face():
-    """After it the disk is behind the line of the face, by more than rounding, until it has gone past the end."""
-    scene = disk([1.5, 1.0], [-1.5, -1.0], 0.5, walls=[[[-4.0, 0.0], [1.0, 0.0]]], gravity=[0.0, -9.0])
+    """After it the disk is behind the line of the face, by more than rounding, until it has gone
+    past the end."""
+    scene = disk(
+        [1.5, 1.0], [-1.5, -1.0], 0.5, walls=[[[-4.0, 0.0], [1.0, 0.0]]], gravity=[0.0, -9.0]
+    )
     one = Scenario("end", "?", "", scene, 1.5, 1 / 16)
     exact = computed(one).sampled(scene, (), one.times)
     engine = EventEngine(scene)
@@ -179,18 +213,27 @@ def test_a_bounce_off_the_end_of_a_wall_is_not_one_off_its_face():
 
 
 def test_more_collisions_than_can_be_followed_are_refused():
-    """A disk to and fro in a gap of a nanometre, a billion times a second: in less than a second of work."""
+    """A disk to and fro in a gap of a nanometre, a billion times a second: in less than a second of
+    work."""
     gap = 1e-9
-    scene = disk([0.25 + gap / 2, 0.0], [1.0, 0.0], 1.0, gravity=None,
-                 walls=[[[0.0, -1.0], [0.0, 1.0]], [[0.5 + gap, -1.0], [0.5 + gap, 1.0]]])  # fmt: skip
+    scene = disk(
+        [0.25 + gap / 2, 0.0],
+        [1.0, 0.0],
+        1.0,
+        gravity=None,
+        walls=[[[0.0, -1.0], [0.0, 1.0]], [[0.5 + gap, -1.0], [0.5 + gap, 1.0]]],
+    )
     engine = EventEngine(scene)
-    with pytest.raises(NoTruth, match=r"\d+ events from 0 s to 0\.0004\d+ s are too many to follow up to 1 s"):
+    with pytest.raises(
+        NoTruth, match=r"\d+ events from 0 s to 0\.0004\d+ s are too many to follow up to 1 s"
+    ):
         engine.advance(1.0)
     assert engine.spent < 1.1 * events.MOST
 
 
 def test_many_collisions_in_a_short_time_are_followed():
-    """31415 of a light disk between a wall and a heavy one: most of them within a ten-thousandth of the time."""
+    """31415 of a light disk between a wall and a heavy one: most of them within a ten-thousandth of
+    the time."""
     one = counting_pi(31415, 1e8, 31.0, (1,))
     engine = EventEngine(one.scene)
     engine.advance(31.0)
@@ -200,7 +243,9 @@ def test_many_collisions_in_a_short_time_are_followed():
 def test_what_would_take_for_ever_is_refused_though_it_is_no_collision():
     """A thrust without measure makes a disk cross cell after cell."""
     engine = EventEngine(
-        Scene(position=[[0.0, 0.0]], velocity=[[0.0, 0.0]], radius=[0.25], mass=[1.0], restitution=1.0)
+        Scene(
+            position=[[0.0, 0.0]], velocity=[[0.0, 0.0]], radius=[0.25], mass=[1.0], restitution=1.0
+        )
     )
     engine.accelerate(0, 0.0, np.array([1e160, 0.0]))
     with pytest.raises(NoTruth, match="are too many to follow up to 1 s"):
@@ -259,7 +304,8 @@ def test_accumulation_in_plain_python_is_the_same(monkeypatch):
     ("right", "wrong"),
     [
         ("if held == 0.0 or", "if True or"),  # nothing lies still in a corner
-        # What rattles is not noticed, and a wall's end lifts a disk to its face: both rattle on for seconds.
+        # What rattles is not noticed, and a wall's end lifts a disk to its face: both rattle on for
+        # seconds.
         pytest.param("if run.collisions < COLLISIONS:", "if True:", marks=pytest.mark.slow),
         pytest.param("if abs(gap) < ROUNDING", "if gap < ROUNDING", marks=pytest.mark.slow),
         ("fall_into(walls, a, w, k) > 0.0", "False"),  # it is left to the first of its two walls

@@ -18,7 +18,8 @@ from scenarios.model import Scene
 from scenarios.no_truth import NoTruth
 from tests.adapters.event_driven.gases import collisions_of
 
-# A second algorithm: all contacts as polynomials, all roots by numpy, nothing kept from one event to the next.
+# A second algorithm: all contacts as polynomials, all roots by numpy, nothing kept from one event
+# to the next.
 
 
 def first_fall(gap):
@@ -33,34 +34,54 @@ def first_fall(gap):
 def contacts(scene, x, v, a, images):
     """All contacts ahead: (time, disk, other or -1 - wall, normal to it at the contact)."""
     for i in range(scene.n):
-        points = [(scene.radius[i], -1 - w, end, 0, 0) for w, wall in enumerate(scene.walls) for end in wall]
+        points = [
+            (scene.radius[i], -1 - w, end, 0, 0)
+            for w, wall in enumerate(scene.walls)
+            for end in wall
+        ]
         others = [
             (scene.radius[i] + scene.radius[j], j, x[j] + shift, v[j], a[j])
-            for j in range(i + 1, scene.n) for shift in images
-        ]  # fmt: skip
+            for j in range(i + 1, scene.n)
+            for shift in images
+        ]
         for reach, j, place, speed, acceleration in [*points, *others]:
             path = np.array([(a[i] - acceleration) / 2, v[i] - speed, x[i] - place])
-            gap = sum(np.convolve(path[:, axis], path[:, axis]) for axis in range(2)) - [0, 0, 0, 0, reach**2]
+            gap = sum(np.convolve(path[:, axis], path[:, axis]) for axis in range(2)) - [
+                0,
+                0,
+                0,
+                0,
+                reach**2,
+            ]
             if (t := first_fall(gap)) < np.inf:
                 yield t, i, j, np.array([np.polyval(path[:, axis], t) for axis in range(2)])
         for w, (start, end) in enumerate(scene.walls):
             along = (end - start) / np.hypot(*(end - start))
             for normal in (np.array([-along[1], along[0]]), np.array([along[1], -along[0]])):
-                t = first_fall([a[i] @ normal / 2, v[i] @ normal, (x[i] - start) @ normal - scene.radius[i]])
-                if t < np.inf and 0 < (x[i] + v[i] * t + a[i] * t * t / 2 - start) @ along < np.hypot(*(end - start)):
+                t = first_fall(
+                    [a[i] @ normal / 2, v[i] @ normal, (x[i] - start) @ normal - scene.radius[i]]
+                )
+                if t < np.inf and 0 < (
+                    x[i] + v[i] * t + a[i] * t * t / 2 - start
+                ) @ along < np.hypot(*(end - start)):
                     yield t, i, -1 - w, normal
 
 
 def brute_force(scene, side, count):
-    """Up to `count` collisions as (t, i, j) within 5 s, and when it stopped and where; side: of the torus, or 0."""
+    """Up to `count` collisions as (t, i, j) within 5 s, and when it stopped and where; side: of the
+    torus, or 0."""
     x, v, w = scene.position.copy(), scene.velocity.copy(), 1 / scene.mass
     a = np.where(scene.static[:, None], 0.0, scene.gravity)
-    images = [np.array([k, m]) * side for k in (-1, 0, 1) for m in (-1, 0, 1)] if side else [np.zeros(2)]
+    images = (
+        [np.array([k, m]) * side for k in (-1, 0, 1) for m in (-1, 0, 1)] if side else [np.zeros(2)]
+    )
     now, collisions = 0.0, []
     while len(collisions) < count:
         if side:
             x = np.mod(x, side)
-        t, i, j, normal = min(contacts(scene, x, v, a, images), key=lambda c: c[0], default=(np.inf, 0, 0, None))
+        t, i, j, normal = min(
+            contacts(scene, x, v, a, images), key=lambda c: c[0], default=(np.inf, 0, 0, None)
+        )
         t = min(t, 0.2 if side else 10.0)  # in 0.2 s nobody passes the next image
         if now + t > 5:
             break
@@ -78,26 +99,34 @@ def brute_force(scene, side, count):
 
 
 def random_scene(seed):
-    """A box, a torus, or an open place with loose walls; any radii and masses, some static, gravity or none."""
+    """A box, a torus, or an open place with loose walls; any radii and masses, some static, gravity
+    or none."""
     draw = np.random.default_rng(seed)
     n, kind = int(draw.integers(2, 7)), ("box", "torus", "open")[seed % 3]
     radius = draw.uniform(0.05, 0.3, n)
     walls = {"box": box([-1.6, -1.3], [1.7, 1.5]), "torus": np.zeros((0, 2, 2))}.get(kind)
     if walls is None:
         walls = draw.uniform(-1, 1, (2, 2, 2)) + [[[0, -2.4]], [[0, 2.4]]]
-    position = scatter(draw, [0.01, 0.01], [1.79, 1.79], radius) if kind == "torus" else scatter(
-        draw, [-1.2, -0.9], [1.3, 1.1], radius
-    )  # fmt: skip
+    position = (
+        scatter(draw, [0.01, 0.01], [1.79, 1.79], radius)
+        if kind == "torus"
+        else scatter(draw, [-1.2, -0.9], [1.3, 1.1], radius)
+    )
     mass = np.where(draw.random(n) < 0.2, np.inf, draw.uniform(0.3, 5, n))
     return Scene(
-        position=position, velocity=np.where(np.isinf(mass)[:, None], 0.0, draw.normal(size=(n, 2))),
-        radius=radius, mass=mass, walls=walls, restitution=float(draw.choice([0.6, 0.9, 1.0])),
+        position=position,
+        velocity=np.where(np.isinf(mass)[:, None], 0.0, draw.normal(size=(n, 2))),
+        radius=radius,
+        mass=mass,
+        walls=walls,
+        restitution=float(draw.choice([0.6, 0.9, 1.0])),
         gravity=draw.normal(size=2) * (draw.random() < 0.6),
-    ), 1.8 if kind == "torus" else 0.0  # fmt: skip
+    ), (1.8 if kind == "torus" else 0.0)
 
 
 def compare(seed):
-    """A random scene by the engine and by brute force: the first eight collisions, and the positions after them."""
+    """A random scene by the engine and by brute force: the first eight collisions, and the
+    positions after them."""
     scene, side = random_scene(seed)
     try:
         engine = EventEngine(scene, [[0, 0], [side, side]] if side else None)
@@ -106,8 +135,11 @@ def compare(seed):
     collisions, now, x = brute_force(scene, side, 8)
     engine.advance(now + 1e-9)
     found = collisions_of(engine)[: len(collisions)]
-    # Eight collisions of disks a tenth as large as their paths: each may take a digit from the sixteen there are.
-    np.testing.assert_allclose(np.array(found).reshape(-1, 3), np.array(collisions).reshape(-1, 3), rtol=0, atol=1e-7)
+    # Eight collisions of disks a tenth as large as their paths: each may take a digit from the
+    # sixteen there are.
+    np.testing.assert_allclose(
+        np.array(found).reshape(-1, 3), np.array(collisions).reshape(-1, 3), rtol=0, atol=1e-7
+    )
     apart = engine.look(now)[0] - x
     apart -= side * np.round(apart / side) if side else 0
     assert np.abs(apart).max() < 1e-7
@@ -131,8 +163,10 @@ BUGS = {
     "stale record kept": ("b.count == a.partner_count", "True"),
     "nearest image": (
         "dx, dy = b.x - x + image(b.cx - cx, g.shift[0]), b.y - y + image(b.cy - cy, g.shift[1])",
-        "dx = b.x - x\n        dx -= g.span[0] * np.round(dx / g.span[0]) * g.torus\n        dy = b.y - y\n"
-        "        dy -= g.span[1] * np.round(dy / g.span[1]) * g.torus",
+        (
+            "dx = b.x - x\n        dx -= g.span[0] * np.round(dx / g.span[0]) * g.torus\n        dy"
+            " = b.y - y\n        dy -= g.span[1] * np.round(dy / g.span[1]) * g.torus"
+        ),
     ),
     "contact found late": (
         "t = max(gap, 0.0) / (sqrt(max(disc, 0.0)) - closing)",
@@ -140,7 +174,10 @@ BUGS = {
     ),
     "wall end forgotten": ("for part in range(3)", "for part in range(1)"),
     "static disk falls along": ("arena.rules.mixed and (b.ax", "False and (b.ax"),
-    "new cells not searched": ("if beyond == ALL:", "if beyond != ALL: return 0\n    if beyond == ALL:"),
+    "new cells not searched": (
+        "if beyond == ALL:",
+        "if beyond != ALL: return 0\n    if beyond == ALL:",
+    ),
 }
 
 
@@ -153,9 +190,12 @@ def plain_kernels(right="", wrong=""):
     assert right in source
     names: dict = {"__name__": "plain"}
     exec(source.replace(right, wrong) if right else source, names)
-    # Compiled (error_model="numpy") a division by zero gives an infinity or nan in silence, which the kernels use.
+    # Compiled (error_model="numpy") a division by zero gives an infinity or nan in silence, which
+    # the kernels use.
     quiet = np.errstate(divide="ignore", invalid="ignore")
-    return SimpleNamespace(**names | {name: quiet(names[name]) for name in ("begin", "advance", "acceleration")})
+    return SimpleNamespace(
+        **names | {name: quiet(names[name]) for name in ("begin", "advance", "acceleration")}
+    )
 
 
 def test_the_kernels_as_plain_python_find_the_same(monkeypatch):

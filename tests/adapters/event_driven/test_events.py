@@ -25,9 +25,11 @@ ANSWERED = [name for name in SCENARIOS if scenario(name).truth and name not in R
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_the_closed_forms_are_met_up_to_the_horizon(name):
-    """States and lists of collisions, to a few roundings, which chaos makes a thousand: far within the 1e-9 m claimed.
+    """States and lists of collisions, to a few roundings, which chaos makes a thousand: far within
+    the 1e-9 m claimed.
 
-    The truth is the closed form, or the oracle in many digits, which shares no algorithm with the event engine.
+    The truth is the closed form, or the oracle in many digits, which shares no algorithm with the
+    event engine.
     """
     run = scenario(name)
     exact, truth = run.truth(run.times), float64_truth(run)
@@ -35,20 +37,32 @@ def test_the_closed_forms_are_met_up_to_the_horizon(name):
     k = min(len(exact), len(found))
     assert found.t[k - 1] == exact.t[k - 1]
     chaos = 1e3 if isinstance(run.truth, OracleTruth) else 1.0
-    for field, tolerance in (("position", 1e-12), ("velocity", 2e-12), ("angle", 1e-14), ("angular_velocity", 1e-14)):
-        np.testing.assert_allclose(getattr(found, field)[:k], getattr(exact, field)[:k], rtol=0, atol=chaos * tolerance)
+    for field, tolerance in (
+        ("position", 1e-12),
+        ("velocity", 2e-12),
+        ("angle", 1e-14),
+        ("angular_velocity", 1e-14),
+    ):
+        np.testing.assert_allclose(
+            getattr(found, field)[:k], getattr(exact, field)[:k], rtol=0, atol=chaos * tolerance
+        )
     reported, listed = found.collisions, exact.collisions
-    last = min(found.t[k - 1], 8.0 if name == "bouncing_ball_e09" else np.inf)  # it lists only collisions 1e-4 s apart
+    # it lists only collisions 1e-4 s apart
+    last = min(found.t[k - 1], 8.0 if name == "bouncing_ball_e09" else np.inf)
     h = int((listed.t <= last).sum())
     assert h == (reported.t <= last).sum()
     pairs = [
         sorted(zip(np.round(c.t[:h], 8), c.i[:h], c.j[:h])) for c in (reported, listed)
     ]  # 49 balls collide at once
     assert pairs[0] == pairs[1]
-    np.testing.assert_allclose(reported.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=chaos * 1e-12)
+    np.testing.assert_allclose(
+        reported.impulse[:h], listed.impulse[:h], rtol=1e-11, atol=chaos * 1e-12
+    )
 
 
-@pytest.mark.parametrize("name", ["free_fall", "galperin_3", "ping_pong", "mass_ratios", "line_gas"])
+@pytest.mark.parametrize(
+    "name", ["free_fall", "galperin_3", "ping_pong", "mass_ratios", "line_gas"]
+)
 def test_where_nothing_is_chaotic_the_horizon_is_the_duration(name):
     """A start one unit in the last place away leads to the same answer."""
     run = scenario(name)
@@ -65,7 +79,8 @@ def test_a_scene_without_an_answer_is_refused_with_its_reason(name, words):
 
 @pytest.mark.parametrize("name", ["gas_of_100", "asteroids", "falling_box"])
 def test_the_horizon_of_a_chaotic_scene_is_reported(name):
-    """It lies within the duration, and no sample beyond it is given; more samples do not change it."""
+    """It lies within the duration, and no sample beyond it is given; more samples do not change
+    it."""
     run = scenario(name)
     truth = float64_truth(run)
     assert 0 < truth.horizon < run.duration
@@ -77,25 +92,48 @@ def test_the_horizon_of_a_chaotic_scene_is_reported(name):
 def two(gap=0.5, closing=1.0, **fields):
     """Two disks of radius 0.5 on the x axis."""
     arrays = {
-        "position": [[0.0, 0.0], [1.0 + gap, 0.0]], "velocity": [[closing, 0.0], [0.0, 0.0]],
-        "radius": [0.5, 0.5], "mass": [1.0, 1.0], "restitution": 1.0,
-    }  # fmt: skip
+        "position": [[0.0, 0.0], [1.0 + gap, 0.0]],
+        "velocity": [[closing, 0.0], [0.0, 0.0]],
+        "radius": [0.5, 0.5],
+        "mass": [1.0, 1.0],
+        "restitution": 1.0,
+    }
     return Scene(**(arrays | fields))
 
 
 @pytest.mark.parametrize(
     ("scene", "torus", "words"),
     [
-        (two(gap=-0.25), None, r"disks 0 and 1 overlap by 0\.25 m at the start: move one 0\.25 m away"),
+        (
+            two(gap=-0.25),
+            None,
+            r"disks 0 and 1 overlap by 0\.25 m at the start: move one 0\.25 m away",
+        ),
         (two(gap=-(2.0**-52)), None, "disks 0 and 1 overlap by 2.22e-16 m"),
         (two(gap=0.0), None, "disks 0 and 1 touch and close in at 1 m/s at the start: leave a gap"),
-        (two(walls=[[[0, -0.25], [9, -0.25]]]), None, r"disk 0 overlaps wall 0 by 0\.25 m at the start: move it 0\.25"),
-        (two(walls=[[[-0.5, -9], [-0.5, 9]]], closing=-1.0), None, "disk 0 touches wall 0 and closes in at the start"),
-        (two(wrap=[[0, -0.4], [9, 0.4]]), None, r"the box is 0\.8 m wide: its largest disk has a diameter of 1 m"),
-        (two(), [[0, 0], [9, 2.9]], r"the torus is 2\.9 m wide: three diameters of its largest disk are 3 m"),
+        (
+            two(walls=[[[0, -0.25], [9, -0.25]]]),
+            None,
+            r"disk 0 overlaps wall 0 by 0\.25 m at the start: move it 0\.25",
+        ),
+        (
+            two(walls=[[[-0.5, -9], [-0.5, 9]]], closing=-1.0),
+            None,
+            "disk 0 touches wall 0 and closes in at the start",
+        ),
+        (
+            two(wrap=[[0, -0.4], [9, 0.4]]),
+            None,
+            r"the box is 0\.8 m wide: its largest disk has a diameter of 1 m",
+        ),
+        (
+            two(),
+            [[0, 0], [9, 2.9]],
+            r"the torus is 2\.9 m wide: three diameters of its largest disk are 3 m",
+        ),
         (two(gap=7.5), [[0, 0], [9, 9]], r"disks 0 and 1 overlap by 0\.5 m"),
     ],
-)  # fmt: skip
+)
 def test_a_start_that_is_none_is_refused_and_says_what_would_cure_it(scene, torus, words):
     """Judged in rationals: one unit in the last place is an overlap."""
     with pytest.raises(NoTruth, match=words):
@@ -110,11 +148,16 @@ def test_touching_disks_that_part_are_allowed():
 
 
 def test_accumulation_is_refused_with_time_and_disk():
-    """A ball above a static one at e = 0.5: from 1.4 m, over after 3 t1; the answer up to there is given."""
+    """A ball above a static one at e = 0.5: from 1.4 m, over after 3 t1; the answer up to there is
+    given."""
     fall = Scene(
-        position=[[0, 1.6], [0, 0]], velocity=np.zeros((2, 2)), radius=[0.1, 0.1], mass=[1.0, np.inf], restitution=0.5,
+        position=[[0, 1.6], [0, 0]],
+        velocity=np.zeros((2, 2)),
+        radius=[0.1, 0.1],
+        mass=[1.0, np.inf],
+        restitution=0.5,
         gravity=[0, -9.81],
-    )  # fmt: skip
+    )
     end = 3 * np.sqrt(2 * 1.4 / 9.81)
     truth = float64_truth(Scenario("ball", "", "", fall, 3.0, 0.01))
     assert truth.horizon == pytest.approx(end, abs=1e-12)
@@ -123,13 +166,18 @@ def test_accumulation_is_refused_with_time_and_disk():
 
 
 def test_the_wrap_is_an_event_and_a_reentry_on_top_of_a_disk_ends_the_answer():
-    """It leaves at 0.5 s to the right; one that waits on the left edge is in its way, another lets it pass."""
+    """It leaves at 0.5 s to the right; one that waits on the left edge is in its way, another lets
+    it pass."""
     box_ = [[-5, -3], [5, 3]]
     for wait, free in ((-4.2, False), (-3.5, True)):
         scene = Scene(
-            position=[[4.0, 0.0], [wait, 0.0]], velocity=[[2.0, 0.0], [0.0, 0.0]], radius=[0.5, 0.5], mass=[1.0, 1.0],
-            restitution=1.0, wrap=box_,
-        )  # fmt: skip
+            position=[[4.0, 0.0], [wait, 0.0]],
+            velocity=[[2.0, 0.0], [0.0, 0.0]],
+            radius=[0.5, 0.5],
+            mass=[1.0, 1.0],
+            restitution=1.0,
+            wrap=box_,
+        )
         if free:
             engine, x, v = state_after(scene, 1.0)
             assert collisions_of(engine) == [(0.75, 0, 1)]
@@ -151,7 +199,8 @@ def test_a_disk_under_a_thrust_strikes_a_resting_one_at_the_root_of_the_gap():
 
 
 def test_the_log_and_the_epochs_change_nothing():
-    """Collisions are reported in full over many epochs of the clock, whatever the stops on the way."""
+    """Collisions are reported in full over many epochs of the clock, whatever the stops on the
+    way."""
     scene, torus = gas(16, 0.05)
     at_once, x, _ = state_after(scene, 5.0, torus)
     often = EventEngine(scene, torus)

@@ -1,5 +1,5 @@
-"""Gases of hard disks by the event engine: pressure, rate of collisions and speeds of the literature; nothing
-drifts."""
+"""Gases of hard disks by the event engine: pressure, rate of collisions and speeds of the
+literature; nothing drifts."""
 
 from __future__ import annotations
 
@@ -20,19 +20,21 @@ def check(row, tolerance):
 
 
 def test_a_gas_has_the_pressure_energy_and_momentum_of_the_literature():
-    """A million collisions of 1024 disks at packing 0.3; 0.6 % is three times the statistical error."""
+    """A million collisions of 1024 disks at packing 0.3; 0.6 % is three times the statistical
+    error."""
     check(measured(0.3, collisions=1_000_000), 0.006)
 
 
 @pytest.mark.parametrize("packing", PACKINGS)
 def test_the_committed_figures_are_those_of_the_literature(packing):
-    """Within four standard errors, reported by the blocks; Z is off by (Z - 1) / N at first order, by the next one
-    too."""
+    """Within four standard errors, reported by the blocks; Z is off by (Z - 1) / N at first order,
+    by the next one too."""
     row = read()[packing]
     assert row["collisions"] > 9.9e6
     for name in ("Z", "rate"):
         assert (
-            abs(row[name] - row[f"{name}_reference"]) < 4 * row[f"{name}_error"] + row[f"{name}_reference"] / 1024**1.5
+            abs(row[name] - row[f"{name}_reference"])
+            < 4 * row[f"{name}_error"] + row[f"{name}_reference"] / 1024**1.5
         )
     check(row, 0.002)
     # <v4> / <v2>2 = 2 N / (N + 1); 1024 draws of an exponential: standard deviation 2 sqrt(5 / N).
@@ -42,7 +44,8 @@ def test_the_committed_figures_are_those_of_the_literature(packing):
 @pytest.mark.slow
 @pytest.mark.parametrize("packing", PACKINGS)
 def test_the_committed_figures_come_out_again(packing):
-    """Other code generation rounds otherwise, and chaos makes it another sample: within the errors of both."""
+    """Other code generation rounds otherwise, and chaos makes it another sample: within the errors
+    of both."""
     row, new = read()[packing], measured(packing)
     for name in ("Z", "rate"):
         assert abs(new[name] - row[name]) < 4 * np.sqrt(2) * row[f"{name}_error"]

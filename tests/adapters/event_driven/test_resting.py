@@ -1,4 +1,5 @@
-"""Rest in the event engine: bounces that come to their end, what lies on a wall, and what takes it off again."""
+"""Rest in the event engine: bounces that come to their end, what lies on a wall, and what takes it
+off again."""
 
 from __future__ import annotations
 
@@ -35,15 +36,23 @@ def after(scene, until):
 
 @pytest.mark.parametrize("e", [0.0, 0.1, 0.5, 0.9, 0.99])
 def test_a_bouncing_ball_follows_the_closed_form_into_rest(e):
-    """At any time, also between bounces a microsecond apart, and for ever after sqrt(2 h / g) (1 + e) / (1 - e)."""
+    """At any time, also between bounces a microsecond apart, and for ever after sqrt(2 h / g) (1 +
+    e) / (1 - e)."""
     end = np.sqrt(2 * 2.0 / G) * (1 + e) / (1 - e)
     engine = EventEngine(disks([[0.0, 2.5]], [[0.25, 0.0]], e))
-    times = end * np.sort(np.concatenate([np.linspace(0, 1.5, 200), 1 - np.geomspace(1e-1, 1e-9, 60)]))
-    height, speed = bouncing(2.0, G, e, times[-1]).at(times) if e > 0 else (np.maximum(2 - G * times**2 / 2, 0), None)
+    times = end * np.sort(
+        np.concatenate([np.linspace(0, 1.5, 200), 1 - np.geomspace(1e-1, 1e-9, 60)])
+    )
+    height, speed = (
+        bouncing(2.0, G, e, times[-1]).at(times)
+        if e > 0
+        else (np.maximum(2 - G * times**2 / 2, 0), None)
+    )
     for k, at in enumerate(times):
         engine.advance(at)
         x, v = engine.look(at)
-        # A time is rounded at every bounce, 3231 of them at e = 0.99, and moves the ball by 6.3 m/s s.
+        # A time is rounded at every bounce, 3231 of them at e = 0.99, and moves the ball by 6.3 m/s
+        # s.
         assert x[0] == pytest.approx([at / 4, 0.5 + height[k]], abs=2e-11)
         if at > end * (1 + 1e-11):
             assert (x[0, 1], *v[0]) == (0.5, 0.25, 0.0)
@@ -65,15 +74,20 @@ def test_bounces_down_an_incline_end_in_a_slide():
             assert v[0] @ normal == pytest.approx(0.0, abs=1e-14)
 
 
-# One of unit speed collisions one that lies on the floor: speeds after A-B, B-floor, A-B, ... until nothing closes in.
+# One of unit speed collisions one that lies on the floor: speeds after A-B, B-floor, A-B, ... until
+# nothing closes in.
 ON_A_LYING_DISK = {0.8: (0.638, 0.0144), 0.5: (0.21875, 0.046875)}
 
 
 @pytest.mark.parametrize("e", ON_A_LYING_DISK)
 def test_a_collision_on_a_lying_disk_is_the_limit_of_small_gaps(e):
-    """By hand for equal masses: at e = 0.8, (-1, 0), (-.1, -.9), (-.1, .72), (.638, -.018), (.638, .0144)."""
+    """By hand for equal masses: at e = 0.8, (-1, 0), (-.1, -.9), (-.1, .72), (.638, -.018), (.638,
+    .0144)."""
     start = np.sqrt(1 - 2 * G * 0.045)
-    engine, at = EventEngine(disks([[0.0, 0.5], [0.0, 1.545]], [[0, 0], [0, -start]], e)), (1 - start) / G
+    engine, at = (
+        EventEngine(disks([[0.0, 0.5], [0.0, 1.545]], [[0, 0], [0, -start]], e)),
+        (1 - start) / G,
+    )
     engine.advance(at + 1e-9)
     _, v = engine.look(at + 1e-9)
     assert v[::-1, 1] == pytest.approx(np.array(ON_A_LYING_DISK[e]) - G * 1e-9, abs=1e-9)
@@ -84,38 +98,52 @@ def test_a_collision_on_a_lying_disk_is_the_limit_of_small_gaps(e):
 def test_a_collision_on_a_lying_disk_that_does_not_end_is_refused(e, mass):
     """As many collisions at one instant as there are: when and whose."""
     scene = disks([[0.0, 0.5], [0.0, 2.0]], [[0, 0], [0, -1.0]], e, mass=[1.0, mass])
-    with pytest.raises(NoTruth, match=r"the collisions of disk [01] on disk [01]( and wall 0)? accumulate at 0\.2316"):
+    with pytest.raises(
+        NoTruth,
+        match=r"the collisions of disk [01] on disk [01]( and wall 0)? accumulate at 0\.2316",
+    ):
         EventEngine(scene).advance(1.0)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_a_collision_on_a_lying_disk_is_one_on_a_disk_just_above_the_floor(seed):
-    """From any side, of any masses and radii: without gravity and 1e-12 m up, where there is no rest, the same."""
+    """From any side, of any masses and radii: without gravity and 1e-12 m up, where there is no
+    rest, the same."""
     draw = np.random.default_rng(seed)
-    radius, mass, angle = draw.uniform(0.3, 1, 2), draw.uniform(0.5, 2, 2), draw.uniform(0.3, np.pi - 0.3)
+    radius, mass, angle = (
+        draw.uniform(0.3, 1, 2),
+        draw.uniform(0.5, 2, 2),
+        draw.uniform(0.3, np.pi - 0.3),
+    )
     toward = np.array([np.cos(angle), np.sin(angle)])
     e, start = draw.uniform(0.7, 1), [0.0, radius[0]]
-    assume(start[1] + (radius.sum() + 1e-3) * toward[1] > radius[1])  # else the other starts below the floor
+    # else the other starts below the floor
+    assume(start[1] + (radius.sum() + 1e-3) * toward[1] > radius[1])
 
     def played(lift, gravity):
         position = np.array([start, start + (radius.sum() + 1e-3) * toward]) + [0, lift]
         velocity = [[0.0, 0.0], -5 * toward]
-        engine = EventEngine(disks(position, velocity, e, radius=radius, mass=mass, gravity=[0.0, -gravity]))
+        engine = EventEngine(
+            disks(position, velocity, e, radius=radius, mass=mass, gravity=[0.0, -gravity])
+        )
         engine.advance(3e-4)
         return engine.look(3e-4)[1]
 
-    # Between two collisions the upper one moves 5 m/s times 1e-12 m over the slow speed of the lower one, some mm/s;
-    # and in 3e-4 s gravity changes a speed by 3e-9 m/s.
+    # Between two collisions the upper one moves 5 m/s times 1e-12 m over the slow speed of the
+    # lower one, some mm/s; and in 3e-4 s gravity changes a speed by 3e-9 m/s.
     assert played(0.0, 1e-5) == pytest.approx(played(1e-12, 0.0), abs=2e-7)
 
 
 @pytest.mark.parametrize(("speed", "flies"), [(2.3, True), (2.2, False)])
 def test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(speed, flies):
-    """It turns about the end, on a circle, if v2 < g r = 5 m2/s2; else its parabola never touches the end again."""
+    """It turns about the end, on a circle, if v2 < g r = 5 m2/s2; else its parabola never touches
+    the end again."""
     scene = disks([[-1.0, 0.5]], [[speed, 0.0]], 0.5, walls=[[[-5, 0], [0, 0]]])
     if not flies:
-        with pytest.raises(NoTruth, match=r"disk 0 slides round the end of wall 0 at 0\.4545\d* s: no parabola"):
+        with pytest.raises(
+            NoTruth, match=r"disk 0 slides round the end of wall 0 at 0\.4545\d* s: no parabola"
+        ):
             after(scene, 1.0)
         return
     x, v = after(scene, 1.0)
@@ -125,7 +153,8 @@ def test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(sp
 
 
 def test_a_thrust_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
-    """2 m/s2 upward and to the right from 1 s to 2 s; the same twice as strong downward leaves it where it is."""
+    """2 m/s2 upward and to the right from 1 s to 2 s; the same twice as strong downward leaves it
+    where it is."""
     scene = disks([[0.0, 0.5]], [[0.0, 0.0]], 0.5)
     for upward, height in ((2.0, 1.0), (-4.0, 0.0)):
         engine = EventEngine(scene)
@@ -138,7 +167,8 @@ def test_a_thrust_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
 
 
 def test_lying_disks_collide_along_the_floor_and_stay_on_it():
-    """Head-on at e = 0.5, equal masses and radii: the normal is along the floor, to the last bit."""
+    """Head-on at e = 0.5, equal masses and radii: the normal is along the floor, to the last
+    bit."""
     scene = disks([[0.0, 0.5], [3.0, 0.5]], [[1.0, 0.0], [-1.0, 0.0]], 0.5)
     x, v = after(scene, 3.0)
     assert x.tolist() == [[0.0, 0.5], [3.0, 0.5]]
@@ -146,7 +176,8 @@ def test_lying_disks_collide_along_the_floor_and_stay_on_it():
 
 
 def test_without_mutual_help_nothing_stands_on_a_point_or_on_another_disk():
-    """Bounces on a wall's end, on a static disk, or of one disk on another have no rest: refused."""
+    """Bounces on a wall's end, on a static disk, or of one disk on another have no rest:
+    refused."""
     pin = disks([[0.0, 2.0]], [[0.0, 0.0]], 0.5, walls=[[[0.0, -1.0], [0.0, 0.0]]])
     pile = disks([[0.0, 0.5], [0.0, 2.0]], [[0.0, 0.0], [0.0, 0.0]], 0.5)
     post = disks([[0.0, 0.5], [0.0, 2.0]], [[0.0, 0.0], [0.0, 0.0]], 0.5, mass=[np.inf, 1.0])
@@ -161,9 +192,14 @@ def rain(seed, restitution, n=21):
     radius = draw.uniform(0.08, 0.3, n)
     position = scatter(draw, [0.3, 0.3], [9.7, 5.7], radius)
     return Scene(
-        position=position, velocity=draw.uniform(-0.5, 0.5, (n, 2)), radius=radius, mass=30 * radius**2,
-        restitution=restitution, gravity=[0.0, -G], walls=box([0.0, 0.0], [10.0, 6.0]),
-    )  # fmt: skip
+        position=position,
+        velocity=draw.uniform(-0.5, 0.5, (n, 2)),
+        radius=radius,
+        mass=30 * radius**2,
+        restitution=restitution,
+        gravity=[0.0, -G],
+        walls=box([0.0, 0.0], [10.0, 6.0]),
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -235,7 +271,8 @@ def test_rest_in_plain_python_is_the_same(monkeypatch):
             "speed * uy, acceleration * ux, acceleration * uy",
             "speed * uy, a.free_ax, a.free_ay",
         ),  # what lies still falls
-        ("if a.wall >= 0:\n        t = end_time", "if False:\n        t = end_time"),  # a wall without an end
+        # a wall without an end
+        ("if a.wall >= 0:\n        t = end_time", "if False:\n        t = end_time"),
     ],
 )
 def test_a_planted_bug_in_rest_is_caught(right, wrong, monkeypatch):

@@ -1,4 +1,5 @@
-"""What must not change the event engine's answer: order, mirror, direction of time, cells; nothing ever overlaps."""
+"""What must not change the event engine's answer: order, mirror, direction of time, cells; nothing
+ever overlaps."""
 
 from __future__ import annotations
 
@@ -16,14 +17,23 @@ from tests.adapters.event_driven.gases import collisions_of, gas, state_after
 def changed(scene, order=slice(None), x=lambda a: a, v=lambda a: a):
     """The scene with its disks in another order and its vectors mapped."""
     return replace(
-        scene, position=x(scene.position)[order], velocity=v(scene.velocity)[order], radius=scene.radius[order],
-        mass=scene.mass[order], angle=scene.angle[order], angular_velocity=scene.angular_velocity[order],
-        inertia=scene.inertia[order], walls=x(scene.walls), gravity=v(scene.gravity),
+        scene,
+        position=x(scene.position)[order],
+        velocity=v(scene.velocity)[order],
+        radius=scene.radius[order],
+        mass=scene.mass[order],
+        angle=scene.angle[order],
+        angular_velocity=scene.angular_velocity[order],
+        inertia=scene.inertia[order],
+        walls=x(scene.walls),
+        gravity=v(scene.gravity),
         wrap=None if scene.wrap is None else np.sort(x(scene.wrap), axis=0),
-    )  # fmt: skip
+    )
 
 
-@pytest.mark.parametrize(("name", "until"), [("gas_of_100", 0.6), ("asteroids", 6.0), ("falling_box", 0.25)])
+@pytest.mark.parametrize(
+    ("name", "until"), [("gas_of_100", 0.6), ("asteroids", 6.0), ("falling_box", 0.25)]
+)
 def test_order_and_mirror_do_not_matter(name, until):
     """The same gas with its disks shuffled, and seen in a mirror."""
     scene = scenario(name).scene

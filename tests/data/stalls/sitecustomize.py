@@ -1,8 +1,10 @@
-"""On the path of a process: `STALL=MODULE:NAME` makes that function one that never returns, wherever it is called.
+"""On the path of a process: `STALL=MODULE:NAME` makes that function one that never returns,
+wherever it is called.
 
-A test cannot reach into the workers of a command otherwise. The function blocks as compiled code does that runs for
-ever: in C, holding Python's lock, so that no handler of a signal runs; `STALL=MODULE:NAME:waits` lets go of the lock.
-Python imports this file by its name.
+A test cannot reach into the workers of a command otherwise. The function blocks as compiled code
+does that runs for
+ever: in C, holding Python's lock, so that no handler of a signal runs; `STALL=MODULE:NAME:waits`
+lets go of the lock. Python imports this file by its name.
 """
 
 import os

@@ -1,5 +1,5 @@
-"""The confusion table of the check: `python -m tests.reports.check.confusion` writes tests/data/confusion.csv from all
-known solvers."""
+"""The confusion table of the check: `python -m tests.reports.check.confusion` writes
+tests/data/confusion.csv from all known solvers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,14 @@ from reports.check.verdict import FileCheck, check_file
 from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 
 TABLE = Path(__file__).parents[3] / "tests" / "data" / "confusion.csv"
-COLUMNS = ("solver", "fault is in", "found", "reported first in", "first cause", "first cause is right")
+COLUMNS = (
+    "solver",
+    "fault is in",
+    "found",
+    "reported first in",
+    "first cause",
+    "first cause is right",
+)
 
 
 def judged(paths: Sequence[Path]) -> dict[Path, FileCheck]:
@@ -41,15 +48,19 @@ def main() -> None:
     """Check all, write the table, print how many are right."""
     with tempfile.TemporaryDirectory() as folder:
         checks = judged([mutant.write(Path(folder)) for mutant in MUTANTS])
-        rows = [row_of(mutant.name, mutant, checks[Path(folder) / mutant.name]) for mutant in MUTANTS]
+        rows = [
+            row_of(mutant.name, mutant, checks[Path(folder) / mutant.name]) for mutant in MUTANTS
+        ]
     rows += [row_of(path.name, None, one) for path, one in judged(CORRECT).items()]
     with TABLE.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerows([COLUMNS, *rows])
     found, right = (sum(row[k] == "yes" for row in rows[: len(MUTANTS)]) for k in (2, 5))
     faulted = sum(row[2] == "yes" for row in rows[len(MUTANTS) :])
-    print(f"{found} of {len(MUTANTS)} mutants found, {right} with the right cause first; "
-          f"{faulted} of {len(CORRECT)} correct solvers faulted")  # fmt: skip
+    print(
+        f"{found} of {len(MUTANTS)} mutants found, {right} with the right cause first; "
+        f"{faulted} of {len(CORRECT)} correct solvers faulted"
+    )
 
 
 def row_of(name: str, mutant: Mutant | None, one: FileCheck) -> tuple[str, ...]:

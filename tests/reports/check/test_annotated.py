@@ -10,7 +10,8 @@ from reports.check.command import JUNIT, PAGE
 from reports.run.made import is_sealed, may_overwrite, sealed
 from reports.terminal.exits import FolderTaken
 
-TEXT = f"<html>{PAGE.decode()}{'<p>a row</p>' * 1000}\udcff</html>\n"  # longer than where its mark is looked for
+# longer than where its mark is looked for
+TEXT = f"<html>{PAGE.decode()}{'<p>a row</p>' * 1000}\udcff</html>\n"
 
 
 def test_what_we_wrote_and_nobody_changed_is_written_over(tmp_path: Path):

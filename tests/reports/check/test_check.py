@@ -1,5 +1,5 @@
-"""What the check says of right and of wrong solvers: `python -m tests.reports.check.confusion` makes the whole
-table."""
+"""What the check says of right and of wrong solvers: `python -m tests.reports.check.confusion`
+makes the whole table."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from reports.check.verdict import FileCheck
 from tests.reports.check.confusion import TABLE, judged, said_first
 from tests.solvers.mutants import CORRECT, MUTANTS
 
-# A solver takes half a second: some here, of either language and any task; all of both lists in the long test.
+# A solver takes half a second: some here, of either language and any task; all of both lists in the
+# long test.
 FAST, FAST_CORRECT = MUTANTS[::12], CORRECT[::4]
 
 
@@ -31,7 +32,9 @@ def test_the_catalogue_is_large_enough_and_covers_every_task():
     assert len(CORRECT) >= 12
 
 
-@pytest.mark.parametrize("solvers", [FAST_CORRECT, pytest.param(CORRECT, marks=pytest.mark.slow)], ids=["some", "all"])
+@pytest.mark.parametrize(
+    "solvers", [FAST_CORRECT, pytest.param(CORRECT, marks=pytest.mark.slow)], ids=["some", "all"]
+)
 def test_no_correct_solver_is_faulted(solvers: list[Path]):
     """However it is written: no fault, and every task asked that the file has."""
     faults = {path.name: one.sentences for path, one in judged(solvers).items() if not one.passed}
@@ -43,12 +46,15 @@ def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
     """Every twelfth of the catalogue; the long test has them all."""
     checks = judged([mutant.write(tmp_path) for mutant in FAST])
 
-    assert [mutant.name for mutant in FAST if not said_first(mutant, checks[tmp_path / mutant.name])] == []
+    assert [
+        mutant.name for mutant in FAST if not said_first(mutant, checks[tmp_path / mutant.name])
+    ] == []
 
 
 @pytest.mark.slow
 def test_the_committed_table_is_what_comes_out(tmp_path: Path):
-    """All mutants and all correct solvers: found, cause first, as the table says; and 38 of 40 or better."""
+    """All mutants and all correct solvers: found, cause first, as the table says; and 38 of 40 or
+    better."""
     checks = judged([mutant.write(tmp_path) for mutant in MUTANTS])
     right = {mutant.name: said_first(mutant, checks[tmp_path / mutant.name]) for mutant in MUTANTS}
     rows = {row["solver"]: row for row in csv.DictReader(TABLE.read_text().splitlines())}
@@ -69,8 +75,12 @@ def test_the_same_file_gets_the_same_rows():
 def test_two_mistakes_are_both_reported(tmp_path: Path):
     """One in task 1 and one in 2d: two sentences, in this order, without those that only follow."""
     text = (CORRECT[0].parent / "plain.py").read_text()
-    text = text.replace(" / sphere.mass * dt", " * dt").replace("sphereB.velocity.x -= J", "sphereB.velocity.x += J")
-    (tmp_path / "solver.py").write_text(text.replace("sphereB.velocity.y -= J", "sphereB.velocity.y += J"))
+    text = text.replace(" / sphere.mass * dt", " * dt").replace(
+        "sphereB.velocity.x -= J", "sphereB.velocity.x += J"
+    )
+    (tmp_path / "solver.py").write_text(
+        text.replace("sphereB.velocity.y -= J", "sphereB.velocity.y += J")
+    )
     sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences
 
     assert "the force is not divided by the mass" in sentences[0]
@@ -79,7 +89,10 @@ def test_two_mistakes_are_both_reported(tmp_path: Path):
 
 def test_another_restitution_is_a_note_and_is_judged_by_itself():
     """The file with e = 0.5 has no fault, and its scenes have that e."""
-    rows = {row.name: row for row in check_solver(next(path for path in CORRECT if path.name == "unusual_e.js"))}
+    rows = {
+        row.name: row
+        for row in check_solver(next(path for path in CORRECT if path.name == "unusual_e.js"))
+    }
 
     assert rows["restitution"].verdict == "note"
     assert "e = 0.5 is written into the file" in rows["restitution"].cause
@@ -88,10 +101,15 @@ def test_another_restitution_is_a_note_and_is_judged_by_itself():
 
 def test_free_choices_are_notes():
     """`<=`, a one-sided displacement, an impulse on pairs that part, no guard for equal centres."""
-    rows = {row.name: row for row in check_solver(next(path for path in CORRECT if path.name == "one_sided.js"))}
+    rows = {
+        row.name: row
+        for row in check_solver(next(path for path in CORRECT if path.name == "one_sided.js"))
+    }
 
     notes = [rows[name].cause for name in ("touch", "split", "separating", "same centre")]
-    assert {rows[name].verdict for name in ("touch", "split", "separating", "same centre")} == {"note"}
+    assert {rows[name].verdict for name in ("touch", "split", "separating", "same centre")} == {
+        "note"
+    }
     assert "compares with <=" in notes[0]
     assert "A alone is moved" in notes[1]
     assert "as the formula is printed" in notes[2]
@@ -100,7 +118,9 @@ def test_free_choices_are_notes():
 def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):
     """Numbers that no formula of the table gives are reported as numbers."""
     text = (CORRECT[0].parent / "plain.py").read_text()
-    (tmp_path / "solver.py").write_text(text.replace("J = -(1 + RESTITUTION) * vn", "J = -(1 + RESTITUTION) * vn**3"))
+    (tmp_path / "solver.py").write_text(
+        text.replace("J = -(1 + RESTITUTION) * vn", "J = -(1 + RESTITUTION) * vn**3")
+    )
     sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences
 
     assert "unknown" in sentences[0]
@@ -121,22 +141,57 @@ def test_the_numbers_beside_an_unknown_mistake_are_those_of_a_pair_that_is_wrong
 @pytest.mark.parametrize(
     ("old", "new", "task", "cause"),
     [
-        ("1 / sphereB.mass)", "1 / sphereB.Mass)", "2c", "the impulse is no number (a field that does not exist"),
-        ("if (vn >= 0) return;", "vn /= sphereB.Mass;", "2c", "the impulse is no number (a field that does not"),
-        ("if (vn >= 0) return;", "vn *= vn / vn;", "2c", "the velocities of a pair at relative rest become no numbers"),
-        ("/ (1 / sphereA.mass + 1 / sphereB.mass)", "/ 0", "2c", "the impulse is no number (a field that does not"),
-        ("-= J / sphereB.mass * nx", "-= J / sphereB.mas * nx", "2d", "the velocity of B becomes no number"),
-        ("  var overlap = ", "  var overlap = sphereA.sise - ", "2b", "the positions become no numbers"),
+        (
+            "1 / sphereB.mass)",
+            "1 / sphereB.Mass)",
+            "2c",
+            "the impulse is no number (a field that does not exist",
+        ),
+        (
+            "if (vn >= 0) return;",
+            "vn /= sphereB.Mass;",
+            "2c",
+            "the impulse is no number (a field that does not",
+        ),
+        (
+            "if (vn >= 0) return;",
+            "vn *= vn / vn;",
+            "2c",
+            "the velocities of a pair at relative rest become no numbers",
+        ),
+        (
+            "/ (1 / sphereA.mass + 1 / sphereB.mass)",
+            "/ 0",
+            "2c",
+            "the impulse is no number (a field that does not",
+        ),
+        (
+            "-= J / sphereB.mass * nx",
+            "-= J / sphereB.mas * nx",
+            "2d",
+            "the velocity of B becomes no number",
+        ),
+        (
+            "  var overlap = ",
+            "  var overlap = sphereA.sise - ",
+            "2b",
+            "the positions become no numbers",
+        ),
     ],
 )
 def test_numbers_that_are_none_have_one_cause_and_accuse_nothing_else(
     tmp_path: Path, old: str, new: str, task: str, cause: str
 ):
-    """A misspelt field is NaN in JavaScript, a division by zero infinite: neither is read as another mistake."""
+    """A misspelt field is NaN in JavaScript, a division by zero infinite: neither is read as
+    another mistake."""
     text = (CORRECT[0].parent / "plain.js").read_text()
     assert old in text
     (tmp_path / "solver.js").write_text(text.replace(old, new))
-    faults = [row for row in check_solver(tmp_path / "solver.js") if row.verdict == "fault" and row.task[0] == "2"]
+    faults = [
+        row
+        for row in check_solver(tmp_path / "solver.js")
+        if row.verdict == "fault" and row.task[0] == "2"
+    ]
 
     assert {row.task for row in faults} == {task}
     assert len({row.cause for row in faults}) == 1
@@ -144,11 +199,15 @@ def test_numbers_that_are_none_have_one_cause_and_accuse_nothing_else(
 
 
 def test_the_bound_on_a_scene_lets_a_right_solver_pass_and_a_wrong_restitution_not():
-    """Motions that are exact but for e = 0.85 leave the bound of e = 0.9 wherever there are at most three spheres."""
+    """Motions that are exact but for e = 0.85 leave the bound of e = 0.9 wherever there are at most
+    three spheres."""
     for (scenario, record), (other, other_record) in zip(scenes(0.9)[1:4], scenes(0.85)[1:4]):
         truth, off = truth_of(scenario, record), truth_of(other, other_record)
 
-        assert np.abs(off.position - truth.position).max() > bounds(scenario, record, truth.t, 1e-3).max()
+        assert (
+            np.abs(off.position - truth.position).max()
+            > bounds(scenario, record, truth.t, 1e-3).max()
+        )
 
 
 def test_a_contact_is_judged_by_the_formula():
@@ -162,7 +221,10 @@ def test_a_contact_is_judged_by_the_formula():
     assert "sphere 1 has (0.91, 0) m/s after it, not (0.9, 0) m/s" in contact_fault(
         np.array([before, after]), scene, 0, 1
     )
-    at_touch = np.array([before, after]) + [[[0, 0, 0, 0], [0.1, 0, 0, 0]], [[0.05, 0, 0, 0], [0.05, 0, 0, 0]]]
+    at_touch = np.array([before, after]) + [
+        [[0, 0, 0, 0], [0.1, 0, 0, 0]],
+        [[0.05, 0, 0, 0], [0.05, 0, 0, 0]],
+    ]
     assert "sphere 1 has (0.91, 0) m/s after it" in contact_fault(at_touch, scene, 0, 1), (
         "who reacts at a touch is judged"
     )
@@ -189,7 +251,8 @@ def library_read(path: Path) -> float:
 
 
 def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path):
-    """A name of its own in the text loads it; a file without one has no such globals, and no other text of it."""
+    """A name of its own in the text loads it; a file without one has no such globals, and no other
+    text of it."""
     (tmp_path / "gl-matrix.js").write_text(library(1))
     for name, text in {"with.js": READS_IT + "// vec2\n", "without.js": READS_IT}.items():
         (tmp_path / name).write_text(text)
@@ -199,7 +262,9 @@ def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path)
     assert read_solver(tmp_path / "without.js").beside == ()
 
 
-def test_the_gl_matrix_beside_the_file_comes_before_that_of_npm_and_the_nearest_package_first(tmp_path: Path):
+def test_the_gl_matrix_beside_the_file_comes_before_that_of_npm_and_the_nearest_package_first(
+    tmp_path: Path,
+):
     """One after the other is put there, each before all that were there."""
     solver = tmp_path / "class" / "anna" / "Exercise.js"
     solver.parent.mkdir(parents=True)
@@ -229,11 +294,16 @@ def test_from_version_3_on_the_names_are_taken_out_of_gl_matrix(tmp_path: Path):
     (tmp_path / "named.js").write_text("const { vec2 } = glMatrix;\n" + READS_IT)
     (tmp_path / "own.js").write_text("var vec2 = { mark: 6 };\n" + READS_IT)
 
-    assert [library_read(tmp_path / f"{name}.js") for name in ("plain", "named", "own")] == [5.0, 5.0, 6.0]
+    assert [library_read(tmp_path / f"{name}.js") for name in ("plain", "named", "own")] == [
+        5.0,
+        5.0,
+        6.0,
+    ]
 
 
 def test_gl_matrix_is_read_once_and_decides_what_the_solver_is(tmp_path: Path):
-    """As a module beside a solver.py: what is saved later is not played, and another library is another solver."""
+    """As a module beside a solver.py: what is saved later is not played, and another library is
+    another solver."""
     path = tmp_path / "Exercise.js"
     path.write_text(READS_IT + "// vec2\n")
     (tmp_path / "gl-matrix.js").write_text(library(1))
@@ -248,21 +318,30 @@ def test_gl_matrix_is_read_once_and_decides_what_the_solver_is(tmp_path: Path):
 
 
 def test_who_calls_gl_matrix_where_there_is_none_is_reported_where_to_put_it(tmp_path: Path):
-    """One sentence, where it is called and where what lies there is no library; nothing where the name is his own."""
+    """One sentence, where it is called and where what lies there is no library; nothing where the
+    name is his own."""
     path = tmp_path / "Exercise.js"
     path.write_text((CORRECT[0].parent / "gl_vec3.js").read_text())
-    with pytest.raises(SolverFailed, match=r"mat4 is not defined: put the gl-matrix\.js that the exercise hands out"):
+    with pytest.raises(
+        SolverFailed,
+        match=r"mat4 is not defined: put the gl-matrix\.js that the exercise hands out",
+    ):
         SolverProcess(read_solver(path))
     (tmp_path / "gl-matrix.js").write_text("import { vec2 } from 'elsewhere';")
-    with pytest.raises(SolverFailed, match=r"calls gl-matrix\.js, which cannot be loaded .*; put the gl-matrix\.js"):
+    with pytest.raises(
+        SolverFailed, match=r"calls gl-matrix\.js, which cannot be loaded .*; put the gl-matrix\.js"
+    ):
         SolverProcess(read_solver(path))
 
 
 def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():
-    """A call that does nothing to a sphere far away leaves its 12 numbers, bit for bit, in both languages."""
+    """A call that does nothing to a sphere far away leaves its 12 numbers, bit for bit, in both
+    languages."""
     for name in ("plain.js", "plain.py"):
         with SolverProcess(read_solver(CORRECT[0].parent / name)) as process:
-            far = QUESTIONS["touch"]._replace(balls=(Ball((0.1, 0.2), (1 / 3, 0.7)), Ball((9.0, 1e-7), m=5e-324)))
+            far = QUESTIONS["touch"]._replace(
+                balls=(Ball((0.1, 0.2), (1 / 3, 0.7)), Ball((9.0, 1e-7), m=5e-324))
+            )
             answer = ask(process, {"far": far})["far"]
 
         assert answer.last == list(far.balls)

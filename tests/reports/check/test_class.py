@@ -1,4 +1,5 @@
-"""A class of solvers in a terminal: a row a file, whatever the students are called and whatever they handed in."""
+"""A class of solvers in a terminal: a row a file, whatever the students are called and whatever
+they handed in."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_the_table_of_a_class_fits_a_terminal(folder: Path):
-    """A line a file, and how many are right of those that were checked; a link to nothing is reported, too."""
+    """A line a file, and how many are right of those that were checked; a link to nothing is
+    reported, too."""
     (folder / "eve.js").symlink_to("gone.js")
     done = crosscheck("check", folder, cwd=folder)
     refused = check_file(folder / "eve.js").refused
@@ -42,13 +44,16 @@ def test_the_table_of_a_class_fits_a_terminal(folder: Path):
     assert not {"ok", "FAULT"} & set(eve.split())
     assert refused == f"{folder}/eve.js: is a link to gone.js, which is not there"
     assert "eve.js: is a link to gone.js, which is not there" in reported
-    assert "ben/Exercise.js: Task 2c impulse, impulse: it divides by (mA + mB)" in re.sub(" +", " ", reported)
+    assert "ben/Exercise.js: Task 2c impulse, impulse: it divides by (mA + mB)" in re.sub(
+        " +", " ", reported
+    )
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
     assert "Traceback" not in done.stderr
 
 
 def test_a_student_with_a_long_name_and_one_with_an_empty_folder_have_a_row(tmp_path: Path):
-    """The middle of a name gives way; the table keeps its columns; what was not handed in is reported."""
+    """The middle of a name gives way; the table keeps its columns; what was not handed in is
+    reported."""
     for name in ("a" * 70, "b", "with nothing", ".git"):
         (tmp_path / name).mkdir()
     shutil.copy(RIGHT, tmp_path / ("a" * 70) / "Exercise.js")
@@ -61,7 +66,9 @@ def test_a_student_with_a_long_name_and_one_with_an_empty_folder_have_a_row(tmp_
     assert "a…a" in long
     assert long.split()[0].endswith("a/Exercise.js")
     assert long.split()[1:] == ["ok"] * 8
-    assert [line.split()[:3] for line in lines if line.startswith("with")] == [["with", "nothing", "-"]]
+    assert [line.split()[:3] for line in lines if line.startswith("with")] == [
+        ["with", "nothing", "-"]
+    ]
     assert "  with nothing: holds no .js and no .py file" in done.stdout
     assert "1 of 1 files without a fault; 2 not checked." in done.stdout
     assert (done.returncode, ".git" in done.stdout) == (1, False)

@@ -24,9 +24,12 @@ def flooded(size: int) -> SolverProcess:
     talk = SolverProcess.__new__(SolverProcess)
     talk.kind = "python"
     talk.process = subprocess.Popen(
-        [sys.executable, "-c", FLOOD.format(size=size)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        start_new_session=True, bufsize=0,
-    )  # fmt: skip
+        [sys.executable, "-c", FLOOD.format(size=size)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+        bufsize=0,
+    )
     return talk
 
 
@@ -51,17 +54,22 @@ def test_a_line_without_an_end_is_cut_at_its_longest(monkeypatch: pytest.MonkeyP
 
 
 def test_a_message_of_ten_megabytes_is_cut_before_it_is_escaped():
-    """Of letters that each are written in six, or in one: what is shown is the same as of a short one."""
+    """Of letters that each are written in six, or in one: what is shown is the same as of a short
+    one."""
     began = monotonic()
     for letter in ("\a", "x"):
-        assert SolverFailed("error", letter * 10**7).what == SolverFailed("error", letter * 10**4).what
+        assert (
+            SolverFailed("error", letter * 10**7).what == SolverFailed("error", letter * 10**4).what
+        )
     assert len(SolverFailed("error", "x" * 10**4).what) == LONGEST + len(" ...")
     assert SolverFailed("error", "x" * LONGEST).what == "x" * LONGEST
     assert monotonic() - began < 5.0
 
 
 @pytest.mark.parametrize(
-    "words", [("check",), ("run", "free_fall", "--out", "out", "--engine")], ids=["check", "run --engine"]
+    "words",
+    [("check",), ("run", "free_fall", "--out", "out", "--engine")],
+    ids=["check", "run --engine"],
 )
 @pytest.mark.parametrize("ending", [".py", ".js"])
 def test_a_name_that_no_file_can_have_is_a_sentence(tmp_path, words: tuple[str, ...], ending: str):

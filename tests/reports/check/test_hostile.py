@@ -1,4 +1,5 @@
-"""Files that no solver should be: each gets one clear message, within the limits, and nothing else is affected."""
+"""Files that no solver should be: each gets one clear message, within the limits, and nothing else
+is affected."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from reports.check.verdict import FileCheck
 pytestmark = pytest.mark.slow  # waits for what hangs, twice for each function
 
 Results = dict[str, list[CheckRow] | NotASolver]
-SECONDS = 16.0  # for one file on a busy machine: two calls that are stopped late, a process that starts
+# for one file on a busy machine: two calls that are stopped late, a process that starts
+SECONDS = 16.0
 JS = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.js").read_text()
 PY = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.py").read_text()
 
@@ -25,11 +27,15 @@ PY = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.py").read_tex
 def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     """The rows of every file below, or its refusal, two at once; each must come in time."""
     folder = tmp_path_factory.mktemp("hostile")
-    texts: dict[str, str | bytes] = {name: text for name, (text, _) in (LOADING | CALLS | REFUSED).items()}
+    texts: dict[str, str | bytes] = {
+        name: text for name, (text, _) in (LOADING | CALLS | REFUSED).items()
+    }
     texts |= HARMLESS | {f"replaces {k}.js": JS + code for k, code in enumerate(REPLACED.values())}
 
     def check(name: str) -> list[CheckRow] | NotASolver:
-        (folder / name).write_bytes(text if isinstance(text := texts[name], bytes) else text.encode())
+        (folder / name).write_bytes(
+            text if isinstance(text := texts[name], bytes) else text.encode()
+        )
         began = monotonic()
         try:
             return check_solver(folder / name)
@@ -51,7 +57,7 @@ def rows_of(results: Results, name: str) -> list[CheckRow]:
 
 def first(rows: list[CheckRow]) -> str:
     """The sentence that comes first, on one line."""
-    (sentence, *_) = FileCheck(Path("file"), rows).sentences
+    sentence, *_ = FileCheck(Path("file"), rows).sentences
     assert "\n" not in sentence
     assert "Traceback" not in sentence
     return sentence
@@ -59,47 +65,93 @@ def first(rows: list[CheckRow]) -> str:
 
 def within(text: str, function: str, code: str) -> str:
     """A solver whose `function` begins with `code`."""
-    for head in (f"function {function}(sphere, dt) {{\n", f"function {function}(sphereA, sphereB) {{\n",
-                 f"def {function}(sphere, dt):\n", f"def {function}(sphereA, sphereB):\n"):  # fmt: skip
+    for head in (
+        f"function {function}(sphere, dt) {{\n",
+        f"function {function}(sphereA, sphereB) {{\n",
+        f"def {function}(sphere, dt):\n",
+        f"def {function}(sphereA, sphereB):\n",
+    ):
         if head in text:
             return text.replace(head, head + code + "\n")
     raise AssertionError(function)
 
 
 LOADING = {
-    "endless_load.js": ("while (true) {}\n" + JS, "does not come back within 2 s while it is loaded"),
-    "syntax.js": ("var a = 1;\nlet b = ;\n" + JS, "SyntaxError: Unexpected token ';' (line 2, column 9)"),
-    "syntax_crlf.js": ("\ufeffvar a = 1;\r\nlet b = ;\r\n", "SyntaxError: Unexpected token ';' (line 2, column 9)"),
+    "endless_load.js": (
+        "while (true) {}\n" + JS,
+        "does not come back within 2 s while it is loaded",
+    ),
+    "syntax.js": (
+        "var a = 1;\nlet b = ;\n" + JS,
+        "SyntaxError: Unexpected token ';' (line 2, column 9)",
+    ),
+    "syntax_crlf.js": (
+        "\ufeffvar a = 1;\r\nlet b = ;\r\n",
+        "SyntaxError: Unexpected token ';' (line 2, column 9)",
+    ),
     "escape.js": (r"throw new Error('\x1b[31m\u202e\x07')", r"Error: \x1b[31m\u202e\x07 (line 1"),
     "escape.py": (r"raise ValueError('\x1b[31m\n\x07')", r"ValueError: \x1b[31m\n\x07 (line 1"),
-    "export.js": ("export " + JS[JS.index("function") :], "plain script, which has no modules; leave it out (line 1"),
-    "import.js": ("import { vec2 } from './gl-matrix.js';\n" + JS, "plain script, which has no modules; leave it out"),
-    "module.js": (JS + "module.exports = { integrate };", "module is not defined: the exercise's page loads"),
-    "page.js": ("document.title = 'mine';\n" + JS, "document is not defined: a solver is run without page"),
-    "timer.js": (JS + "setTimeout(initScene, 1);", "setTimeout is not defined: a solver is run without page, network"),
+    "export.js": (
+        "export " + JS[JS.index("function") :],
+        "plain script, which has no modules; leave it out (line 1",
+    ),
+    "import.js": (
+        "import { vec2 } from './gl-matrix.js';\n" + JS,
+        "plain script, which has no modules; leave it out",
+    ),
+    "module.js": (
+        JS + "module.exports = { integrate };",
+        "module is not defined: the exercise's page loads",
+    ),
+    "page.js": (
+        "document.title = 'mine';\n" + JS,
+        "document is not defined: a solver is run without page",
+    ),
+    "timer.js": (
+        JS + "setTimeout(initScene, 1);",
+        "setTimeout is not defined: a solver is run without page, network",
+    ),
     "unclosed.js": (JS[:-3], "SyntaxError"),
-    "throws.js": (JS + "\n  nothing.x = 1;\n", "ReferenceError: nothing is not defined (line 93, column 3)"),
-    "endless_load.py": ("while True: pass\n" + PY, "does not come back within 3 s while it is loaded"),
+    "throws.js": (
+        JS + "\n  nothing.x = 1;\n",
+        "ReferenceError: nothing is not defined (line 93, column 3)",
+    ),
+    "endless_load.py": (
+        "while True: pass\n" + PY,
+        "does not come back within 3 s while it is loaded",
+    ),
     "memory_load.js": ("var all = []; for (;;) all.push(new Array(1e6).fill(1));", "memory"),
     "buffer_load.js": ("var all = new Uint8Array(1e10).fill(1);", "memory"),
     "syntax.py": ("a = 1\ndef f(:\n    pass\n", "SyntaxError: invalid syntax (line 2, column 7)"),
     "throws.py": (PY + "\n1 / 0\n", "ZeroDivisionError: division by zero (line 92, column 1)"),
-    "memory_load.py": ("x = bytearray(10**10)\n", "wants more memory than it is given while it is loaded"),
+    "memory_load.py": (
+        "x = bytearray(10**10)\n",
+        "wants more memory than it is given while it is loaded",
+    ),
     "exit.py": ("import sys\nsys.exit(3)\n", "ends the process (SystemExit: 3) (line 2, column 1)"),
     "kill.py": ("import os\nos._exit(3)\n", "ended its own process (exit status 3)"),
     "intrudes.py": (
-        "import os\nfor k in range(3, 30):\n    try: os.write(k, b'[]\\n')\n    except OSError: pass\n",
+        (
+            "import os\nfor k in range(3, 30):\n    try: os.write(k, b'[]\\n')\n    except OSError:"
+            " pass\n"
+        ),
         "wrote into the channel that its answers come by",
     ),
-    "asks.py": ("n = input('how many? ')\n", "nobody is there to answer input() (line 1, column 5)"),
+    "asks.py": (
+        "n = input('how many? ')\n",
+        "nobody is there to answer input() (line 1, column 5)",
+    ),
     "abort.py": ("import os\nos.abort()\n", "its process was ended by SIGABRT"),
     "segfault.py": ("import ctypes\nctypes.string_at(0)\n", "ended its own process (SIGSEGV)"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", LOADING)
-def test_a_file_that_cannot_be_loaded_is_one_row_that_says_why_and_where(results: Results, name: str):
-    """The row "loads" is a fault; its cause has line and column of the user's file where the language reports them."""
+def test_a_file_that_cannot_be_loaded_is_one_row_that_says_why_and_where(
+    results: Results, name: str
+):
+    """The row "loads" is a fault; its cause has line and column of the user's file where the
+    language reports them."""
     rows = rows_of(results, name)
 
     assert [row.name for row in rows] == ["loads"]
@@ -110,54 +162,124 @@ def test_a_file_that_cannot_be_loaded_is_one_row_that_says_why_and_where(results
 
 LEFT = "a sphere is left with a position, velocity or force that has no x and y"
 CALLS = {
-    "endless_integrate.js": (within(JS, "integrate", "while (true) {}"), "integrate: does not come back within 1 s"),
-    "endless_collide.js": (within(JS, "sphereSphereCollisionHandling", "for (;;);"), "does not come back within 1 s"),
+    "endless_integrate.js": (
+        within(JS, "integrate", "while (true) {}"),
+        "integrate: does not come back within 1 s",
+    ),
+    "endless_collide.js": (
+        within(JS, "sphereSphereCollisionHandling", "for (;;);"),
+        "does not come back within 1 s",
+    ),
     "recursion.js": (within(JS, "integrate", "integrate(sphere, dt);"), "calls itself without end"),
-    "memory.js": (within(JS, "integrate", "var a = []; for (;;) a.push(new Array(1e6).fill(1));"), "memory"),
-    "buffers.js": (within(JS, "integrate", "var a = []; for (;;) a.push(new Uint8Array(1e9));"), "memory"),
+    "memory.js": (
+        within(JS, "integrate", "var a = []; for (;;) a.push(new Array(1e6).fill(1));"),
+        "memory",
+    ),
+    "buffers.js": (
+        within(JS, "integrate", "var a = []; for (;;) a.push(new Uint8Array(1e9));"),
+        "memory",
+    ),
     "throws_null.js": (within(JS, "integrate", "throw null;"), "threw null"),
     "nan.js": (within(JS, "integrate", "sphere.velocity.x = NaN;"), "NaN"),
     "infinity.js": (within(JS, "integrate", "sphere.velocity.x = Infinity;"), "infinite"),
-    "throws_long.js": (within(JS, "integrate", "throw new Error('x'.repeat(1e6));"), "x ... (line 38, column 7)"),
-    "throws_what.js": (within(JS, "integrate", "throw Symbol('x');"), "threw something that cannot be shown"),
+    "throws_long.js": (
+        within(JS, "integrate", "throw new Error('x'.repeat(1e6));"),
+        "x ... (line 38, column 7)",
+    ),
+    "throws_what.js": (
+        within(JS, "integrate", "throw Symbol('x');"),
+        "threw something that cannot be shown",
+    ),
     "proxy.js": (
-        within(JS, "integrate", "sphere.position = new Proxy(sphere.position, { get() { return {}; } });"),
+        within(
+            JS,
+            "integrate",
+            "sphere.position = new Proxy(sphere.position, { get() { return {}; } });",
+        ),
         "position: it is no number",
     ),
-    "frozen.js": (within(JS, "integrate", "Object.freeze(sphere.velocity);"), "velocity: it is never changed"),
-    "awaits.js": (JS.replace("function integrate(sphere, dt) {", "async function integrate(sphere, dt) { await 0;"),
-                  "integrate returns something new"),
+    "frozen.js": (
+        within(JS, "integrate", "Object.freeze(sphere.velocity);"),
+        "velocity: it is never changed",
+    ),
+    "awaits.js": (
+        JS.replace(
+            "function integrate(sphere, dt) {", "async function integrate(sphere, dt) { await 0;"
+        ),
+        "integrate returns something new",
+    ),
     "nested.js": ("(function () {\n" + JS + "})();", "integrate, but one inside something else"),
-    "capital.py": (PY.replace("def integrate(", "def Integrate("), "the file has no function integrate, but Integrate"),
-    "init.js": (JS.replace("  initAsteroids();\n}", "  for (;;);\n}"), "initScene: does not come back within 2 s"),
-    "typo.js": (JS.replace("sphere.velocity.x +=", "sphere.velocty.x +="), "(reading 'x') (line 38, column 10)"),
-    "vec2.js": (within(JS, "integrate", "vec2.normalise();"), "vec2.normalise is not a function (line 38, column 6)"),
-    "strings.js": (JS.replace("x += sphere.force.x", "x += '' + sphere.force.x"), "velocity: it is no number"),
+    "capital.py": (
+        PY.replace("def integrate(", "def Integrate("),
+        "the file has no function integrate, but Integrate",
+    ),
+    "init.js": (
+        JS.replace("  initAsteroids();\n}", "  for (;;);\n}"),
+        "initScene: does not come back within 2 s",
+    ),
+    "typo.js": (
+        JS.replace("sphere.velocity.x +=", "sphere.velocty.x +="),
+        "(reading 'x') (line 38, column 10)",
+    ),
+    "vec2.js": (
+        within(JS, "integrate", "vec2.normalise();"),
+        "vec2.normalise is not a function (line 38, column 6)",
+    ),
+    "strings.js": (
+        JS.replace("x += sphere.force.x", "x += '' + sphere.force.x"),
+        "velocity: it is no number",
+    ),
     "array.js": (within(JS, "integrate", "sphere.position = [1, 2];"), "position: it is no number"),
-    "clock.js": (within(JS, "integrate", "var t = Date.now();"), "run without page, network and clock"),
-    "endless_integrate.py": (within(PY, "integrate", "    while True: pass"), "does not come back within 1 s"),
+    "clock.js": (
+        within(JS, "integrate", "var t = Date.now();"),
+        "run without page, network and clock",
+    ),
+    "endless_integrate.py": (
+        within(PY, "integrate", "    while True: pass"),
+        "does not come back within 1 s",
+    ),
     "stubborn.py": (
-        within(PY, "integrate", "    import signal as s; s.signal(14, s.SIG_IGN); s.signal(27, s.SIG_IGN)")
-        .replace("s.SIG_IGN)\n", "s.SIG_IGN)\n    while True: pass\n"),
+        within(
+            PY,
+            "integrate",
+            "    import signal as s; s.signal(14, s.SIG_IGN); s.signal(27, s.SIG_IGN)",
+        ).replace("s.SIG_IGN)\n", "s.SIG_IGN)\n    while True: pass\n"),
         "had to be stopped",
     ),
     "tuple.py": (within(PY, "integrate", "    sphere.position = (1.0, 2.0); return"), LEFT),
     "null.js": (within(JS, "integrate", "sphere.position = null; return;"), LEFT),
-    "awaits.py": (PY.replace("def integrate", "async def integrate"), "runs nothing: it is an async def"),
+    "awaits.py": (
+        PY.replace("def integrate", "async def integrate"),
+        "runs nothing: it is an async def",
+    ),
     "yields.py": (within(PY, "integrate", "    yield"), "runs nothing: it is an async def"),
-    "sleeps.py": (within(PY, "integrate", "    import time; time.sleep(100)"), "does not come back within 1 s"),
-    "recursion.py": (within(PY, "integrate", "    integrate(sphere, dt)"), "calls itself without end"),
-    "memory.py": (within(PY, "integrate", "    x = [0] * 10**10"), "wants more memory than it is given"),
+    "sleeps.py": (
+        within(PY, "integrate", "    import time; time.sleep(100)"),
+        "does not come back within 1 s",
+    ),
+    "recursion.py": (
+        within(PY, "integrate", "    integrate(sphere, dt)"),
+        "calls itself without end",
+    ),
+    "memory.py": (
+        within(PY, "integrate", "    x = [0] * 10**10"),
+        "wants more memory than it is given",
+    ),
     "typo.py": (PY.replace("sphere.velocity.x +=", "sphere.velocty.x +="), "AttributeError"),
     "nan.py": (within(PY, "integrate", "    sphere.velocity.x = float('nan')"), "NaN"),
-    "missing.js": (JS.replace("function sphereSphere", "function other"), "no function sphereSphereCollision"),
+    "missing.js": (
+        JS.replace("function sphereSphere", "function other"),
+        "no function sphereSphereCollision",
+    ),
     "missing.py": (PY.replace("def integrate(", "def integrated("), "no function integrate"),
     "none.py": ("print('no solver')\n", "no function integrate"),
     "returns.js": (
-        within(JS, "integrate", "  sphere = JSON.parse(JSON.stringify(sphere));")
-        .replace("  sphere.alpha +=", "  return sphere;\n  sphere.alpha +="), "returns something new",
+        within(JS, "integrate", "  sphere = JSON.parse(JSON.stringify(sphere));").replace(
+            "  sphere.alpha +=", "  return sphere;\n  sphere.alpha +="
+        ),
+        "returns something new",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -168,17 +290,26 @@ def test_a_function_that_fails_is_named_with_what_it_does(results: Results, name
 
 def test_a_function_that_never_comes_back_does_not_hide_the_other(results: Results):
     """An endless integrate leaves the collision function to be judged."""
-    assert {row.verdict for row in rows_of(results, "endless_integrate.js") if row.task == "2c"} == {"right", "note"}
+    assert {
+        row.verdict for row in rows_of(results, "endless_integrate.js") if row.task == "2c"
+    } == {"right", "note"}
 
 
 REPLACED = {
-    "Array.prototype.Symbol(Symbol.iterator)": "Array.prototype[Symbol.iterator] = function () { throw 1; };\n",
-    "Array.prototype.0": "Object.defineProperty(Array.prototype, 0, { set() {}, get() { return 7; } });\n",
+    "Array.prototype.Symbol(Symbol.iterator)": (
+        "Array.prototype[Symbol.iterator] = function () { throw 1; };\n"
+    ),
+    "Array.prototype.0": (
+        "Object.defineProperty(Array.prototype, 0, { set() {}, get() { return 7; } });\n"
+    ),
     "Object.prototype.get": "Object.prototype.get = function () { throw 1; };\n",
     "Object, JSON": "delete globalThis.Object; delete globalThis.JSON;\n",
     "Math.hypot": "Math.hypot = vec2.length;\n",
     "Math.sqrt": "Math.sqrt = function (x) { return 1; };\n",
-    "Math": "Math = { PI: 3, sqrt: function () { return 2; }, random: function () {}, pow: function () {} };\n",
+    "Math": (
+        "Math = { PI: 3, sqrt: function () { return 2; }, random: function () {}, pow: function ()"
+        " {} };\n"
+    ),
     "Object.prototype.x": "Object.prototype.x = 7;\n",
     "Array.prototype.push": "Array.prototype.push = function () {};\n",
     "JSON.stringify": "JSON.stringify = function () { return '{}'; };\n",
@@ -194,7 +325,9 @@ def test_a_built_in_that_is_replaced_is_named_and_fools_nobody(results: Results,
     assert all(row.verdict == "right" for row in rows if row.task == "1")
 
 
-STRICT = '"use strict";\nvar numAsteroids, minX, maxX, minY, maxY, restitution, earth, ufo, asteroids;\n'
+STRICT = (
+    '"use strict";\nvar numAsteroids, minX, maxX, minY, maxY, restitution, earth, ufo, asteroids;\n'
+)
 HARMLESS = {
     "bom_crlf.js": ("\ufeff" + JS.replace("\n", "\r\n")).encode(),
     "bom_crlf.py": ("\ufeff" + PY.replace("\n", "\r\n")).encode(),
@@ -202,19 +335,31 @@ HARMLESS = {
     "utf32.js": JS.encode("utf-32"),
     "no_global.js": (JS + "globalThis = null;\n").encode(),
     "latin.js": ("// Größe\n" + JS).encode("latin-1"),
-    "floods.js": within(JS, "integrate", "for (var k = 0; k < 1000; k++) console.log('flood', k);").encode(),
+    "floods.js": (
+        within(JS, "integrate", "for (var k = 0; k < 1000; k++) console.log('flood', k);").encode()
+    ),
     "floods.py": within(PY, "integrate", "    print('flood' * 1000)").encode(),
-    "single.py": within(PY, "integrate", "    import numpy; sphere.mass = numpy.float32(sphere.mass)").encode(),
+    "single.py": (
+        within(
+            PY, "integrate", "    import numpy; sphere.mass = numpy.float32(sphere.mass)"
+        ).encode()
+    ),
     "json.py": ("import json\njson.dumps = json.loads = None\n" + PY).encode(),
-    "waits_once.py": within(PY, "integrate", "    import time; time.sleep(done.pop() if done else 0)")
-    .replace("import", "done = [1.5]\nimport", 1)
-    .encode(),
+    "waits_once.py": (
+        within(PY, "integrate", "    import time; time.sleep(done.pop() if done else 0)")
+        .replace("import", "done = [1.5]\nimport", 1)
+        .encode()
+    ),
     "reads_stdin.py": within(PY, "integrate", "    import sys; sys.stdin.read()").encode(),
-    "const.js": JS.replace("numAsteroids = 20;", "const numAsteroids = 20;\nlet earth, ufo, asteroids;").encode(),
+    "const.js": (
+        JS.replace(
+            "numAsteroids = 20;", "const numAsteroids = 20;\nlet earth, ufo, asteroids;"
+        ).encode()
+    ),
     "strict.js": (STRICT + JS).encode(),
     "node.js": (JS + "if (typeof module !== 'undefined') module.exports = { integrate };").encode(),
     "own_vec2.js": (JS + "const vec2 = { own: true };\nfunction vec3() {}").encode(),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", HARMLESS)

@@ -1,4 +1,5 @@
-"""The check as people, graders and projects see it: command, JSON, JUnit, page, pytest, and the file as an engine."""
+"""The check as people, graders and projects see it: command, JSON, JUnit, page, pytest, and the
+file as an engine."""
 
 from __future__ import annotations
 
@@ -44,30 +45,40 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
-# A process of its own loads for seconds what this one has; that it ends the same is for the long test.
+# A process of its own loads for seconds what this one has; that it ends the same is for the long
+# test.
 @pytest.mark.parametrize("call", [crosscheck, pytest.param(process, marks=pytest.mark.slow)])
 def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(
     folder: Path, tmp_path: Path, call: Callable[..., Any]
 ):
-    """The first line is the sentence to begin with; the page, and it alone, is where the command was given."""
-    right, wrong = (call("check", folder / who / "Exercise.js", cwd=tmp_path) for who in ("anna", "ben"))
+    """The first line is the sentence to begin with; the page, and it alone, is where the command
+    was given."""
+    right, wrong = (
+        call("check", folder / who / "Exercise.js", cwd=tmp_path) for who in ("anna", "ben")
+    )
 
     assert (right.returncode, wrong.returncode) == (0, 1)
     assert right.stdout.startswith("No fault found")
-    assert wrong.stdout.replace("\n", " ").startswith("1. Task 2c impulse, impulse: it divides by (mA + mB)")
+    assert wrong.stdout.replace("\n", " ").startswith(
+        "1. Task 2c impulse, impulse: it divides by (mA + mB)"
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["check.html"]
 
 
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
-    """JSON of a folder: four files in order, as the schema says; what is no text is refused with its reason."""
+    """JSON of a folder: four files in order, as the schema says; what is no text is refused with
+    its reason."""
     done = crosscheck("check", folder, "--json", "--junit", folder / "class.xml", cwd=folder)
     reported = json.loads(done.stdout)
 
     jsonschema.validate(reported, json.loads(SCHEMA.read_text()))
     assert done.returncode == 1
     assert [(Path(one["file"]).parent.name, one["passed"]) for one in reported["files"]] == [
-        ("anna", True), ("ben", False), ("cem", False), ("dora", False)
-    ]  # fmt: skip
+        ("anna", True),
+        ("ben", False),
+        ("cem", False),
+        ("dora", False),
+    ]
     assert "SyntaxError" in reported["files"][2]["sentences"][0]
     assert "is not text" in reported["files"][3]["refused"]
     suites = ElementTree.parse(folder / "class.xml").getroot()
@@ -79,19 +90,43 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["nobody.js"], "nobody.js: is not there; name an Exercise.js, a solver.py or a folder of them"),
+        (
+            ["nobody.js"],
+            "nobody.js: is not there; name an Exercise.js, a solver.py or a folder of them",
+        ),
         ([""], '"": is not there; name a file or a folder'),
         (["anna/Exercise.js", "--page", ""], '"": is not there; name a file or a folder'),
         (["class.txt"], "a solver is a .js or a .py file"),
         (["empty"], "holds no .js and no .py file"),
-        (["anna/Exercise.js", "--junit", "no/such/x.xml"], "--junit no/such/x.xml: No such file or directory"),
-        (["anna/Exercise.js", "--page", "class.txt"], "class.txt: is there and no page of a check; name another file"),
+        (
+            ["anna/Exercise.js", "--junit", "no/such/x.xml"],
+            "--junit no/such/x.xml: No such file or directory",
+        ),
+        (
+            ["anna/Exercise.js", "--page", "class.txt"],
+            "class.txt: is there and no page of a check; name another file",
+        ),
         ([".", "--page", "p.html"], "--page p.html: shows one file"),
-        (["anna/Exercise.js", "--page", "no/x.html"], "--page no/x.html: No such file or directory; name another file"),
-        (["anna/Exercise.js", "--page", "empty"], "--page empty: Is a directory; name another file"),
-        ([".", "--junit", "class.txt"], "--junit class.txt: is there and no JUnit file of a check; name another file"),
-        (["anna/Exercise.js", "--junit", "anna/Exercise.js"], "Exercise.js: is there and no JUnit file of a check"),
-        (["anna/Exercise.js", "--junit", "./check.html"], "--junit check.html: is where the page goes"),
+        (
+            ["anna/Exercise.js", "--page", "no/x.html"],
+            "--page no/x.html: No such file or directory; name another file",
+        ),
+        (
+            ["anna/Exercise.js", "--page", "empty"],
+            "--page empty: Is a directory; name another file",
+        ),
+        (
+            [".", "--junit", "class.txt"],
+            "--junit class.txt: is there and no JUnit file of a check; name another file",
+        ),
+        (
+            ["anna/Exercise.js", "--junit", "anna/Exercise.js"],
+            "Exercise.js: is there and no JUnit file of a check",
+        ),
+        (
+            ["anna/Exercise.js", "--junit", "./check.html"],
+            "--junit check.html: is where the page goes",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], message: str):
@@ -106,13 +141,17 @@ def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], me
     assert len(done.stderr.splitlines()) == 1
     assert (folder / "class.txt").read_text() == "mine"
     assert (folder / "anna" / "Exercise.js").read_text() == RIGHT.read_text()
-    assert not any("anna" in str(call) for call in asked.call_args_list), "nothing is checked before it is refused"
+    assert not any("anna" in str(call) for call in asked.call_args_list), (
+        "nothing is checked before it is refused"
+    )
 
 
 def test_a_junit_file_of_an_earlier_check_is_written_over_and_a_page_is_not(folder: Path):
     """Each kind knows its own; neither takes the other's place."""
     (folder / "none.py").write_text("x = 1\n")
-    first, again = (crosscheck("check", "none.py", "--json", "--junit", "r.xml", cwd=folder) for _ in range(2))
+    first, again = (
+        crosscheck("check", "none.py", "--json", "--junit", "r.xml", cwd=folder) for _ in range(2)
+    )
     other = crosscheck("check", "none.py", "--json", "--page", "r.xml", cwd=folder)
     (folder / "none.py").unlink()
 
@@ -122,11 +161,19 @@ def test_a_junit_file_of_an_earlier_check_is_written_over_and_a_page_is_not(fold
 
 @pytest.mark.slow
 def test_pytest_runs_the_rows_as_tests(folder: Path):
-    """In a folder without any project: a right file passes, a wrong one fails with the numbers, junk is refused."""
+    """In a folder without any project: a right file passes, a wrong one fails with the numbers,
+    junk is refused."""
     (folder / "own").mkdir(exist_ok=True)
     right, wrong, junk = (
         subprocess.run(
-            [CROSSCHECK.parent / "pytest", "-q", "-p", "no:cacheprovider", "--solver", folder / path],
+            [
+                CROSSCHECK.parent / "pytest",
+                "-q",
+                "-p",
+                "no:cacheprovider",
+                "--solver",
+                folder / path,
+            ],
             cwd=folder / "own",
             capture_output=True,
             text=True,
@@ -178,7 +225,8 @@ def test_a_right_solver_has_no_failing_scene():
 def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
     browser: Browser, folder: Path, smallest: Smallest, width: int
 ):
-    """Opened from the file, at two widths: both layers move, nothing overflows, no error, no request."""
+    """Opened from the file, at two widths: both layers move, nothing overflows, no error, no
+    request."""
     from reports.check.page import write_page
 
     page_path = folder / "page.html"

@@ -33,8 +33,11 @@ def busy(spent: float) -> Iterator[str | Exception]:
     yield "7"
 
 
-def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endless_one_is_not(tmp_path: Path):
-    """What V8 was stopped in counts only if it has run for its time; a step cannot be asked twice."""
+def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endless_one_is_not(
+    tmp_path: Path,
+):
+    """What V8 was stopped in counts only if it has run for its time; a step cannot be asked
+    twice."""
     (tmp_path / "Exercise.js").write_text(JS)
     solver = JavaScriptSolver(read_solver(tmp_path / "Exercise.js"))
 
@@ -49,12 +52,15 @@ def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endle
 
 
 def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Path):
-    """V8 stops the loop after its limit; nobody is there to hear it, and no process is left behind."""
+    """V8 stops the loop after its limit; nobody is there to hear it, and no process is left
+    behind."""
     (tmp_path / "Exercise.js").write_text("while (true) {}")
     worker = subprocess.Popen(
         python(WORK),
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
     assert worker.stdin is not None
     assert worker.stdout is not None
     assert json.loads(worker.stdout.readline()) == HERE
@@ -72,5 +78,7 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path):
     """Nobody writes into it, so that reading it would never end."""
     os.mkfifo(tmp_path / "Exercise.js")
 
-    with pytest.raises(NotASolver, match=r"Exercise\.js: is no file; name an Exercise\.js or a solver\.py"):
+    with pytest.raises(
+        NotASolver, match=r"Exercise\.js: is no file; name an Exercise\.js or a solver\.py"
+    ):
         read_solver(tmp_path / "Exercise.js")

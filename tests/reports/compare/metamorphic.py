@@ -1,7 +1,9 @@
-"""A scenario, its exact answer and what was played of it, all stated otherwise: turned, shifted, in other units ...
+"""A scenario, its exact answer and what was played of it, all stated otherwise: turned, shifted, in
+other units ...
 
-What is changed is what was played, not how: the metrics are under test here, and no engine. Steps, samples and the
-collisions of a stepping engine are put on the grid of the new units, as the engine would have put them.
+What is changed is what was played, not how: the metrics are under test here, and no engine. Steps,
+samples and the collisions of a stepping engine are put on the grid of the new units, as the engine
+would have put them.
 """
 
 from __future__ import annotations
@@ -30,8 +32,8 @@ class Change:
         length, time, mass: m, s and kg in the new units.
         turn: rad; flip: -1 for the mirror image (y -> -y, before the turn).
         shift: m; boost: m/s, both in the new frame and units.
-        order: for n disks, which comes where; walls: those of a scene -> new ones; wall: of each collision -> the new
-            walls.
+        order: for n disks, which comes where; walls: those of a scene -> new ones; wall: of each
+            collision -> the new walls.
         thrusts: of a scenario -> new ones.
     """
 
@@ -70,31 +72,42 @@ class Change:
         unit = self.length / self.time
         velocity = np.where(scene.static[:, None], 0.0, self.speed(scene.velocity))
         return Scene(
-            position=self.place(scene.position)[order], velocity=velocity[order],
+            position=self.place(scene.position)[order],
+            velocity=velocity[order],
             radius=self.length * scene.radius[order],
-            mass=self.mass * scene.mass[order], restitution=scene.restitution,
+            mass=self.mass * scene.mass[order],
+            restitution=scene.restitution,
             angle=(self.flip * scene.angle + self.turn)[order],
             angular_velocity=(self.flip / self.time * scene.angular_velocity)[order],
-            inertia=self.mass * self.length**2 * scene.inertia[order], walls=self.place(self.walls(scene.walls)),
+            inertia=self.mass * self.length**2 * scene.inertia[order],
+            walls=self.place(self.walls(scene.walls)),
             gravity=unit / self.time * self.way(scene.gravity),
             wrap=None if scene.wrap is None else np.sort(self.place(scene.wrap), axis=0),
-        )  # fmt: skip
+        )
 
     def thrust(self, thrust: Thrust, n: int) -> Thrust:
         """The thrust, stated otherwise; one that turns with its disk only flips."""
-        flipped = thrust.force * [1, self.flip] if thrust.frame == "body" else self.way(thrust.force)
+        flipped = (
+            thrust.force * [1, self.flip] if thrust.frame == "body" else self.way(thrust.force)
+        )
         force = self.mass * self.length / self.time**2 * flipped
         torque = self.mass * self.length**2 / self.time**2 * self.flip * thrust.torque
         disk = int(np.argsort(self.order(n))[thrust.disk])
-        return Thrust(disk, self.time * thrust.start, self.time * thrust.stop, force, torque, thrust.frame)
+        return Thrust(
+            disk, self.time * thrust.start, self.time * thrust.stop, force, torque, thrust.frame
+        )
 
     def scenario(self, one: Scenario) -> Scenario:
         """The scenario, with its exact answer stated otherwise."""
         thrusts = [self.thrust(thrust, one.scene.n) for thrust in self.thrusts(one.thrusts)]
         new = replace(
-            one, scene=self.scene(one.scene), duration=self.time * one.duration,
-            sample_interval=self.time * one.sample_interval, thrusts=thrusts, truth=None,
-        )  # fmt: skip
+            one,
+            scene=self.scene(one.scene),
+            duration=self.time * one.duration,
+            sample_interval=self.time * one.sample_interval,
+            thrusts=thrusts,
+            truth=None,
+        )
         if one.truth is None:
             return new
         old = one.truth
@@ -107,19 +120,25 @@ class Change:
         return replace(new, truth=truth)
 
     def trajectory(self, old: Trajectory, one: Scenario, t: Array, dt: float | None) -> Trajectory:
-        """What was played of a scenario with steps of `dt` s (None: its exact answer), at the times `t` s now."""
+        """What was played of a scenario with steps of `dt` s (None: its exact answer), at the times
+        `t` s now."""
         order = self.order(one.scene.n)
         velocity = np.where(one.scene.static[:, None], 0.0, self.speed(old.velocity))
         return Trajectory(
-            t=frozen(t), position=frozen(self.place(old.position, t[:, None])[:, order]),
-            velocity=frozen(velocity[:, order]), angle=frozen((self.flip * old.angle + self.turn)[:, order]),
+            t=frozen(t),
+            position=frozen(self.place(old.position, t[:, None])[:, order]),
+            velocity=frozen(velocity[:, order]),
+            angle=frozen((self.flip * old.angle + self.turn)[:, order]),
             angular_velocity=frozen((self.flip / self.time * old.angular_velocity)[:, order]),
-            collisions=self.collisions(old, one, dt), horizon=self.time * old.horizon,
-            error_bound=self.length * old.error_bound, reason=old.reason,
-        )  # fmt: skip
+            collisions=self.collisions(old, one, dt),
+            horizon=self.time * old.horizon,
+            error_bound=self.length * old.error_bound,
+            reason=old.reason,
+        )
 
     def collisions(self, old: Trajectory, one: Scenario, dt: float | None) -> Collisions:
-        """The collisions of what was played; those that the end of a step has found are found there again."""
+        """The collisions of what was played; those that the end of a step has found are found there
+        again."""
         collisions, rows, number = old.collisions, [], np.argsort(self.order(one.scene.n))
         asked = one.truth if dt is None and len(collisions) else None
         where = (
@@ -127,12 +146,21 @@ class Change:
             if asked
             else old.position[np.searchsorted(old.t, collisions.t).clip(max=len(old) - 1)]
         )
-        for t, i, j, impulse, x in zip(collisions.t, collisions.i, collisions.j, collisions.impulse, where):
+        for t, i, j, impulse, x in zip(
+            collisions.t, collisions.i, collisions.j, collisions.impulse, where
+        ):
             steps = round(t / dt) if dt else 0
             found = dt is not None and abs(steps - t / dt) < ON_GRID
             now = steps * (self.time * dt) if dt and found else self.time * t
-            others = [number[j]] if j >= 0 else [-1 - w for w in self.wall(-1 - j, x[i], one.scene.walls, dt is None)]
-            rows += [(now, int(number[i]), int(o), impulse * self.mass * self.length / self.time) for o in others]
+            others = (
+                [number[j]]
+                if j >= 0
+                else [-1 - w for w in self.wall(-1 - j, x[i], one.scene.walls, dt is None)]
+            )
+            rows += [
+                (now, int(number[i]), int(o), impulse * self.mass * self.length / self.time)
+                for o in others
+            ]
         return Collisions.of(rows)
 
     def run(self, run: Run, one: Scenario) -> Run:
@@ -144,7 +172,12 @@ class Change:
 
     def factor(self, unit: str) -> float:
         """By how much a number of this unit is to change."""
-        rates = {"m": self.length, "m/s": self.length / self.time, "s": self.time, "rad/s": 1 / self.time}
+        rates = {
+            "m": self.length,
+            "m/s": self.length / self.time,
+            "s": self.time,
+            "rad/s": 1 / self.time,
+        }
         return rates.get(unit, 1.0)
 
 
@@ -176,7 +209,9 @@ def one_after_the_other(thrusts: Sequence[Thrust]) -> Sequence[Thrust]:
 
 def side_by_side(thrusts: Sequence[Thrust]) -> Sequence[Thrust]:
     """Each thrust as two at once, that share its force."""
-    return [replace(t, force=p * t.force, torque=p * t.torque) for t in thrusts for p in (CUT, 1 - CUT)]
+    return [
+        replace(t, force=p * t.force, torque=p * t.torque) for t in thrusts for p in (CUT, 1 - CUT)
+    ]
 
 
 CHANGES = {

@@ -14,19 +14,26 @@ SPINNING = ("spin_under_torque", "body_frame_thrust", "ship_thrust")
 
 @pytest.mark.parametrize("name", SPINNING)
 @pytest.mark.parametrize("factor", [0.0, 1.01, 2.0])
-def test_a_wrong_angular_velocity_is_caught_even_where_all_angles_are_right(name: str, factor: float):
-    """An engine that reports no spin, a hundredth too much, or twice; the truth itself, the control, reads 0."""
+def test_a_wrong_angular_velocity_is_caught_even_where_all_angles_are_right(
+    name: str, factor: float
+):
+    """An engine that reports no spin, a hundredth too much, or twice; the truth itself, the
+    control, reads 0."""
     one, truth = truth_of(name)
     spin = truth.angular_velocity
     for dt in map(one.dt, one.substeps):
-        read = [beside_truth(one, dt, each, truth) for each in (replace(truth, angular_velocity=spin * factor), truth)]
+        read = [
+            beside_truth(one, dt, each, truth)
+            for each in (replace(truth, angular_velocity=spin * factor), truth)
+        ]
         wrong, right = (METRICS["angular_velocity_max"].of(view) for view in read)
         blind = METRICS["angle_max"].of(read[0])
 
         assert wrong is not None
         assert right is not None
         assert blind is not None
-        assert wrong.value > 0.9 * abs(factor - 1) * np.abs(spin[1:-4]).max()  # what is near the end is not judged
+        # what is near the end is not judged
+        assert wrong.value > 0.9 * abs(factor - 1) * np.abs(spin[1:-4]).max()
         assert wrong.note == right.note == read[0].carried
         assert (right.value, blind.value) == (0, 0)
 
@@ -37,6 +44,8 @@ def test_it_is_judged_as_the_velocity_is():
         assert name in SCENARIOS
         one, truth = truth_of(name)
         view = beside_truth(one, one.dt(1), truth, truth)
-        spin, velocity = (METRICS[metric].of(view) for metric in ("angular_velocity_max", "velocity_max"))
+        spin, velocity = (
+            METRICS[metric].of(view) for metric in ("angular_velocity_max", "velocity_max")
+        )
 
         assert spin == velocity

@@ -1,4 +1,5 @@
-"""The judge of collisions judged: which played collision answers which true one, and who is not blamed."""
+"""The judge of collisions judged: which played collision answers which true one, and who is not
+blamed."""
 
 from itertools import combinations
 
@@ -27,8 +28,8 @@ def test_a_missing_collision_is_missed_and_an_extra_collision_is_spurious():
 
 
 def test_an_engine_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_late():
-    """Collisions that come later and later are delays; beyond half the time between true collisions nobody knows which
-    is which."""
+    """Collisions that come later and later are delays; beyond half the time between true collisions
+    nobody knows which is which."""
     true = np.arange(1.0, 9.0)
     late = match(collisions(*(true + 0.06 * true)), collisions(*true), 100, 0.01)
     too_late = match(collisions(9.0), collisions(1.0), 100, 0.01)
@@ -39,13 +40,15 @@ def test_an_engine_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_
 
 
 def test_a_collision_that_the_end_cuts_off_is_not_blamed():
-    """A true collision less than `WINDOW` dt before the end may fall behind it for a late engine."""
+    """A true collision less than `WINDOW` dt before the end may fall behind it for a late
+    engine."""
     assert match(collisions(1.0), collisions(1.0, 9.98), 10.0, 0.01).missed == []
     assert match(collisions(1.0), collisions(1.0, 9.96), 10.0, 0.01).missed == [(9.96, 0, 1)]
 
 
 def test_collisions_that_no_step_can_tell_apart_are_not_blamed():
-    """Of ever faster bounces those closer together than 2 dt are left out, with what the engine makes of them."""
+    """Of ever faster bounces those closer together than 2 dt are left out, with what the engine
+    makes of them."""
     true = 2.0 - 0.5 ** np.arange(12.0)
     played = [t for t in true if t < 1.97]
     found = match(collisions(*played, 1.99, 2.01), collisions(*true), 10.0, 0.01)
@@ -72,7 +75,11 @@ def test_matching_in_order_is_the_closest_there_is():
         many = np.sort(rng.uniform(size=rng.integers(0, 7)))
         few = np.sort(rng.uniform(size=rng.integers(0, len(many) + 1)))
         chosen = closest_in_order(few, many, 0.0)
-        best = min(np.abs(few - many[list(some)]).sum() for some in combinations(range(len(many)), len(few)))
+        best = min(
+            np.abs(few - many[list(some)]).sum()
+            for some in combinations(range(len(many)), len(few))
+        )
 
         assert (np.diff(chosen) > 0).all()
-        assert np.abs(few - many[chosen]).sum() == pytest.approx(best, rel=1e-12)  # sums of six, in another order
+        # sums of six, in another order
+        assert np.abs(few - many[chosen]).sum() == pytest.approx(best, rel=1e-12)

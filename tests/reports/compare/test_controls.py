@@ -1,4 +1,5 @@
-"""No perfect score of nothing: who freezes, doubles its speed or gains energy is caught in every scene of the suite."""
+"""No perfect score of nothing: who freezes, doubles its speed or gains energy is caught in every
+scene of the suite."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,7 +17,8 @@ from tests.adapters.broken_engines import DoublesSpeed, Exact, Freezes, GainsEne
 from tests.reports.compare.answers import beside_truth, truth_of
 
 STILL = {"rest_on_floor", "column_of_ten"}
-"""Scenes whose truth stands still: to freeze is right there, and twice no speed is none, so nothing is to be caught."""
+"""Scenes whose truth stands still: to freeze is right there, and twice no speed is none, so nothing
+is to be caught."""
 MOVING = [name for name in SCENARIOS if name not in STILL]
 FEW = {"free_fall", "falling_box", "ship_thrust", "asteroids", "gas_of_100"}
 VELOCITIES = (
@@ -30,7 +32,8 @@ VELOCITIES = (
 
 
 def scaled(factor: float) -> Callable[[Trajectory], Trajectory]:
-    """The truth, all of whose velocities are `factor` times as large after the start; the positions know nothing."""
+    """The truth, all of whose velocities are `factor` times as large after the start; the positions
+    know nothing."""
 
     def corrupt(truth: Trajectory) -> Trajectory:
         size = np.append(1.0, np.full(len(truth) - 1, factor))
@@ -40,7 +43,11 @@ def scaled(factor: float) -> Callable[[Trajectory], Trajectory]:
     return corrupt
 
 
-CONTROLS = {"freezes": scaled(0.0), "doubles its speed": scaled(2.0), "gains 2 % of energy": scaled(1.01)}
+CONTROLS = {
+    "freezes": scaled(0.0),
+    "doubles its speed": scaled(2.0),
+    "gains 2 % of energy": scaled(1.01),
+}
 
 
 def largest(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> float:
@@ -48,20 +55,28 @@ def largest(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> 
     beside = beside_truth(one, dt, played, truth)
     found = {name: METRICS[name].of(beside) for name in VELOCITIES}
     fastest = top_speed(one).max() or 1.0
-    relative = [abs(one.value) / (fastest if "velocity" in name else 1) for name, one in found.items() if one]
+    relative = [
+        abs(one.value) / (fastest if "velocity" in name else 1)
+        for name, one in found.items()
+        if one
+    ]
     return float(np.nanmax(relative))
 
 
 @pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize("name", MOVING)
-def test_a_wrong_velocity_is_caught_at_every_step_size_even_where_all_positions_are_right(name: str, control: str):
-    """Of velocity, momentum or energy, in a crowd and at the coarsest step too; the truth itself reads 0."""
+def test_a_wrong_velocity_is_caught_at_every_step_size_even_where_all_positions_are_right(
+    name: str, control: str
+):
+    """Of velocity, momentum or energy, in a crowd and at the coarsest step too; the truth itself
+    reads 0."""
     one, truth = truth_of(name)
     assert truth.velocity.any() or truth.angular_velocity.any()
     for substeps in one.substeps:
         dt = one.dt(substeps)
 
-        # An energy off by 2 % is a hundredth of a speed; a scene's fastest is as fast as it can get, not as it is.
+        # An energy off by 2 % is a hundredth of a speed; a scene's fastest is as fast as it can
+        # get, not as it is.
         assert largest(one, dt, CONTROLS[control](truth), truth) > 1e-3
         assert largest(one, dt, truth, truth) == 0
 
@@ -80,13 +95,19 @@ def test_what_stands_still_is_not_to_be_caught(name: str):
     "name", [name if name in FEW else pytest.param(name, marks=pytest.mark.slow) for name in MOVING]
 )
 def test_an_engine_that_does_so_is_caught_in_the_tables(name: str, make: type[Exact]):
-    """Played and compared as any engine: by energy or momentum, wherever the disks are; the sound one reads less."""
+    """Played and compared as any engine: by energy or momentum, wherever the disks are; the sound
+    one reads less."""
     one = replace(scenario(name), substeps=(scenario(name).substeps[0],))
     dt = one.dt(one.substeps[0])
-    tables = [compare(one, [play(each(), "reference:exercise", one, dt)]).table for each in (make, Exact)]
-    wrong, sound = (table.drop_duplicates("metric", keep="last").set_index("metric").value for table in tables)
+    tables = [
+        compare(one, [play(each(), "reference:exercise", one, dt)]).table for each in (make, Exact)
+    ]
+    wrong, sound = (
+        table.drop_duplicates("metric", keep="last").set_index("metric").value for table in tables
+    )
     excess = wrong.abs() - sound.abs()
 
-    # 10 % of the energy, of what is at hand in the whole scene: least in a fall that has just begun.
+    # 10 % of the energy, of what is at hand in the whole scene: least in a fall that has just
+    # begun.
     assert excess[["energy_error", "energy_deviation", "momentum_deviation"]].max() > 1e-3
     assert np.isfinite(wrong["velocity_max"])

@@ -1,4 +1,5 @@
-"""Late costs nothing, wrong is seen: velocities, momenta and energies against the truth within the detection delay."""
+"""Late costs nothing, wrong is seen: velocities, momenta and energies against the truth within the
+detection delay."""
 
 from dataclasses import replace
 
@@ -26,12 +27,15 @@ def values(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> l
 
 
 def late(one: Scenario, truth: Trajectory, delay: float) -> Trajectory:
-    """The truth as it was `delay` s ago: without gravity a motion with every collision late by as much."""
+    """The truth as it was `delay` s ago: without gravity a motion with every collision late by as
+    much."""
     assert one.truth is not None
     return replace(truth, velocity=one.truth(np.maximum(truth.t - delay, 0.0)).velocity)
 
 
-@pytest.mark.parametrize("name", ["head_on_unequal_e05", "oblique_e09", "box_billiard", "asteroids", "gas_of_100"])
+@pytest.mark.parametrize(
+    "name", ["head_on_unequal_e05", "oblique_e09", "box_billiard", "asteroids", "gas_of_100"]
+)
 @pytest.mark.parametrize("steps", [0.3, 1.0, 2.7])
 def test_to_be_late_by_less_than_three_steps_costs_nothing(name: str, steps: float):
     """Each disk has another velocity for as long; none that it does not have in the truth."""
@@ -42,7 +46,9 @@ def test_to_be_late_by_less_than_three_steps_costs_nothing(name: str, steps: flo
     assert max(values(one, dt, late(one, truth, steps * dt), truth)) < 1e-13
 
 
-@pytest.mark.parametrize("name", ["head_on_unequal_e05", "oblique_e09", "box_billiard", "asteroids", "gas_of_100"])
+@pytest.mark.parametrize(
+    "name", ["head_on_unequal_e05", "oblique_e09", "box_billiard", "asteroids", "gas_of_100"]
+)
 def test_to_be_late_by_more_than_that_is_seen(name: str):
     """The control: at four samples of the coarse step a whole collision is missing."""
     one, truth = truth_of(name)
@@ -61,12 +67,14 @@ def test_gravity_hides_no_error_of_an_integrator():
     near = np.abs(truth.t[1:, None] - collisions).min(axis=1) < WINDOW * dt
 
     assert near.sum() > 20
-    np.testing.assert_allclose(apart[near & np.isfinite(apart)], gravity * dt, rtol=1e-9)  # digits of v - g dt
+    # digits of v - g dt
+    np.testing.assert_allclose(apart[near & np.isfinite(apart)], gravity * dt, rtol=1e-9)
 
 
 @pytest.mark.parametrize("steps", [0.0, 0.4])
 def test_a_disk_that_is_late_may_keep_falling(steps: float):
-    """Under gravity the flight before the collision is followed on, not held at the velocity it ended with."""
+    """Under gravity the flight before the collision is followed on, not held at the velocity it
+    ended with."""
     one, truth = truth_of("bouncing_ball_e1")
     dt = one.dt(1)
     velocity = truth.velocity.copy()
@@ -80,8 +88,11 @@ def test_a_disk_that_is_late_may_keep_falling(steps: float):
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_a_sample_at_the_instant_of_a_collision_may_have_the_velocity_before_it_or_after_it(name: str):
-    """Whichever of the two the truth has there, by its rounding; with the control that a third one may not."""
+def test_a_sample_at_the_instant_of_a_collision_may_have_the_velocity_before_it_or_after_it(
+    name: str,
+):
+    """Whichever of the two the truth has there, by its rounding; with the control that a third one
+    may not."""
     one, truth = truth_of(name)
     assert one.truth is not None
     jumps = jumps_of(truth, one)
@@ -97,7 +108,9 @@ def test_a_sample_at_the_instant_of_a_collision_may_have_the_velocity_before_it_
     assert np.abs(nearest_velocity(wrong, at, jumps, 1e-7) - wrong.velocity).max() > 1e-3
 
 
-@pytest.mark.parametrize("name", ["falling_box", "gas_of_100", "oblique_e09", "asteroids", "galperin_31"])
+@pytest.mark.parametrize(
+    "name", ["falling_box", "gas_of_100", "oblique_e09", "asteroids", "galperin_31"]
+)
 def test_collisions_take_the_energy_and_the_walls_the_momentum_that_the_truth_loses(name: str):
     """What the jumps say, added up from the start, is what the truth has less."""
     one, truth = truth_of(name)
@@ -110,38 +123,49 @@ def test_collisions_take_the_energy_and_the_walls_the_momentum_that_the_truth_lo
 
     # Sums of a few hundred terms of the size of the scale.
     np.testing.assert_allclose(energy, energy[0] - lost, rtol=0, atol=1e-12 * scales.energy(one))
-    np.testing.assert_allclose(momentum, momentum[0] + weight + taken, rtol=0, atol=1e-12 * scales.momentum(one))
+    np.testing.assert_allclose(
+        momentum, momentum[0] + weight + taken, rtol=0, atol=1e-12 * scales.momentum(one)
+    )
     assert len(jumps.t) > 0
 
 
 def test_of_two_collisions_at_one_instant_either_may_come_first():
-    """A ball in the middle of a row receives an impulse and gives one; mirrored, the list has the two the other way
-    round."""
+    """A ball in the middle of a row receives an impulse and gives one; mirrored, the list has the
+    two the other way round."""
     t, when = np.array([1.0]), np.array([1.0, 1.0])
     receive, give = np.array([1.0, 0.0]), np.array([-1.0, 0.0])
     still = np.zeros((1, 1, 2))
     limits = np.array([0, 2])
     for change in (np.array([receive, give]), np.array([give, receive])):
         for met in (receive, give, np.zeros(2)):
-            assert np.array_equal(nearest(t, met[None, None], still, limits, when, change, 0.1)[0, 0], met)
-    apart = np.array([1.0, 1.01])  # the control: one after the other, to give before it receives is wrong
-    found = nearest(t + 0.02, give[None, None], still, limits, apart, np.array([receive, give]), 0.1)[0, 0]
+            assert np.array_equal(
+                nearest(t, met[None, None], still, limits, when, change, 0.1)[0, 0], met
+            )
+    # the control: one after the other, to give before it receives is wrong
+    apart = np.array([1.0, 1.01])
+    found = nearest(
+        t + 0.02, give[None, None], still, limits, apart, np.array([receive, give]), 0.1
+    )[0, 0]
     assert not np.array_equal(found, give)
 
 
 def test_the_distance_to_a_range_of_sums_is_that_to_a_parallelogram():
-    """Inside it nothing; beside it the distance to its nearest edge or corner, whichever way it is turned."""
+    """Inside it nothing; beside it the distance to its nearest edge or corner, whichever way it is
+    turned."""
     rng = np.random.default_rng(1)
     for _ in range(200):
         turn = rng.uniform(0, 2 * np.pi)
         c, s = np.cos(turn), np.sin(turn)
         turned = np.array([[c, s], [-s, c]])
-        parts = np.array([[1.0, 0.0], [0.0, 2.0], [0.5, 0.0], [-1.0, 0.0]])  # together [-1, 1.5] x [0, 2]
+        # together [-1, 1.5] x [0, 2]
+        parts = np.array([[1.0, 0.0], [0.0, 2.0], [0.5, 0.0], [-1.0, 0.0]])
         point = rng.uniform(-4, 4, 2)
         expected = np.hypot(*(point - np.clip(point, [-1, 0], [1.5, 2])))
 
         # Rounding of four subtractions of numbers up to 4.
-        assert distance_to_range(point @ turned, parts @ turned) == pytest.approx(expected, abs=1e-12)
+        assert distance_to_range(point @ turned, parts @ turned) == pytest.approx(
+            expected, abs=1e-12
+        )
 
 
 def test_a_point_within_a_range_of_many_impulses_has_no_distance():
@@ -149,48 +173,75 @@ def test_a_point_within_a_range_of_many_impulses_has_no_distance():
     rng = np.random.default_rng(2)
     for _ in range(50):
         parts = rng.normal(size=(20, 2))
-        # The shares are found one after the other, in at most `SWEEPS` rounds: to 1e-6 of the impulses at hand.
+        # The shares are found one after the other, in at most `SWEEPS` rounds: to 1e-6 of the
+        # impulses at hand.
         assert distance_to_range(rng.uniform(size=20) @ parts, parts) < 1e-6
 
 
 def box(pace: float) -> Scenario:
     """Eight disks in a box, `pace` times as fast and as short."""
-    velocity: Array = np.array([
-        [2.35, 0.51], [-0.17, 1.64], [-2.82, 1.24], [-0.75, -2.45], [0.96, 2.59], [-1.76, 0.78], [-1.21, 1.45],
-        [1.33, -1.69],
-    ])  # fmt: skip
+    velocity: Array = np.array(
+        [
+            [2.35, 0.51],
+            [-0.17, 1.64],
+            [-2.82, 1.24],
+            [-0.75, -2.45],
+            [0.96, 2.59],
+            [-1.76, 0.78],
+            [-1.21, 1.45],
+            [1.33, -1.69],
+        ]
+    )
     scene = Scene(
-        position=[[-1.5, 1.7], [-2.2, -0.4], [-1.9, 1.1], [-0.6, 0.1], [0.5, 1.3], [-1.1, 0.5], [-1.1, -2.7],
-                  [-1.1, -1.0]],
-        velocity=pace * velocity, radius=[0.17, 0.27, 0.25, 0.17, 0.24, 0.3, 0.29, 0.34],
-        mass=[2.6, 2.1, 2.2, 2.6, 1.6, 2.4, 2.7, 0.8], restitution=0.9,
+        position=[
+            [-1.5, 1.7],
+            [-2.2, -0.4],
+            [-1.9, 1.1],
+            [-0.6, 0.1],
+            [0.5, 1.3],
+            [-1.1, 0.5],
+            [-1.1, -2.7],
+            [-1.1, -1.0],
+        ],
+        velocity=pace * velocity,
+        radius=[0.17, 0.27, 0.25, 0.17, 0.24, 0.3, 0.29, 0.34],
+        mass=[2.6, 2.1, 2.2, 2.6, 1.6, 2.4, 2.7, 0.8],
+        restitution=0.9,
         walls=[[[-3, -3], [3, -3]], [[3, -3], [3, 3]], [[3, 3], [-3, 3]], [[-3, 3], [-3, -3]]],
-    )  # fmt: skip
+    )
     return with_oracle(Scenario("box", "?", "", scene, 1.0 / pace, 0.02 / pace, (1, 2)))
 
 
 def largest_change(metric: str) -> float:
-    """How much a metric, of four engines against the truth and each other, changes if all is ten times as fast."""
+    """How much a metric, of four engines against the truth and each other, changes if all is ten
+    times as fast."""
     names = ("reference:exercise", "reference:lesson", "pymunk:matched", "event_driven:float64")
     found = []
     for pace in (1, 10):
         one = box(pace)
-        runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in one.substeps]
+        runs = [
+            play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in one.substeps
+        ]
         table = compare(one, runs).table
-        found.append(table[table.metric == metric].value.to_numpy() / (pace if "velocity" in metric else 1))
+        found.append(
+            table[table.metric == metric].value.to_numpy() / (pace if "velocity" in metric else 1)
+        )
     assert len(found[0]) > 8
     return float(np.abs(found[0] - found[1]).max())
 
 
 @pytest.mark.parametrize("metric", HELD)
 def test_the_same_scene_ten_times_as_fast_reads_the_same(metric: str):
-    """Samples, steps and the collisions that are reported of them lie on one grid: no rounding of it decides."""
-    # Rounding of the speeds, 3 m/s, that a few collisions have spread; momenta and energies are relative.
+    """Samples, steps and the collisions that are reported of them lie on one grid: no rounding of
+    it decides."""
+    # Rounding of the speeds, 3 m/s, that a few collisions have spread; momenta and energies are
+    # relative.
     assert largest_change(metric) < 1e-9
 
 
 def test_a_threshold_on_the_grid_is_seen(monkeypatch: pytest.MonkeyPatch):
-    """The control: with a window of three steps the rounding of the grid decides which samples are compared."""
+    """The control: with a window of three steps the rounding of the grid decides which samples are
+    compared."""
     for module in (delays, view):
         monkeypatch.setattr(module, "WINDOW", 3.0)
 

@@ -1,4 +1,5 @@
-"""Missing no collision is no merit where none is judged, and a number says of how many collisions it speaks."""
+"""Missing no collision is no merit where none is judged, and a number says of how many collisions
+it speaks."""
 
 from dataclasses import replace
 
@@ -34,16 +35,22 @@ def counts(note: str) -> tuple[int, int]:
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
 def test_an_engine_that_reports_no_collision_is_caught_wherever_one_is_judged(name: str):
-    """By every collision that is judged, at every step size; where none or few are, it reads no number at all.
+    """By every collision that is judged, at every step size; where none or few are, it reads no
+    number at all.
 
     The control is the truth itself, which misses none of as many.
     """
     one, truth = truth_of(name)
     for dt in map(one.dt, one.substeps):
-        silent, right = (read(one, dt, each, truth) for each in (replace(truth, collisions=NOTHING), truth))
+        silent, right = (
+            read(one, dt, each, truth) for each in (replace(truth, collisions=NOTHING), truth)
+        )
         if not len(truth.collisions):
             assert silent["collisions_missed"].note.startswith(NOT_JUDGED)
-            assert (silent["collisions_spurious"].value, silent["first_wrong_collision_s"].value) == (0, np.inf)
+            assert (
+                silent["collisions_spurious"].value,
+                silent["first_wrong_collision_s"].value,
+            ) == (0, np.inf)
             continue
         judged, total = counts(right["collisions_missed"].note)
 
@@ -51,9 +58,15 @@ def test_an_engine_that_reports_no_collision_is_caught_wherever_one_is_judged(na
         assert counts(silent["collisions_missed"].note) == (judged, total)
         if judged < LEAST_SHARE * total:
             assert all(np.isnan(value.value) for value in (*silent.values(), *right.values()))
-            assert all(value.note.startswith(f"{NOT_JUDGED}: only ") for value in (*silent.values(), *right.values()))
+            assert all(
+                value.note.startswith(f"{NOT_JUDGED}: only ")
+                for value in (*silent.values(), *right.values())
+            )
         else:
-            assert (silent["collisions_missed"].value, right["collisions_missed"].value) == (judged, 0)
+            assert (silent["collisions_missed"].value, right["collisions_missed"].value) == (
+                judged,
+                0,
+            )
             assert judged > 0
             assert np.isfinite(silent["first_wrong_collision_s"].value)
             assert right["first_wrong_collision_s"].value == np.inf
@@ -93,7 +106,8 @@ def test_a_finer_step_judges_more_collisions():
 
 
 def test_where_there_is_no_collision_none_is_missed_but_one_may_be_invented():
-    """An engine that reports one in a near miss; the page counts it, and does not count what cannot be missed."""
+    """An engine that reports one in a near miss; the page counts it, and does not count what cannot
+    be missed."""
     one, truth = truth_of("near_miss")
     invents = replace(truth, collisions=Collisions.of([(one.duration / 2, 0, 1, 1.0)]))
     found = read(one, one.dt(1), invents, truth)
@@ -114,6 +128,8 @@ def test_a_scene_in_which_too_few_collisions_are_judged_is_left_out_of_the_sum()
     one, truth = truth_of("column_of_ten")
     runs = [Run("pymunk", "matched", one.name, one.dt(k), trajectory=truth) for k in one.substeps]
     column = list(overview.SUMMARY).index("wrong_collisions")
-    cell = overview.summary([compare(one, runs)], ["pymunk:matched"], set())["pymunk:matched"][column]
+    cell = overview.summary([compare(one, runs)], ["pymunk:matched"], set())["pymunk:matched"][
+        column
+    ]
 
     assert (cell.text, cell.remark) == ("–", f"in 0 scenarios, {NOT_JUDGED} in 1")

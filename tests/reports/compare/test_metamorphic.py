@@ -1,7 +1,8 @@
-"""Every metric changes as its unit says if the same is stated otherwise: numbers of disks, axes, origin, units, walls.
+"""Every metric changes as its unit says if the same is stated otherwise: numbers of disks, axes,
+origin, units, walls.
 
-Nothing else may change a number, not by more than rounding, and not by the rounding of a grid on which steps, samples
-and collisions lie together.
+Nothing else may change a number, not by more than rounding, and not by the rounding of a grid on
+which steps, samples and collisions lie together.
 """
 
 from collections.abc import Callable
@@ -27,11 +28,19 @@ from scenarios.model import Scenario, Scene, Thrust
 from scenarios.truth.exact import with_oracle
 from tests.reports.compare.metamorphic import CHANGES, Change
 
-PLAYED = ("reference:exercise", "reference:ordered", "pymunk:matched", "box2d:matched", "event_driven:float64")
+PLAYED = (
+    "reference:exercise",
+    "reference:ordered",
+    "pymunk:matched",
+    "box2d:matched",
+    "event_driven:float64",
+)
 ROOM = box([-2.5, -2.5], [2.5, 2.5])
 
 
-def asked(name: str, scene: Scene, duration: float, interval: float, thrusts: tuple[Thrust, ...] = ()) -> Scenario:
+def asked(
+    name: str, scene: Scene, duration: float, interval: float, thrusts: tuple[Thrust, ...] = ()
+) -> Scenario:
     """The scene at two steps, with the oracle for its answer."""
     return with_oracle(Scenario(name, "?", "", scene, duration, interval, (1, 2), thrusts))
 
@@ -41,48 +50,75 @@ def crowd(**more: object) -> Scene:
     return lay_out(
         position=[[-1.5, 1.7], [-2.2, -0.4], [-0.6, 0.1], [0.5, 1.3], [1.2, -1.1]],
         velocity=[[2.35, -1.51], [1.17, 0.64], [-0.75, -2.45], [-0.96, -2.59], [-1.76, 1.78]],
-        radius=[0.17, 0.27, 0.25, 0.34, 0.4], mass=[2.6, 2.1, 0.8, 1.6, 2.4],
-        angle=[0.1, 1.2, -2.0, 0.0, 0.3], angular_velocity=[0.4, -1.0, 0.0, 2.0, 0.7], **more,
-    )  # fmt: skip
+        radius=[0.17, 0.27, 0.25, 0.34, 0.4],
+        mass=[2.6, 2.1, 0.8, 1.6, 2.4],
+        angle=[0.1, 1.2, -2.0, 0.0, 0.3],
+        angular_velocity=[0.4, -1.0, 0.0, 2.0, 0.7],
+        **more,
+    )
 
 
 SCENES: dict[str, Callable[[], Scenario]] = {
     "free": lambda: asked("free", crowd(restitution=0.8), 1.0, 0.02),
     "elastic": lambda: asked("elastic", crowd(restitution=1.0, walls=ROOM), 1.5, 0.02),
     "room": lambda: asked("room", crowd(restitution=0.9, walls=ROOM), 1.0, 0.02),
-    "falling": lambda: asked("falling", crowd(restitution=0.5, walls=ROOM, gravity=[0.3, -9.81]), 0.8, 0.02),
-    # Every collision at the end of a step and of a sample interval; the walls in many pieces of decimal lengths.
+    "falling": lambda: asked(
+        "falling", crowd(restitution=0.5, walls=ROOM, gravity=[0.3, -9.81]), 0.8, 0.02
+    ),
+    # Every collision at the end of a step and of a sample interval; the walls in many pieces of
+    # decimal lengths.
     "grid": lambda: asked(
-        "grid", lay_out(
+        "grid",
+        lay_out(
             position=[[-0.5, 0.0], [0.5, 0.0], [0.0, 1.0], [0.0, -1.0]],
-            velocity=[[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, 0.0]], radius=[0.1] * 4, mass=[1.0, 1.0, 2.0, np.inf],
-            restitution=1.0, walls=box([-1.1, -1.7], [1.1, 1.7]),
-        ), 3.0, 0.1,
+            velocity=[[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, 0.0]],
+            radius=[0.1] * 4,
+            mass=[1.0, 1.0, 2.0, np.inf],
+            restitution=1.0,
+            walls=box([-1.1, -1.7], [1.1, 1.7]),
+        ),
+        3.0,
+        0.1,
     ),
     "thrust": lambda: asked(
-        "thrust", crowd(restitution=0.8), 1.0, 0.02,
+        "thrust",
+        crowd(restitution=0.8),
+        1.0,
+        0.02,
         (Thrust(0, 0.1, 0.5, [1.5, -2.0], 0.3), Thrust(3, 0.2, 0.77, [0.0, 4.0])),
     ),
     "thrust to the walls": lambda: asked(
-        "steered", crowd(restitution=0.7, walls=ROOM), 0.8, 0.02, (Thrust(1, 0.0, 0.6, [3.0, 0.5], 0.3, "body"),),
+        "steered",
+        crowd(restitution=0.7, walls=ROOM),
+        0.8,
+        0.02,
+        (Thrust(1, 0.0, 0.6, [3.0, 0.5], 0.3, "body"),),
     ),
-    "wrapped": lambda: asked("wrapped", crowd(restitution=0.9, wrap=[[-3.0, -2.0], [3.0, 2.0]]), 1.0, 0.02),
-}  # fmt: skip
+    "wrapped": lambda: asked(
+        "wrapped", crowd(restitution=0.9, wrap=[[-3.0, -2.0], [3.0, 2.0]]), 1.0, 0.02
+    ),
+}
 
-# What a change cannot be asked of: a moving frame moves walls, what stands still and gravity's energy; the wrap stands
-# along the axes and is as long as it is.
+# What a change cannot be asked of: a moving frame moves walls, what stands still and gravity's
+# energy; the wrap stands along the axes and is as long as it is.
 WALLED = ("elastic", "room", "falling", "grid", "thrust to the walls", "wrapped")
 LEFT_OUT = {("boosted", name) for name in WALLED} | {
     (name, "wrapped") for name in ("turned", "turned by a quarter and mirrored")
 }
-# Numbers that belong to a frame: energies and the spin of the whole about a point are others in a moving one.
+# Numbers that belong to a frame: energies and the spin of the whole about a point are others in a
+# moving one.
 OF_A_FRAME = (
-    "energy_error", "energy_deviation", "energy_created", "energy_loss_error", "angular_momentum_error",
-)  # fmt: skip
+    "energy_error",
+    "energy_deviation",
+    "energy_created",
+    "energy_loss_error",
+    "angular_momentum_error",
+)
 
 ROUNDING = 1e-9
-"""Of a number, and of the size of what it is the difference of: float64 of some ten roundings, in coordinates of 40 m
-where lengths are of 1 m, spread a hundredfold by restitutions read off small changes of velocity."""
+"""Of a number, and of the size of what it is the difference of: float64 of some ten roundings, in
+coordinates of 40 m where lengths are of 1 m, spread a hundredfold by restitutions read off small
+changes of velocity."""
 
 
 @cache
@@ -110,16 +146,22 @@ def wrong(name: str, change: Change) -> list[str]:
         same = a.value * factor == b.value or abs(a.value * factor - b.value) <= near
         same |= bool(np.isnan(a.value) and np.isnan(b.value))
         if not same:
-            found.append(f"{a.metric} {a.engine} {a.dt_s:g} {a.versus}: {a.value * factor!r} is {b.value!r} {b.note}")
+            found.append(
+                f"{a.metric} {a.engine} {a.dt_s:g} {a.versus}: {a.value * factor!r} is {b.value!r}"
+                f" {b.note}"
+            )
     return found
 
 
 CAN = {change: [name for name in SCENES if (change, name) not in LEFT_OUT] for change in CHANGES}
 # Every change and every scene is in the third that is played here; the long test has the others.
 PAIRS = [
-    pytest.param(name, change, marks=[] if j % 3 == k % min(3, len(CAN[change])) else [pytest.mark.slow])
-    for k, change in enumerate(CHANGES) for j, name in enumerate(CAN[change])
-]  # fmt: skip
+    pytest.param(
+        name, change, marks=[] if j % 3 == k % min(3, len(CAN[change])) else [pytest.mark.slow]
+    )
+    for k, change in enumerate(CHANGES)
+    for j, name in enumerate(CAN[change])
+]
 
 
 @pytest.mark.parametrize(("name", "change"), PAIRS)
@@ -134,15 +176,23 @@ def test_every_metric_is_under_test():
     assert {*pd.concat(tables).metric} == {*METRICS}
     for metric in METRICS:
         values = np.concatenate([table[table.metric == metric].value for table in tables])
-        assert (np.isfinite(values) & (values != 0)).any() or metric == "disks_through_walls", metric
+        assert (np.isfinite(values) & (values != 0)).any() or metric == "disks_through_walls", (
+            metric
+        )
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
-    length=st.floats(1e-4, 1e4), time=st.floats(1e-4, 1e4), mass=st.floats(1e-4, 1e4), turn=st.floats(0, 7),
-    flip=st.sampled_from([1, -1]), name=st.sampled_from(["free", "falling", "grid", "thrust"]),
-)  # fmt: skip
-def test_any_units_and_any_axes_will_do(length: float, time: float, mass: float, turn: float, flip: int, name: str):
+    length=st.floats(1e-4, 1e4),
+    time=st.floats(1e-4, 1e4),
+    mass=st.floats(1e-4, 1e4),
+    turn=st.floats(0, 7),
+    flip=st.sampled_from([1, -1]),
+    name=st.sampled_from(["free", "falling", "grid", "thrust"]),
+)
+def test_any_units_and_any_axes_will_do(
+    length: float, time: float, mass: float, turn: float, flip: int, name: str
+):
     """All at once."""
     assert not wrong(name, Change(length=length, time=time, mass=mass, turn=turn, flip=flip))
 
@@ -232,7 +282,9 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("of", "unit", "name", "change"), WRONG, ids=lambda part: getattr(part, "__name__", str(part)))
+@pytest.mark.parametrize(
+    ("of", "unit", "name", "change"), WRONG, ids=lambda part: getattr(part, "__name__", str(part))
+)
 def test_a_metric_that_should_not_be_one_is_caught(
     of: Callable[[View], Value], unit: str, name: str, change: str, monkeypatch: pytest.MonkeyPatch
 ):
@@ -253,8 +305,10 @@ def test_there_is_a_control_for_every_change():
 
 
 def test_a_bound_on_the_grid_is_caught_in_the_metrics_themselves(monkeypatch: pytest.MonkeyPatch):
-    """With windows of three steps, or times compared without their rounding, the last bit decides."""
-    monkeypatch.setattr(collisions, "judge", collisions.judge.py_func)  # what is compiled keeps its bounds
+    """With windows of three steps, or times compared without their rounding, the last bit
+    decides."""
+    # what is compiled keeps its bounds
+    monkeypatch.setattr(collisions, "judge", collisions.judge.py_func)
     for module in (delays, view, collisions):
         monkeypatch.setattr(module, "WINDOW", 3.0)
     assert wrong_again("room", "ten times as fast")
@@ -279,19 +333,26 @@ CASES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 def test_a_scene_ten_times_as_fast_gives_the_same_numbers_in_its_own_file():
     """Two files that are one scene, played each: here engines are asked as well.
 
-    Those without a unit of time: pymunk takes as much of an overlap away in a second, whatever a second is.
+    Those without a unit of time: pymunk takes as much of an overlap away in a second, whatever a
+    second is.
     """
     tables = []
     for name in ("pace_1", "pace_10"):
         one = read_scene_file(CASES / f"{name}.toml")
         runs = [
             play(ENGINES[who].make(), who, one, one.dt(k))
-            for who in ("reference:exercise", "reference:lesson", "reference:ordered", "event_driven:float64")
+            for who in (
+                "reference:exercise",
+                "reference:lesson",
+                "reference:ordered",
+                "event_driven:float64",
+            )
             for k in one.substeps
         ]
         tables.append(compare(one, runs).table)
     slow, fast = tables
     assert slow.metric.tolist() == fast.metric.tolist()
     factor = slow.unit.map({"m/s": 10.0, "rad/s": 10.0, "s": 0.1}).fillna(1.0)
-    # Chaos spreads the rounding of the velocities a millionfold by the end, as the horizon of the scene says.
+    # Chaos spreads the rounding of the velocities a millionfold by the end, as the horizon of the
+    # scene says.
     np.testing.assert_allclose(fast.value, slow.value * factor, rtol=1e-8, atol=1e-9)

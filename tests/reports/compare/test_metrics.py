@@ -30,7 +30,8 @@ def value(metric: str, view: View) -> float:
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
 def test_the_truth_against_itself_is_zero(name: str):
-    """Every error of the truth measured against the truth is 0, it never leaves the 1 % band, it misses no collision.
+    """Every error of the truth measured against the truth is 0, it never leaves the 1 % band, it
+    misses no collision.
 
     What is not judged at this step is no number (test_judged_collisions.py).
     """
@@ -46,27 +47,39 @@ def test_the_truth_against_itself_is_zero(name: str):
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
 def test_the_truth_keeps_the_laws(name: str):
-    """Momentum, energy and non-penetration hold in the truth to the rounding of a sum over its disks."""
+    """Momentum, energy and non-penetration hold in the truth to the rounding of a sum over its
+    disks."""
     one, truth = truth_of(name)
     view = View(one, one.dt(1), truth)
 
-    for metric in ("momentum_error", "angular_momentum_error", "energy_error", "energy_created", "penetration_radii"):
+    for metric in (
+        "momentum_error",
+        "angular_momentum_error",
+        "energy_error",
+        "energy_created",
+        "penetration_radii",
+    ):
         if (found := METRICS[metric].of(view)) is not None:
-            # A few hundred roundings of terms of the size of the scale; angular momentum squares the distances.
+            # A few hundred roundings of terms of the size of the scale; angular momentum squares
+            # the distances.
             assert found.value < 1e-12, metric
 
 
 @pytest.mark.parametrize("name", ["head_on_equal_e09", "line_gas", "ping_pong"])
 def test_a_disk_moved_by_a_millimetre_reads_a_millimetre(name: str):
-    """One sample of one disk moved by 1 mm: the largest deviation is 1 mm, at that disk and that instant."""
+    """One sample of one disk moved by 1 mm: the largest deviation is 1 mm, at that disk and that
+    instant."""
     one, truth = truth_of(name)
     position = truth.position.copy()
     k, disk = len(truth) // 2, one.scene.n - 1
     position[k, disk] += [0.0006, 0.0008]
-    found = METRICS["position_max"].of(View(one, one.dt(1), replace(truth, position=position), truth))
+    found = METRICS["position_max"].of(
+        View(one, one.dt(1), replace(truth, position=position), truth)
+    )
 
     assert found is not None
-    assert found.value == pytest.approx(1e-3, rel=1e-9)  # the rounding of x + 0.0008 at |x| < 20, over 1e-3
+    # the rounding of x + 0.0008 at |x| < 20, over 1e-3
+    assert found.value == pytest.approx(1e-3, rel=1e-9)
     assert (found.disk, found.at) == (disk, truth.t[k])
 
 
@@ -96,15 +109,28 @@ def test_energy_that_is_created_is_seen():
 
 def test_weight_and_thrust_are_accounted_for():
     """Free flight under gravity and a world-frame thrust has no momentum error."""
-    scene = Scene(position=[[0, 0]], velocity=[[1, 2]], radius=[0.1], mass=[2], restitution=1, gravity=[0, -9.81])
+    scene = Scene(
+        position=[[0, 0]],
+        velocity=[[1, 2]],
+        radius=[0.1],
+        mass=[2],
+        restitution=1,
+        gravity=[0, -9.81],
+    )
     one = Scenario(
-        name="thrust", asks="?", source="", scene=scene, duration=1.0, sample_interval=0.1,
+        name="thrust",
+        asks="?",
+        source="",
+        scene=scene,
+        duration=1.0,
+        sample_interval=0.1,
         thrusts=[Thrust(0, 0.25, 0.6, [3.0, 1.0])],
-    )  # fmt: skip
+    )
     run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
     assert run.trajectory is not None
 
-    assert value("momentum_error", View(one, run.dt, run.trajectory)) < 1e-14  # ten additions of float64
+    # ten additions of float64
+    assert value("momentum_error", View(one, run.dt, run.trajectory)) < 1e-14
 
 
 def test_deviation_is_measured_across_the_seam():
@@ -112,9 +138,11 @@ def test_deviation_is_measured_across_the_seam():
     one = scenario("asteroids")
     run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(4))
     assert run.trajectory is not None
-    moved = replace(run.trajectory, position=run.trajectory.position + [10.0, 0.0])  # the box is 10 m wide
+    # the box is 10 m wide
+    moved = replace(run.trajectory, position=run.trajectory.position + [10.0, 0.0])
 
-    assert value("position_max", View(one, run.dt, moved, run.trajectory)) < 1e-14  # rounding of x + 10
+    # rounding of x + 10
+    assert value("position_max", View(one, run.dt, moved, run.trajectory)) < 1e-14
 
 
 @pytest.mark.parametrize("e", ["e0", "e05", "e09", "e1"])
@@ -122,7 +150,8 @@ def test_restitution_is_read_off_the_velocities(e: str):
     """The exact answer has the restitution it was made with."""
     one, truth = truth_of(f"oblique_{e}")
 
-    # Sampled velocities are exact up to rounding; the quotient amplifies it by v / v_n, below 10 here.
+    # Sampled velocities are exact up to rounding; the quotient amplifies it by v / v_n, below 10
+    # here.
     assert value("restitution_error", View(one, one.dt(1), truth)) < 1e-14
 
 
@@ -130,17 +159,21 @@ def test_restitution_is_read_off_the_velocities(e: str):
 def test_the_reference_has_the_restitution_of_the_scene_in_every_scene(name: str):
     """Its impulse is exact, so what is read off its samples is e, or the reading is wrong."""
     one = scenario(name)
-    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(one.substeps[0]))
+    run = play(
+        ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(one.substeps[0])
+    )
     assert run.trajectory is not None
     found = METRICS["restitution_error"].of(View(one, run.dt, run.trajectory))
 
-    # Rounding of v, twice over the closing speed: once in the normal, once in e. The slowest graze here is 1e-3 v.
+    # Rounding of v, twice over the closing speed: once in the normal, once in e. The slowest graze
+    # here is 1e-3 v.
     assert found is None or found.value < 1e-8
 
 
 @pytest.mark.parametrize("metric", METRICS)
 def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
-    """Also for one that explodes, one that stands still, one sample, and a disk that does not turn."""
+    """Also for one that explodes, one that stands still, one sample, and a disk that does not
+    turn."""
     scene = replace(scenario("box_billiard").scene, inertia=np.array([np.inf]))
     one = replace(scenario("box_billiard"), scene=scene)
     assert one.truth is not None
@@ -151,14 +184,17 @@ def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
         for other in (None, cut(truth, len(played))):
             kind = "itself" if other is None else "truth"
             if kind in METRICS[metric].against:
-                beside = View(one, one.dt(1), played, other, None if other is None else jumps_of(truth, one))
+                beside = View(
+                    one, one.dt(1), played, other, None if other is None else jumps_of(truth, one)
+                )
                 with np.errstate(over="ignore", invalid="ignore"):  # as `compare` does
                     found = METRICS[metric].of(beside)
                 assert found is None or isinstance(found.value, float | int)
 
 
 def test_a_run_that_diverged_earns_a_status_and_no_score():
-    """An engine that gives NaN at step 7 was right before it, for a scene that nobody else played so short."""
+    """An engine that gives NaN at step 7 was right before it, for a scene that nobody else played
+    so short."""
     one = scenario("slow_collision")
     run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
     good = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", one, one.dt(1))
@@ -171,7 +207,8 @@ def test_a_run_that_diverged_earns_a_status_and_no_score():
 
 
 def test_to_refuse_a_scene_does_not_help_in_the_ranking():
-    """Who has no result in a scene is last in it, and who has none in half of them is not ranked first."""
+    """Who has no result in a scene is last in it, and who has none in half of them is not ranked
+    first."""
     one, two = scenario("slow_collision"), scenario("near_miss")
     runs = {
         name: [play(ENGINES[name].make(), name, each, each.dt(4)) for each in (one, two)]
@@ -209,9 +246,14 @@ def test_an_explosion_does_not_make_itself_small():
 def test_falling_through_a_wrap_is_no_energy_error():
     """A disk that is set from the bottom to the top has more height; that is the scene's doing."""
     scene = Scene(
-        position=[[0, 0]], velocity=[[0, 0]], radius=[0.1], mass=[1], restitution=1, gravity=[0, -1],
+        position=[[0, 0]],
+        velocity=[[0, 0]],
+        radius=[0.1],
+        mass=[1],
+        restitution=1,
+        gravity=[0, -1],
         wrap=[[-1, -1], [1, 1]],
-    )  # fmt: skip
+    )
     one = Scenario(name="rain", asks="?", source="", scene=scene, duration=5.0, sample_interval=0.1)
     run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
     assert run.trajectory is not None
@@ -232,11 +274,19 @@ def test_comparison_stops_where_the_other_ends():
 
 
 def test_the_table_has_failures_too_and_every_pair_once():
-    """A refused run is a row with its reason; engines are compared pairwise at the same dt, in one direction."""
+    """A refused run is a row with its reason; engines are compared pairwise at the same dt, in one
+    direction."""
     one = scenario("head_on_equal_e1")
     names = ["reference:exercise", "reference:lesson", "pymunk:matched"]
     runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in (1, 2)]
-    refused = Run("box2d", "matched", one.name, one.dt(1), "unsupported", "mass 1e+300 does not fit into float32")
+    refused = Run(
+        "box2d",
+        "matched",
+        one.name,
+        one.dt(1),
+        "unsupported",
+        "mass 1e+300 does not fit into float32",
+    )
     table = compare(one, [*runs, refused]).table
     status = table[table.metric == "status"]
     pairs = table[~table.versus.isin(["itself", "truth"]) & (table.metric == "position_rms")]
@@ -250,7 +300,10 @@ def test_the_table_has_failures_too_and_every_pair_once():
 def test_without_a_truth_nothing_is_called_an_error_of_position():
     """Where nobody knows the answer the table has laws and pairs only."""
     one = replace(scenario("gas_of_100"), duration=0.5, truth=None)
-    runs = [play(ENGINES[name].make(), name, one, one.dt(4)) for name in ("reference:exercise", "pymunk:matched")]
+    runs = [
+        play(ENGINES[name].make(), name, one, one.dt(4))
+        for name in ("reference:exercise", "pymunk:matched")
+    ]
     table = compare(one, runs).table
 
     assert set(table.versus) == {"itself", "pymunk:matched"}
@@ -258,7 +311,13 @@ def test_without_a_truth_nothing_is_called_an_error_of_position():
 
 def test_where_the_oracle_refuses_the_comparison_says_why():
     """Disks that overlap have no exact answer: no error is claimed, and the reason is at hand."""
-    scene = Scene(position=[[0, 0], [0.3, 0]], velocity=[[0, 0], [0, 0]], radius=[0.2, 0.2], mass=[1, 1], restitution=1)
+    scene = Scene(
+        position=[[0, 0], [0.3, 0]],
+        velocity=[[0, 0], [0, 0]],
+        radius=[0.2, 0.2],
+        mass=[1, 1],
+        restitution=1,
+    )
     refused = compare(with_oracle(Scenario("two", "?", "", scene, 1.0, 0.1)), [])
 
     assert refused.truth is None

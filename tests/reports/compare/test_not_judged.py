@@ -1,4 +1,5 @@
-"""A number that too few samples carry is not judged: shown so, and left out of medians, best marks and verdicts."""
+"""A number that too few samples carry is not judged: shown so, and left out of medians, best marks
+and verdicts."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,9 +24,14 @@ from scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
 CARRIED = (
-    "velocity_max", "velocity_rms", "angular_velocity_max", "momentum_deviation", "energy_deviation", "energy_error",
+    "velocity_max",
+    "velocity_rms",
+    "angular_velocity_max",
+    "momentum_deviation",
+    "energy_deviation",
+    "energy_error",
     "energy_loss_error",
-)  # fmt: skip
+)
 NAMES = ("reference:exercise", "pymunk:matched")
 
 
@@ -56,7 +62,8 @@ def against_truth(table: pd.DataFrame, metric: str, dt: float) -> pd.DataFrame:
 @pytest.mark.parametrize("name", ["falling_box", "gas_of_100"])
 @pytest.mark.parametrize("metric", CARRIED)
 def test_a_crowded_scene_is_judged_at_every_step_size(name: str, metric: str):
-    """From nearly all of its samples, and says from how many; a stepping engine has no perfect score."""
+    """From nearly all of its samples, and says from how many; a stepping engine has no perfect
+    score."""
     one = replace(scenario(name), substeps=(1, 2, 4))
     rows = compared(one).table.query("metric == @metric and versus == 'truth'")
 
@@ -79,8 +86,8 @@ def test_nothing_is_judged_by_the_start_alone():
 
 @pytest.mark.parametrize("metric", [name for name in CARRIED if name != "energy_loss_error"])
 def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
-    """Within three steps of its end a truth does not say which velocity may come early: of 3 samples 2 are left at dt
-    / 4, none at dt."""
+    """Within three steps of its end a truth does not say which velocity may come early: of 3
+    samples 2 are left at dt / 4, none at dt."""
     one = known_until("wall_to_wall", 4)
     table = compared(one).table
     fine, coarse = (against_truth(table, metric, one.dt(k)) for k in (4, 1))
@@ -92,7 +99,8 @@ def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
 
 
 def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
-    """Of a pair that collides once, all samples but those within three steps of the collision of either engine."""
+    """Of a pair that collides once, all samples but those within three steps of the collision of
+    either engine."""
     one = scenario("head_on_equal_e05")
     runs = [play(ENGINES[name].make(), name, one, one.dt(1)).trajectory for name in NAMES]
     assert runs[0] is not None
@@ -109,11 +117,17 @@ def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
 def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisions():
     """Each reports a collision every other step: less than a tenth of the samples is left."""
     one = scenario("slide_on_incline")
-    found = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)).trajectory
+    found = play(
+        ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)
+    ).trajectory
     assert found is not None
     times = np.arange(0.0, one.duration, 2 * one.dt(1))
     collisions = replace(
-        found.collisions, t=times, i=np.zeros(len(times), int), j=np.full(len(times), -1), impulse=np.ones(len(times))
+        found.collisions,
+        t=times,
+        i=np.zeros(len(times), int),
+        j=np.full(len(times), -1),
+        impulse=np.ones(len(times)),
     )
     view = View(one, one.dt(1), replace(found, collisions=collisions), found)
     value = METRICS["velocity_max"].of(view)
@@ -135,17 +149,25 @@ def lost(comparison: Comparison, name: str, metric: str) -> Comparison:
 
 
 def test_what_is_not_judged_is_shown_and_counts_in_no_median_and_for_no_best_mark():
-    """Of two scenes the other one makes the median; where none is left there is none, and nobody is best by it."""
+    """Of two scenes the other one makes the median; where none is left there is none, and nobody is
+    best by it."""
     good = [compared(scenario(name)) for name in ("wall_to_wall", "head_on_equal_e05")]
     half = [good[0], lost(good[1], NAMES[0], "energy_error")]
     none = [lost(one, NAMES[0], "energy_error") for one in good]
     column = list(overview.SUMMARY).index("energy_error")
     whole, some, nothing = (overview.summary(each, NAMES, set()) for each in (good, half, none))
-    [row] = [cells for key, _, _, cells in overview.scenario_table(half[1], NAMES) if key == "energy_error"]
+    [row] = [
+        cells
+        for key, _, _, cells in overview.scenario_table(half[1], NAMES)
+        if key == "energy_error"
+    ]
 
     assert whole[NAMES[0]][column].remark == "in 2 scenarios"
     assert some[NAMES[0]][column].remark == f"in 1 scenarios, {NOT_JUDGED} in 1"
-    assert some[NAMES[0]][column].text == overview.summary(good[:1], NAMES, set())[NAMES[0]][column].text
+    assert (
+        some[NAMES[0]][column].text
+        == overview.summary(good[:1], NAMES, set())[NAMES[0]][column].text
+    )
     assert (nothing[NAMES[0]][column].text, nothing[NAMES[0]][column].best) == ("–", False)
     assert nothing[NAMES[1]][column].best
     assert (row[0].text, row[0].best) == (NOT_JUDGED, False)
@@ -158,7 +180,10 @@ def test_a_scene_known_at_its_start_only_beats_nobody():
     cells = overview.heat_map([nothing], NAMES)["wall_to_wall"]
 
     assert "No scene here has an exact answer" in findings([nothing], set())[0]
-    assert "median of 1 scenes" in findings([nothing, compared(scenario("head_on_equal_e05"))], set())[0]
+    assert (
+        "median of 1 scenes"
+        in findings([nothing, compared(scenario("head_on_equal_e05"))], set())[0]
+    )
     assert {(cell.text, cell.heat) for cell in cells} == {(NOT_JUDGED, -1)}
     for chart in CHARTS.values():
         chart.draw(nothing)
@@ -197,7 +222,9 @@ def test_a_velocity_that_overflows_is_judged_and_bad():
 def test_a_failed_run_is_no_number_that_is_not_judged():
     """Its row is a status."""
     one = scenario("wall_to_wall")
-    table = compare(one, [Run("pymunk", "matched", one.name, one.dt(1), "unsupported", "too hard")]).table
+    table = compare(
+        one, [Run("pymunk", "matched", one.name, one.dt(1), "unsupported", "too hard")]
+    ).table
 
     assert table.metric.tolist() == ["status"]
     assert not table.note.str.startswith(NOT_JUDGED).any()
@@ -208,5 +235,9 @@ def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
     comparisons = [compared(known_until("slow_collision", 5))]
     alone, without = findings(comparisons, set(NAMES))[0], findings([], set())[0]
 
-    assert alone == "No engine that counts was played to its end in a scene with an exact answer, so nobody is scored."
+    assert (
+        alone
+        == "No engine that counts was played to its end in a scene with an exact answer, so nobody"
+        " is scored."
+    )
     assert without.startswith("No scene here has an exact answer")

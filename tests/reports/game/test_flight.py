@@ -1,5 +1,5 @@
-"""A flight without a server: keys accelerate as the exercise says, the same keys give the same bits, a saved flight
-too."""
+"""A flight without a server: keys accelerate as the exercise says, the same keys give the same
+bits, a saved flight too."""
 
 from __future__ import annotations
 
@@ -20,13 +20,25 @@ from scenarios.files.scene_file import read_scene_file, scene_text
 from scenarios.truth.closed_forms import world_thrusts
 
 EVENTS = [  # frame, key, down: a turn, a thrust across it, a renewed thrust, both keys of a pair
-    (8, "a", True), (24, "w", True), (40, "w", True), (56, "a", False), (72, "w", False), (80, "s", True),
-    (88, "d", True), (96, "w", True), (110, "d", False), (120, "s", False), (130, "w", False),
-]  # fmt: skip
+    (8, "a", True),
+    (24, "w", True),
+    (40, "w", True),
+    (56, "a", False),
+    (72, "w", False),
+    (80, "s", True),
+    (88, "d", True),
+    (96, "w", True),
+    (110, "d", False),
+    (120, "s", False),
+    (130, "w", False),
+]
 
 
 def flown(
-    names: Sequence[str], frames: int, events: Iterable[tuple[int, str, bool]] = EVENTS, **field: float
+    names: Sequence[str],
+    frames: int,
+    events: Iterable[tuple[int, str, bool]] = EVENTS,
+    **field: float,
 ) -> Flight:
     """A flight steered by `events` (frame, key, down)."""
     flight = Flight(field_scenario(**field), names)  # type: ignore[arg-type]
@@ -39,34 +51,48 @@ def flown(
 
 def bits(flight: Flight) -> list[dict[str, bytes]]:
     """The state of every engine."""
-    return [{name: array.tobytes() for name, array in vars(flyer.state).items()} for flyer in flight.flyers]
+    return [
+        {name: array.tobytes() for name, array in vars(flyer.state).items()}
+        for flyer in flight.flyers
+    ]
 
 
-@pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64"])
+@pytest.mark.parametrize(
+    "name", ["reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64"]
+)
 def test_keys_move_the_ship_as_the_exercise_says(name: str):
-    """Against x + v t + F t2 / 2m, thrusts of 0.25 m/s2 along the heading at the key event and turns of 1 rad/s2."""
+    """Against x + v t + F t2 / 2m, thrusts of 0.25 m/s2 along the heading at the key event and
+    turns of 1 rad/s2."""
     flight = flown([name], 160, asteroids=0)
     scenario = flight.saved()
     truth = world_thrusts(scenario.scene, scenario.thrusts, scenario.times).at(-1)
-    # Each thrust of T s puts the ship (alpha - 1/2) a dt T off, which it keeps; alpha is the order of the updates.
+    # Each thrust of T s puts the ship (alpha - 1/2) a dt T off, which it keeps; alpha is the order
+    # of the updates.
     thrusting = sum(thrust.stop - thrust.start for thrust in scenario.thrusts if thrust.force.any())
     offset = abs(ENGINES[name].alpha - 0.5) * 0.25 * flight.dt * thrusting
     rounding = ENGINES[name].rounding * 160 * 16 * 4  # one a step, of coordinates up to 4 m
     apart = np.abs(flight.solid.state.position[SHIP] - truth.position[SHIP]).max()
 
     assert apart <= offset + rounding
-    assert abs(flight.solid.state.angle[SHIP] - truth.angle[SHIP]) <= 160 * FRAME * flight.dt + rounding
+    assert (
+        abs(flight.solid.state.angle[SHIP] - truth.angle[SHIP])
+        <= 160 * FRAME * flight.dt + rounding
+    )
     assert np.hypot(*(truth.position[SHIP] - START)) > 0.2
 
 
 def test_a_thrust_keeps_its_direction_while_the_ship_turns():
-    """W aims once when it goes down, and anew when its event is repeated; the force's size is mass times 0.25."""
+    """W aims once when it goes down, and anew when its event is repeated; the force's size is mass
+    times 0.25."""
     flight = flown(["reference:exercise"], 60, EVENTS[:4], asteroids=0)
     thrusts = [thrust for thrust in flight.saved().thrusts if thrust.force.any()]
     size = flight.scenario.scene.mass[SHIP] * 0.25
     headings = [np.arctan2(*thrust.force[::-1]) for thrust in thrusts]
 
-    assert [(thrust.start / FRAME, thrust.stop / FRAME) for thrust in thrusts] == [(24, 40), (40, 60)]
+    assert [(thrust.start / FRAME, thrust.stop / FRAME) for thrust in thrusts] == [
+        (24, 40),
+        (40, 60),
+    ]
     assert np.allclose([np.hypot(*thrust.force) for thrust in thrusts], size, rtol=1e-15)
     # alpha'' = 1 rad/s2 since frame 8; symplectic Euler turns dt t / 2 further, and rounds.
     expected = [((frame - 8) * FRAME) ** 2 / 2 for frame in (24, 40)]
@@ -74,8 +100,11 @@ def test_a_thrust_keeps_its_direction_while_the_ship_turns():
 
 
 def test_releasing_either_key_of_a_pair_ends_the_thrust():
-    """As in the exercise: S takes over from W, and when S is released no force acts, though W is still held."""
-    flight = flown(["reference:exercise"], 40, [(0, "w", True), (10, "s", True), (20, "s", False)], asteroids=0)
+    """As in the exercise: S takes over from W, and when S is released no force acts, though W is
+    still held."""
+    flight = flown(
+        ["reference:exercise"], 40, [(0, "w", True), (10, "s", True), (20, "s", False)], asteroids=0
+    )
     first, second = flight.saved().thrusts
 
     assert (first.force == -second.force).all()
@@ -92,7 +121,8 @@ def test_the_same_keys_give_the_same_flight():
 
 @pytest.mark.parametrize("substeps", [2, 16])
 def test_a_saved_flight_replays_to_the_same_bits(tmp_path: Path, substeps: int):
-    """Flown again, and played by `crosscheck run`'s own loop: every engine ends in the same state."""
+    """Flown again, and played by `crosscheck run`'s own loop: every engine ends in the same
+    state."""
     names = list(ENGINES)
     flight = flown(names, 150, substeps=substeps)
     path = tmp_path / "flight.toml"
@@ -107,13 +137,17 @@ def test_a_saved_flight_replays_to_the_same_bits(tmp_path: Path, substeps: int):
     assert bits(again) == bits(flight)
     for run, state in zip(runs, bits(flight)):
         assert run.trajectory is not None
-        assert {name: array.tobytes() for name, array in vars(run.trajectory.at(-1)).items()} == state
+        assert {
+            name: array.tobytes() for name, array in vars(run.trajectory.at(-1)).items()
+        } == state
 
 
 def steered_home() -> list[tuple[int, str, bool]]:
-    """Keys that bring the ship from its start to rest at the earth: half a turn in, half out, thrust, coast, brake."""
+    """Keys that bring the ship from its start to rest at the earth: half a turn in, half out,
+    thrust, coast, brake."""
     dx, dy = np.array(EARTH) - START
-    turn = round(sqrt(np.arctan2(dy, dx)) / FRAME)  # t2 = angle: turned up for t, down for t, at 1 rad/s2
+    # t2 = angle: turned up for t, down for t, at 1 rad/s2
+    turn = round(sqrt(np.arctan2(dy, dx)) / FRAME)
     burn = 256  # frames: 4 s at 0.25 m/s2, to 1 m/s and 2 m on
     coast = round((np.hypot(dx, dy) - 4.0) / FRAME)
     keys = [("a", turn), ("d", turn), ("w", burn), ("", coast), ("s", burn)]
@@ -143,7 +177,13 @@ def test_winning_is_the_exercises_rule_as_written():
     flight = Flight(field_scenario(asteroids=0), ["reference:exercise"])
     state = flight.solid.state
     verdicts = []
-    for away, speed, spin in ((0.70, 0.0, -5.0), (0.71, 0.0, 0.0), (0.0, 0.31, 0.0), (0.0, 0.32, 0.0), (0.0, 0.0, 0.1)):
+    for away, speed, spin in (
+        (0.70, 0.0, -5.0),
+        (0.71, 0.0, 0.0),
+        (0.0, 0.31, 0.0),
+        (0.0, 0.32, 0.0),
+        (0.0, 0.0, 0.1),
+    ):
         state.position[SHIP] = [EARTH[0] + away, EARTH[1]]
         state.velocity[SHIP], state.angular_velocity[SHIP] = [speed, 0.0], spin
         verdicts.append(flight.won)
@@ -154,7 +194,12 @@ def test_winning_is_the_exercises_rule_as_written():
 def test_a_ship_that_leaves_is_set_back_to_its_start():
     """At rest, in each engine by itself; what is saved ends before, for a scene has no way back."""
     # Backwards: 1.5 m at 0.25 m/s2 take sqrt(12) s = 222 frames.
-    flight = flown(["reference:exercise", "box2d:matched"], 240, [(0, "s", True), (225, "s", False)], asteroids=0)
+    flight = flown(
+        ["reference:exercise", "box2d:matched"],
+        240,
+        [(0, "s", True), (225, "s", False)],
+        asteroids=0,
+    )
 
     assert [flyer.set_backs for flyer in flight.flyers] == [1, 1]
     assert 220 <= flight.left_at <= 223
@@ -165,12 +210,13 @@ def test_a_ship_that_leaves_is_set_back_to_its_start():
 
 @pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched"])
 def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
-    """As in the exercise: the rest of the frame it is already under way again, thrusting from its start and from
-    rest."""
+    """As in the exercise: the rest of the frame it is already under way again, thrusting from its
+    start and from rest."""
     flight = flown([name], 222, [(0, "s", True)], asteroids=0)
     while flight.left_at < 0:
         flight.advance()
-    # After k steps, velocity first, it is a dt2 k (k + 1) / 2 behind, position first a dt2 k (k - 1) / 2.
+    # After k steps, velocity first, it is a dt2 k (k + 1) / 2 behind, position first a dt2 k (k -
+    # 1) / 2.
     a, first = 0.25 * flight.dt**2 / 2, 1 if ENGINES[name].alpha == 1.0 else -1
     behind = a * np.arange(6000) * (np.arange(6000) + first)
     leaves = int(np.argmax(START[0] - behind < -5.0))
@@ -183,7 +229,8 @@ def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
 
 
 def test_looking_at_every_step_near_an_edge_changes_no_bit():
-    """The ship turns round 0.1 m before the edge, where it is looked at step by step; `play` looks once a frame."""
+    """The ship turns round 0.1 m before the edge, where it is looked at step by step; `play` looks
+    once a frame."""
     names = list(ENGINES)
     keys = [(0, "s", True), (150, "s", False), (151, "w", True)]
     flight = flown(names, 400, keys, seed=4, asteroids=8)
@@ -199,8 +246,8 @@ def test_looking_at_every_step_near_an_edge_changes_no_bit():
 
 
 def test_the_marker_names_the_first_collision():
-    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it parts at the first collision; the oracle names
-    it."""
+    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it parts at the first collision;
+    the oracle names it."""
     flight = flown(["reference:exercise", "pymunk:shipped", "pymunk:matched"], 64, [])
     scenario = flight.saved()
     ghost, matched = flight.flyers[1:]
@@ -211,7 +258,10 @@ def test_the_marker_names_the_first_collision():
     assert (ghost.divergence.collision.i, ghost.divergence.collision.j) in ((i, j), (j, i))
     assert ghost.divergence.collision.frame == int(t / FRAME)
     assert ghost.divergence.shared
-    assert matched.divergence is None or matched.divergence.collision.frame > ghost.divergence.collision.frame
+    assert (
+        matched.divergence is None
+        or matched.divergence.collision.frame > ghost.divergence.collision.frame
+    )
 
 
 def read_truth(scenario):  # type: ignore[no-untyped-def]
@@ -240,7 +290,9 @@ class Failing:
 def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.MonkeyPatch):
     """With its reason; where it was the solid one, the next takes over."""
     row = ENGINES["pymunk:matched"]
-    monkeypatch.setitem(ENGINES, "pymunk:matched", EngineRow(lambda: Failing(row), "fails", 0.0, 0.0))  # type: ignore[arg-type,return-value]
+    monkeypatch.setitem(
+        ENGINES, "pymunk:matched", EngineRow(lambda: Failing(row), "fails", 0.0, 0.0)
+    )  # type: ignore[arg-type,return-value]
     flight = Flight(field_scenario(), ["pymunk:matched", "reference:exercise"])
     flight.advance(10)
 
@@ -253,8 +305,10 @@ def test_spin_is_part_of_the_energy():
     """m v2 / 2 + I w2 / 2, and momentum m v, of all disks."""
     flight = Flight(field_scenario(), ["reference:exercise"])
     scene, reported = flight.scenario.scene, flight.measures(flight.solid)
-    each = [m * (v @ v) / 2 + i * w * w / 2 for m, v, i, w in zip(
-        scene.mass, scene.velocity, scene.inertia, scene.angular_velocity)]  # fmt: skip
+    each = [
+        m * (v @ v) / 2 + i * w * w / 2
+        for m, v, i, w in zip(scene.mass, scene.velocity, scene.inertia, scene.angular_velocity)
+    ]
 
     assert reported["energy"] == pytest.approx(sum(each), rel=1e-14)
     assert reported["momentum"] == pytest.approx((scene.mass @ scene.velocity).tolist(), rel=1e-13)

@@ -1,5 +1,5 @@
-"""Somebody's own solver in the game: one that cannot fly is reported before; one that dies in flight leaves the
-others."""
+"""Somebody's own solver in the game: one that cannot fly is reported before; one that dies in
+flight leaves the others."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ from tests.reports.page.browsing import opened, served
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
 SOLVER = Path(__file__).parents[3] / "tests" / "solvers" / "correct" / "plain.js"
-# Appended to a right solver: from the given call of `integrate` on it does this. A frame of 21 disks has 336 calls.
+# Appended to a right solver: from the given call of `integrate` on it does this. A frame of 21
+# disks has 336 calls.
 AFTER = (
-    "\ncalls = 0; good = integrate; integrate = function (s, dt) {{ if (++calls > {calls}) {act}; good(s, dt); }};\n"
+    "\ncalls = 0; good = integrate; integrate = function (s, dt) {{ if (++calls > {calls}) {act};"
+    " good(s, dt); }};\n"
 )
 FOREVER = "while (true) {}"
 
@@ -41,26 +43,35 @@ def solver(folder: Path, more: str = "") -> Path:
 
 @contextmanager
 def page_of(browser: Browser, path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Page]:
-    """The game, paused at its first frame, with this solver solid and the reference as its ghost."""
+    """The game, paused at its first frame, with this solver solid and the reference as its
+    ghost."""
     rows = own_rows([f"{path}:own"])
     for name, row in rows.items():
         monkeypatch.setitem(ENGINES, name, row)
     with served(application(Game([*rows, "reference:exercise"]))) as url:
-        page, heard = opened(browser, url, viewport={"width": 400, "height": 800}, reduced_motion="reduce")
+        page, heard = opened(
+            browser, url, viewport={"width": 400, "height": 800}, reduced_motion="reduce"
+        )
         page.wait_for_function("() => game.field")
         yield page
         page.context.close()
     assert heard == []
 
 
-def test_a_right_solver_flies_as_the_reference_does(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_right_solver_flies_as_the_reference_does(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """Under its file's name, the ship under thrust in both."""
     with page_of(browser, solver(tmp_path), monkeypatch) as page:
         page.keyboard.down("w")
         fly(page, 20)
-        reported = page.evaluate("game.now.flyers.map((flyer) => [flyer.left, flyer.ship_deviation])")
+        reported = page.evaluate(
+            "game.now.flyers.map((flyer) => [flyer.left, flyer.ship_deviation])"
+        )
         who = page.locator("tr.solid .who").inner_text()
-        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        wide = page.evaluate(
+            "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+        )
 
     assert reported[0] == ["", 0.0]
     assert reported[1][0] == ""
@@ -70,12 +81,14 @@ def test_a_right_solver_flies_as_the_reference_does(browser: Browser, tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("act", "reason"), [("throw new Error('out of fuel')", "out of fuel"), (FOREVER, "does not come back")]
+    ("act", "reason"),
+    [("throw new Error('out of fuel')", "out of fuel"), (FOREVER, "does not come back")],
 )
 def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, act: str, reason: str
 ):
-    """Whether it throws or hangs: the page says so in the field and in its row, and the ghost becomes solid."""
+    """Whether it throws or hangs: the page says so in the field and in its row, and the ghost
+    becomes solid."""
     path = solver(tmp_path, AFTER.format(calls=3000, act=act))
     with page_of(browser, path, monkeypatch) as page:
         began = monotonic()
@@ -94,12 +107,16 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
     assert took < 10 * PATIENCE
 
 
-def test_the_page_says_that_it_waits(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_page_says_that_it_waits(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """While an answer takes longer than a second; then why."""
     path = solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
     with page_of(browser, path, monkeypatch) as page:
         page.evaluate("game.ask(4)")
-        page.wait_for_function("() => document.getElementById('banner').textContent.startsWith('Waiting')")
+        page.wait_for_function(
+            "() => document.getElementById('banner').textContent.startsWith('Waiting')"
+        )
         page.wait_for_function("() => !game.waiting", timeout=10_000 * PATIENCE)
         banner = page.locator("#banner").inner_text()
 
@@ -112,7 +129,10 @@ def test_the_page_says_that_it_waits(browser: Browser, tmp_path: Path, monkeypat
         ("function integrate(sphere, dt) {", "SyntaxError"),
         ("var nothing = 0;", "has no function integrate"),
         ("throw new Error('not today')", "not today"),
-        (SOLVER.read_text() + "\nintegrate = function () { throw new TypeError('of what?'); };", "of what?"),
+        (
+            SOLVER.read_text() + "\nintegrate = function () { throw new TypeError('of what?'); };",
+            "of what?",
+        ),
         (
             SOLVER.read_text() + "\nintegrate = function (s) { s.position.x = NaN; };",
             "position of disk 0 is not finite",
@@ -150,7 +170,9 @@ def test_every_file_that_cannot_fly_is_reported(tmp_path: Path, monkeypatch: pyt
     assert list(ENGINES) == before
 
 
-def test_a_solver_that_hangs_keeps_no_other_tab_waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_solver_that_hangs_keeps_no_other_tab_waiting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """The engines of each tab work in a thread of their own."""
     path = solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
     for name, row in own_rows([f"{path}:own"]).items():
@@ -177,10 +199,13 @@ def test_a_solver_that_hangs_keeps_no_other_tab_waiting(tmp_path: Path, monkeypa
 
 
 def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
-    """As soon as the patience with it is at its end: exit 0, and nothing but where it was and that it has stopped."""
+    """As soon as the patience with it is at its end: exit 0, and nothing but where it was and that
+    it has stopped."""
     solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
     words = [CROSSCHECK, "play", "--port", "8300", "--engine", "Exercise.js"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as started:
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+    ) as started:
         assert started.stdout is not None
         url = started.stdout.readline().split()[0].rstrip("/")
         with connect(url.replace("http", "ws") + "/fly", origin=url) as tab:  # type: ignore[arg-type]
@@ -198,8 +223,11 @@ def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
     assert took < 10 * PATIENCE
 
 
-def test_any_name_of_a_folder_will_do(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Spaces, umlauts, quotes, brackets: the solver flies, and can be left out and made solid again."""
+def test_any_name_of_a_folder_will_do(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Spaces, umlauts, quotes, brackets: the solver flies, and can be left out and made solid
+    again."""
     folder = tmp_path / 'Übung "zwei" <b>]'
     folder.mkdir()
     with page_of(browser, solver(folder), monkeypatch) as page:
@@ -214,7 +242,10 @@ def test_any_name_of_a_folder_will_do(browser: Browser, tmp_path: Path, monkeypa
     [
         (["Exercise.js"], "Exercise.js: is a solver and no flight; fly it by --engine Exercise.js"),
         ([""], '"": is not there; name a file'),
-        ([word for k in range(17) for word in ("--engine", f"{k}.js")], "--engine: 17 engines; at most 16 fly at once"),
+        (
+            [word for k in range(17) for word in ("--engine", f"{k}.js")],
+            "--engine: 17 engines; at most 16 fly at once",
+        ),
     ],
 )
 def test_what_is_asked_wrongly_is_reported(

@@ -1,4 +1,5 @@
-"""The game in a real browser: keys steer, a flight is won, ghosts part, what is saved is what was flown."""
+"""The game in a real browser: keys steer, a flight is won, ghosts part, what is saved is what was
+flown."""
 
 from __future__ import annotations
 
@@ -36,7 +37,9 @@ def url() -> Iterator[str]:
 @pytest.fixture
 def page(browser: Browser, url: str) -> Iterator[Page]:
     """The game, paused at its first frame; whatever it complained of fails the test."""
-    page, heard = opened(browser, url, viewport={"width": 1280, "height": 900}, reduced_motion="reduce")
+    page, heard = opened(
+        browser, url, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
+    )
     page.wait_for_function("() => game.field")
     yield page
     page.context.close()
@@ -77,7 +80,8 @@ def saved(page: Page, folder: Path) -> Path:
 
 
 def test_keys_held_and_released_move_the_ship(page: Page):
-    """W held for 64 frames, then a turn by A: x = a t2 / 2 + v t, angle = t2 / 2 (0.25 m/s2, 1 rad/s2)."""
+    """W held for 64 frames, then a turn by A: x = a t2 / 2 + v t, angle = t2 / 2 (0.25 m/s2, 1
+    rad/s2)."""
     wish(page, asteroids=0)
     keys = page.keyboard
     keys.down("w")
@@ -110,9 +114,11 @@ def test_a_scripted_flight_wins(page: Page):
     assert page.locator("#banner.won").inner_text() == "You won"
 
 
-def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(page: Page, tmp_path: Path):
-    """pymunk as shipped makes e2 of e: it contributions at the first collision, whose pair and instant the exact answer
-    reports."""
+def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
+    page: Page, tmp_path: Path
+):
+    """pymunk as shipped makes e2 of e: it contributions at the first collision, whose pair and
+    instant the exact answer reports."""
     fly(page, 16)
     together = [flyer["deviation"] for flyer in page.evaluate("game.now.flyers")]
     page.locator("#stop").check()
@@ -134,7 +140,8 @@ def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(pag
 
 
 def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Path):
-    """Real keys in real time; the file, played by the harness, ends in the very state that the page showed."""
+    """Real keys in real time; the file, played by the harness, ends in the very state that the page
+    showed."""
     wish(page, asteroids=0)
     page.locator("#pause").click()
     page.wait_for_function("() => game.now.frame > 5")
@@ -148,16 +155,29 @@ def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Pa
     page.wait_for_function("() => !game.waiting")
     shown, solid = page.evaluate("game.now.ship"), FLOWN[0]
     scenario = read_scene_file(saved(page, tmp_path))
-    end = play(ENGINES[solid].make(), solid, scenario, scenario.dt(scenario.substeps[1])).trajectory.at(-1)  # type: ignore[union-attr]
+    end = play(
+        ENGINES[solid].make(), solid, scenario, scenario.dt(scenario.substeps[1])
+    ).trajectory.at(-1)  # type: ignore[union-attr]
     exact = world_thrusts(scenario.scene, scenario.thrusts, scenario.times).at(-1)
 
     assert len(scenario.thrusts) >= 2
-    assert shown == [*end.position[SHIP], *end.velocity[SHIP], end.angle[SHIP], end.angular_velocity[SHIP]]
-    assert np.abs(exact.position[SHIP] - end.position[SHIP]).max() < 0.25 * FRAME / 16 * scenario.duration
+    assert shown == [
+        *end.position[SHIP],
+        *end.velocity[SHIP],
+        end.angle[SHIP],
+        end.angular_velocity[SHIP],
+    ]
+    assert (
+        np.abs(exact.position[SHIP] - end.position[SHIP]).max()
+        < 0.25 * FRAME / 16 * scenario.duration
+    )
 
 
-def test_a_saved_flight_is_shown_again_to_the_same_bits(browser: Browser, page: Page, tmp_path: Path):
-    """By `crosscheck play FLIGHT.toml`: it ends by itself, where the first flight was saved, and takes no keys."""
+def test_a_saved_flight_is_shown_again_to_the_same_bits(
+    browser: Browser, page: Page, tmp_path: Path
+):
+    """By `crosscheck play FLIGHT.toml`: it ends by itself, where the first flight was saved, and
+    takes no keys."""
     page.keyboard.down("w")
     fly(page, 50)
     page.keyboard.up("w")
@@ -180,7 +200,9 @@ def test_a_saved_flight_is_shown_again_to_the_same_bits(browser: Browser, page: 
 
 def test_any_scene_file_can_be_flown(browser: Browser):
     """Walls, static disks and no wrap: drawn and played to its end, with no earth to win."""
-    scenario = read_scene_file(Path(__file__).parents[3] / "tests" / "data" / "scenes" / "bumper.toml")
+    scenario = read_scene_file(
+        Path(__file__).parents[3] / "tests" / "data" / "scenes" / "bumper.toml"
+    )
     with served(application(Game(["reference:exercise", "event_driven:float64"], scenario))) as url:
         page, heard = opened(browser, url)
         page.wait_for_function("() => game.now && game.now.over", timeout=30_000)
@@ -210,7 +232,9 @@ def test_a_lost_connection_is_reported_and_mended(page: Page):
     """The page says so, and begins anew when the server is there again."""
     fly(page, 3)
     page.evaluate("game.socket.close(); game.field.seen = true")
-    page.wait_for_function("() => document.getElementById('banner').textContent.includes('Trying again')")
+    page.wait_for_function(
+        "() => document.getElementById('banner').textContent.includes('Trying again')"
+    )
     page.wait_for_function("() => !game.field.seen && game.now.frame === 0", timeout=10_000)
 
 
@@ -221,11 +245,16 @@ def test_another_engine_can_be_solid(page: Page):
     page.locator("[name=flies][value='box2d:matched']").uncheck()
     page.wait_for_function("() => game.field.engines.length === 3")
 
-    assert page.evaluate("game.field.engines") == ["pymunk:shipped", "reference:exercise", "event_driven:float64"]
+    assert page.evaluate("game.field.engines") == [
+        "pymunk:shipped",
+        "reference:exercise",
+        "event_driven:float64",
+    ]
 
 
 def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
-    """Nothing scrolls sideways but the table; Tab comes to every control, with a visible outline."""
+    """Nothing scrolls sideways but the table; Tab comes to every control, with a visible
+    outline."""
     page, heard = opened(browser, url, viewport={"width": 400, "height": 800}, color_scheme="dark")
     page.wait_for_function("() => game.field && game.now.frame > 10", timeout=20_000)
     too_wide = overhang(page)
@@ -234,14 +263,25 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
     reached = []
     for _ in range(40):
         page.keyboard.press("Tab")
-        reached.append(page.evaluate("document.activeElement.id || document.activeElement.name || ''"))
+        reached.append(
+            page.evaluate("document.activeElement.id || document.activeElement.name || ''")
+        )
     outlined = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
     page.context.close()
 
     assert too_wide <= 0
-    assert {"sky", "pause", "step", "again", "save", "flies", "solid", "asteroids", "restitution", "seed"} <= set(
-        reached
-    )
+    assert {
+        "sky",
+        "pause",
+        "step",
+        "again",
+        "save",
+        "flies",
+        "solid",
+        "asteroids",
+        "restitution",
+        "seed",
+    } <= set(reached)
     assert outlined != "none"
     assert heard == []
 
@@ -256,11 +296,16 @@ def test_with_reduced_motion_nothing_moves_by_itself(page: Page):
 
 @pytest.mark.slow
 def test_the_frame_time_is_measured_by_a_command():
-    """`python -m tests.bench.game` prints a row for each thing timed, and how fast the flight goes."""
+    """`python -m tests.bench.game` prints a row for each thing timed, and how fast the flight
+    goes."""
     words = [sys.executable, "-m", "tests.bench.game", "1"]
-    done = subprocess.run(words, cwd=Path(__file__).parents[3], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        words, cwd=Path(__file__).parents[3], capture_output=True, text=True, timeout=120
+    )
     lines = done.stdout.splitlines()
-    numbers = [[float(number) for number in re.findall(r"\d+\.\d\d", line[:50])] for line in lines[2:6]]
+    numbers = [
+        [float(number) for number in re.findall(r"\d+\.\d\d", line[:50])] for line in lines[2:6]
+    ]
 
     assert done.returncode == 0, done.stderr
     assert lines[0].startswith("4 engines, 21 disks")
@@ -272,19 +317,26 @@ def test_the_page_tells_its_frame_time(page: Page):
     """Pictures a second, and what the engines take of a frame."""
     fly(page, 30)
 
-    assert re.search(r"\d+ pictures a second.* engines take \d+\.\d ms", page.locator("#pace").inner_text())
+    assert re.search(
+        r"\d+ pictures a second.* engines take \d+\.\d ms", page.locator("#pace").inner_text()
+    )
 
 
 def test_a_page_of_an_earlier_server_is_loaded_anew(browser: Browser):
-    """Started again with other engines on the same port, as after a change of one's solver: the new ones fly."""
+    """Started again with other engines on the same port, as after a change of one's solver: the new
+    ones fly."""
     game = Game(["reference:exercise", "pymunk:shipped"])
     with served(application(game)) as url:
         page, heard = opened(browser, url, reduced_motion="reduce")
         page.wait_for_function("() => game.field")
         game.engines, game.mark = ["reference:exercise", "box2d:shipped"], "later"
         page.evaluate("game.socket.close()")
-        page.wait_for_function("() => document.body.dataset.server === 'later' && window.game?.field", timeout=10_000)
-        flown, ticked = page.evaluate("[game.field.engines, game.rows.filter((row) => !row.matches('.off')).length]")
+        page.wait_for_function(
+            "() => document.body.dataset.server === 'later' && window.game?.field", timeout=10_000
+        )
+        flown, ticked = page.evaluate(
+            "[game.field.engines, game.rows.filter((row) => !row.matches('.off')).length]"
+        )
         page.context.close()
 
     assert (flown, ticked, heard) == (["reference:exercise", "box2d:shipped"], 2, [])

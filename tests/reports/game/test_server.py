@@ -40,7 +40,9 @@ class Served:
         self.port = listening.getsockname()[1]
         self.origin = f"http://localhost:{self.port}"
         self.server = uvicorn.Server(config_of(application(self.game)))
-        self.thread = threading.Thread(target=self.server.run, kwargs={"sockets": [listening]}, daemon=True)
+        self.thread = threading.Thread(
+            target=self.server.run, kwargs={"sockets": [listening]}, daemon=True
+        )
         self.thread.start()
 
     def open(self, origin: str | None = "", **options: object) -> ClientConnection:
@@ -97,12 +99,24 @@ def no_tabs(served: Served) -> bool:
 
 @pytest.mark.parametrize(
     "origin",
-    [None, "null", "http://evil.example", "http://localhost:1", "http://127.0.0.1.evil.example", "file://",
-     "https://localhost:{port}", "http://localhost:{port}.evil.example", "http://127.0.0.1:{port}"],
-)  # fmt: skip
+    [
+        None,
+        "null",
+        "http://evil.example",
+        "http://localhost:1",
+        "http://127.0.0.1.evil.example",
+        "file://",
+        "https://localhost:{port}",
+        "http://localhost:{port}.evil.example",
+        "http://127.0.0.1:{port}",
+    ],
+)
 def test_pages_of_other_origins_cannot_drive_it(served: Served, origin: str | None):
     """403 before a flight is made; the same tab from its own origin is let in."""
-    with pytest.raises(InvalidStatus) as refusal, served.open(origin and origin.format(port=served.port)):
+    with (
+        pytest.raises(InvalidStatus) as refusal,
+        served.open(origin and origin.format(port=served.port)),
+    ):
         pass
 
     assert refusal.value.response.status_code == 403
@@ -162,7 +176,8 @@ def test_a_tab_that_does_not_read_holds_nobody_up(served: Served):
 
 
 def test_ten_tabs_fly_their_own_flights_and_give_them_back(served: Served):
-    """Each counts its own frames; a tab whose connection is cut is closed, too; one too many is reported."""
+    """Each counts its own frames; a tab whose connection is cut is closed, too; one too many is
+    reported."""
     assert no_tabs(served)
     with ExitStack() as stack:
         tabs = [stack.enter_context(served.open()) for _ in range(10)]
@@ -184,13 +199,16 @@ def test_ten_tabs_fly_their_own_flights_and_give_them_back(served: Served):
 
 
 def test_a_flight_is_the_same_whatever_another_tab_does_meanwhile(monkeypatch: pytest.MonkeyPatch):
-    """Box2D 3.1 has one unit of length for all its worlds: another tab's world is made before or after, not within."""
+    """Box2D 3.1 has one unit of length for all its worlds: another tab's world is made before or
+    after, not within."""
     alone = flown(["box2d_v3:shipped"], 100)
     other, options, tabs = ENGINES["box2d_v3:matched"].make(), Box2DV3._options, []
 
     def interrupted(engine: Box2DV3) -> dict[str, float]:
         if not tabs:
-            tabs.append(threading.Thread(target=other.load, args=(field_scenario().scene, alone.dt)))
+            tabs.append(
+                threading.Thread(target=other.load, args=(field_scenario().scene, alone.dt))
+            )
             tabs[0].start()
             tabs[0].join(0.3)
         return options(engine)
@@ -204,7 +222,8 @@ def test_a_flight_is_the_same_whatever_another_tab_does_meanwhile(monkeypatch: p
 
 
 def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_reported(served: Served, tmp_path: Path):
-    """Exit 0, no traceback, with a tab open; where the port is taken the next free one is used and named."""
+    """Exit 0, no traceback, with a tab open; where the port is taken the next free one is used and
+    named."""
     program = Path(sys.executable).parent / "crosscheck"
     arguments = [program, "play", "--port", str(served.port), "--engine", "reference"]
     with subprocess.Popen(
@@ -233,13 +252,19 @@ def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_reported(served: Served, tm
     ],
 )
 def test_bad_input_is_reported_and_nothing_is_served(
-    flight: str | None, engines: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    flight: str | None,
+    engines: list[str],
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ):
     """A line a fault, exit 2."""
     top = 'name = "a"\nduration = 1.0\nsample_interval = 0.5\nrestitution = {}\n'
     disk = "[[disk]]\nposition = [{}, 0.0]\nvelocity = [0.0, 0.0]\nradius = 0.1\nmass = 1.0\n"
     (tmp_path / "bad.toml").write_text(top.format(2.0) + disk.format(0.0))
-    (tmp_path / "crowd.toml").write_text(top.format(1.0) + "".join(disk.format(x) for x in range(201)))
+    (tmp_path / "crowd.toml").write_text(
+        top.format(1.0) + "".join(disk.format(x) for x in range(201))
+    )
     with pytest.raises(SystemExit) as exit:
         play(tmp_path / flight if flight else None, engines, 8000, False)
 
@@ -264,11 +289,15 @@ def test_a_port_that_nobody_may_have_is_not_called_taken(
     assert "--port 80: the system keeps it for administrators" in capsys.readouterr().err
 
 
-def test_a_missing_browser_is_reported(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+def test_a_missing_browser_is_reported(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
     """By --open on a machine without one; it is served all the same."""
     served_on: list[int] = []
     monkeypatch.setattr("webbrowser.open", lambda _: False)
-    monkeypatch.setattr(uvicorn.Server, "run", lambda _, sockets: served_on.append(sockets[0].close()))
+    monkeypatch.setattr(
+        uvicorn.Server, "run", lambda _, sockets: served_on.append(sockets[0].close())
+    )
     serve(application(Game(FLOWN)), 8700, "/", True)
 
     assert "--open: no browser was found here; open http://localhost:87" in capsys.readouterr().err

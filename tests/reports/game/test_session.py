@@ -1,4 +1,5 @@
-"""One open page of the game: what it answers, and what it reports of a scene that is flown again."""
+"""One open page of the game: what it answers, and what it reports of a scene that is flown
+again."""
 
 from __future__ import annotations
 
@@ -18,15 +19,30 @@ from scenarios.model import Scenario
 
 @pytest.mark.parametrize(
     "text",
-    ["", "{", "null", "[]", "1e999", '{"do": "fly"}', '{"do": "jump"}', '{"do": "frames", "count": 5}',
-     '{"do": "frames", "count": 1.5}', '{"do": "frames", "count": "1"}', '{"do": "frames", "count": 1, "more": 2}',
-     '{"do": "key", "key": "q", "down": true}', '{"do": "key", "key": "w", "down": 1}',
-     '{"do": "fly", "engines": []}', '{"do": "fly", "engines": ["nobody"]}',
-     '{"do": "fly", "engines": ["reference:exercise"], "restitution": 1.5}',
-     '{"do": "fly", "engines": ["reference:exercise"], "asteroids": 1000000}',
-     '{"do": "fly", "engines": ["reference:exercise"], "seed": -1}', '{"do": "save"' + " " * 5000 + "}",
-     b"\xff\xfe\x00", "[" * 3000],
-)  # fmt: skip
+    [
+        "",
+        "{",
+        "null",
+        "[]",
+        "1e999",
+        '{"do": "fly"}',
+        '{"do": "jump"}',
+        '{"do": "frames", "count": 5}',
+        '{"do": "frames", "count": 1.5}',
+        '{"do": "frames", "count": "1"}',
+        '{"do": "frames", "count": 1, "more": 2}',
+        '{"do": "key", "key": "q", "down": true}',
+        '{"do": "key", "key": "w", "down": 1}',
+        '{"do": "fly", "engines": []}',
+        '{"do": "fly", "engines": ["nobody"]}',
+        '{"do": "fly", "engines": ["reference:exercise"], "restitution": 1.5}',
+        '{"do": "fly", "engines": ["reference:exercise"], "asteroids": 1000000}',
+        '{"do": "fly", "engines": ["reference:exercise"], "seed": -1}',
+        '{"do": "save"' + " " * 5000 + "}",
+        b"\xff\xfe\x00",
+        "[" * 3000,
+    ],
+)
 def test_a_malformed_message_is_reported_in_a_sentence(text: str | bytes):
     """ValueError and nothing else, whatever the text is."""
     with pytest.raises(ValueError, match=r"\w{3,}"):
@@ -40,14 +56,22 @@ def test_saving_before_flying_is_reported():
 
 
 def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
-    """The earth, the way back to the start and "You won" belong to the exercise's field, not to every wrap."""
+    """The earth, the way back to the start and "You won" belong to the exercise's field, not to
+    every wrap."""
     scene = lay_out(
-        position=[[3.0, 1.5]], velocity=[[1.0, 0.0]], radius=[0.25], mass=[1.0], restitution=1.0, wrap=[[0, 0], [4, 3]]
+        position=[[3.0, 1.5]],
+        velocity=[[1.0, 0.0]],
+        radius=[0.25],
+        mass=[1.0],
+        restitution=1.0,
+        wrap=[[0, 0], [4, 3]],
     )
     scenario = Scenario("through-the-edge", "Does it come back?", "", scene, 6.0, 0.125)
     session = Session(["reference:exercise"], scenario)
     session.flight.advance(scenario.samples)
-    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", scenario, session.flight.dt)
+    run = play(
+        ENGINES["reference:exercise"].make(), "reference:exercise", scenario, session.flight.dt
+    )
     reported = session.now()
 
     assert run.trajectory is not None
@@ -56,7 +80,8 @@ def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
 
 
 def test_the_flame_is_against_a_thrust_that_turns_with_the_ship():
-    """In a replayed scene whose thrust is in the ship's own frame; the page draws what it is sent."""
+    """In a replayed scene whose thrust is in the ship's own frame; the page draws what it is
+    sent."""
     whole = SCENARIOS["body_frame_thrust"]()
     session = Session(["reference:exercise"], whole)
     [thrust] = whole.thrusts
@@ -66,4 +91,6 @@ def test_the_flame_is_against_a_thrust_that_turns_with_the_ship():
 
     assert thrust.frame == "body"
     assert abs(angle) > 0.1
-    assert session.force()[:2] == pytest.approx([cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y])
+    assert session.force()[:2] == pytest.approx(
+        [cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y]
+    )

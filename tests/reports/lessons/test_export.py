@@ -1,5 +1,5 @@
-"""A lesson as a file needs no server, all of them lead to each other, and what cannot be written is reported at
-once."""
+"""A lesson as a file needs no server, all of them lead to each other, and what cannot be written is
+reported at once."""
 
 from __future__ import annotations
 
@@ -19,14 +19,19 @@ from tests.reports.terminal.command_line import crosscheck
 
 
 def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
-    """It asks nothing of anywhere, its sliders work, and what it holds is what the lesson shows live."""
+    """It asks nothing of anywhere, its sliders work, and what it holds is what the lesson shows
+    live."""
     lesson = LESSONS["order"]
     path = tmp_path / "order.html"
-    path.write_text(offline(lesson, {places: answer_json("order", places) for places in lesson.grid}))
+    path.write_text(
+        offline(lesson, {places: answer_json("order", places) for places in lesson.grid})
+    )
     page, heard = opened(browser, path.as_uri())
     page.on("request", lambda request: heard.append(request.url))
     page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
-    curves = "[...document.querySelectorAll('.curve')].map((curve) => curve.getAttribute('d')).join()"
+    curves = (
+        "[...document.querySelectorAll('.curve')].map((curve) => curve.getAttribute('d')).join()"
+    )
     before = page.evaluate(curves)
     page.locator(".sliders [name=order]").focus()
     page.keyboard.press("End")
@@ -43,12 +48,17 @@ def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A page each and their list, with the conventions in it; nothing asks for a server. Two of them, for the time."""
+def test_all_lessons_in_a_folder_lead_to_each_other(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """A page each and their list, with the conventions in it; nothing asks for a server. Two of
+    them, for the time."""
     few = {name: LESSONS[name] for name in ("order", "mixing")}
     monkeypatch.setattr(command, "LESSONS", few)
     monkeypatch.setattr(pages, "LESSONS", few)
-    monkeypatch.setattr(command, "ENGINES", {name: command.ENGINES[name] for name in ("pymunk:shipped",)})
+    monkeypatch.setattr(
+        command, "ENGINES", {name: command.ENGINES[name] for name in ("pymunk:shipped",)}
+    )
     done = crosscheck("lesson", "--export", tmp_path / "all", cwd=tmp_path)
     again = crosscheck("lesson", "--export", tmp_path / "all", cwd=tmp_path)
     page, heard = opened(browser, (tmp_path / "all" / "index.html").as_uri())
@@ -56,14 +66,19 @@ def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: 
     links = page.locator("a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
     lesson, more = opened(browser, (tmp_path / "all" / "order.html").as_uri())
     lesson.wait_for_function("() => window.lesson && document.querySelector('.curve')")
-    around = lesson.locator(".crumbs a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
+    around = lesson.locator(".crumbs a").evaluate_all(
+        "all => all.map((a) => a.getAttribute('href'))"
+    )
     page.context.close()
     lesson.context.close()
 
     assert (done.returncode, again.returncode) == (0, 0)
     assert sorted(path.name for path in (tmp_path / "all").iterdir()) == [
-        "index.html", "made.json", "mixing.html", "order.html",
-    ]  # fmt: skip
+        "index.html",
+        "made.json",
+        "mixing.html",
+        "order.html",
+    ]
     assert sorted(links) == ["mixing.html", "order.html"]
     assert around == ["index.html", "mixing.html"]
     assert "pymunk 7.3.1" in text
@@ -80,7 +95,10 @@ def test_all_lessons_in_a_folder_lead_to_each_other(browser: Browser, tmp_path: 
         (["order", "--export", "nowhere/a.html"], "nowhere/a.html: No such file or directory"),
         (["order", "--export", "/proc/a.html"], "/proc/a.html: No such file or directory"),
         (["order", "--export", ""], "name a file"),
-        (["--export", "folder"], "holds other.txt, and no made.json says that crosscheck lesson made it"),
+        (
+            ["--export", "folder"],
+            "holds other.txt, and no made.json says that crosscheck lesson made it",
+        ),
         (["--export", "other.html"], "other.html: is a file"),
         (["--export", "/proc/all"], "/proc/all: "),
     ],
@@ -103,7 +121,9 @@ def test_what_cannot_be_written_is_reported_before_any_run(
     assert (tmp_path / "other.html").read_text() == "somebody's own"
 
 
-def test_a_page_that_cannot_be_made_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_page_that_cannot_be_made_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """The new one takes its place only when it is whole."""
     path = tmp_path / "order.html"
     crosscheck("lesson", "order", "--export", path, cwd=tmp_path)
@@ -119,8 +139,11 @@ def test_a_page_that_cannot_be_made_leaves_the_old_one(tmp_path: Path, monkeypat
     assert path.read_text() == whole
 
 
-def test_a_run_that_fails_ends_the_export_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Exit 1 with the lesson, where its sliders were, and what was raised; nothing is left behind."""
+def test_a_run_that_fails_ends_the_export_in_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Exit 1 with the lesson, where its sliders were, and what was raised; nothing is left
+    behind."""
     monkeypatch.setattr(command, "answer_json", fails)
     done = crosscheck("lesson", "order", "--export", tmp_path / "order.html", cwd=tmp_path)
 

@@ -1,4 +1,5 @@
-"""What the lessons claim: off, the mechanisms give the reference; on, the engine; and every number is of a run."""
+"""What the lessons claim: off, the mechanisms give the reference; on, the engine; and every number
+is of a run."""
 
 from __future__ import annotations
 
@@ -64,14 +65,18 @@ def test_with_nothing_switched_on_the_mechanisms_give_the_reference(name: str):
         ("row", "box2d:matched", (1, 3, 1), (1, 2, 1), 24 * 5 * FLOAT32),
         ("row", "pymunk:matched", (0, 3, 1), (1, 3, 1), 1e-12),
     ],
-)  # fmt: skip
+)
 def test_the_ablated_reference_lies_on_the_engine(
     name: str, engine: str, on: tuple[int, ...], off: tuple[int, ...], bound: float
 ):
-    """Within the rounding of the engine where the right mechanism is on; far off with another setting."""
+    """Within the rounding of the engine where the right mechanism is on; far off with another
+    setting."""
 
     def apart(places: tuple[int, ...]) -> float:
-        curves = {curve.name: np.asarray(curve.y, float) for curve in LESSONS[name].at(places).charts[0].curves}
+        curves = {
+            curve.name: np.asarray(curve.y, float)
+            for curve in LESSONS[name].at(places).charts[0].curves
+        }
         return float(np.nanmax(np.abs(curves[ABLATED] - curves[engine])))
 
     assert apart(on) <= bound
@@ -80,7 +85,8 @@ def test_the_ablated_reference_lies_on_the_engine(
 
 @pytest.mark.parametrize("name", LESSONS)
 def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name: str):
-    """Drawn in the replay and, where a chart can show it, in a chart; all who are drawn are in the legend."""
+    """Drawn in the replay and, where a chart can show it, in a chart; all who are drawn are in the
+    legend."""
     lesson = LESSONS[name]
     shown = lesson.at(lesson.start)
     drawn = {curve.name for chart in shown.charts for curve in chart.curves}
@@ -93,8 +99,11 @@ def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name:
 
 
 def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
-    """Equal disks, e = 1, collision at one end: all orders of the collisions give everything to the last disk."""
-    curves = {curve.name: np.asarray(curve.y) for curve in LESSONS["row"].at((0, 3, 2)).charts[0].curves}
+    """Equal disks, e = 1, collision at one end: all orders of the collisions give everything to the
+    last disk."""
+    curves = {
+        curve.name: np.asarray(curve.y) for curve in LESSONS["row"].at((0, 3, 2)).charts[0].curves
+    }
 
     assert curves[TRUTH].tolist() == [0, 0, 0, 0, 0, 5]
     assert np.abs(curves["reference:exercise"] - curves[TRUTH]).max() <= 1e-12
@@ -116,14 +125,25 @@ def test_the_numbers_of_a_collision_are_those_of_the_solver():
 
 def test_conventions_are_measured():
     """An engine that is made otherwise is found otherwise: nothing in the table is typed in."""
-    rows = {row.asked: row.got for row in table({name: ENGINES[name] for name in ("pymunk:shipped", "box2d:shipped")})}
+    rows = {
+        row.asked: row.got
+        for row in table({name: ENGINES[name] for name in ("pymunk:shipped", "box2d:shipped")})
+    }
     slow = rows["What is e of a pair that closes at 0.1 m/s, where 0.5 is stated?"]
     swapped = {row.asked: row.got for row in table({"pymunk:shipped": ENGINES["pymunk:matched"]})}
 
     assert slow["pymunk:shipped"] == ("0.25", "departs")
     assert slow["box2d:shipped"][1] == "departs"
-    assert rows["What coefficient of friction acts between two disks?"]["box2d:shipped"] == ("0.2", "departs")
-    assert swapped["What is e of a pair that closes at 0.1 m/s, where 0.5 is stated?"]["pymunk:shipped"][1] == "keeps"
+    assert rows["What coefficient of friction acts between two disks?"]["box2d:shipped"] == (
+        "0.2",
+        "departs",
+    )
+    assert (
+        swapped["What is e of a pair that closes at 0.1 m/s, where 0.5 is stated?"][
+            "pymunk:shipped"
+        ][1]
+        == "keeps"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -135,9 +155,12 @@ def url() -> Iterator[str]:
 
 @pytest.mark.parametrize("name", EVERY)
 def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
-    """Moved by keyboard; no complaint, nothing wider than the window at 400 and 1280 px, nothing moves by itself."""
+    """Moved by keyboard; no complaint, nothing wider than the window at 400 and 1280 px, nothing
+    moves by itself."""
     lesson: Lesson = LESSONS[name]
-    page, heard = opened(browser, f"{url}/{name}", viewport={"width": 400, "height": 800}, reduced_motion="reduce")
+    page, heard = opened(
+        browser, f"{url}/{name}", viewport={"width": 400, "height": 800}, reduced_motion="reduce"
+    )
     page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
     drawn = "[...document.querySelectorAll('.curve, .curves .axis')]"
     curves = f"{drawn}.map((each) => each.getAttribute('d') ?? each.textContent).join()"
@@ -159,9 +182,13 @@ def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
     assert (narrow <= 0, wide <= 0, playing, heard) == (True, True, False, [])
 
 
-def test_the_list_of_lessons_fits_and_leads_to_each(browser: Browser, url: str, monkeypatch: pytest.MonkeyPatch):
+def test_the_list_of_lessons_fits_and_leads_to_each(
+    browser: Browser, url: str, monkeypatch: pytest.MonkeyPatch
+):
     """With the table of conventions below it, which says when and with what it was measured."""
-    monkeypatch.setattr(pages, "ENGINES", {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")})
+    monkeypatch.setattr(
+        pages, "ENGINES", {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")}
+    )
     page, heard = opened(browser, url, viewport={"width": 400, "height": 800})
     links = page.locator(".shelf a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
     waits = page.locator("#measured").inner_text()
@@ -197,18 +224,17 @@ def test_what_cannot_be_shown_is_reported(url: str, path: str, status: int, said
 
 
 def test_a_slider_that_is_dragged_asks_for_where_it_stops(browser: Browser, url: str):
-    """Not for every place it passes: a lesson that takes a second would answer half a minute later."""
+    """Not for every place it passes: a lesson that takes a second would answer half a minute
+    later."""
     page, heard = opened(browser, f"{url}/horizon", viewport={"width": 1280, "height": 900})
     page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     page.locator(".sliders input").first.focus()
-    page.evaluate(
-        """for (let k = 0; k < 12; k++) {
+    page.evaluate("""for (let k = 0; k < 12; k++) {
           lesson.sliders[0].value = k % 3;
           lesson.sliders[0].dispatchEvent(new Event("input"));
-        }"""
-    )
+        }""")
     page.evaluate("lesson.ready")
     at = page.evaluate("lesson.at")
     page.context.close()

@@ -1,5 +1,5 @@
-"""Lesson 8: its brackets are those of the stability report, measured when asked for, and its run is the one that
-fails."""
+"""Lesson 8: its brackets are those of the stability report, measured when asked for, and its run is
+the one that fails."""
 
 from __future__ import annotations
 
@@ -40,31 +40,45 @@ def test_the_brackets_are_those_of_the_stability_report(name: str):
 
 
 def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
-    """The limit of Box2D is not typed in: what is given its name without the threshold does not fail."""
+    """The limit of Box2D is not typed in: what is given its name without the threshold does not
+    fail."""
     place = at("slow_collision", "box2d:shipped", 5)
     limits_of.cache_clear()
     with monkeypatch.context() as patch:
-        patch.setitem(variants.VARIANTS, "box2d:shipped", Variant("box2d:shipped", ENGINES["box2d:matched"].make))
+        patch.setitem(
+            variants.VARIANTS,
+            "box2d:shipped",
+            Variant("box2d:shipped", ENGINES["box2d:matched"].make),
+        )
         without = dict(LESSON.at(place).facts)["box2d:shipped"]
     limits_of.cache_clear()
 
     assert without == "does not fail up to 0.001 m/s"
     again = dict(LESSON.at(place).facts)["box2d:shipped"]
-    works, fails = map(float, re.fullmatch(r"works at ([\d.]+), fails at ([\d.]+) m/s", again).groups())
+    works, fails = map(
+        float, re.fullmatch(r"works at ([\d.]+), fails at ([\d.]+) m/s", again).groups()
+    )
     assert fails < 1.0 < works < 1.06 * fails
 
 
 @pytest.mark.parametrize(
     ("case", "engine", "place", "fails"),
     [
-        ("slow_collision", "box2d:shipped", 1, False), ("slow_collision", "box2d:shipped", 3, True),
-        ("slow_collision", "box2d:matched", 3, False), ("tunnelling_thin_wall", "pymunk:matched", 3, False),
-        ("tunnelling_thin_wall", "pymunk:matched", 5, True), ("tunnelling_thin_wall", "event_driven:float64", 8, False),
-        ("spin", "box2d:matched", 8, True), ("near_miss", "box2d_v3:shipped", 7, True),
+        ("slow_collision", "box2d:shipped", 1, False),
+        ("slow_collision", "box2d:shipped", 3, True),
+        ("slow_collision", "box2d:matched", 3, False),
+        ("tunnelling_thin_wall", "pymunk:matched", 3, False),
+        ("tunnelling_thin_wall", "pymunk:matched", 5, True),
+        ("tunnelling_thin_wall", "event_driven:float64", 8, False),
+        ("spin", "box2d:matched", 8, True),
+        ("near_miss", "box2d_v3:shipped", 7, True),
     ],
-)  # fmt: skip
-def test_the_run_fails_beyond_the_limit_and_only_there(case: str, engine: str, place: int, fails: bool):
-    """What is drawn leaves the exact answer, and the replay marks where; else it stays, and marks nothing."""
+)
+def test_the_run_fails_beyond_the_limit_and_only_there(
+    case: str, engine: str, place: int, fails: bool
+):
+    """What is drawn leaves the exact answer, and the replay marks where; else it stays, and marks
+    nothing."""
     shown = LESSON.at(at(case, engine, place))
     curves = {curve.name: np.asarray(curve.y) for curve in shown.charts[0].curves}
     here = dict(shown.steps)["Here"]
@@ -75,7 +89,9 @@ def test_the_run_fails_beyond_the_limit_and_only_there(case: str, engine: str, p
         k = len(curves[engine])
         way = np.ptp(curves[TRUTH])
         # A near miss leaves it by the thousandth part of a way that is none at all.
-        assert np.abs(curves[engine] - curves[TRUTH][:k]).max() > (0.2 * way if case != "near_miss" else 1e-4)
+        assert np.abs(curves[engine] - curves[TRUTH][:k]).max() > (
+            0.2 * way if case != "near_miss" else 1e-4
+        )
 
 
 def test_refusals_are_shown_beside_the_exact_answer():
@@ -99,6 +115,9 @@ def test_every_case_has_its_values_within_the_report():
 
 def test_the_slider_says_the_parameter_of_its_case():
     """With its unit: what the same place means depends on the case."""
-    said = [LESSON.at(at(name, "pymunk:matched", 3)).said["place"] for name in ("slow_collision", "tunnelling_head_on")]
+    said = [
+        LESSON.at(at(name, "pymunk:matched", 3)).said["place"]
+        for name in ("slow_collision", "tunnelling_head_on")
+    ]
 
     assert said == ["closing speed = 0.275 m/s", "v dt / R = 1"]

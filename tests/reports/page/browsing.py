@@ -1,4 +1,5 @@
-"""A Chromium that reaches nothing but this machine, and a server in a thread for it; for the tests of served pages."""
+"""A Chromium that reaches nothing but this machine, and a server in a thread for it; for the tests
+of served pages."""
 
 from __future__ import annotations
 
@@ -18,9 +19,13 @@ from starlette.applications import Starlette
 from reports.page.server import HOST, config_of, taken_socket
 
 FLAGS = [
-    "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
-    "--disable-sync", "--no-first-run",
-]  # fmt: skip
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
 
 
 @contextmanager
@@ -54,10 +59,14 @@ def served(app: Starlette) -> Iterator[str]:
 
 
 def opened(browser: Browser, url: str, **context: Any) -> tuple[Page, list[str]]:
-    """The page at `url`, and what it said on the console or asked of other machines; a file may ask for nothing."""
+    """The page at `url`, and what it said on the console or asked of other machines; a file may ask
+    for nothing."""
     page = browser.new_context(**context).new_page()
     heard: list[str] = []
-    page.route(lambda each: not belongs(each, url), lambda route: (heard.append(route.request.url), route.abort())[1])
+    page.route(
+        lambda each: not belongs(each, url),
+        lambda route: (heard.append(route.request.url), route.abort())[1],
+    )
     page.on("console", lambda message: heard.append(message.text))
     page.on("pageerror", lambda error: heard.append(str(error)))
     page.goto(url)
@@ -65,7 +74,8 @@ def opened(browser: Browser, url: str, **context: Any) -> tuple[Page, list[str]]
 
 
 def belongs(asked: str, url: str) -> bool:
-    """Whether what is asked for is of the page itself: its server's, the very file, or data within it."""
+    """Whether what is asked for is of the page itself: its server's, the very file, or data within
+    it."""
     host = urlsplit(url).hostname
     if host is None:
         return asked.startswith(("data:", "blob:")) or asked.split("#")[0] == url
@@ -74,4 +84,6 @@ def belongs(asked: str, url: str) -> bool:
 
 def overhang(page: Page) -> int:
     """By how many pixels the page is wider than the window."""
-    return page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    return page.evaluate(
+        "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    )

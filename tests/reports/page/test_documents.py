@@ -15,7 +15,8 @@ from reports.page.style import look
 
 TEMPLATES = sorted(REPORTS.glob("*/*.j2"))
 BASE, MACROS = "page/base.html.j2", "page/macros.html.j2"
-PARTS = {BASE, MACROS, "lessons/conventions.html.j2", "speed/budget.html.j2"}  # no pages: they stand inside of one
+# no pages: they stand inside of one
+PARTS = {BASE, MACROS, "lessons/conventions.html.j2", "speed/budget.html.j2"}
 
 LINKS = {"game": "", "lesson": ""}
 
@@ -36,7 +37,11 @@ def test_every_page_extends_the_base_and_only_the_base_has_a_head(path: Path):
 
 def test_no_macro_is_defined_twice():
     """What two pages need is in macros.html.j2."""
-    defined = [name for path in TEMPLATES for name in re.findall(r"{% macro (\w+)", path.read_text(encoding="utf-8"))]
+    defined = [
+        name
+        for path in TEMPLATES
+        for name in re.findall(r"{% macro (\w+)", path.read_text(encoding="utf-8"))
+    ]
 
     assert sorted(set(defined)) == sorted(defined)
 
@@ -45,16 +50,23 @@ def test_templates_are_read_in_one_place():
     """jinja2 is imported by documents.py and by no other file of the reports."""
     users = []
     for path in REPORTS.rglob("*.py"):
-        imports = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom)]
+        imports = [
+            node
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.ImportFrom)
+        ]
         users += [short(path)] * any(node.module == "jinja2" for node in imports)
 
     assert users == ["page/documents.py"]
 
 
 def test_the_plotly_library_is_in_a_page_that_asks_for_it_and_may_run_there():
-    """Its hash is one more in the policy; the library stands in the page deflated, in a third of its size."""
+    """Its hash is one more in the policy; the library stands in the page deflated, in a third of
+    its size."""
     fields = {"links": LINKS, "groups": {}, "table": "", "generator": "test"}
-    plain, charted = (render("lessons/index.html.j2", plotly=plotly, **fields) for plotly in (False, True))
+    plain, charted = (
+        render("lessons/index.html.j2", plotly=plotly, **fields) for plotly in (False, True)
+    )
     policies = [re.search(r"script-src ([^;]*);", unescape(page))[1] for page in (plain, charted)]  # type: ignore[index]
 
     assert [policy.count("sha256-") for policy in policies] == [0, 1]
@@ -66,7 +78,12 @@ def test_text_is_escaped_and_a_name_that_nobody_gave_is_an_error():
     """Both hold for pages and for parts of them."""
     name = "<b>engine</b>:shipped"
     page = render(
-        "lessons/index.html.j2", generator="<i>", looks={name: look(name)}, links=LINKS, groups={}, table="<u>"
+        "lessons/index.html.j2",
+        generator="<i>",
+        looks={name: look(name)},
+        links=LINKS,
+        groups={},
+        table="<u>",
     )
 
     assert "<u>" not in page

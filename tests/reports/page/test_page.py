@@ -1,4 +1,5 @@
-"""The page is one file that asks nothing of anywhere, draws what was computed, and runs no text it was given."""
+"""The page is one file that asks nothing of anywhere, draws what was computed, and runs no text it
+was given."""
 
 from __future__ import annotations
 
@@ -21,26 +22,35 @@ from reports.page.page import write_page
 from scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened, overhang
 
-HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>{{ 7 * 7 }}"
+HOSTILE = (
+    "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>{{ 7 * 7 }}"
+)
 LONG = "a_name_without_a_place_to_break_it_" * 6
 PLAYED = ("reference:exercise", "pymunk:matched", "box2d:shipped")
 HEAD_ON, ORBIT, ASTEROIDS = "head_on_equal_e09", "disk_between_static_disks", "asteroids"
 
 
 def played(name: str, **changes: Any) -> Comparison:
-    """A real scenario on three real engines, with one that crashed and one that refused, both saying hostile things."""
+    """A real scenario on three real engines, with one that crashed and one that refused, both
+    saying hostile things."""
     scene = replace(scenario(name), **changes)
     steps = scene.substeps[1:3]
     scene = replace(scene, substeps=steps)
     runs = [play(ENGINES[key].make(), key, scene, scene.dt(k)) for key in PLAYED for k in steps]
-    failed = [("box2d_v3", "shipped", "crashed", HOSTILE), ("box2d_v3", "matched", "unsupported", f"no {LONG}")]
-    runs += [Run(e, p, name, scene.dt(k), status, why) for e, p, status, why in failed for k in steps]
+    failed = [
+        ("box2d_v3", "shipped", "crashed", HOSTILE),
+        ("box2d_v3", "matched", "unsupported", f"no {LONG}"),
+    ]
+    runs += [
+        Run(e, p, name, scene.dt(k), status, why) for e, p, status, why in failed for k in steps
+    ]
     return compare(scene, runs)
 
 
 @pytest.fixture(scope="module")
 def comparisons() -> list[Comparison]:
-    """A scene with a truth, one whose truth ends early, one without a truth that wraps and turns."""
+    """A scene with a truth, one whose truth ends early, one without a truth that wraps and
+    turns."""
     return [
         played(HEAD_ON, asks=f"Is this inert? {HOSTILE} {LONG}", source=HOSTILE),
         played(ORBIT),
@@ -51,17 +61,44 @@ def comparisons() -> list[Comparison]:
 @pytest.fixture(scope="module")
 def path(comparisons: list[Comparison], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of these three, with hostile text wherever text can come from."""
-    probe = {"engine": "pymunk", "profile": "matched", "probe": HOSTILE, "asked": HOSTILE, "got": 0.81, "expected": 0.9}
+    probe = {
+        "engine": "pymunk",
+        "profile": "matched",
+        "probe": HOSTILE,
+        "asked": HOSTILE,
+        "got": 0.81,
+        "expected": 0.9,
+    }
     conformance = pd.DataFrame([probe | {"bound": 1e-6, "verdict": "departs", "note": HOSTILE}])
-    known = {"column": "ODE", "dt_s": 1e-3, "published_J2": 185.027, "ours_J2": 185.027, "source": HOSTILE}
-    about = {"command": f"crosscheck --out '{HOSTILE}'", "seed": 0, "machine": {"system": HOSTILE}, "seconds": 1.0}
-    about |= {"versions": {"pymunk": "7.3.1"}, "started": "2026-01-01T00:00:00+00:00", "known_answers_text": HOSTILE}
+    known = {
+        "column": "ODE",
+        "dt_s": 1e-3,
+        "published_J2": 185.027,
+        "ours_J2": 185.027,
+        "source": HOSTILE,
+    }
+    about = {
+        "command": f"crosscheck --out '{HOSTILE}'",
+        "seed": 0,
+        "machine": {"system": HOSTILE},
+        "seconds": 1.0,
+    }
+    about |= {
+        "versions": {"pymunk": "7.3.1"},
+        "started": "2026-01-01T00:00:00+00:00",
+        "known_answers_text": HOSTILE,
+    }
     path = tmp_path_factory.mktemp("page") / "report.html"
     write_page(
-        path, comparisons, untrusted=set(),
-        findings=["One.", HOSTILE, "Three."], conformance=conformance,
-        known_answers=pd.DataFrame([known]), about=about, lessons=LESSONS,
-    )  # fmt: skip
+        path,
+        comparisons,
+        untrusted=set(),
+        findings=["One.", HOSTILE, "Three."],
+        conformance=conformance,
+        known_answers=pd.DataFrame([known]),
+        about=about,
+        lessons=LESSONS,
+    )
     return path
 
 
@@ -73,7 +110,8 @@ def desktop(browser: Browser, path: Path) -> tuple[Page, list[str]]:
 
 @pytest.fixture
 def page(desktop: tuple[Page, list[str]]) -> Iterator[Page]:
-    """The page at 1280 px, on light, at its top; at the end it has asked for nothing and complained of nothing."""
+    """The page at 1280 px, on light, at its top; at the end it has asked for nothing and complained
+    of nothing."""
     page, heard = desktop
     page.emulate_media(color_scheme="light")
     page.evaluate("scrollTo({ top: 0, behavior: 'instant' })")
@@ -104,7 +142,10 @@ def test_every_chart_is_drawn_once_it_is_in_view(page: Page) -> None:
 def test_nothing_is_drawn_before_it_is_in_view(browser: Browser, path: Path) -> None:
     """A page just opened has drawn no chart and unpacked no replay of its last scenario."""
     page, _ = opened(browser, path.as_uri())
-    drawn = page.locator(f"#s-{ASTEROIDS} .main-svg").count(), page.evaluate("name => name in engines", ASTEROIDS)
+    drawn = (
+        page.locator(f"#s-{ASTEROIDS} .main-svg").count(),
+        page.evaluate("name => name in engines", ASTEROIDS),
+    )
     page.context.close()
 
     assert drawn == (0, False)
@@ -115,7 +156,10 @@ def test_the_engine_moves_disks(page: Page) -> None:
     with_engine(page, HEAD_ON)
     picture = "name => document.querySelector('#s-' + name + ' canvas').toDataURL()"
     before = page.evaluate(picture, HEAD_ON)
-    seek = "name => [0, 1].map(t => { engines[name].seek(t); return engines[name].positions('pymunk:matched'); })"
+    seek = (
+        "name => [0, 1].map(t => { engines[name].seek(t); return"
+        " engines[name].positions('pymunk:matched'); })"
+    )
     start, later = page.evaluate(seek, HEAD_ON)
 
     assert abs(later[0][0] - start[0][0]) > 0.1
@@ -123,12 +167,18 @@ def test_the_engine_moves_disks(page: Page) -> None:
 
 
 @pytest.mark.parametrize("name", [HEAD_ON, ORBIT, ASTEROIDS])
-def test_the_engine_shows_the_trajectory(page: Page, comparisons: list[Comparison], name: str) -> None:
-    """At the packed instants positions are those of the run, to half a step of the position grid."""
+def test_the_engine_shows_the_trajectory(
+    page: Page, comparisons: list[Comparison], name: str
+) -> None:
+    """At the packed instants positions are those of the run, to half a step of the position
+    grid."""
     with_engine(page, name)
     comparison = next(each for each in comparisons if each.scenario.name == name)
     instants = np.array(page.evaluate("name => engines[name].pack.t", name))
-    at_all = "([p, layer]) => engines[p].pack.t.map(t => { engines[p].seek(t); return engines[p].positions(layer); })"
+    at_all = (
+        "([p, layer]) => engines[p].pack.t.map(t => { engines[p].seek(t); return"
+        " engines[p].positions(layer); })"
+    )
     shown = [page.evaluate(at_all, [name, engine]) for engine in PLAYED]
     rows = np.rint(instants / comparison.scenario.sample_interval).astype(int)
     for engine, positions in zip(PLAYED, shown):
@@ -136,11 +186,14 @@ def test_the_engine_shows_the_trajectory(page: Page, comparisons: list[Compariso
         assert run.trajectory is not None
         expected = run.trajectory.position[rows]
         half_step = np.ptp(expected, axis=(0, 1)) / 65535 / 2
-        # A static disk's coordinate may span nothing; the float64 sum of low and step then rounds by itself.
+        # A static disk's coordinate may span nothing; the float64 sum of low and step then rounds
+        # by itself.
         assert (np.abs(np.array(positions) - expected) <= half_step * (1 + 1e-6) + 1e-12).all()
 
 
-def test_the_truth_is_not_drawn_beyond_its_horizon(page: Page, comparisons: list[Comparison]) -> None:
+def test_the_truth_is_not_drawn_beyond_its_horizon(
+    page: Page, comparisons: list[Comparison]
+) -> None:
     """After the horizon there are no positions of the truth, and the engine says when it ended."""
     with_engine(page, ORBIT)
     truth = comparisons[1].truth
@@ -195,7 +248,8 @@ def test_charts_follow_the_dark(page: Page) -> None:
     page.emulate_media(color_scheme="dark")
 
     page.wait_for_function(
-        "plot => plot.data.every(t => t.line.color === Object.values(looks).find(l => l.dark === t.line.color)?.dark)",
+        "plot => plot.data.every(t => t.line.color === Object.values(looks).find(l => l.dark ==="
+        " t.line.color)?.dark)",
         arg=plot.element_handle(),
     )
 
@@ -231,7 +285,9 @@ def test_failed_and_refused_runs_are_in_sight(page: Page) -> None:
 @pytest.mark.parametrize("width", [400, 1280])
 def test_the_page_never_scrolls_sideways(browser: Browser, path: Path, width: int) -> None:
     """All fits the width, however long a word is; wide tables scroll by themselves."""
-    page, heard = opened(browser, path.as_uri(), viewport={"width": width, "height": 800}, reduced_motion="reduce")
+    page, heard = opened(
+        browser, path.as_uri(), viewport={"width": width, "height": 800}, reduced_motion="reduce"
+    )
     for name in (HEAD_ON, ORBIT, ASTEROIDS):
         with_engine(page, name)
     page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
@@ -254,8 +310,16 @@ def test_the_page_fits_in_eight_megabytes(path: Path) -> None:
 
 
 def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:
-    """Without scenarios, probes and known answers there is still a page, with the command that makes it."""
-    about = {"command": "crosscheck run nothing", "seed": 1, "machine": {}, "versions": {}, "started": "", "seconds": 0}
+    """Without scenarios, probes and known answers there is still a page, with the command that
+    makes it."""
+    about = {
+        "command": "crosscheck run nothing",
+        "seed": 1,
+        "machine": {},
+        "versions": {},
+        "started": "",
+        "seconds": 0,
+    }
     nothing = pd.DataFrame()
     write_page(
         tmp_path / "r.html",
@@ -271,8 +335,11 @@ def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:
     assert "crosscheck run nothing" in (tmp_path / "r.html").read_text()
 
 
-def test_the_browser_of_these_tests_hears_what_a_page_asks_for(browser: Browser, tmp_path: Path) -> None:
-    """A page that asks for another file, for another machine, and complains: all three are heard, data is not."""
+def test_the_browser_of_these_tests_hears_what_a_page_asks_for(
+    browser: Browser, tmp_path: Path
+) -> None:
+    """A page that asks for another file, for another machine, and complains: all three are heard,
+    data is not."""
     path = tmp_path / "asks.html"
     own = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAAC"
     images = f"<img src=other.png><img src=http://elsewhere.invalid/a.png><img src={own}>"
@@ -281,5 +348,7 @@ def test_the_browser_of_these_tests_hears_what_a_page_asks_for(browser: Browser,
     page.wait_for_load_state("networkidle")
     page.context.close()
 
-    assert {"ouch", (tmp_path / "other.png").as_uri(), "http://elsewhere.invalid/a.png"} <= set(heard)
+    assert {"ouch", (tmp_path / "other.png").as_uri(), "http://elsewhere.invalid/a.png"} <= set(
+        heard
+    )
     assert not any(each.startswith("data:") for each in heard)

@@ -1,4 +1,5 @@
-"""Engines that do what engines do at their worst, each at its 100th step: what the runner is there to survive."""
+"""Engines that do what engines do at their worst, each at its 100th step: what the runner is there
+to survive."""
 
 from __future__ import annotations
 
@@ -42,7 +43,12 @@ class Controlled:
         """Nothing: the control of the controls."""
 
     def read(self):
-        return State(self.position.copy(), self.velocity.copy(), self.start.angle, self.start.angular_velocity)
+        return State(
+            self.position.copy(),
+            self.velocity.copy(),
+            self.start.angle,
+            self.start.angular_velocity,
+        )
 
     def collisions(self):
         return []
@@ -160,7 +166,8 @@ class Remembers(Controlled):
 
 
 class Once(Controlled):
-    """Killed by `kill -9` the first time only: where it is asked to, it leaves a mark that it has been here."""
+    """Killed by `kill -9` the first time only: where it is asked to, it leaves a mark that it has
+    been here."""
 
     def misbehave(self):
         mark = Path(os.environ["CONTROL_MARK"])

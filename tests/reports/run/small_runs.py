@@ -1,4 +1,5 @@
-"""A run of two scenes, one of them a file, on two engines, made in this process and so within a second or two."""
+"""A run of two scenes, one of them a file, on two engines, made in this process and so within a
+second or two."""
 
 from pathlib import Path
 
@@ -30,7 +31,13 @@ def make(folder: Path, scene_file: Path) -> Path:
         begin(plan, journal, scenarios, len(cells))
         for name in PLAYED:
             finding = Finding(
-                *name.split(":"), "read_copies", "Does read give copies?", "copies", "copies", 0.0, "keeps"
+                *name.split(":"),
+                "read_copies",
+                "Does read give copies?",
+                "copies",
+                "copies",
+                0.0,
+                "keeps",
             )
             keep_answer(journal, plan, name, [finding])
         keep_answer(journal, plan, KNOWN_ANSWERS[0], 18808.3)

@@ -1,4 +1,5 @@
-"""Runs that are broken off, by whatever, and what must be true of them when they have been resumed."""
+"""Runs that are broken off, by whatever, and what must be true of them when they have been
+resumed."""
 
 import json
 import shutil
@@ -10,9 +11,22 @@ import pandas as pd
 
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, wait_for
 
-SMALL = ["run", "slow_collision", "near_miss", "--engine", "reference:exercise", "--engine", "pymunk"]  # 24 cells of ms
+# 24 cells of ms
+SMALL = [
+    "run",
+    "slow_collision",
+    "near_miss",
+    "--engine",
+    "reference:exercise",
+    "--engine",
+    "pymunk",
+]
 LONG = ["run", "asteroids"]  # 24 cells of 0.4 s
-LONG += [word for name in ("reference:exercise", "reference:lesson", "pymunk", "box2d") for word in ("--engine", name)]
+LONG += [
+    word
+    for name in ("reference:exercise", "reference:lesson", "pymunk", "box2d")
+    for word in ("--engine", name)
+]
 
 
 def undisturbed(words: list[str], cwd: Path) -> Path:
@@ -22,7 +36,8 @@ def undisturbed(words: list[str], cwd: Path) -> Path:
 
 
 def assert_nothing_lost(out: Path, whole: Path) -> None:
-    """24 of 24 good cells, none twice in the journal, and the same numbers as if nothing had happened."""
+    """24 of 24 good cells, none twice in the journal, and the same numbers as if nothing had
+    happened."""
     cells = Counter(line["cell"] for line in lines(out) if "cell" in line)
 
     assert len(cells) == 24
@@ -39,12 +54,17 @@ def lines(out: Path) -> list[dict]:
 def broken_off(whole: Path, out: Path, after: int) -> Path:
     """A copy of a run as a power cut leaves it in the middle of a line of its journal: OUT.part.
 
-    Which of two workers is done first is chance, so the lines are put in order: header, probes, cells.
+    Which of two workers is done first is chance, so the lines are put in order: header, probes,
+    cells.
     """
     part = out.with_name(f"{out.name}.part")
     shutil.copytree(whole, part)
     journal = (part / "journal.jsonl").read_text().splitlines(keepends=True)
-    journal.sort(key=lambda line: [f'{{"{kind}"' in line for kind in ("footer", "cell", "conformance", "header")])
+    journal.sort(
+        key=lambda line: [
+            f'{{"{kind}"' in line for kind in ("footer", "cell", "conformance", "header")
+        ]
+    )
     (part / "journal.jsonl").write_text("".join(journal[:after]) + journal[after][:50])
     for name in ("deviations.csv", "runs.csv", "report.html"):
         (part / name).unlink()
@@ -54,11 +74,17 @@ def broken_off(whole: Path, out: Path, after: int) -> Path:
 def begun(*words: str | Path, cwd: Path, cells: int) -> subprocess.Popen[str]:
     """`crosscheck ... --out out`, of which so many cells have ended; in a session of its own."""
     command = [CROSSCHECK, *words, "--out", "out"]
-    run = subprocess.Popen(command, cwd=cwd, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    run = subprocess.Popen(
+        command, cwd=cwd, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
     wait_for(lambda: ended_in(cwd / "out.part") >= cells or run.poll() is not None)
     return run
 
 
 def ended_in(part: Path) -> int:
     """How many cells have ended, as the journal has it."""
-    return (part / "journal.jsonl").read_text().count('"cell"') if (part / "journal.jsonl").exists() else 0
+    return (
+        (part / "journal.jsonl").read_text().count('"cell"')
+        if (part / "journal.jsonl").exists()
+        else 0
+    )

@@ -23,7 +23,8 @@ def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_a_machine_that_dies_takes_no_cell_along(long: Path, tmp_path: Path):
-    """Two dask workers, of which one is killed in the middle of the run: the other plays its cells, too."""
+    """Two dask workers, of which one is killed in the middle of the run: the other plays its cells,
+    too."""
     with cluster(tmp_path) as (scheduler, machines):
         run = begun(*LONG, "--scheduler", scheduler, cwd=tmp_path, cells=3)
         machines[0].kill()
@@ -36,7 +37,9 @@ def test_a_machine_that_dies_takes_no_cell_along(long: Path, tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_goes_is_one_clear_message_and_the_run_can_be_resumed_here(long: Path, tmp_path: Path):
+def test_a_scheduler_that_goes_is_one_clear_message_and_the_run_can_be_resumed_here(
+    long: Path, tmp_path: Path
+):
     """Exit 1; what was played is kept, and goes on without a cluster."""
     with cluster(tmp_path) as (scheduler, _):
         run = begun(*LONG, "--scheduler", scheduler, cwd=tmp_path, cells=3)
@@ -56,7 +59,9 @@ def test_a_scheduler_that_goes_is_one_clear_message_and_the_run_can_be_resumed_h
         ("tcp://127.0.0.1:1", "--scheduler tcp://127.0.0.1:1: no scheduler answers there"),
     ],
 )
-def test_an_address_where_no_scheduler_is_is_one_clear_message(tmp_path: Path, address: str, said: str):
+def test_an_address_where_no_scheduler_is_is_one_clear_message(
+    tmp_path: Path, address: str, said: str
+):
     """Exit 2, in one line; nothing is written."""
     done = crosscheck("run", "slow_collision", "--scheduler", address, cwd=tmp_path)
 
@@ -68,7 +73,8 @@ def test_an_address_where_no_scheduler_is_is_one_clear_message(tmp_path: Path, a
 
 @contextmanager
 def cluster(cwd: Path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
-    """The address of a dask scheduler with two workers of one thread, started as the README says."""
+    """The address of a dask scheduler with two workers of one thread, started as the README
+    says."""
     log = (cwd / "scheduler.log").open("w")
     words = ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
     processes = [subprocess.Popen([DASK, *words], cwd=cwd, stderr=log)]

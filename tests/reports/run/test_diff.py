@@ -1,4 +1,5 @@
-"""`crosscheck diff`: what got worse between two runs is found, what did not is not; scripts can tell by the exit."""
+"""`crosscheck diff`: what got worse between two runs is found, what did not is not; scripts can
+tell by the exit."""
 
 import json
 import random
@@ -23,9 +24,14 @@ from reports.run.tables import seal_of
 from reports.terminal.progress import Progress
 
 PLAN = RunPlan(
-    ["slow_collision", "near_miss"], {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")},
-    seed=0, dts=[], full=False, timings=1, command="test",
-)  # fmt: skip
+    ["slow_collision", "near_miss"],
+    {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")},
+    seed=0,
+    dts=[],
+    full=False,
+    timings=1,
+    command="test",
+)
 
 
 def run(folder: Path, workers: int) -> Path:
@@ -70,8 +76,11 @@ def exit_of(before: Path, after: Path) -> object:
     return left.value.code
 
 
-def test_the_numbers_do_not_depend_on_workers_or_order(before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """One worker instead of two, and the cells in any order: deviations.csv is the same byte for byte."""
+def test_the_numbers_do_not_depend_on_workers_or_order(
+    before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """One worker instead of two, and the cells in any order: deviations.csv is the same byte for
+    byte."""
     in_order = suite.tasks_of
 
     def shuffled(*words):
@@ -81,7 +90,9 @@ def test_the_numbers_do_not_depend_on_workers_or_order(before: Path, tmp_path: P
 
     monkeypatch.setattr(suite, "tasks_of", shuffled)
     again = run(tmp_path / "again", workers=1)
-    cells = [[line["cell"] for line in lines_of(folder) if "cell" in line] for folder in (before, again)]
+    cells = [
+        [line["cell"] for line in lines_of(folder) if "cell" in line] for folder in (before, again)
+    ]
 
     assert cells[0] != cells[1]
     assert (again / "deviations.csv").read_bytes() == (before / "deviations.csv").read_bytes()
@@ -89,14 +100,17 @@ def test_the_numbers_do_not_depend_on_workers_or_order(before: Path, tmp_path: P
     assert (changed.numbers, changed.statuses) == ([], [])
 
 
-def test_the_same_run_has_not_changed(before: Path, after: Path, capsys: pytest.CaptureFixture[str]):
+def test_the_same_run_has_not_changed(
+    before: Path, after: Path, capsys: pytest.CaptureFixture[str]
+):
     """Exit 0."""
     assert exit_of(before, after) == 0
     assert "Nothing got worse." in capsys.readouterr().out
 
 
 def test_one_bit_in_a_cell_that_is_the_same_is_worse(before: Path, after: Path):
-    """Same scene, settings and versions must give the same bits, even where the number got smaller."""
+    """Same scene, settings and versions must give the same bits, even where the number got
+    smaller."""
     table = pd.read_csv(after / "deviations.csv", dtype=str, keep_default_na=False)
     row = table.index[(table.metric == "position_max") & (table.versus == "truth")][0]
     table.loc[row, "value"] = repr(float(table.loc[row, "value"]) * (1 - 2**-53))
@@ -108,8 +122,11 @@ def test_one_bit_in_a_cell_that_is_the_same_is_worse(before: Path, after: Path):
 
 
 @pytest.mark.parametrize(("factor", "verdict"), [(2.0, "worse"), (0.5, "better")])
-def test_where_versions_differ_the_metric_says_what_is_worse(before: Path, after: Path, factor: float, verdict: str):
-    """A larger error is worse, a smaller better; the deviation of two engines is neither; and there is a warning."""
+def test_where_versions_differ_the_metric_says_what_is_worse(
+    before: Path, after: Path, factor: float, verdict: str
+):
+    """A larger error is worse, a smaller better; the deviation of two engines is neither; and there
+    is a warning."""
 
     def other_version(line: dict) -> None:
         if "cell" in line:
@@ -129,21 +146,30 @@ def test_where_versions_differ_the_metric_says_what_is_worse(before: Path, after
 
 
 def test_a_cell_that_fails_now_or_is_gone_is_worse(before: Path, after: Path):
-    """One crashed, one missing: two changes, exit 1; the other way round they are better or nothing."""
+    """One crashed, one missing: two changes, exit 1; the other way round they are better or
+    nothing."""
     cells = [line for line in lines_of(after) if "cell" in line]
     kept = [line for line in lines_of(after) if line.get("cell") != cells[0]["cell"]]
     (after / JOURNAL).write_text("".join(json.dumps(line) + "\n" for line in kept))
-    edit(after, lambda line: line.update(status="crashed") if line.get("cell") == cells[1]["cell"] else None)
+    edit(
+        after,
+        lambda line: (
+            line.update(status="crashed") if line.get("cell") == cells[1]["cell"] else None
+        ),
+    )
 
     assert sorted((one.after, one.verdict) for one in difference(before, after).statuses) == [
-        ("crashed", "worse"), ("not played", "worse"),
-    ]  # fmt: skip
+        ("crashed", "worse"),
+        ("not played", "worse"),
+    ]
     assert exit_of(before, after) == 1
     assert [one.verdict for one in difference(after, before).statuses] == ["better"]
 
 
 @pytest.mark.parametrize(("machine", "verdicts"), [("same", {"worse"}), ("other", set())])
-def test_timings_are_judged_on_one_machine_only(before: Path, after: Path, machine: str, verdicts: set[str]):
+def test_timings_are_judged_on_one_machine_only(
+    before: Path, after: Path, machine: str, verdicts: set[str]
+):
     """All twice as slow: worse; on another machine there is a warning instead."""
     edit(after, lambda line: line.update(seconds=2 * line["seconds"]) if "timing" in line else None)
     for folder in (before, after):  # nine rounds of the same
@@ -153,7 +179,12 @@ def test_timings_are_judged_on_one_machine_only(before: Path, after: Path, machi
                 for line in timings * 8:
                     journal.append(line)
     if machine == "other":
-        edit(after, lambda line: line["header"]["machine"].update(processor="abacus") if "header" in line else None)
+        edit(
+            after,
+            lambda line: (
+                line["header"]["machine"].update(processor="abacus") if "header" in line else None
+            ),
+        )
     changed = difference(before, after)
 
     assert {one.verdict for one in changed.timings} == verdicts
@@ -183,16 +214,21 @@ def test_a_machine_that_is_busy_in_all_rounds_but_one_does_not_make_an_engine_sl
 
 
 def test_the_interval_holds_the_true_median_as_often_as_it_says():
-    """Of 2000 samples of 20 from a lopsided distribution of median 1, at least 98.5 % of intervals hold it."""
+    """Of 2000 samples of 20 from a lopsided distribution of median 1, at least 98.5 % of intervals
+    hold it."""
     draw = random.Random(1)
-    found = [timing("any", sorted(draw.expovariate(0.6931471805599453) for _ in range(20)), 1.0) for _ in range(2000)]
+    found = [
+        timing("any", sorted(draw.expovariate(0.6931471805599453) for _ in range(20)), 1.0)
+        for _ in range(2000)
+    ]
 
     assert isinstance(found[0], Timing)
     assert sum(one.low <= 1 <= one.high for one in found) / 2000 > 0.985
 
 
 def test_a_scene_that_is_not_judged_any_more_is_worse(before: Path, after: Path):
-    """Its exact answer took too long: its numbers are gone, which no other row would tell; the other way is better."""
+    """Its exact answer took too long: its numbers are gone, which no other row would tell; the
+    other way is better."""
     table = pd.read_csv(after / "deviations.csv", dtype=str, keep_default_na=False)
     judged = table[(table.scenario != "slow_collision") | (table.versus != "truth")]
     runs = table[table.scenario == "slow_collision"].drop_duplicates(["engine", "profile", "dt_s"])

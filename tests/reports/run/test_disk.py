@@ -1,4 +1,5 @@
-"""A disk that is full, or may not be written to, is one clear message, and the journal stays whole."""
+"""A disk that is full, or may not be written to, is one clear message, and the journal stays
+whole."""
 
 import shutil
 import subprocess
@@ -20,7 +21,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_one_clear_message_and_the_run_goes_on_when_there_is_room(small: Path, tmp_path: Path):
+def test_a_full_disk_is_one_clear_message_and_the_run_goes_on_when_there_is_room(
+    small: Path, tmp_path: Path
+):
     """A tmpfs of 400 kB: exit 1, the journal whole; with more room, resumed to the same numbers."""
     with mounted(tmp_path / "disk", "size=400k") as disk:
         done = crosscheck(*SMALL, "--out", disk / "out", cwd=tmp_path)
@@ -44,7 +47,8 @@ def test_a_folder_that_cannot_be_written_is_one_clear_message(small: Path, tmp_p
         shutil.copytree(small, disk / "had")
         subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
         done = [
-            crosscheck(*words, cwd=tmp_path) for words in ((*SMALL, "--out", disk / "out"), ("report", disk / "had"))
+            crosscheck(*words, cwd=tmp_path)
+            for words in ((*SMALL, "--out", disk / "out"), ("report", disk / "had"))
         ]
 
     assert [one.returncode for one in done] == [2, 2]
@@ -56,7 +60,9 @@ def test_a_folder_that_cannot_be_written_is_one_clear_message(small: Path, tmp_p
 def mounted(where: Path, options: str) -> Iterator[Path]:
     """A small file system in memory; skips the test where it may not be mounted."""
     where.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", where], capture_output=True).returncode:
+    if subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", options, "tmpfs", where], capture_output=True
+    ).returncode:
         pytest.skip("mounting a tmpfs takes root")
     try:
         yield where

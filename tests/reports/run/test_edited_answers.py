@@ -1,4 +1,5 @@
-"""An exact answer that somebody has edited, or replaced by something else, is computed again, and that is said."""
+"""An exact answer that somebody has edited, or replaced by something else, is computed again, and
+that is said."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ def with_arrays(path: Path, edit: Callable[[dict[str, Any]], None]) -> None:
 
 
 def halved(arrays: dict[str, Any]) -> None:
-    """Every flight begins at half its place, with half its velocity; every collision is half as late."""
+    """Every flight begins at half its place, with half its velocity; every collision is half as
+    late."""
     arrays["legs"][:, 2:6] /= 2
     arrays["events"][:, 0] /= 2
 
@@ -79,7 +81,9 @@ EDITS: dict[str, Callable[[Path], None]] = {
     "nothing remains": lambda path: with_arrays(path, numbers(remains=5)),
     "said otherwise": saying("timeout", "x", "soon"),
     "said in a list": saying("timeout", "x", 5.0),
-    "brackets": lambda path: saying()(path) or ZipFile(path, "w").writestr("answer.json", "[" * 200_000),
+    "brackets": lambda path: (
+        saying()(path) or ZipFile(path, "w").writestr("answer.json", "[" * 200_000)
+    ),
     "a pipe": pipe,
     "a device": endless,
 }
@@ -89,7 +93,11 @@ EDITS: dict[str, Callable[[Path], None]] = {
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run, with its tables."""
     place = tmp_path_factory.mktemp("edited")
-    scene = Path(shutil.copy(Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml", place / "two.toml"))
+    scene = Path(
+        shutil.copy(
+            Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml", place / "two.toml"
+        )
+    )
     made = make(place / "whole", scene)
     assert crosscheck("report", made, cwd=place).returncode == 0
     return made
@@ -104,8 +112,10 @@ def test_an_edited_answer_is_as_good_as_none(tmp_path: Path, edit: str):
     assert read_answer(tmp_path / "one.npz") is None
 
 
-@pytest.mark.parametrize("edit", [pytest.param(name, marks=pytest.mark.slow) if k else name
-                                  for k, name in enumerate(EDITS)])  # fmt: skip
+@pytest.mark.parametrize(
+    "edit",
+    [pytest.param(name, marks=pytest.mark.slow) if k else name for k, name in enumerate(EDITS)],
+)
 def test_an_edited_answer_is_computed_again_and_said(whole: Path, tmp_path: Path, edit: str):
     """All numbers are as they were, though every share was deleted with it."""
     out = Path(shutil.copytree(whole, tmp_path / "out"))
@@ -117,7 +127,9 @@ def test_an_edited_answer_is_computed_again_and_said(whole: Path, tmp_path: Path
     done = crosscheck("report", "out", cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
-    assert f"{path.name} is not what was written: that exact answer is computed again" in done.stderr
+    assert (
+        f"{path.name} is not what was written: that exact answer is computed again" in done.stderr
+    )
     assert (out / "deviations.csv").read_bytes() == before
     assert path.is_file()
     assert read_answer(path) is not None
@@ -144,9 +156,23 @@ def test_the_answer_to_another_scene_is_not_the_answer_to_this_one(tmp_path: Pat
 
 def test_numbers_of_a_record_are_numbers_and_its_texts_texts():
     """What is read from the user's own cache is asked the same."""
-    good = {"horizon": 1.0, "error_bound": 1e-9, "float64_horizon": 2, "bits": 53, "method": "", "reason": "",
-            "remains": ["a"]}  # fmt: skip
-    bad = [{"horizon": "soon"}, {"remains": 5}, {"remains": [5]}, {"bits": 1.5}, {"bits": True}, {"reason": None}]
+    good = {
+        "horizon": 1.0,
+        "error_bound": 1e-9,
+        "float64_horizon": 2,
+        "bits": 53,
+        "method": "",
+        "reason": "",
+        "remains": ["a"],
+    }
+    bad = [
+        {"horizon": "soon"},
+        {"remains": 5},
+        {"remains": [5]},
+        {"bits": 1.5},
+        {"bits": True},
+        {"reason": None},
+    ]
 
     assert is_said(good)
     assert not any(is_said(good | one) for one in bad)
@@ -155,14 +181,21 @@ def test_numbers_of_a_record_are_numbers_and_its_texts_texts():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("place", ["trajectories", "compared"])
-@pytest.mark.parametrize("words", [("report", "out"), ("diff", "whole", "out")], ids=["report", "diff"])
-def test_a_pipe_in_a_result_folder_is_waited_for_by_nobody(whole: Path, tmp_path: Path, place: str, words: Any):
-    """In the place of every file of a folder of a run: a process of its own, as what hangs is to be ended."""
+@pytest.mark.parametrize(
+    "words", [("report", "out"), ("diff", "whole", "out")], ids=["report", "diff"]
+)
+def test_a_pipe_in_a_result_folder_is_waited_for_by_nobody(
+    whole: Path, tmp_path: Path, place: str, words: Any
+):
+    """In the place of every file of a folder of a run: a process of its own, as what hangs is to be
+    ended."""
     out = Path(shutil.copytree(whole, tmp_path / "out"))
     (tmp_path / "whole").symlink_to(whole)
     for path in (out / place).iterdir():
         pipe(path)
-    done = subprocess.run([CROSSCHECK, *words], cwd=tmp_path, capture_output=True, text=True, timeout=200)
+    done = subprocess.run(
+        [CROSSCHECK, *words], cwd=tmp_path, capture_output=True, text=True, timeout=200
+    )
 
     assert done.returncode in (0, 1, 2)
     assert "Traceback" not in done.stderr

@@ -1,4 +1,5 @@
-"""A journal that somebody edited is refused by line or used, by every command that reads one: never a traceback."""
+"""A journal that somebody edited is refused by line or used, by every command that reads one: never
+a traceback."""
 
 import copy
 import json
@@ -20,12 +21,32 @@ from tests.reports.terminal.command_line import Done, crosscheck
 GONE = object()
 DEEP = json.loads("[" * 60 + "]" * 60)
 WRONG: dict[str, Any] = {
-    "null": None, "true": True, "negative": -1, "zero": 0, "half": 0.5, "huge": 1e308, "400 digits": 10**400,
-    "not a number": float("nan"), "infinite": float("inf"), "nan as text": "nan", "empty": "", "path": "../../../x",
-    "another name": "other", "long": "x" * 5000, "escape codes": "a\x1b[31mb\r", "surrogate": "\udcff",
-    "null byte": "a\0b", "markup": "[/nope]", "colon": "a:b", "list": ["x"], "empty list": [], "deep": DEEP,
-    "empty table": {}, "table": {"a": {"b": [1]}}, "missing": GONE,
-}  # fmt: skip
+    "null": None,
+    "true": True,
+    "negative": -1,
+    "zero": 0,
+    "half": 0.5,
+    "huge": 1e308,
+    "400 digits": 10**400,
+    "not a number": float("nan"),
+    "infinite": float("inf"),
+    "nan as text": "nan",
+    "empty": "",
+    "path": "../../../x",
+    "another name": "other",
+    "long": "x" * 5000,
+    "escape codes": "a\x1b[31mb\r",
+    "surrogate": "\udcff",
+    "null byte": "a\0b",
+    "markup": "[/nope]",
+    "colon": "a:b",
+    "list": ["x"],
+    "empty list": [],
+    "deep": DEEP,
+    "empty table": {},
+    "table": {"a": {"b": [1]}},
+    "missing": GONE,
+}
 SAMPLE = 30  # edits that are taken, and are put to all commands in the long test
 
 
@@ -33,15 +54,26 @@ SAMPLE = 30  # edits that are taken, and are put to all commands in the long tes
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run in which nothing is wrong."""
     place = tmp_path_factory.mktemp("edits")
-    scene = Path(shutil.copy(Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml", place / "two.toml"))
+    scene = Path(
+        shutil.copy(
+            Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml", place / "two.toml"
+        )
+    )
     return make(place / "made", scene)
 
 
 def places(value: Any, at: tuple = ()) -> Iterator[tuple]:
-    """Where a line may be edited: every key of every table in it, and the first two items of every list."""
+    """Where a line may be edited: every key of every table in it, and the first two items of every
+    list."""
     if at:
         yield at
-    items = value.items() if isinstance(value, dict) else enumerate(value[:2]) if isinstance(value, list) else ()
+    items = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value[:2])
+        if isinstance(value, list)
+        else ()
+    )
     for key, item in items:
         yield from places(item, (*at, key))
 
@@ -60,7 +92,8 @@ def edited(line: dict[str, Any], at: tuple, value: Any) -> dict[str, Any]:
 
 
 def edits(folder: Path) -> Iterator[tuple[int, dict[str, Any], str]]:
-    """(Number of a line, the line edited, what was done), for every field of every kind of line, to all of `WRONG`."""
+    """(Number of a line, the line edited, what was done), for every field of every kind of line, to
+    all of `WRONG`."""
     lines = [json.loads(line) for line in (folder / JOURNAL).read_text().splitlines()]
     first = {kind_of(line, KINDS.models): number for number, line in reversed([*enumerate(lines)])}
     assert set(first) == set(KINDS.models)
@@ -77,12 +110,16 @@ def put(folder: Path, number: int, line: dict[str, Any]) -> None:
     (folder / JOURNAL).write_text("\n".join(lines) + "\n")
 
 
-def put_to_all(made: Path, number: int, line: dict[str, Any], place: Path, resumes: bool) -> list[Done]:
+def put_to_all(
+    made: Path, number: int, line: dict[str, Any], place: Path, resumes: bool
+) -> list[Done]:
     """What all commands that read a journal make of a copy of a run with such a line."""
     key = next(record["cell"] for record in Archive.read(made).records)
     commands = [["report", "out"], ["diff", made, "out"], ["replay", key, "--out", "out"]]
     done = []
-    for command in [*commands, ["run", "--resume", "out", "--workers", "1"]] if resumes else commands:
+    for command in (
+        [*commands, ["run", "--resume", "out", "--workers", "1"]] if resumes else commands
+    ):
         for folder in ("out", "out.part"):
             shutil.rmtree(place / folder, ignore_errors=True)
         shutil.copytree(made, place / "out")
@@ -140,14 +177,22 @@ def test_what_is_refused_names_its_line(made: Path, tmp_path: Path):
         ("cell", ("scene",), "near_miss", "must be one of the scenes of the header"),
         ("cell", ("seed",), 10**400, "must be that of the header"),
         ("header", ("header", "machine"), DEEP, "header.machine = [["),
-        ("header", ("header", "timings"), 10**12, "header.timings = 1000000000000: must be less than"),
+        (
+            "header",
+            ("header", "timings"),
+            10**12,
+            "header.timings = 1000000000000: must be less than",
+        ),
         ("header", ("header", "seed"), GONE, "header.seed: missing"),
         ("conformance", ("of",), "pymunk:other", "must be of one engine"),
         ("timing", ("seconds",), float("nan"), "seconds = nan: must be a finite number"),
     ],
-)  # fmt: skip
-def test_what_does_not_fit_is_named(made: Path, tmp_path: Path, kind: str, at: tuple, value: Any, said: str):
-    """By line, key, value and what is allowed; exit 2 of all four commands, of which none writes outside of the run."""
+)
+def test_what_does_not_fit_is_named(
+    made: Path, tmp_path: Path, kind: str, at: tuple, value: Any, said: str
+):
+    """By line, key, value and what is allowed; exit 2 of all four commands, of which none writes
+    outside of the run."""
     lines = [json.loads(line) for line in (made / JOURNAL).read_text().splitlines()]
     number = next(k for k, line in enumerate(lines) if kind in line)
     before = sorted(path.name for path in tmp_path.parent.iterdir())
@@ -158,7 +203,9 @@ def test_what_does_not_fit_is_named(made: Path, tmp_path: Path, kind: str, at: t
     assert sorted(path.name for path in tmp_path.parent.iterdir()) == before
 
 
-@pytest.mark.parametrize("line", ["[" * 100_000, "{" * 100_000, "NaN", '"\\ud800"', "1e999", "\x00", "\udcff"])
+@pytest.mark.parametrize(
+    "line", ["[" * 100_000, "{" * 100_000, "NaN", '"\\ud800"', "1e999", "\x00", "\udcff"]
+)
 def test_a_line_that_is_no_table_is_named(made: Path, tmp_path: Path, line: str):
     """Brackets in brackets without end, a number, a text, bytes that are none."""
     copied = Path(shutil.copytree(made, tmp_path / "copied"))
@@ -171,12 +218,19 @@ def test_a_line_that_is_no_table_is_named(made: Path, tmp_path: Path, line: str)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "at", "value"), [("cell", ("dt_s",), 0.5), ("cell", ("scenario",), "other")])
-def test_a_line_that_does_not_fit_its_scene_is_named(made: Path, tmp_path: Path, kind: str, at: tuple, value: Any):
-    """It is as its schema has it, but a scene has its own name and its own steps: exit 2 of what reads the scene."""
+@pytest.mark.parametrize(
+    ("kind", "at", "value"), [("cell", ("dt_s",), 0.5), ("cell", ("scenario",), "other")]
+)
+def test_a_line_that_does_not_fit_its_scene_is_named(
+    made: Path, tmp_path: Path, kind: str, at: tuple, value: Any
+):
+    """It is as its schema has it, but a scene has its own name and its own steps: exit 2 of what
+    reads the scene."""
     lines = [json.loads(line) for line in (made / JOURNAL).read_text().splitlines()]
     number = next(k for k, line in enumerate(lines) if kind in line)
-    report, _, replay, resumed = put_to_all(made, number, edited(lines[number], at, value), tmp_path, resumes=True)
+    report, _, replay, resumed = put_to_all(
+        made, number, edited(lines[number], at, value), tmp_path, resumes=True
+    )
     cell = lines[number]["cell"]
 
     for done in (report, resumed) if replay.returncode == 0 else (report, replay, resumed):
@@ -186,8 +240,10 @@ def test_a_line_that_does_not_fit_its_scene_is_named(made: Path, tmp_path: Path,
 
 @pytest.mark.slow
 def test_what_is_taken_ends_no_command_with_a_traceback(made: Path, tmp_path: Path):
-    """Of the edits that the schema lets pass, a sample goes to every command; an exception would fail this test."""
-    assert crosscheck("report", made, cwd=tmp_path).returncode == 0  # so that the copies need not compare again
+    """Of the edits that the schema lets pass, a sample goes to every command; an exception would
+    fail this test."""
+    # so that the copies need not compare again
+    assert crosscheck("report", made, cwd=tmp_path).returncode == 0
     taken = []
     copied = Path(shutil.copytree(made, tmp_path / "copied"))
     for number, line, what in edits(made):

@@ -1,4 +1,5 @@
-"""What is killed or signalled to stop loses nothing: a worker, the run itself, from outside or by Ctrl-C."""
+"""What is killed or signalled to stop loses nothing: a worker, the run itself, from outside or by
+Ctrl-C."""
 
 import os
 import signal
@@ -19,7 +20,8 @@ def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_a_parent_that_is_killed_leaves_all_that_had_ended(long: Path, tmp_path: Path):
-    """`kill -9` in the middle, then resume: nothing lost, nothing twice, and no worker outlives it."""
+    """`kill -9` in the middle, then resume: nothing lost, nothing twice, and no worker outlives
+    it."""
     run = begun(*LONG, cwd=tmp_path, cells=3)
     workers = children_of(run.pid)
     run.kill()
@@ -36,12 +38,16 @@ def test_a_parent_that_is_killed_leaves_all_that_had_ended(long: Path, tmp_path:
 
 
 @pytest.mark.slow
-def test_workers_that_are_killed_are_replaced_and_their_cells_played_again(long: Path, tmp_path: Path):
+def test_workers_that_are_killed_are_replaced_and_their_cells_played_again(
+    long: Path, tmp_path: Path
+):
     """`kill -9` of a worker, four times during a run."""
     run = begun(*LONG, cwd=tmp_path, cells=1)
     killed = 0
     for count in (1, 6, 11, 16):
-        wait_for(lambda count=count: ended_in(tmp_path / "out.part") >= count or run.poll() is not None)
+        wait_for(
+            lambda count=count: ended_in(tmp_path / "out.part") >= count or run.poll() is not None
+        )
         for pid in children_of(run.pid)[:1]:
             os.kill(pid, signal.SIGKILL)
             killed += 1
@@ -53,12 +59,14 @@ def test_workers_that_are_killed_are_replaced_and_their_cells_played_again(long:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("how", "code", "word"), [(signal.SIGINT, 130, "Interrupted."), (signal.SIGTERM, 143, "Terminated.")]
+    ("how", "code", "word"),
+    [(signal.SIGINT, 130, "Interrupted."), (signal.SIGTERM, 143, "Terminated.")],
 )
 def test_a_run_that_is_signalled_to_stop_keeps_what_was_played_and_says_how_to_go_on(
     long: Path, tmp_path: Path, how: int, code: int, word: str
 ):
-    """Ctrl-C, and what a batch system sends: no worker is left behind, and both commands it names do as they say."""
+    """Ctrl-C, and what a batch system sends: no worker is left behind, and both commands it names
+    do as they say."""
     run = begun(*LONG, "--workers", "1", cwd=tmp_path, cells=3)
     os.killpg(run.pid, how)
     _, said = run.communicate(timeout=60)
@@ -69,7 +77,8 @@ def test_a_run_that_is_signalled_to_stop_keeps_what_was_played_and_says_how_to_g
     assert "Traceback" not in said
     with pytest.raises(ProcessLookupError):
         os.killpg(run.pid, 0)
-    assert crosscheck(*look, cwd=tmp_path).returncode in (0, 1)  # 1: of an engine nothing was played yet
+    # 1: of an engine nothing was played yet
+    assert crosscheck(*look, cwd=tmp_path).returncode in (0, 1)
     assert crosscheck(*go_on, cwd=tmp_path).returncode == 0
     assert_nothing_lost(tmp_path / "out", long)
 

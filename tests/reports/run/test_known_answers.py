@@ -5,9 +5,12 @@ import pytest
 from reports.run.known_answers import KNOWN_ANSWERS, KnownAnswer, mean_squared_error_of
 
 
-@pytest.mark.parametrize("known", KNOWN_ANSWERS, ids=lambda known: f"{known.column} {known.made_by} {known.dt_s:g}")
+@pytest.mark.parametrize(
+    "known", KNOWN_ANSWERS, ids=lambda known: f"{known.column} {known.made_by} {known.dt_s:g}"
+)
 def test_a_published_number_comes_out_digit_for_digit(known: KnownAnswer):
-    """ODE's column out of pymunk and out of a step that falls or reflects, Bullet's out of one that does both."""
+    """ODE's column out of pymunk and out of a step that falls or reflects, Bullet's out of one that
+    does both."""
     # Published with six significant digits; both sides sum the same doubles in another order.
     assert f"{known.reproduce():.6g}" == f"{known.published_J2:.6g}"
 
@@ -15,4 +18,6 @@ def test_a_published_number_comes_out_digit_for_digit(known: KnownAnswer):
 @pytest.mark.parametrize("dt", [1e-2, 1e-3])
 def test_no_setting_of_pymunk_changes_the_ode_column(dt: float):
     """As shipped it gives the same number: it is the order of operations, not a setting."""
-    assert mean_squared_error_of("pymunk:shipped", dt) == mean_squared_error_of("pymunk:matched", dt)
+    assert mean_squared_error_of("pymunk:shipped", dt) == mean_squared_error_of(
+        "pymunk:matched", dt
+    )

@@ -1,4 +1,5 @@
-"""What failed for a reason outside the engine is no result: it is said to be so, and is played again."""
+"""What failed for a reason outside the engine is no result: it is said to be so, and is played
+again."""
 
 from __future__ import annotations
 
@@ -49,7 +50,12 @@ def one(task: Any, **means: Any) -> Any:
 
 def own(path: Path) -> partial:
     """The cell of a solver's file."""
-    return partial(play_here, Cell(SCENE, 0, f"{path}:own", 1), engine_file(path), replace(scenario(SCENE), truth=None))
+    return partial(
+        play_here,
+        Cell(SCENE, 0, f"{path}:own", 1),
+        engine_file(path),
+        replace(scenario(SCENE), truth=None),
+    )
 
 
 def fails() -> None:
@@ -80,7 +86,11 @@ def not_importable() -> Any:
         (fails, False, "RuntimeError: no such luck"),
         (devours, True, "MemoryError: took more than 900 MB (--memory)"),
         (has_no_process, True, "NotStarted: no process"),
-        (not_importable(), True, "the worker cannot read its task: ModuleNotFoundError: No module named 'only_here'"),
+        (
+            not_importable(),
+            True,
+            "the worker cannot read its task: ModuleNotFoundError: No module named 'only_here'",
+        ),
     ],
 )
 def test_a_failure_says_whether_it_lies_outside_what_was_done(task: Any, outside: bool, said: str):
@@ -100,7 +110,9 @@ def test_a_worker_that_cannot_start_is_not_the_fault_of_its_task(monkeypatch: py
 
 
 @pytest.mark.usefixtures("fresh_workers")
-def test_a_worker_that_does_not_come_up_is_not_the_fault_of_its_task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_worker_that_does_not_come_up_is_not_the_fault_of_its_task(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """A Python that says nothing."""
     (tmp_path / "python").write_text("#!/bin/sh\nexec sleep 1000\n")
     (tmp_path / "python").chmod(0o755)
@@ -108,20 +120,29 @@ def test_a_worker_that_does_not_come_up_is_not_the_fault_of_its_task(tmp_path: P
     monkeypatch.setattr(worker, "STARTING", 1.0)
     ended = one(fails)
 
-    assert (ended.status, ended.reason, ended.outside) == ("timeout", "its worker did not start in 1 s", True)
+    assert (ended.status, ended.reason, ended.outside) == (
+        "timeout",
+        "its worker did not start in 1 s",
+        True,
+    )
 
 
-def test_a_process_of_a_solver_that_cannot_start_is_not_the_fault_of_its_file(monkeypatch: pytest.MonkeyPatch):
+def test_a_process_of_a_solver_that_cannot_start_is_not_the_fault_of_its_file(
+    monkeypatch: pytest.MonkeyPatch,
+):
     """It is neither a row of the check nor the status of a run."""
     monkeypatch.setattr(safe_path.sys, "executable", shutil.which("false"))
     question, engine = scenario(SCENE), engine_file(RIGHT).make()
 
-    with pytest.raises(NotStarted, match=r"the process for a solver's file could not be started: .*exit status 1"):
+    with pytest.raises(
+        NotStarted, match=r"the process for a solver's file could not be started: .*exit status 1"
+    ):
         play(engine, "x:own", question, question.dt(1))
 
 
 def test_resume_plays_again_what_failed_outside_the_engine_and_nothing_else(tmp_path: Path):
-    """Of four cells that crashed two did so by themselves: those stay. So with the probes of two engines."""
+    """Of four cells that crashed two did so by themselves: those stay. So with the probes of two
+    engines."""
     whole = undisturbed(SMALL, tmp_path)
     changed, cells, probes = [], 0, 0
     for line in lines(whole):
@@ -136,21 +157,33 @@ def test_resume_plays_again_what_failed_outside_the_engine_and_nothing_else(tmp_
     records = Archive.read(whole).records
 
     assert lines(whole)[-1]["footer"]["played"] == 3
-    assert [record["reason"] for record in records if record["status"] != "ok"] == ["planted", "planted"]
+    assert [record["reason"] for record in records if record["status"] != "ok"] == [
+        "planted",
+        "planted",
+    ]
 
 
-def test_no_more_workers_are_started_than_the_machine_can_hold(monkeypatch: pytest.MonkeyPatch, capsys):
-    """Each takes memory and open files; the sentence names what there is least of. Fewer are left alone."""
-    monkeypatch.setattr(runner.os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 10**9 // 4096}.get)
+def test_no_more_workers_are_started_than_the_machine_can_hold(
+    monkeypatch: pytest.MonkeyPatch, capsys
+):
+    """Each takes memory and open files; the sentence names what there is least of. Fewer are left
+    alone."""
+    monkeypatch.setattr(
+        runner.os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 10**9 // 4096}.get
+    )
     monkeypatch.setattr(runner.resource, "getrlimit", lambda _: (1024, 4096))
 
     assert affordable(1000) == 2
-    assert capsys.readouterr().err == (
-        "1000 workers are more than can start here (memory of 999 MB, of which each takes 400): 2 do\n"
+    assert (
+        capsys.readouterr().err
+        == "1000 workers are more than can start here (memory of 999 MB, of which each takes 400):"
+        " 2 do\n"
     )
     assert affordable(2) == 2
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(runner.os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 10**12 // 4096}.get)
+    monkeypatch.setattr(
+        runner.os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 10**12 // 4096}.get
+    )
     assert affordable(1000) == 184
     assert "limit of 1024 open files, of which each takes 5): 184 do" in capsys.readouterr().err
 
@@ -175,7 +208,9 @@ def test_a_solver_that_is_stopped_is_not_said_to_be_in_a_line_of_this_program(tm
     )
     ended = one(own(tmp_path / "solver.py"), timeout=2.0)
 
-    assert ended.reason == "stopped after 2 s, while the solver's file had not come back from a call"
+    assert (
+        ended.reason == "stopped after 2 s, while the solver's file had not come back from a call"
+    )
     assert not ended.outside
 
 
@@ -183,7 +218,9 @@ def test_a_solver_that_is_stopped_is_not_said_to_be_in_a_line_of_this_program(tm
 def test_a_solver_may_be_called_in_capitals(tmp_path: Path, name: str):
     """As `check` takes it: no engine of that name is looked for."""
     (tmp_path / name).write_text("nonsense(")
-    done = crosscheck("run", SCENE, "--dt", str(1 / 60), "--engine", name, "--out", "out", cwd=tmp_path)
+    done = crosscheck(
+        "run", SCENE, "--dt", str(1 / 60), "--engine", name, "--out", "out", cwd=tmp_path
+    )
 
     assert done.returncode == 1
     assert f"no cell of {name}:own was played to its end" in done.stderr
@@ -193,7 +230,8 @@ def test_a_solver_may_be_called_in_capitals(tmp_path: Path, name: str):
 
 
 def little_memory() -> None:
-    """In a process to be: half of what a solver's file is given otherwise, and no right to more, not even as root."""
+    """In a process to be: half of what a solver's file is given otherwise, and no right to more,
+    not even as root."""
     prctl_capbset_drop, cap_sys_resource = 24, 24
     ctypes.CDLL(None).prctl(prctl_capbset_drop, cap_sys_resource, 0, 0, 0)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY // 2, MEMORY // 2))
@@ -202,9 +240,12 @@ def little_memory() -> None:
 def test_a_worker_with_little_memory_can_still_start_a_solver():
     """A limit that is lower than the solver's own stays as it is: nobody but root may raise it."""
     with subprocess.Popen(
-        python(WORK), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        preexec_fn=little_memory, start_new_session=True,
-    ) as process:  # fmt: skip
+        python(WORK),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        preexec_fn=little_memory,
+        start_new_session=True,
+    ) as process:
         assert process.stdin is not None
         assert process.stdout is not None
         solver = json.dumps(pickle.dumps((read_solver(RIGHT), None)).hex())

@@ -1,4 +1,5 @@
-"""A folder called OUT.part may be somebody's finished result: it is no interrupted run of OUT, and stays as it is."""
+"""A folder called OUT.part may be somebody's finished result: it is no interrupted run of OUT, and
+stays as it is."""
 
 from __future__ import annotations
 
@@ -38,7 +39,9 @@ def here(kept: Path, tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("both", [False, True], ids=["out.part alone", "out beside it"])
 @pytest.mark.parametrize("words", NAMED, ids=["resume", "again"])
-def test_a_finished_result_called_out_part_is_nobodys_interrupted_run(here: Path, words: tuple[str, ...], both: bool):
+def test_a_finished_result_called_out_part_is_nobodys_interrupted_run(
+    here: Path, words: tuple[str, ...], both: bool
+):
     """Refused with a true sentence; not a byte of it, nor of OUT, changes."""
     if both:
         shutil.copytree(here / "out.part", here / "out")
@@ -46,7 +49,10 @@ def test_a_finished_result_called_out_part_is_nobodys_interrupted_run(here: Path
     done = crosscheck(*words, cwd=here)
 
     assert done.returncode == 2
-    assert "out.part is needed while it is made, and holds a finished result; move that elsewhere" in done.stderr
+    assert (
+        "out.part is needed while it is made, and holds a finished result; move that elsewhere"
+        in done.stderr
+    )
     assert "interrupted" not in done.stderr
     assert all_of(here) == before
 
@@ -74,8 +80,11 @@ def test_what_is_looked_at_is_not_a_result_of_another_name(here: Path):
     assert found(here / "out.part") == here / "out.part"
 
 
-def test_what_was_killed_before_it_took_its_place_is_its_own_run(here: Path, monkeypatch: pytest.MonkeyPatch):
-    """The other way round: finished and called out.part, as it was to be `out` when its process died."""
+def test_what_was_killed_before_it_took_its_place_is_its_own_run(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The other way round: finished and called out.part, as it was to be `out` when its process
+    died."""
     part = part_of(here / "out")
     with monkeypatch.context() as patch:
         patch.setattr(Path, "rename", lambda *_: (_ for _ in ()).throw(OSError(5, "killed")))
@@ -89,4 +98,5 @@ def test_what_was_killed_before_it_took_its_place_is_its_own_run(here: Path, mon
     replace_folder(part, here / "out", RUN)
     made = read_made(here / "out")
     assert made is not None
-    assert (made.finished, made.out) == (True, "")  # so that by another name it is a finished result
+    # so that by another name it is a finished result
+    assert (made.finished, made.out) == (True, "")

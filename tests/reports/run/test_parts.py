@@ -1,4 +1,5 @@
-"""OUT.part: what an interrupted command has got is gone on with, or left as it is; no other command takes its place."""
+"""OUT.part: what an interrupted command has got is gone on with, or left as it is; no other command
+takes its place."""
 
 from __future__ import annotations
 
@@ -64,10 +65,13 @@ def test_what_another_command_has_begun_is_left_as_it_is(
 
 @pytest.mark.parametrize("had", COMMANDS)
 @pytest.mark.parametrize("torn", [False, True])
-def test_a_run_takes_the_place_of_nothing_that_has_begun(parts: dict[str, Path], tmp_path: Path, had: str, torn: bool):
+def test_a_run_takes_the_place_of_nothing_that_has_begun(
+    parts: dict[str, Path], tmp_path: Path, had: str, torn: bool
+):
     """Of its own kind, of another, or with a line in it that nobody can read."""
     journal = journal_of(parts[had], tmp_path)
-    for name in ("limits.csv", "maps.csv", "laws.csv", "stability.html"):  # not there while it lasts
+    # not there while it lasts
+    for name in ("limits.csv", "maps.csv", "laws.csv", "stability.html"):
         (journal.parent / name).unlink(missing_ok=True)
     for path in journal.parent.glob("speed*"):
         path.unlink()
@@ -83,7 +87,9 @@ def test_a_run_takes_the_place_of_nothing_that_has_begun(parts: dict[str, Path],
 
 
 @pytest.mark.parametrize("name", ["speed", "stability"])
-def test_a_scene_file_that_has_changed_is_not_gone_on_with(parts: dict[str, Path], tmp_path: Path, name: str):
+def test_a_scene_file_that_has_changed_is_not_gone_on_with(
+    parts: dict[str, Path], tmp_path: Path, name: str
+):
     """Its old numbers would be reported as those of the new scene."""
     journal = journal_of(parts[name], tmp_path)
     before = journal.read_bytes()
@@ -95,9 +101,13 @@ def test_a_scene_file_that_has_changed_is_not_gone_on_with(parts: dict[str, Path
     assert journal.read_bytes() == before
 
 
-@pytest.mark.parametrize("line", ["5", "[1, 2]", '{"foo": 1}', '{"task": {"kind": "limit"}}', '{"header": 7}'])
+@pytest.mark.parametrize(
+    "line", ["5", "[1, 2]", '{"foo": 1}', '{"task": {"kind": "limit"}}', '{"header": 7}']
+)
 @pytest.mark.parametrize("name", ["speed", "stability"])
-def test_a_line_that_is_none_of_its_own_is_reported(parts: dict[str, Path], tmp_path: Path, name: str, line: str):
+def test_a_line_that_is_none_of_its_own_is_reported(
+    parts: dict[str, Path], tmp_path: Path, name: str, line: str
+):
     """Before anything is played, by its number, with and without --resume."""
     journal = journal_of(parts[name], tmp_path)
     first, *others = journal.read_text().splitlines()

@@ -1,4 +1,5 @@
-"""`crosscheck replay`: a cell again, from its last good state, found by the beginning of its key."""
+"""`crosscheck replay`: a cell again, from its last good state, found by the beginning of its
+key."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -26,14 +27,18 @@ ENGINES = {name: CONTROLS[name] for name in ("aborts:control", "turnstonan:contr
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of one good engine and two bad ones, at one step."""
     folder = tmp_path_factory.mktemp("run")
-    plan = RunPlan(["slow_collision"], ENGINES, seed=0, dts=[1 / 60], full=False, timings=0, command="test")
+    plan = RunPlan(
+        ["slow_collision"], ENGINES, seed=0, dts=[1 / 60], full=False, timings=0, command="test"
+    )
     with Journal(folder) as journal, Progress() as progress:
         carry_out(plan, Means(workers=2), journal, progress)
     return folder
 
 
 @pytest.fixture
-def replayed(folder: Path, capfd: pytest.CaptureFixture[str]) -> Callable[[str], tuple[object, str, str]]:
+def replayed(
+    folder: Path, capfd: pytest.CaptureFixture[str]
+) -> Callable[[str], tuple[object, str, str]]:
     """Exit status and what was printed."""
 
     def run(name: str) -> tuple[object, str, str]:
@@ -47,7 +52,9 @@ def replayed(folder: Path, capfd: pytest.CaptureFixture[str]) -> Callable[[str],
 
 def key_of(folder: Path, engine: str) -> str:
     """The key of the cell of one of `ENGINES`."""
-    return next(r["cell"] for r in Archive.read(folder).records if f"{r['engine']}:{r['profile']}" == engine)
+    return next(
+        r["cell"] for r in Archive.read(folder).records if f"{r['engine']}:{r['profile']}" == engine
+    )
 
 
 def test_the_journal_says_how_far_a_cell_came(folder: Path):
@@ -63,7 +70,8 @@ def test_the_journal_says_how_far_a_cell_came(folder: Path):
 
 
 def test_a_crash_is_replayed_from_its_last_good_state(folder: Path, replayed):
-    """It begins at step 99; the engine, which counts from there, now crashes 100 steps later: exit 1."""
+    """It begins at step 99; the engine, which counts from there, now crashes 100 steps later: exit
+    1."""
     code, said, printed = replayed(key_of(folder, "aborts:control")[:8])
 
     assert code == 1
@@ -94,7 +102,8 @@ def test_a_cell_that_is_not_there_is_bad_input_with_what_is_near(folder: Path, r
 
 @pytest.mark.parametrize("name", ["spin_under_torque", "body_frame_thrust"])
 def test_the_rest_of_a_scenario_is_its_rest(name: str):
-    """From the middle state on, under what is left of its thrusts, the reference plays what it played before."""
+    """From the middle state on, under what is left of its thrusts, the reference plays what it
+    played before."""
     whole, row = scenario(name), EVERY["reference:exercise"]
     first = play_cell(Cell(name, 0, "reference:exercise", 1), row, whole).trajectory
     k = whole.samples // 2
@@ -104,4 +113,6 @@ def test_the_rest_of_a_scenario_is_its_rest(name: str):
     assert any(thrust.stop > whole.times[k] for thrust in whole.thrusts)
     # Shifting the thrusts by the middle time rounds their share of a step, some 1e-13 of it.
     for part in ("position", "velocity", "angle", "angular_velocity"):
-        np.testing.assert_allclose(getattr(second, part), getattr(first, part)[k:], rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(
+            getattr(second, part), getattr(first, part)[k:], rtol=1e-11, atol=1e-12
+        )

@@ -1,4 +1,5 @@
-"""A run that was broken off is gone on with: nothing is lost, nothing is played twice, nothing is buried."""
+"""A run that was broken off is gone on with: nothing is lost, nothing is played twice, nothing is
+buried."""
 
 import shutil
 from pathlib import Path
@@ -18,7 +19,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return undisturbed(SMALL, tmp_path_factory.mktemp("small"))
 
 
-def test_resume_plays_what_a_torn_journal_does_not_have_and_nothing_else(small: Path, tmp_path: Path):
+def test_resume_plays_what_a_torn_journal_does_not_have_and_nothing_else(
+    small: Path, tmp_path: Path
+):
     """Header, 3 conformances and 11 cells are there, half of the next line is not a line."""
     part = broken_off(small, tmp_path / "out", after=15)
     had = len(Archive.read(part).records)
@@ -30,7 +33,9 @@ def test_resume_plays_what_a_torn_journal_does_not_have_and_nothing_else(small: 
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-def test_an_interrupted_run_can_be_reported_and_says_it_is_not_finished(small: Path, tmp_path: Path):
+def test_an_interrupted_run_can_be_reported_and_says_it_is_not_finished(
+    small: Path, tmp_path: Path
+):
     """Tables and page from what there is; the terminal says how many cells have ended."""
     part = broken_off(small, tmp_path / "out", after=15)
     done = crosscheck("report", "out", cwd=tmp_path)
@@ -40,7 +45,9 @@ def test_an_interrupted_run_can_be_reported_and_says_it_is_not_finished(small: P
     assert len(pd.read_csv(part / "runs.csv")) == 11
 
 
-def test_an_engine_that_was_asked_but_has_not_played_yet_does_not_spoil_the_page(small: Path, tmp_path: Path):
+def test_an_engine_that_was_asked_but_has_not_played_yet_does_not_spoil_the_page(
+    small: Path, tmp_path: Path
+):
     """Broken off after the first cell: the probes of all have ended, one engine has a row."""
     broken_off(small, tmp_path / "out", after=5)
     done = crosscheck("report", "out", cwd=tmp_path)
@@ -60,7 +67,9 @@ def test_what_lost_its_trajectory_is_worse_and_is_played_again(small: Path, tmp_
     assert crosscheck("diff", small, "out", cwd=tmp_path).returncode == 1
     assert crosscheck("run", "--resume", "out", cwd=tmp_path).returncode == 0
     assert lines(tmp_path / "out")[-1]["footer"]["played"] == 2
-    assert (tmp_path / "out" / "deviations.csv").read_bytes() == (small / "deviations.csv").read_bytes()
+    assert (tmp_path / "out" / "deviations.csv").read_bytes() == (
+        small / "deviations.csv"
+    ).read_bytes()
 
 
 @pytest.mark.parametrize("line", ["[1, 2]", '{"cell": "0"}', '{"what": 1}'])
@@ -85,14 +94,19 @@ def test_a_new_run_does_not_bury_an_interrupted_one(small: Path, tmp_path: Path)
     assert done.returncode == 2
     assert "in which 11 cells have ended" in done.stderr
     assert f"crosscheck run --resume {tmp_path / 'out'}" in done.stderr
-    assert (part / "journal.jsonl").read_bytes()[: before.rfind(b"\n") + 1] == before[: before.rfind(b"\n") + 1]
+    assert (part / "journal.jsonl").read_bytes()[: before.rfind(b"\n") + 1] == before[
+        : before.rfind(b"\n") + 1
+    ]
 
 
 def test_a_second_writer_is_refused_and_a_dead_one_is_no_hindrance(small: Path, tmp_path: Path):
     """The lock is the kernel's: as long as one holds the journal, and no longer."""
     part = broken_off(small, tmp_path / "out", after=15)
     with Journal(part):
-        done = [crosscheck(*words, cwd=tmp_path) for words in ((*SMALL, "--out", "out"), ("run", "--resume", "out"))]
+        done = [
+            crosscheck(*words, cwd=tmp_path)
+            for words in ((*SMALL, "--out", "out"), ("run", "--resume", "out"))
+        ]
 
     assert [one.returncode for one in done] == [2, 2]
     assert all("is being written by another crosscheck" in one.stderr for one in done)
@@ -105,7 +119,10 @@ def test_a_second_writer_is_refused_and_a_dead_one_is_no_hindrance(small: Path, 
         (["run", "--resume", "nowhere"], "no run is there"),
         (["run", "slow_collision", "--resume", "out"], "it takes no scenarios"),
         (["run", "slow_collision", "--timeout", "inf"], "less than or equal to 1000000"),
-        (["run", "slow_collision", "--memory", "10000000000000"], "less than or equal to 1000000000"),
+        (
+            ["run", "slow_collision", "--memory", "10000000000000"],
+            "less than or equal to 1000000000",
+        ),
         (["run", "slow_collision", "--memory", "10"], "--memory 10: a worker takes 400 MB"),
         (["replay", "zzz", "--out", "whole"], "'zzz' is no cell of"),
         (["diff", "whole", "nowhere"], "nowhere: has no journal.jsonl"),

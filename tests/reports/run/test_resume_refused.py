@@ -1,4 +1,5 @@
-"""`run --resume OUT` decides before it moves anything, and plays by the paths of where the run was begun."""
+"""`run --resume OUT` decides before it moves anything, and plays by the paths of where the run was
+begun."""
 
 from __future__ import annotations
 
@@ -13,7 +14,15 @@ from tests.reports.terminal.test_strangers import all_of
 
 SCENE = (Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml").read_text()
 SOLVER = Path(__file__).parents[3] / "tests" / "solvers" / "correct" / "plain.py"
-PLAYED = ("run", "in/my.toml", "head_on_equal_e09", "--engine", "reference:exercise", "--out", "out")
+PLAYED = (
+    "run",
+    "in/my.toml",
+    "head_on_equal_e09",
+    "--engine",
+    "reference:exercise",
+    "--out",
+    "out",
+)
 RESUME = ("run", "--resume", "out")
 
 
@@ -34,7 +43,9 @@ def home(begun_at: Path, tmp_path: Path) -> Path:
     """A copy, of which the journal says that it was begun there."""
     shutil.copytree(begun_at, tmp_path / "home")
     journal = tmp_path / "home" / "out" / "journal.jsonl"
-    journal.write_text(journal.read_text().replace(json.dumps(str(begun_at)), json.dumps(str(tmp_path / "home"))))
+    journal.write_text(
+        journal.read_text().replace(json.dumps(str(begun_at)), json.dumps(str(tmp_path / "home")))
+    )
     return tmp_path / "home"
 
 
@@ -86,16 +97,22 @@ def an_engine_nobody_knows(home: Path) -> None:
     """The journal is of another version."""
     journal = home / "out" / "journal.jsonl"
     journal.write_text(
-        journal.read_text().replace('"reference:exercise", "mine', '"reference:exercise", "bullet:shipped", "mine')
+        journal.read_text().replace(
+            '"reference:exercise", "mine', '"reference:exercise", "bullet:shipped", "mine'
+        )
     )
 
 
 REFUSED = {
-    broken: "in/my.toml: name = 3", gone_with_its_copy: "in/my.toml: no such file or directory",
-    no_solver: "mine.py", a_solver_that_is_none: "mine.py", somebodys_part: "out.part: holds notes.txt",
-    a_journal_in_somebodys_part: "out.part: holds journal.jsonl", a_file_as_part: "out.part: is a file",
+    broken: "in/my.toml: name = 3",
+    gone_with_its_copy: "in/my.toml: no such file or directory",
+    no_solver: "mine.py",
+    a_solver_that_is_none: "mine.py",
+    somebodys_part: "out.part: holds notes.txt",
+    a_journal_in_somebodys_part: "out.part: holds journal.jsonl",
+    a_file_as_part: "out.part: is a file",
     an_engine_nobody_knows: "engine 'bullet:shipped' is not known",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("spoil", REFUSED)
@@ -112,13 +129,16 @@ def test_a_run_that_cannot_be_gone_on_with_is_not_moved(home: Path, spoil):
 
 
 def test_from_another_folder_the_same_files_are_played(home: Path, tmp_path: Path):
-    """There a scene and a solver of the same names lie, which are others: nothing is played by them, nor again."""
+    """There a scene and a solver of the same names lie, which are others: nothing is played by
+    them, nor again."""
     there = tmp_path / "there"
     (there / "in").mkdir(parents=True)
     (there / "in" / "my.toml").write_text(SCENE.replace("mass = 2.0", "mass = 3.0"))
     (there / "mine.py").write_text("raise SystemExit\n")
     done = crosscheck("run", "--resume", "../home/out", cwd=there)
-    replayed = crosscheck("replay", cell_of(home / "out", "mine.py"), "--out", "../home/out", cwd=there)
+    replayed = crosscheck(
+        "replay", cell_of(home / "out", "mine.py"), "--out", "../home/out", cwd=there
+    )
 
     assert done.returncode == 0, done.stderr
     assert last_of(home / "out")["footer"]["played"] == 0
@@ -129,16 +149,25 @@ def test_from_another_folder_the_same_files_are_played(home: Path, tmp_path: Pat
 def cell_of(out: Path, engine: str) -> str:
     """The key of a cell of an engine that was played."""
     lines = map(json.loads, (out / "journal.jsonl").read_text().splitlines())
-    return next(line["cell"] for line in lines if line.get("engine") == engine and line.get("status") == "ok")
+    return next(
+        line["cell"]
+        for line in lines
+        if line.get("engine") == engine and line.get("status") == "ok"
+    )
 
 
 def test_of_a_scene_file_that_is_gone_the_copy_is_played(home: Path):
-    """What is missing is played from it; what is there is not played again, and the copy stays as it was."""
+    """What is missing is played from it; what is there is not played again, and the copy stays as
+    it was."""
     (home / "in" / "my.toml").unlink()
     copy = home / "out" / "scenes" / "two-disks.toml"
     before = copy.read_bytes()
     lines = map(json.loads, (home / "out" / "journal.jsonl").read_text().splitlines())
-    (cell, *_) = [line["cell"] for line in lines if line.get("scenario") == "two-disks" and line["status"] == "ok"]
+    cell, *_ = [
+        line["cell"]
+        for line in lines
+        if line.get("scenario") == "two-disks" and line["status"] == "ok"
+    ]
     (home / "out" / "trajectories" / f"{cell}.npz").unlink()
     done = crosscheck(*RESUME, cwd=home)
 
@@ -148,7 +177,8 @@ def test_of_a_scene_file_that_is_gone_the_copy_is_played(home: Path):
 
 
 def test_of_a_folder_that_was_moved_the_copy_is_played_and_a_solver_is_missed(home: Path):
-    """A relative path of where the run was begun is not looked for elsewhere: a file of that name may be another."""
+    """A relative path of where the run was begun is not looked for elsewhere: a file of that name
+    may be another."""
     away = home.rename(home.parent / "away")
     before = all_of(away)
     done = crosscheck(*RESUME, cwd=away)

@@ -1,4 +1,5 @@
-"""Cells in worker processes: what aborts, hangs, raises or eats takes nothing along, and says where it was."""
+"""Cells in worker processes: what aborts, hangs, raises or eats takes nothing along, and says where
+it was."""
 
 import sys
 from dataclasses import replace
@@ -30,16 +31,20 @@ from tests.reports.run.control_engines import (
     Once,
     Remembers,
     row,
-)  # fmt: skip
+)
 
-SCENE = "slow_collision"  # 240 samples of 1/60 s; at one step a sample the 100th step is due after 99 of them
+# 240 samples of 1/60 s; at one step a sample the 100th step is due after 99 of them
+SCENE = "slow_collision"
 GOOD = {f"good{i}:control": row(Controlled) for i in range(24)}
 
 
 def cells(rows: dict[str, EngineRow]) -> dict[str, partial]:
     """A task a row: `SCENE` at its coarsest step."""
     question = replace(scenario(SCENE), truth=None)
-    return {name: partial(play_here, Cell(SCENE, 0, name, 1), row, question) for name, row in rows.items()}
+    return {
+        name: partial(play_here, Cell(SCENE, 0, name, 1), row, question)
+        for name, row in rows.items()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +52,14 @@ def ended() -> dict[str, CellResult | Failure]:
     """How 24 good cells ended and nine bad ones among them, on two workers."""
     mixed = {**dict(list(GOOD.items())[:12]), **CONTROLS, **dict(list(GOOD.items())[12:])}
     tasks = cells(mixed)
-    hang = {"hangs:control": tasks.pop("hangs:control")}  # by itself, for the others may need long on a busy machine
-    with mock.patch.object(worker, "start", FRESH):  # as users have it: how it ends is what is asked
-        results = [*run_all(tasks, workers=2, memory=500_000_000), *run_all(hang, workers=1, timeout=3.0)]
+    # by itself, for the others may need long on a busy machine
+    hang = {"hangs:control": tasks.pop("hangs:control")}
+    # as users have it: how it ends is what is asked
+    with mock.patch.object(worker, "start", FRESH):
+        results = [
+            *run_all(tasks, workers=2, memory=500_000_000),
+            *run_all(hang, workers=1, timeout=3.0),
+        ]
 
     assert sorted(key for key, _ in results) == sorted(mixed)  # each once
     return dict(results)
@@ -68,7 +78,11 @@ def test_every_good_cell_is_kept(ended):
     [
         ("raises", "error", "RuntimeError: no such luck"),
         ("aborts", "crashed", "SIGABRT in misbehave, line "),
-        ("aborts", "crashed", 'of run/control_engines.py; it had printed "assertion failed: mass > 0"'),
+        (
+            "aborts",
+            "crashed",
+            'of run/control_engines.py; it had printed "assertion failed: mass > 0"',
+        ),
         ("segfaults", "crashed", "SIGSEGV in string_at, line "),
         ("hangs", "timeout", "stopped after 3 s in misbehave, line "),
         ("devours", "error", "MemoryError: took more than 500 MB (--memory)"),
@@ -91,7 +105,9 @@ def test_a_bad_cell_says_how_it_ended_and_where(ended, engine: str, status: str,
 def test_what_died_leaves_every_good_state_before(ended, engine: str):
     """The trail holds the same bits as a run that lives, up to the sample before the fatal step."""
     trajectory = from_trail(ended[f"{engine}:control"].trail, scenario(SCENE))
-    whole = play_cell(Cell(SCENE, 0, "good:control", 1), row(Controlled), scenario(SCENE)).trajectory
+    whole = play_cell(
+        Cell(SCENE, 0, "good:control", 1), row(Controlled), scenario(SCENE)
+    ).trajectory
 
     assert len(trajectory) == FATAL
     for name in ("t", "position", "velocity", "angle", "angular_velocity"):
@@ -100,11 +116,14 @@ def test_what_died_leaves_every_good_state_before(ended, engine: str):
 
 @pytest.mark.slow
 def test_the_clock_of_a_cell_starts_when_its_engine_is_loaded():
-    """Loading that takes longer than the time-out is no fault; a hang after it is, and so is one that never loads."""
+    """Loading that takes longer than the time-out is no fault; a hang after it is, and so is one
+    that never loads."""
     slow = {"slow:control": row(LoadsSlowly), "hangs:control": row(LoadsSlowlyAndHangs)}
     ended = dict(run_all(cells(slow), workers=2, timeout=SLOW / 2))
     question = replace(scenario(SCENE), truth=None)
-    stuck = {"stuck": partial(impatient, Cell(SCENE, 0, "stuck:control", 1), row(HangsInLoad), question)}
+    stuck = {
+        "stuck": partial(impatient, Cell(SCENE, 0, "stuck:control", 1), row(HangsInLoad), question)
+    }
     [(_, never)] = run_all(stuck, workers=1, timeout=1.0)
 
     assert ended["slow:control"].run.status == "ok"
@@ -120,32 +139,51 @@ def impatient(*words: Any) -> CellResult:
     return play_here(*words)
 
 
-def test_a_worker_that_is_killed_from_outside_is_no_fault_of_its_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_worker_that_is_killed_from_outside_is_no_fault_of_its_cell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """`kill -9` once: the cell is played again and is as good as any."""
     monkeypatch.setenv("CONTROL_MARK", str(tmp_path / "mark"))
-    results = dict(run_all(cells({"once:control": row(Once), "good:control": row(Controlled)}), workers=1))
+    results = dict(
+        run_all(cells({"once:control": row(Once), "good:control": row(Controlled)}), workers=1)
+    )
 
     assert (tmp_path / "mark").exists()
     assert results["once:control"].file == results["good:control"].file
 
 
 def test_an_engine_that_leaves_state_gets_a_process_a_cell():
-    """Declared in its row, the same cell gives the same bits again and again; not declared, it does not."""
-    tasks = cells({f"{kind}{i}:control": row(Remembers) for kind in ("alone", "together") for i in range(3)})
+    """Declared in its row, the same cell gives the same bits again and again; not declared, it does
+    not."""
+    tasks = cells(
+        {f"{kind}{i}:control": row(Remembers) for kind in ("alone", "together") for i in range(3)}
+    )
     files: dict[str, set[bytes]] = {"alone": set(), "together": set()}
-    for name, played in run_all(tasks, workers=1, alone={name for name in tasks if name.startswith("alone")}):
+    for name, played in run_all(
+        tasks, workers=1, alone={name for name in tasks if name.startswith("alone")}
+    ):
         files[name[:-9]].add(played.file)
 
-    assert {kind: len(different) for kind, different in files.items()} == {"alone": 1, "together": 3}
+    assert {kind: len(different) for kind, different in files.items()} == {
+        "alone": 1,
+        "together": 3,
+    }
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_no_engine_remembers_what_it_played(name: str):
-    """After other scenes in the same process a cell has the bits it has as the first, so no row has `leaves_state`."""
+    """After other scenes in the same process a cell has the bits it has as the first, so no row has
+    `leaves_state`."""
     first, *others = ("slow_collision", "line_gas", "falling_box")
     tasks = {
-        key: partial(play_here, Cell(scene, 0, name, 1), ENGINES[name], replace(scenario(scene), truth=None))
-        for key, scene in (("before", first), *((other, other) for other in others), ("after", first))
+        key: partial(
+            play_here, Cell(scene, 0, name, 1), ENGINES[name], replace(scenario(scene), truth=None)
+        )
+        for key, scene in (
+            ("before", first),
+            *((other, other) for other in others),
+            ("after", first),
+        )
     }
     played = dict(run_all(tasks, workers=1))
 
@@ -157,10 +195,18 @@ def test_no_engine_remembers_what_it_played(name: str):
     ("address", "said"),
     [
         ("foo", "--scheduler foo: is no address; one is like tcp://192.168.0.7:8786"),
-        ("tcp://foo:1", "--scheduler tcp://foo:1: many machines take the package distributed, which is not installed"),
+        (
+            "tcp://foo:1",
+            (
+                "--scheduler tcp://foo:1: many machines take the package distributed, which is not"
+                " installed"
+            ),
+        ),
     ],
 )
-def test_a_cluster_without_its_extra_is_one_clear_sentence(monkeypatch: pytest.MonkeyPatch, address: str, said: str):
+def test_a_cluster_without_its_extra_is_one_clear_sentence(
+    monkeypatch: pytest.MonkeyPatch, address: str, said: str
+):
     """What is wrong with the address is said first; else what is missing, and how to get it."""
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(NoScheduler) as refusal:

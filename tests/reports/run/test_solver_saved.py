@@ -1,4 +1,5 @@
-"""A solver's file that is saved, or gone, while it is played: what was read is played, and kept as what it was."""
+"""A solver's file that is saved, or gone, while it is played: what was read is played, and kept as
+what it was."""
 
 from __future__ import annotations
 
@@ -22,20 +23,30 @@ from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
 
-TEXTS = {path.name: path.read_text() for path in CORRECT if path.name in ("plain.js", "plain.py", "arrays.py")}
-# A flight twice as fast: of a number that is in the file, in a module beside it, or compiled by numba.
+TEXTS = {
+    path.name: path.read_text()
+    for path in CORRECT
+    if path.name in ("plain.js", "plain.py", "arrays.py")
+}
+# A flight twice as fast: of a number that is in the file, in a module beside it, or compiled by
+# numba.
 FASTER = {
     "plain.js": ("sphere.position.x += ", "sphere.position.x += 2 * "),
     "plain.py": ("sphere.position.x += ", "sphere.position.x += 2 * "),
     "arrays.py": ("disks.position[moves] += ", "disks.position[moves] += 2 * "),
 }
-BESIDE = TEXTS["plain.py"].replace("sphere.position.x += ", "sphere.position.x += helper.factor() * ")
-COMPILED = "\nimport helper\nfrom numba import njit\n\n@njit(cache=True)\ndef factor():\n    return {}\n"
+BESIDE = TEXTS["plain.py"].replace(
+    "sphere.position.x += ", "sphere.position.x += helper.factor() * "
+)
+COMPILED = (
+    "\nimport helper\nfrom numba import njit\n\n@njit(cache=True)\ndef factor():\n    return {}\n"
+)
 WORDS = ["run", "head_on_equal_e09", "--dt", str(1 / 60)]
 
 
 def place(folder: Path, file: str, factor: int) -> Path:
-    """Write a solver whose flight is `factor` times as fast, by what stands in `file`, and return where it is."""
+    """Write a solver whose flight is `factor` times as fast, by what stands in `file`, and return
+    where it is."""
     if file in TEXTS:
         old, new = FASTER[file]
         assert old in TEXTS[file]
@@ -47,7 +58,9 @@ def place(folder: Path, file: str, factor: int) -> Path:
     elif file == "compiled beside":
         compiled = COMPILED.format("helper.factor()")
         (folder / "solver.py").write_text(BESIDE.replace("helper.", "") + compiled)
-        (folder / "helper.py").write_text(f"from numba import njit\n\n@njit\ndef factor():\n    return {factor}\n")
+        (folder / "helper.py").write_text(
+            f"from numba import njit\n\n@njit\ndef factor():\n    return {factor}\n"
+        )
     else:
         (folder / "solver.py").write_text("import helper\n" + BESIDE)
     return folder / "solver.py"
@@ -69,21 +82,28 @@ def played(row) -> Run:
 def test_the_text_that_was_read_is_played_whatever_is_saved_since(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
-    """A row made before plays the old text, one made after the new one, and neither what numba kept of the other."""
+    """A row made before plays the old text, one made after the new one, and neither what numba kept
+    of the other."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     before = engine_file(place(tmp_path, file, 1))
     after = engine_file(place(tmp_path, file, 2))
     first, second, again = played(before), played(after), played(before)
 
-    at_start = [run.trajectory.position[1] - run.trajectory.position[0] for run in (first, second, again)]
-    assert np.allclose(at_start[1], 2 * at_start[0], rtol=1e-9)  # by the rounding of a difference of positions
+    at_start = [
+        run.trajectory.position[1] - run.trajectory.position[0] for run in (first, second, again)
+    ]
+    # by the rounding of a difference of positions
+    assert np.allclose(at_start[1], 2 * at_start[0], rtol=1e-9)
     assert np.array_equal(at_start[0], at_start[2])
     assert before.source != after.source
 
 
 @pytest.mark.parametrize("file", ["compiled", "compiled beside"])
-def test_what_numba_keeps_would_be_taken_for_another_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str):
-    """The negative control: compiled from where the file is, the old text's code is played for the new one."""
+def test_what_numba_keeps_would_be_taken_for_another_text(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
+):
+    """The negative control: compiled from where the file is, the old text's code is played for the
+    new one."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(solver_process, "kept_copies", lambda solver, _: solver.path.parent)
     before = engine_file(place(tmp_path, file, 1))
@@ -117,10 +137,13 @@ def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
 def test_a_file_that_vanishes_during_a_run_is_played_to_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
-    """All of it was read; to go on with such a run is refused in a sentence, for nobody knows what would be played."""
+    """All of it was read; to go on with such a run is refused in a sentence, for nobody knows what
+    would be played."""
     path = place(tmp_path, file, 1)
     meanwhile(monkeypatch, path.unlink)
-    done = crosscheck(*WORDS, "--engine", path.name, "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path)
+    done = crosscheck(
+        *WORDS, "--engine", path.name, "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path
+    )
     monkeypatch.undo()
     statuses = {record["status"] for record in Archive.read(tmp_path / "out").records}
     again = crosscheck("run", "--resume", "out", cwd=tmp_path)
@@ -173,7 +196,10 @@ def test_a_replay_says_that_the_file_is_another(tmp_path: Path):
     other = crosscheck("replay", record["cell"], "--out", "out", cwd=tmp_path)
 
     assert "has changed since" not in same.stderr
-    assert "plain.py or a version has changed since: what is played is what is there now" in other.stderr
+    assert (
+        "plain.py or a version has changed since: what is played is what is there now"
+        in other.stderr
+    )
     assert "bits:   other than recorded" in other.stdout
 
 

@@ -29,7 +29,7 @@ from reports.run.shares import (
     compared,
     name_of,
     share_of,
-)  # fmt: skip
+)
 from reports.run.suite import Means, RunPlan, carry_out
 from reports.run.tables import comparisons_of, make_tables
 from reports.run.worker_process import Failure
@@ -44,7 +44,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("tables")
     engines = {name: ENGINES[name] for name in ("pymunk:shipped", "pymunk:matched")}
     plan = RunPlan(
-        ["slow_collision", "cradle_touching"], engines, seed=0, dts=[], full=False, timings=0, command="test"
+        ["slow_collision", "cradle_touching"],
+        engines,
+        seed=0,
+        dts=[],
+        full=False,
+        timings=0,
+        command="test",
     )
     with Journal(folder) as journal, Progress() as progress:
         carry_out(plan, Means(workers=1), journal, progress)
@@ -56,7 +62,8 @@ def silent(_: str) -> None:
 
 
 def test_all_is_compared_while_it_is_played(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """When the last cell has ended every share is there: the tables are put together, and no worker is asked."""
+    """When the last cell has ended every share is there: the tables are put together, and no worker
+    is asked."""
     monkeypatch.setattr(shares, "share_of", None)
     monkeypatch.setattr(shares, "answer_here", None)
     archive = Archive.read(folder)
@@ -72,18 +79,23 @@ def test_what_is_kept_is_what_was_compared(folder: Path):
     archive = Archive.read(folder)
     made = make_tables(archive, silent)
     by_scene = tables.ordered(archive)
-    computed = [compared(folder, records, answer_here(folder, records)) for records in by_scene.values()]
+    computed = [
+        compared(folder, records, answer_here(folder, records)) for records in by_scene.values()
+    ]
 
     for one, again in zip(computed, comparisons_of(archive, made)):
         for column in one.table.columns:
-            assert np.array_equal(one.table[column], again.table[column], equal_nan=one.table[column].dtype == float), (
-                column
-            )
-        assert [run.name for run in again.middle_runs if run.trajectory] == [run.name for run in again.middle_runs]
+            assert np.array_equal(
+                one.table[column], again.table[column], equal_nan=one.table[column].dtype == float
+            ), column
+        assert [run.name for run in again.middle_runs if run.trajectory] == [
+            run.name for run in again.middle_runs
+        ]
 
 
 def test_a_share_that_is_not_there_or_not_whole_is_made_again(folder: Path, tmp_path: Path):
-    """As a worker that was killed while it compared, or a parent while it wrote, leaves it: to the same bytes."""
+    """As a worker that was killed while it compared, or a parent while it wrote, leaves it: to the
+    same bytes."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     make_tables(Archive.read(copy), silent)
     whole = (copy / "deviations.csv").read_bytes()
@@ -99,7 +111,8 @@ def test_a_share_that_is_not_there_or_not_whole_is_made_again(folder: Path, tmp_
 def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """`kill -9` once, after the judge has changed: all is compared anew, nothing is played, the bytes are the same."""
+    """`kill -9` once, after the judge has changed: all is compared anew, nothing is played, the
+    bytes are the same."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     before = make_tables(Archive.read(copy), silent).shares
     whole = (copy / "deviations.csv").read_bytes()
@@ -122,17 +135,24 @@ def killed_once(mark: Path, *given: Any) -> Share:
     return share_of(*given)
 
 
-def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_before(folder: Path, tmp_path: Path):
-    """Of two scenes with the cells coming in turn, each gives its task with its own last cell, once, then the next."""
+def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_before(
+    folder: Path, tmp_path: Path
+):
+    """Of two scenes with the cells coming in turn, each gives its task with its own last cell,
+    once, then the next."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     whole = {path: path.read_bytes() for path in (copy / "compared").iterdir()}
     for path in whole:
         path.unlink()
     archive = Archive.read(copy)
-    cells = [Cell(one["scene"], one["seed"], name_of(one), one["substeps"]) for one in archive.records]
+    cells = [
+        Cell(one["scene"], one["seed"], name_of(one), one["substeps"]) for one in archive.records
+    ]
     gathering = Gathering(replace(archive, records=[]), cells, 60.0, pytest.fail)
     made = [(record["scene"], [*gathering.ended(record)]) for record in archive.records]
-    last = {scene: max(k for k, (which, _) in enumerate(made) if which == scene) for scene, _ in made}
+    last = {
+        scene: max(k for k, (which, _) in enumerate(made) if which == scene) for scene, _ in made
+    }
     resumed = [path.name for path, _ in Gathering(archive, cells[:1], 60.0, pytest.fail).whole()]
     first = [task for _, tasks in made for task in tasks]
     assert gathering.asked == list(last)  # which the person who waits is shown
@@ -142,7 +162,9 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_
 
     assert [k for k, (_, tasks) in enumerate(made) if tasks] == sorted(last.values())
     assert all(len(tasks) <= 1 for _, tasks in made)
-    assert [name.split("-")[0] for name in resumed] == [scene for scene in last if scene != cells[0].scene]
+    assert [name.split("-")[0] for name in resumed] == [
+        scene for scene in last if scene != cells[0].scene
+    ]
     assert [path.suffix for path, _ in (*first, *then)] == [ANSWER] * 2 + [".csv"] * 2
     assert after == list(Gathering(archive, [], 60.0, pytest.fail).whole()) == gathering.asked == []
     assert {path: path.read_bytes() for path in (copy / "compared").glob("*.csv")} == {
@@ -153,7 +175,8 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_
 def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """It says what was raised, in the worker; the scene is held to no answer; nothing of it is kept."""
+    """It says what was raised, in the worker; the scene is held to no answer; nothing of it is
+    kept."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     for path in (copy / "compared").glob("slow_collision*.csv"):
         path.unlink()
@@ -177,22 +200,34 @@ WHY = "the comparison could not be made: error: ZeroDivisionError: of a metric"
 
 
 def test_what_took_too_long_is_had_again_only_with_more_time(folder: Path, tmp_path: Path):
-    """An answer that was not had in 5 s is not tried again within 5 s; within 6 s it is, and all is as it was."""
+    """An answer that was not had in 5 s is not tried again within 5 s; within 6 s it is, and all is
+    as it was."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     whole = (copy / "deviations.csv").read_bytes() if (copy / "deviations.csv").exists() else b""
-    archive = replace(Archive.read(copy), records=[r | {"timeout_s": 5.0} for r in Archive.read(copy).records])
-    (records,) = [records for scene, records in tables.ordered(archive).items() if scene == "slow_collision"]
+    archive = replace(
+        Archive.read(copy), records=[r | {"timeout_s": 5.0} for r in Archive.read(copy).records]
+    )
+    (records,) = [
+        records for scene, records in tables.ordered(archive).items() if scene == "slow_collision"
+    ]
     put_answer(answer_file(copy, records), no_answer(Failure("timeout", "stopped after 5 s"), 5.0))
     without = make_tables(archive, silent)
     table = pd.read_csv(copy / "deviations.csv")
     said = table[(table.scenario == "slow_collision") & (table.metric == "status")]
-    again = make_tables(replace(archive, records=[r | {"timeout_s": 6.0} for r in archive.records]), silent)
+    again = make_tables(
+        replace(archive, records=[r | {"timeout_s": 6.0} for r in archive.records]), silent
+    )
 
-    assert without.unjudged == {"slow_collision": "the exact answer took longer than 5 s (--timeout)"}
+    assert without.unjudged == {
+        "slow_collision": "the exact answer took longer than 5 s (--timeout)"
+    }
     assert set(said.versus) == {"truth"}
     assert len(said) == len(records)
-    assert "truth" not in set(table[(table.scenario == "slow_collision") & (table.metric != "status")].versus)
-    assert len(table[(table.scenario == "slow_collision") & (table.metric != "status")])  # laws and engines are judged
+    assert "truth" not in set(
+        table[(table.scenario == "slow_collision") & (table.metric != "status")].versus
+    )
+    # laws and engines are judged
+    assert len(table[(table.scenario == "slow_collision") & (table.metric != "status")])
     assert again.unjudged == {}
     assert whole in (b"", (copy / "deviations.csv").read_bytes())
 
@@ -248,8 +283,9 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
 
     assert JUDGES[0].startswith("reports/compare/")
     assert {name for name in imported if name.startswith("reports")} <= {
-        "reports.compare", *(f"reports.compare.{path.stem}" for path in folder.rglob("*.py"))
-    }  # fmt: skip
+        "reports.compare",
+        *(f"reports.compare.{path.stem}" for path in folder.rglob("*.py")),
+    }
 
 
 @pytest.mark.parametrize(
@@ -260,16 +296,31 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
         ("reference_impl/ordered.py", cells.source_hash),
         ("reports/compare/metrics.py", shares.judge),
         ("scenarios/truth/oracle/events.py", shares.judge),
-        ("scenarios/truth/oracle/events.py", lambda root: cache.source_hash(root / "scenarios" / "truth")),
-        ("scenarios/truth/horizon.py", lambda root: cache.source_hash(root / "scenarios" / "truth")),
+        (
+            "scenarios/truth/oracle/events.py",
+            lambda root: cache.source_hash(root / "scenarios" / "truth"),
+        ),
+        (
+            "scenarios/truth/horizon.py",
+            lambda root: cache.source_hash(root / "scenarios" / "truth"),
+        ),
     ],
 )
-def test_a_file_that_is_moved_into_a_folder_of_its_own_stays_in_the_hash(file, hashed, tmp_path: Path):
+def test_a_file_that_is_moved_into_a_folder_of_its_own_stays_in_the_hash(
+    file, hashed, tmp_path: Path
+):
     """Else a change of it would be served by results that it did not make."""
-    where, moved = tmp_path / "before" / file, tmp_path / "after" / Path(file).parent / "deeper" / Path(file).name
+    where, moved = (
+        tmp_path / "before" / file,
+        tmp_path / "after" / Path(file).parent / "deeper" / Path(file).name,
+    )
     for root in ("before", "after"):
         for top in ("adapters", "reference_impl", "scenarios", "reports"):
-            shutil.copytree(ROOT / top, tmp_path / root / top, ignore=shutil.ignore_patterns("out", "__pycache__"))
+            shutil.copytree(
+                ROOT / top,
+                tmp_path / root / top,
+                ignore=shutil.ignore_patterns("out", "__pycache__"),
+            )
     moved.parent.mkdir()
     (tmp_path / "after" / file).rename(moved)
     at_first = hashed(tmp_path / "before"), hashed(tmp_path / "after")

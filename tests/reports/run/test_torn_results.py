@@ -1,4 +1,5 @@
-"""What is not as it was written is named by `report`, `diff` and `replay`, and played again by `run --resume`."""
+"""What is not as it was written is named by `report`, `diff` and `replay`, and played again by `run
+--resume`."""
 
 import io
 import json
@@ -20,7 +21,11 @@ from tests.reports.terminal.command_line import crosscheck
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run, with its tables."""
     place = tmp_path_factory.mktemp("torn")
-    scene = Path(shutil.copy(Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml", place / "two.toml"))
+    scene = Path(
+        shutil.copy(
+            Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml", place / "two.toml"
+        )
+    )
     made = make(place / "whole", scene)
     assert crosscheck("report", made, cwd=place).returncode == 0
     return made
@@ -65,10 +70,14 @@ TEARS: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.parametrize("tear", TEARS)
 def test_a_torn_trajectory_is_worse_for_diff_and_named(whole: Path, torn: Path, tear: str):
-    """Exit 1 with the file's name, whichever of the two folders it is in; the run as it was written: exit 0."""
+    """Exit 1 with the file's name, whichever of the two folders it is in; the run as it was
+    written: exit 0."""
     path = first_file(torn)
     TEARS[tear](path)
-    after, before = crosscheck("diff", whole, torn, cwd=torn.parent), crosscheck("diff", torn, whole, cwd=torn.parent)
+    after, before = (
+        crosscheck("diff", whole, torn, cwd=torn.parent),
+        crosscheck("diff", torn, whole, cwd=torn.parent),
+    )
 
     assert after.returncode == 1
     for done in (after, before):
@@ -96,7 +105,10 @@ def test_the_report_names_a_torn_trajectory_and_shows_all_else(whole: Path, torn
     TEARS[tear](path)
     crosscheck("report", torn, cwd=torn.parent)
     runs = pd.read_csv(torn / "runs.csv").set_index("cell")
-    tables = [pd.read_csv(folder / "deviations.csv").query("scenario == 'two-disks'") for folder in (whole, torn)]
+    tables = [
+        pd.read_csv(folder / "deviations.csv").query("scenario == 'two-disks'")
+        for folder in (whole, torn)
+    ]
 
     assert list(runs.index[runs.status != "ok"]) == [path.stem]
     assert path.name in runs.loc[path.stem, "reason"]
@@ -133,7 +145,8 @@ def test_shares_and_answers_that_are_torn_are_made_again(whole: Path, torn: Path
 
 @pytest.mark.parametrize("tear", ["empty", "torn", "gone", "one bit"])
 def test_diff_believes_no_torn_table(whole: Path, torn: Path, tear: str):
-    """A table that lost its last rows would be "nothing got worse": exit 2, with the file and what to do."""
+    """A table that lost its last rows would be "nothing got worse": exit 2, with the file and what
+    to do."""
     path = torn / "deviations.csv"
     TEARS[tear](path)
     done = crosscheck("diff", whole, torn, cwd=torn.parent)
@@ -143,7 +156,9 @@ def test_diff_believes_no_torn_table(whole: Path, torn: Path, tear: str):
     assert f"crosscheck report {torn}" in done.stderr
 
 
-def test_a_file_that_diff_cannot_read_is_named(whole: Path, torn: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_file_that_diff_cannot_read_is_named(
+    whole: Path, torn: Path, monkeypatch: pytest.MonkeyPatch
+):
     """What the system says has the file before it, and no number of an error."""
 
     def refused(*_: object) -> None:
@@ -163,7 +178,9 @@ def test_a_scene_copy_that_is_torn_is_named(whole: Path, torn: Path, text: str |
         copy.unlink()
     else:
         copy.write_text(text)
-    record = next(record for record in Archive.read(torn).records if record["scenario"] == "two-disks")
+    record = next(
+        record for record in Archive.read(torn).records if record["scenario"] == "two-disks"
+    )
     for command in (["report", torn], ["replay", record["cell"], "--out", torn]):
         done = crosscheck(*command, cwd=torn.parent)
 

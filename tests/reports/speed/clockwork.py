@@ -12,7 +12,8 @@ from scenarios.model import Array, Scene, State
 
 
 class Sleeper:
-    """Takes a fixed time a step, and much longer to build, to read, and to hear of collisions; it moves nothing."""
+    """Takes a fixed time a step, and much longer to build, to read, and to hear of collisions; it
+    moves nothing."""
 
     listening, wrapping = True, 0.0
 
@@ -73,5 +74,9 @@ class Late(Sleeper):
         """The straight line, and the error grown in proportion to the time."""
         scene = self.scene
         off = self.t * (self.size * self.dt**self.order + self.aside)
-        return State(scene.position + scene.velocity * self.t + np.array([off, 0.0]), scene.velocity.copy(),
-                     scene.angle.copy(), scene.angular_velocity.copy())  # fmt: skip
+        return State(
+            scene.position + scene.velocity * self.t + np.array([off, 0.0]),
+            scene.velocity.copy(),
+            scene.angle.copy(),
+            scene.angular_velocity.copy(),
+        )

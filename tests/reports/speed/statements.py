@@ -1,7 +1,7 @@
 """What README.md and reports/speed/README.md say in numbers, from the kept tables.
 
-`python -m tests.reports.speed.statements` prints it. Every engine is named of which a statement does not hold, so that
-none can be spoken for by the others.
+`python -m tests.reports.speed.statements` prints it. Every engine is named of which a statement
+does not hold, so that none can be spoken for by the others.
 """
 
 from __future__ import annotations
@@ -31,12 +31,16 @@ LATE_BY_KIND = {
     "`reference:lesson`": ("reference:lesson",),
     "the engines as shipped": SHIPPED,
 }
-"""Of whom the caption speaks -> the engines with end-of-step detection that it speaks of: all of them."""
+"""Of whom the caption speaks -> the engines with end-of-step detection that it speaks of: all of
+them."""
 
 
 def caption(kept: pd.DataFrame) -> str:
-    """Of the picture: what half a step buys with end-of-step detection, and who reaches a millionth of a radius."""
-    rows = named(kept[(kept.figure == "cost at accuracy") & (kept["at"] == MILLIONTH)]).set_index("name")
+    """Of the picture: what half a step buys with end-of-step detection, and who reaches a millionth
+    of a radius."""
+    rows = named(kept[(kept.figure == "cost at accuracy") & (kept["at"] == MILLIONTH)]).set_index(
+        "name"
+    )
     got = {name: of(rows.note[name])[0] for name in rows.index}
     failed = named(kept[kept.figure == "pooled error"])
     lost = max(int(of(note)[0]) for note in failed[failed.name == "event_driven:float64"].note)
@@ -45,15 +49,18 @@ def caption(kept: pd.DataFrame) -> str:
     spans = [span(falls.loc[list(names)]) for names in LATE_BY_KIND.values()]
     by = ", ".join(f"of {kind} by {text}" for kind, text in zip(LATE_BY_KIND, spans))
     return (
-        f"half the step divides the error {by}{' (below 1: it grows)' if falls.min(axis=None) < 1 else ''}, and "
-        f"multiplies the cost by {span(grows)}. They reach a millionth of a radius in {min(reached)} to "
-        f"{max(reached)} of {of(rows.note.iloc[0])[1]} scenes, `reference:ordered` in {got['reference:ordered']}, the "
-        f"event-driven engine in {got['event_driven:float64']} (it fails in {lost})."
+        "half the step divides the error"
+        f" {by}{' (below 1: it grows)' if falls.min(axis=None) < 1 else ''}, and multiplies the"
+        f" cost by {span(grows)}. They reach a millionth of a radius in {min(reached)} to"
+        f" {max(reached)} of {of(rows.note.iloc[0])[1]} scenes, `reference:ordered` in"
+        f" {got['reference:ordered']}, the event-driven engine in {got['event_driven:float64']} (it"
+        f" fails in {lost})."
     )
 
 
 def halving(kept: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """By what each halving of the step divides the pooled error, and multiplies the cost: a row an engine."""
+    """By what each halving of the step divides the pooled error, and multiplies the cost: a row an
+    engine."""
     late = [name for names in LATE_BY_KIND.values() for name in names]
     error, cost = (table.loc[late].sort_index(axis=1) for table in pooled(kept))
     coarse, fine = list(error.columns[:-1]), list(error.columns[1:])
@@ -69,23 +76,40 @@ def span(ratios: pd.DataFrame) -> str:
 
 
 def costs(kept: pd.DataFrame) -> str:
-    """In how many scenes our own solver costs least at the same steps; who costs less elsewhere, and where."""
-    rows, bare = (named(kept[(kept.figure == figure) & (kept["at"] == "")]) for figure in (AGAINST, AGAINST_BARE))
+    """In how many scenes our own solver costs least at the same steps; who costs less elsewhere,
+    and where."""
+    rows, bare = (
+        named(kept[(kept.figure == figure) & (kept["at"] == "")])
+        for figure in (AGAINST, AGAINST_BARE)
+    )
     total = max(int(of(note)[1]) for note in rows.note)
     less = scenes_of(rows)
-    said = f"Of the engines with end-of-step detection, `{OWN}` costs least in {total - len(less)} of {total} scenes"
-    said += ". In the others these cost less:\n\n| scene | engines |\n|---|---|\n" if less else ".\n"
+    said = (
+        f"Of the engines with end-of-step detection, `{OWN}` costs least in {total - len(less)} of"
+        f" {total} scenes"
+    )
+    said += (
+        ". In the others these cost less:\n\n| scene | engines |\n|---|---|\n" if less else ".\n"
+    )
     said += "".join(f"| {scene} | {', '.join(names)} |\n" for scene, names in less.items())
     without = scenes_of(bare)
     if set(without) != set(less):
-        said += f"\nWithout what an idle step costs, some engine costs less in {len(without)} scenes: "
+        said += (
+            f"\nWithout what an idle step costs, some engine costs less in {len(without)} scenes: "
+        )
         said += f"{', '.join(without) if without else 'none'}.\n"
     changed = named(kept[(kept.figure == AGAINST) & (kept["at"] != "")])
     cheaper = scenes_of(changed.assign(name=changed.name + " with " + changed["at"]))
     if cheaper:
         names = dict.fromkeys(name for names in cheaper.values() for name in names)
-        return f"{said}\nWith one setting changed: {', '.join(names)} cost less in {', '.join(cheaper)}.\n"
-    return f"{said}\nNone of {len(changed)} changed settings of the matched engines costs less in any scene tried.\n"
+        return (
+            f"{said}\nWith one setting changed: {', '.join(names)} cost less in"
+            f" {', '.join(cheaper)}.\n"
+        )
+    return (
+        f"{said}\nNone of {len(changed)} changed settings of the matched engines costs less in any"
+        " scene tried.\n"
+    )
 
 
 def scenes_of(rows: pd.DataFrame) -> dict[str, list[str]]:
@@ -110,10 +134,13 @@ def of(note: str) -> tuple[int, int]:
 
 
 def pooled(kept: pd.DataFrame) -> list[pd.DataFrame]:
-    """Error in radii and cost, pooled over the scenes: a row an engine, a column a step, coarse to fine."""
+    """Error in radii and cost, pooled over the scenes: a row an engine, a column a step, coarse to
+    fine."""
     table = named(kept)
-    return [table[table.figure == f"pooled {what}"].pivot(index="name", columns="at", values="value")
-            for what in ("error", "cost")]  # fmt: skip
+    return [
+        table[table.figure == f"pooled {what}"].pivot(index="name", columns="at", values="value")
+        for what in ("error", "cost")
+    ]
 
 
 def as_far(kept: pd.DataFrame) -> str:
@@ -121,8 +148,8 @@ def as_far(kept: pd.DataFrame) -> str:
     error, _ = pooled(kept)
     over = error.loc[list(MATCHED)] / error.loc[OWN]
     return (
-        f"At the same step the matched engines are {over.min(axis=None):.1f} to {over.max(axis=None):.1f} times as far "
-        f"off as `{OWN}`.\n"
+        f"At the same step the matched engines are {over.min(axis=None):.1f} to"
+        f" {over.max(axis=None):.1f} times as far off as `{OWN}`.\n"
     )
 
 
@@ -131,11 +158,13 @@ def nearer(orders: pd.DataFrame) -> str:
     rows = named(orders)
     none = rows[no_nearer(rows)].groupby("name").size()
     said = (
-        f"From the coarsest to the finest step the error falls by less than a tenth in so many of "
+        "From the coarsest to the finest step the error falls by less than a tenth in so many of "
         f"{rows.scenario.nunique()} scenes, none of them right to a millionth of a radius:\n\n"
         "| engine | scenes |\n|---|---|\n"
     )
-    return said + "".join(f"| {name} | {none.get(name, 0)} |\n" for name in ENGINES if name in set(rows.name))
+    return said + "".join(
+        f"| {name} | {none.get(name, 0)} |\n" for name in ENGINES if name in set(rows.name)
+    )
 
 
 def budget(table: pd.DataFrame) -> str:
@@ -146,7 +175,9 @@ def budget(table: pd.DataFrame) -> str:
 
 def measured() -> str:
     """All that reports/speed/README.md says in numbers, as it stands there."""
-    kept, orders, table = (figures.read(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED))
+    kept, orders, table = (
+        figures.read(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED)
+    )
     return "\n".join([costs(kept), as_far(kept), nearer(orders), budget(table)])
 
 

@@ -24,7 +24,18 @@ from adapters.mechanisms.table import (
 )
 from reports.compare import scales
 from reports.speed import budget, budget_tables
-from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL, Budget, Offset, budget_of, window_of
+from reports.speed.budget import (
+    ALL,
+    INTERPLAY,
+    RESIDUAL,
+    SUM,
+    TIME,
+    TOTAL,
+    Budget,
+    Offset,
+    budget_of,
+    window_of,
+)
 from scenarios.model import Array, State
 
 FLOAT64 = 2.0**-53
@@ -36,7 +47,8 @@ KNOWN = [
 
 
 class Drifting(AblatedReference):
-    """An engine with the mechanisms of `KNOWN` and a bug nobody knows of: what is read lies `bug` m too far up."""
+    """An engine with the mechanisms of `KNOWN` and a bug nobody knows of: what is read lies `bug` m
+    too far up."""
 
     bug = 0.003
 
@@ -54,7 +66,9 @@ def planted(mechanisms: list[Mechanism]) -> Drifting:
     return Drifting(**parameters)
 
 
-def budgeted(scene: str, known: list[Mechanism], substeps: int = 4) -> tuple[dict[str, Offset], Budget]:
+def budgeted(
+    scene: str, known: list[Mechanism], substeps: int = 4
+) -> tuple[dict[str, Offset], Budget]:
     """The budget of the planted engine for somebody who knows only of `known`."""
     at = window_of(scene, 0, substeps)
     made = Budget(at, known, at.offset(at.played(partial(planted, KNOWN))))
@@ -67,7 +81,9 @@ def test_a_planted_engine_gets_its_contributions_and_its_bug_is_the_residual():
     moving = made.at.scenario.scene.radius
 
     left = contributions[RESIDUAL].position
-    assert left[..., 1] == pytest.approx(np.broadcast_to(Drifting.bug / moving, left.shape[:2]), abs=1e-12)
+    assert left[..., 1] == pytest.approx(
+        np.broadcast_to(Drifting.bug / moving, left.shape[:2]), abs=1e-12
+    )
     assert np.abs(left[..., 0]).max() <= 1e-12
     for mechanism in (RESTITUTION, POSITION_CORRECTION):
         assert contributions[mechanism].radii > 100 * FLOAT64
@@ -75,7 +91,8 @@ def test_a_planted_engine_gets_its_contributions_and_its_bug_is_the_residual():
 
 
 def test_a_mechanism_that_nobody_names_is_the_residual_to_its_size():
-    """Negative control: without the restitution rule in the list, what is left over is as large as it and the bug."""
+    """Negative control: without the restitution rule in the list, what is left over is as large as
+    it and the bug."""
     known, _ = budgeted("oblique_e09", KNOWN)
     missed, _ = budgeted("oblique_e09", [each for each in KNOWN if each.name != RESTITUTION])
 
@@ -83,7 +100,8 @@ def test_a_mechanism_that_nobody_names_is_the_residual_to_its_size():
 
 
 def test_the_parts_close_as_vectors_and_agree_with_the_whole():
-    """engine - truth = contributions + interplay + residual, sample by sample; the shares add up to 1."""
+    """engine - truth = contributions + interplay + residual, sample by sample; the shares add up to
+    1."""
     contributions, _ = budgeted("bouncing_ball_e09", KNOWN)
     causes = [each for part, each in contributions.items() if part not in budget.TOTALS]
     total = contributions[TOTAL]
@@ -91,12 +109,17 @@ def test_the_parts_close_as_vectors_and_agree_with_the_whole():
     assert np.abs(budget.added(causes).position - total.position).max() <= 1e-12
     assert np.abs(budget.added(causes).energy - total.energy).max() <= 1e-12
     assert sum(each.share_of(total) for each in causes) == pytest.approx(1.0, abs=1e-12)
-    assert np.abs((contributions[ALL] - contributions[SUM] - contributions[INTERPLAY]).position).max() <= 1e-12
-    assert contributions[INTERPLAY].radii > 0  # in a row of bounces each changes what the next can do
+    assert (
+        np.abs((contributions[ALL] - contributions[SUM] - contributions[INTERPLAY]).position).max()
+        <= 1e-12
+    )
+    # in a row of bounces each changes what the next can do
+    assert contributions[INTERPLAY].radii > 0
 
 
 def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
-    """x by (alpha - 1/2) dt a t, so that energy is off by -(alpha - 1/2) dt m a2 t, of the energy at hand."""
+    """x by (alpha - 1/2) dt a t, so that energy is off by -(alpha - 1/2) dt m a2 t, of the energy
+    at hand."""
     rows = pd.DataFrame(budget_of("free_fall", 0, "pymunk:matched", 4)).set_index("contribution")
     at = window_of("free_fall", 0, 4)
     g, t = float(np.linalg.norm(at.scenario.scene.gravity)), at.truth.t
@@ -111,10 +134,15 @@ def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
 
 
 def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce():
-    """All eight with known mechanisms; float32 alone leaves less than a thousandth of an engine's error."""
+    """All eight with known mechanisms; float32 alone leaves less than a thousandth of an engine's
+    error."""
     scenes = ("head_on_equal_e09", "wall_to_wall")
-    rows = pd.DataFrame([row for scene in scenes for name in MECHANISMS for row in budget_of(scene, 0, name, 4)])
-    wide = rows.pivot(index=["scenario", "engine", "profile"], columns="contribution", values="position_radii")
+    rows = pd.DataFrame(
+        [row for scene in scenes for name in MECHANISMS for row in budget_of(scene, 0, name, 4)]
+    )
+    wide = rows.pivot(
+        index=["scenario", "engine", "profile"], columns="contribution", values="position_radii"
+    )
 
     assert len(wide) == 2 * len(MECHANISMS)
     assert (wide[RESIDUAL] <= 1e-3 * wide[TOTAL]).all()
@@ -131,7 +159,9 @@ def test_a_scene_has_a_budget_while_late_collisions_alone_are_near_the_truth():
     assert whole.scenario.duration == 4
 
 
-def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(monkeypatch: pytest.MonkeyPatch):
+def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(
+    monkeypatch: pytest.MonkeyPatch,
+):
     """One row that says why, and a row of noughts among all scenes, not none."""
 
     class Refusing(Drifting):
@@ -141,19 +171,34 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(monkeypatch
     monkeypatch.setitem(ENGINES, "reference:exercise", EngineRow(Refusing, "", 1.0, FLOAT64))
     (row,) = budget_of("free_fall", 0, "reference:exercise", 4)
 
-    assert (row["contribution"], row["note"]) == (TOTAL, "error: RuntimeError: no <b>such</b> thing")
+    assert (row["contribution"], row["note"]) == (
+        TOTAL,
+        "error: RuntimeError: no <b>such</b> thing",
+    )
     table = pd.DataFrame([row], columns=budget.COLUMNS)
     assert budget_tables.of_scene(table, "free_fall").notes == {"reference:exercise": row["note"]}
-    assert [cell.value for cell in budget_tables.overview(table).rows["reference:exercise"]] == [0, 0, 0, 0]
+    assert [cell.value for cell in budget_tables.overview(table).rows["reference:exercise"]] == [
+        0,
+        0,
+        0,
+        0,
+    ]
 
 
 def test_tables_have_the_largest_part_and_bars_by_decades():
-    """Bars: full at a radius, empty at a millionth; a part that is nothing for anybody has no column."""
+    """Bars: full at a radius, empty at a millionth; a part that is nothing for anybody has no
+    column."""
     rows = pd.DataFrame(
-        [row for name in ("pymunk:shipped", "box2d:matched") for row in budget_of("slow_collision", 0, name, 4)]
+        [
+            row
+            for name in ("pymunk:shipped", "box2d:matched")
+            for row in budget_of("slow_collision", 0, name, 4)
+        ]
     )
     table, overview = budget_tables.of_scene(rows, "slow_collision"), budget_tables.overview(rows)
-    bars: Array = np.array([budget_tables.cell(value).bar for value in (2.0, 1.0, 1e-3, 1e-6, 1e-9, 0.0, np.nan)])
+    bars: Array = np.array(
+        [budget_tables.cell(value).bar for value in (2.0, 1.0, 1e-3, 1e-6, 1e-9, 0.0, np.nan)]
+    )
 
     assert bars == pytest.approx([1, 1, 0.5, 0, 0, 0, 0])
     assert FLIGHT not in table.columns

@@ -1,4 +1,5 @@
-"""`crosscheck speed` refuses what it cannot measure by name, and measures what is named by itself."""
+"""`crosscheck speed` refuses what it cannot measure by name, and measures what is named by
+itself."""
 
 from __future__ import annotations
 
@@ -23,7 +24,9 @@ pytestmark = pytest.mark.slow  # starts worker processes six times
         (["free_fall", "--out", "tests"], "and no made.json says that crosscheck speed made it"),
     ],
 )
-def test_bad_input_is_one_clear_sentence(arguments: list[str], says: str, monkeypatch: pytest.MonkeyPatch):
+def test_bad_input_is_one_clear_sentence(
+    arguments: list[str], says: str, monkeypatch: pytest.MonkeyPatch
+):
     """Exit 2, no traceback."""
     monkeypatch.chdir(Path(__file__).parents[3])
     done = CliRunner().invoke(app, ["speed", *arguments])
@@ -33,7 +36,9 @@ def test_bad_input_is_one_clear_sentence(arguments: list[str], says: str, monkey
     assert "Traceback" not in done.output
 
 
-def test_a_scene_without_an_exact_answer_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_scene_without_an_exact_answer_is_refused_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """Exit 1 and the reason; nothing is left behind."""
     monkeypatch.setattr("reports.speed.ladder.reach_of", no_reach)
     done = CliRunner().invoke(app, ["speed", "cradle_touching", "--out", str(tmp_path / "out")])
@@ -56,7 +61,13 @@ def test_one_scene_and_one_engine_are_measured_by_themselves(tmp_path: Path):
         done = CliRunner().invoke(app, arguments)
         assert done.exit_code == 0, done.output
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {"speed.html", "speed.csv", "speed_samples.csv", "speed_errors.csv", "machine.json"} <= names
+    assert {
+        "speed.html",
+        "speed.csv",
+        "speed_samples.csv",
+        "speed_errors.csv",
+        "machine.json",
+    } <= names
     assert "speed_figures.csv" not in names
     assert "Noise floor" in done.output
     assert POOLED not in set(pd.read_csv(tmp_path / "out" / "speed.csv").scenario)

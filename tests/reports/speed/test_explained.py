@@ -15,10 +15,12 @@ from reports.speed.ladder import held
 def made_up(*rows: tuple[str, str, float, float, float, float, str]) -> pd.DataFrame:
     """A table of scene, engine, until, horizon, error, what is left, note."""
     return pd.DataFrame(
-        [(scene, 0, engine, "own", 0.1, until, horizon, 9.0, error, left, note)
-         for scene, engine, until, horizon, error, left, note in rows],
+        [
+            (scene, 0, engine, "own", 0.1, until, horizon, 9.0, error, left, note)
+            for scene, engine, until, horizon, error, left, note in rows
+        ],
         columns=COLUMNS,
-    )  # fmt: skip
+    )
 
 
 TABLE = made_up(
@@ -38,7 +40,9 @@ def test_the_share_counts_what_is_not_played_and_what_is_exact_apart():
 
 def test_the_extent_counts_scenes_and_seconds_once_and_names_what_is_cut():
     """However many engines played them."""
-    assert extent(TABLE) == explained.Extent(3, pytest.approx(7.2), pytest.approx(8.0), [Cut("short", 0.2, 1.0)])
+    assert extent(TABLE) == explained.Extent(
+        3, pytest.approx(7.2), pytest.approx(8.0), [Cut("short", 0.2, 1.0)]
+    )
     assert extent(TABLE).cuts[0].share == pytest.approx(0.2)
 
 
@@ -46,17 +50,23 @@ def test_the_sentence_says_what_is_cut_at_which_time_and_how_much_is_left():
     """Nothing is cut: said, too; the words differ, so that neither can stand for the other."""
     said, uncut = sentence(TABLE), sentence(TABLE[TABLE.scenario != "short"])
 
-    assert said.startswith("of 3 errors (2 engines in 3 scenes; 2 more are below 1e-09 radii; 1 were not played) 2 are")
+    assert said.startswith(
+        "of 3 errors (2 engines in 3 scenes; 2 more are below 1e-09 radii; 1 were not played) 2 are"
+    )
     assert "over 7 of 8 simulated seconds: 1 scenes are cut" in said
     assert "(short at 0.2 of 1 s)" in said
     assert said.endswith("Of the 1 errors in scenes that are not cut, 1 are explained to 1 %")
-    assert uncut.endswith("over 7 of 7 simulated seconds: every scene as far as its exact answer goes")
+    assert uncut.endswith(
+        "over 7 of 7 simulated seconds: every scene as far as its exact answer goes"
+    )
 
 
 def test_the_budget_itself_tells_how_far_it_goes():
     """The gas is cut, and its exact answer ends before the scene; a fall is followed to its end."""
     rows = [
-        row for scene, k in (("gas_of_100", 4), ("free_fall", 4)) for row in budget_of(scene, 0, "pymunk:matched", k)
+        row
+        for scene, k in (("gas_of_100", 4), ("free_fall", 4))
+        for row in budget_of(scene, 0, "pymunk:matched", k)
     ]
     table = explained.explained(pd.DataFrame(rows, columns=budget.COLUMNS)).set_index("scenario")
     gas, fall = table.loc["gas_of_100"], table.loc["free_fall"]

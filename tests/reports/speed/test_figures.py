@@ -1,4 +1,5 @@
-"""The kept tables are those of this code, and the documents' statements on speed follow from them, engine by engine."""
+"""The kept tables are those of this code, and the documents' statements on speed follow from them,
+engine by engine."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ def kept_row(path: object, scene: str, name: str) -> pd.Series:
 
 @pytest.mark.parametrize("name", list(ENGINES))
 def test_the_kept_orders_are_those_of_the_code(name: str):
-    """One scene on the ladder of the full form: verdict, slope and the error at the finest step, of every engine."""
+    """One scene on the ladder of the full form: verdict, slope and the error at the finest step, of
+    every engine."""
     scene = "head_on_unequal_e09"
     step_sizes = FULL.ladder(ladder.open_scene(scene, 0))
     rows = ladder.errors_of(scene, 0, name, ENGINES[name].make, step_sizes)
@@ -40,7 +42,8 @@ def test_the_kept_orders_are_those_of_the_code(name: str):
 
     assert kept.verdict == now.verdict
     for end in ("coarsest_error", "finest_error"):
-        assert kept[end] == pytest.approx(now[end], rel=DIGITS, abs=1e-9)  # below: rounding of another machine
+        # below: rounding of another machine
+        assert kept[end] == pytest.approx(now[end], rel=DIGITS, abs=1e-9)
     if now.finest_error > 1e-9:
         assert kept.slope == pytest.approx(now.slope, rel=DIGITS, nan_ok=True)
 
@@ -53,7 +56,9 @@ def test_the_kept_budget_is_that_of_the_code(name: str):
     now, kept = explained.explained(rows).iloc[0], kept_row(figures.EXPLAINED, scene, name)
 
     assert kept.error_radii == pytest.approx(now.error_radii, rel=DIGITS)
-    assert kept.residual_radii == pytest.approx(now.residual_radii, rel=0.1, abs=1e-5 * now.error_radii)
+    assert kept.residual_radii == pytest.approx(
+        now.residual_radii, rel=0.1, abs=1e-5 * now.error_radii
+    )
     assert (kept.until_s, kept.horizon_s, kept.duration_s) == pytest.approx(
         (now.until_s, now.horizon_s, now.duration_s), rel=DIGITS
     )
@@ -61,20 +66,37 @@ def test_the_kept_budget_is_that_of_the_code(name: str):
 
 def test_the_kept_tables_have_every_scene_and_engine():
     """Nobody is left out of a count by not being in the table."""
-    orders, budgets = (speed_figures.named(figures.read(path)) for path in (figures.ORDERS, figures.EXPLAINED))
+    orders, budgets = (
+        speed_figures.named(figures.read(path)) for path in (figures.ORDERS, figures.EXPLAINED)
+    )
 
-    assert set(zip(orders.scenario, orders.name)) == {(scene, name) for scene in SCENARIOS for name in ENGINES}
-    assert set(zip(budgets.scenario, budgets.name)) == {(scene, name) for scene in SCENARIOS for name in MECHANISMS}
+    assert set(zip(orders.scenario, orders.name)) == {
+        (scene, name) for scene in SCENARIOS for name in ENGINES
+    }
+    assert set(zip(budgets.scenario, budgets.name)) == {
+        (scene, name) for scene in SCENARIOS for name in MECHANISMS
+    }
 
 
 def orders(**stays: int) -> pd.DataFrame:
     """Two scenes; an engine's shipped profile comes no nearer in so many."""
-    return pd.DataFrame([
-        {"scenario": f"scene {k}", "engine": name.split(":")[0], "profile": name.split(":")[1],
-         "coarsest_error": 1.0, "failed": 0, "steps": 4,
-         "finest_error": 0.95 if name in SHIPPED and k < stays.get(name.split(":")[0], 0) else 0.8}
-        for name in ENGINES for k in range(2)
-    ])  # fmt: skip
+    return pd.DataFrame(
+        [
+            {
+                "scenario": f"scene {k}",
+                "engine": name.split(":")[0],
+                "profile": name.split(":")[1],
+                "coarsest_error": 1.0,
+                "failed": 0,
+                "steps": 4,
+                "finest_error": (
+                    0.95 if name in SHIPPED and k < stays.get(name.split(":")[0], 0) else 0.8
+                ),
+            }
+            for name in ENGINES
+            for k in range(2)
+        ]
+    )
 
 
 def test_the_sentence_on_finer_steps_counts_each_engine():
@@ -82,21 +104,35 @@ def test_the_sentence_on_finer_steps_counts_each_engine():
     said = speed_figures.nearer(orders(box2d=1, box2d_v3=2)).splitlines()
 
     assert said[0].startswith(
-        "From the coarsest to the finest step the error falls by less than a tenth in so many of 2 scenes, "
+        "From the coarsest to the finest step the error falls by less than a tenth in so many of 2"
+        " scenes, "
     )
     counts = dict(
-        line.strip("| ").split(" | ") for line in said if line.startswith("| ") and line.strip("| ")[-1].isdigit()
+        line.strip("| ").split(" | ")
+        for line in said
+        if line.startswith("| ") and line.strip("| ")[-1].isdigit()
     )
     assert counts["box2d:matched"] == "0"
-    assert {name for name, count in counts.items() if count != "0"} == {"box2d:shipped", "box2d_v3:shipped"}
+    assert {name for name, count in counts.items() if count != "0"} == {
+        "box2d:shipped",
+        "box2d_v3:shipped",
+    }
     assert (counts["box2d:shipped"], counts["box2d_v3:shipped"]) == ("1", "2")
     assert speed_figures.nearer(orders(pymunk=1)) != speed_figures.nearer(orders(box2d=1))
 
 
 def test_no_nearer_is_read_from_the_ends_of_the_ladder():
-    """A tenth less is nearer; a finest step that fails or is no better is not; nor count rounding and all failed."""
+    """A tenth less is nearer; a finest step that fails or is no better is not; nor count rounding
+    and all failed."""
     table = pd.DataFrame(
-        [(1.0, 0.89, 0), (1.0, 0.91, 0), (1.0, np.inf, 1), (np.inf, np.inf, 4), (1e-14, 2e-14, 0), (np.inf, 1.0, 1)],
+        [
+            (1.0, 0.89, 0),
+            (1.0, 0.91, 0),
+            (1.0, np.inf, 1),
+            (np.inf, np.inf, 4),
+            (1e-14, 2e-14, 0),
+            (np.inf, 1.0, 1),
+        ],
         columns=["coarsest_error", "finest_error", "failed"],
     ).assign(steps=4)
 
@@ -106,15 +142,23 @@ def test_no_nearer_is_read_from_the_ends_of_the_ladder():
 def row(figure: str, name: str, at: str, value: float, note: str = "") -> dict:
     """A row of the figures."""
     return dict(zip(("engine", "profile"), name.split(":"))) | {
-        "figure": figure, "at": at, "value": value, "note": note,
-    }  # fmt: skip
+        "figure": figure,
+        "at": at,
+        "value": value,
+        "note": note,
+    }
 
 
 def against(cheaper: dict[str, str], bare: dict[str, str], changed: str = "") -> pd.DataFrame:
-    """Figures of two scenes in which these engines cost less than our own solver, in "k of 2: scenes"."""
+    """Figures of two scenes in which these engines cost less than our own solver, in "k of 2:
+    scenes"."""
     rows = [row(figures.AGAINST, name, "", 2.0, cheaper.get(name, "0 of 2: ")) for name in COMPARED]
-    rows += [row(figures.AGAINST_BARE, name, "", np.nan, bare.get(name, "0 of 2: ")) for name in COMPARED]
-    return pd.DataFrame([*rows, row(figures.AGAINST, "pymunk:matched", "sleeping", 2.0, changed or "0 of 1: ")])
+    rows += [
+        row(figures.AGAINST_BARE, name, "", np.nan, bare.get(name, "0 of 2: ")) for name in COMPARED
+    ]
+    return pd.DataFrame(
+        [*rows, row(figures.AGAINST, "pymunk:matched", "sleeping", 2.0, changed or "0 of 1: ")]
+    )
 
 
 def test_who_costs_less_than_our_own_solver_is_named():
@@ -122,8 +166,9 @@ def test_who_costs_less_than_our_own_solver_is_named():
     alone = speed_figures.costs(against({}, {}))
     thrust = {"pymunk:matched": "1 of 2: ship_thrust"}
 
-    assert alone == (
-        f"Of the engines with end-of-step detection, `{OWN}` costs least in 2 of 2 scenes.\n\n"
+    assert (
+        alone
+        == f"Of the engines with end-of-step detection, `{OWN}` costs least in 2 of 2 scenes.\n\n"
         "None of 1 changed settings of the matched engines costs less in any scene tried.\n"
     )
     said = speed_figures.costs(against(thrust, thrust))
@@ -132,13 +177,18 @@ def test_who_costs_less_than_our_own_solver_is_named():
     assert "idle step" not in said
     other = speed_figures.costs(against({"box2d:matched": "1 of 2: free_fall"}, thrust))
     assert "| free_fall | box2d:matched |" in other
-    assert "Without what an idle step costs, some engine costs less in 1 scenes: ship_thrust." in other
+    assert (
+        "Without what an idle step costs, some engine costs less in 1 scenes: ship_thrust." in other
+    )
     changed = speed_figures.costs(against({}, {}, "1 of 1: free_fall"))
-    assert changed.endswith("With one setting changed: pymunk:matched with sleeping cost less in free_fall.\n")
+    assert changed.endswith(
+        "With one setting changed: pymunk:matched with sleeping cost less in free_fall.\n"
+    )
 
 
 def pooled(worse: str = "") -> pd.DataFrame:
-    """Figures of three steps: every error is halved, every cost doubled; one engine is three times as far off."""
+    """Figures of three steps: every error is halved, every cost doubled; one engine is three times
+    as far off."""
     rows = []
     for name in ENGINES:
         for step_size in range(3):
@@ -148,24 +198,35 @@ def pooled(worse: str = "") -> pd.DataFrame:
                 row("pooled error", name, str(step_size), error, lost),
                 row("pooled cost", name, str(step_size), 2.0**step_size),
             ]
-        rows.append(row("cost at accuracy", name, "1e-6", 1.0, "0 of 2, never in 2" if name in COMPARED else "1 of 2"))
+        rows.append(
+            row(
+                "cost at accuracy",
+                name,
+                "1e-6",
+                1.0,
+                "0 of 2, never in 2" if name in COMPARED else "1 of 2",
+            )
+        )
     return pd.DataFrame(rows)
 
 
 def test_the_sentence_on_errors_at_the_same_step_holds_for_the_worst_and_the_best():
     """The range is that of all matched engines."""
-    assert speed_figures.as_far(pooled()).startswith("At the same step the matched engines are 1.0 to 1.0 times as far")
+    assert speed_figures.as_far(pooled()).startswith(
+        "At the same step the matched engines are 1.0 to 1.0 times as far"
+    )
     for name in MATCHED:
         assert "are 1.0 to 3.0 times as far" in speed_figures.as_far(pooled(name))
 
 
 def test_the_caption_counts_scenes_and_failures():
     """Of the event-driven engine, too."""
-    assert speed_figures.caption(pooled()) == (
-        "half the step divides the error of `reference:exercise` and the matched engines by 2.0 to 2.0, of "
-        "`reference:lesson` by 2.0 to 2.0, of the engines as shipped by 2.0 to 2.0, and multiplies the cost by 2.0 to "
-        "2.0. They reach a millionth of a radius in 0 to 1 of 2 scenes, `reference:ordered` in 1, the event-driven "
-        "engine in 1 (it fails in 1)."
+    assert (
+        speed_figures.caption(pooled())
+        == "half the step divides the error of `reference:exercise` and the matched engines by 2.0"
+        " to 2.0, of `reference:lesson` by 2.0 to 2.0, of the engines as shipped by 2.0 to 2.0,"
+        " and multiplies the cost by 2.0 to 2.0. They reach a millionth of a radius in 0 to 1 of"
+        " 2 scenes, `reference:ordered` in 1, the event-driven engine in 1 (it fails in 1)."
     )
 
 

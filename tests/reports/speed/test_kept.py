@@ -25,19 +25,35 @@ from tests.reports.terminal.command_line import crosscheck
 
 TASK = ("error", "scene", "slow_collision", 0, "reference:exercise", "", 1)
 FAILED = {
-    "scenario": "slow_collision", "seed": 0, "engine": "reference", "profile": "exercise", "dt_s": scenario("slow_collision").dt(1),
-    "substeps": 1, "status": "error", "reason": "no", "until_s": 0.5, "duration_s": scenario("slow_collision").duration,
-    "error_radii": np.inf, "change_radii": np.nan,
-}  # fmt: skip
+    "scenario": "slow_collision",
+    "seed": 0,
+    "engine": "reference",
+    "profile": "exercise",
+    "dt_s": scenario("slow_collision").dt(1),
+    "substeps": 1,
+    "status": "error",
+    "reason": "no",
+    "until_s": 0.5,
+    "duration_s": scenario("slow_collision").duration,
+    "error_radii": np.inf,
+    "change_radii": np.nan,
+}
 SCENES = {"slow_collision": scenario("slow_collision")}
 HEADER: dict[str, Any] = {
-    "scenes": ["slow_collision"], "files": {}, "engines": ["reference:exercise"], "effort": {}, "whole": False, "seed": 0,
-    "versions": {}, "machine": {"system": "", "architecture": "", "processor": "", "cores": 1},
-}  # fmt: skip
+    "scenes": ["slow_collision"],
+    "files": {},
+    "engines": ["reference:exercise"],
+    "effort": {},
+    "whole": False,
+    "seed": 0,
+    "versions": {},
+    "machine": {"system": "", "architecture": "", "processor": "", "cores": 1},
+}
 
 
 def test_what_has_ended_is_not_measured_again(tmp_path: Path):
-    """A journal of the same plan gives back every number, infinities too; one of another plan is not lost to it."""
+    """A journal of the same plan gives back every number, infinities too; one of another plan is
+    not lost to it."""
     rows = [FAILED]
     with Journal(tmp_path) as journal:
         Kept(journal, HEADER, resume=False, scenarios=SCENES).add(TASK, rows)
@@ -50,7 +66,9 @@ def test_what_has_ended_is_not_measured_again(tmp_path: Path):
         assert found[TASK][0]["error_radii"] == np.inf
         assert np.isnan(found[TASK][0]["change_radii"])
     with Journal(tmp_path) as journal:
-        with pytest.raises(FolderTaken, match="holds 1 results of an interrupted run of something else"):
+        with pytest.raises(
+            FolderTaken, match="holds 1 results of an interrupted run of something else"
+        ):
             Kept(journal, HEADER | {"seed": 1}, resume=True, scenarios=SCENES)
         with pytest.raises(FolderTaken, match="ask again with --resume"):
             Kept(journal, HEADER, resume=False, scenarios=SCENES)
@@ -84,7 +102,8 @@ def fails() -> None:
 def test_a_log_gets_a_line_now_and_then(
     quiet: float, lines: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    """A bar is not drawn into a file, and a line a task would be too many: so much time lies between two."""
+    """A bar is not drawn into a file, and a line a task would be too many: so much time lies
+    between two."""
     monkeypatch.setattr(terminal, "QUIET", quiet)
     with Progress() as progress:
         progress.start(2, 2, "error")
@@ -94,8 +113,11 @@ def test_a_log_gets_a_line_now_and_then(
     assert capsys.readouterr().err.count(" of 2, ") == lines
 
 
-def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Ctrl-C where the times begin: exit 130. With --resume no error is looked for a second time; else none is lost."""
+def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Ctrl-C where the times begin: exit 130. With --resume no error is looked for a second time;
+    else none is lost."""
     words = ("speed", "free_fall", "--engine", "reference:exercise", "--out", "out")
     with monkeypatch.context() as patch:
         patch.setattr(measure, "measure_times", interrupted)
@@ -110,7 +132,9 @@ def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(tmp_path: Path, mo
     assert "holds 2 results of an interrupted run" in unasked.stderr
     assert second.returncode == 0, second.stderr
     assert "that had ended: 2" in second.stderr  # a ladder, and what its error is made of
-    assert len(pd.read_csv(tmp_path / "out" / "speed_errors.csv")) == len(QUICK.ladder(scenario("free_fall")))
+    assert len(pd.read_csv(tmp_path / "out" / "speed_errors.csv")) == len(
+        QUICK.ladder(scenario("free_fall"))
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 

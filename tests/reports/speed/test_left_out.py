@@ -1,4 +1,5 @@
-"""A scene or engine without a value is shown as such in tables and charts, and not left out of them in silence."""
+"""A scene or engine without a value is shown as such in tables and charts, and not left out of them
+in silence."""
 
 from __future__ import annotations
 
@@ -17,15 +18,31 @@ from reports.speed.results import Results
 DT = np.array([0.4, 0.2, 0.1])
 
 
-def point(scenario: str = "one", step_size: int = 0, cost: float = 1.0, error: float = 0.1, **more: object) -> dict:
+def point(
+    scenario: str = "one", step_size: int = 0, cost: float = 1.0, error: float = 0.1, **more: object
+) -> dict:
     """A row of `points` of `pymunk:matched`."""
     return {
-        "scenario": scenario, "engine": "pymunk", "profile": "matched", "change": PLAIN, "step_size": step_size,
-        "dt_s": 0.4 / 2**step_size, "cost": cost, "low": cost, "high": cost, "best": cost, "error": error,
-        "error_low": error, "error_high": error, "seeds": 1, "failed": int(np.isinf(error)),
-        "status": "error" if np.isinf(error) else "ok", "reason": "no" if np.isinf(error) else "", "wrapping": 0.0,
+        "scenario": scenario,
+        "engine": "pymunk",
+        "profile": "matched",
+        "change": PLAIN,
+        "step_size": step_size,
+        "dt_s": 0.4 / 2**step_size,
+        "cost": cost,
+        "low": cost,
+        "high": cost,
+        "best": cost,
+        "error": error,
+        "error_low": error,
+        "error_high": error,
+        "seeds": 1,
+        "failed": int(np.isinf(error)),
+        "status": "error" if np.isinf(error) else "ok",
+        "reason": "no" if np.isinf(error) else "",
+        "wrapping": 0.0,
         "idle": 0.5,
-    } | more  # fmt: skip
+    } | more
 
 
 def test_an_accuracy_that_was_not_timed_is_not_called_unreached():
@@ -37,13 +54,21 @@ def test_an_accuracy_that_was_not_timed_is_not_called_unreached():
 
 
 def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
-    """Of five scenes one is reached, one never, one failed, one untimed, one not yet: infinite, and all are
-    reported."""
+    """Of five scenes one is reached, one never, one failed, one untimed, one not yet: infinite, and
+    all are reported."""
     why = ["", UNREACHABLE, FAILED, NOT_TIMED, "not down to dt 0.1 s"]
-    reached = pd.DataFrame({
-        "scenario": list("abcde"), "engine": "pymunk", "profile": "matched", "accuracy": "1 %",
-        "cost": [5.0] + [np.nan] * 4, "dt_s": np.nan, "why": why, "lost": [w in (UNREACHABLE, FAILED) for w in why],
-    })  # fmt: skip
+    reached = pd.DataFrame(
+        {
+            "scenario": list("abcde"),
+            "engine": "pymunk",
+            "profile": "matched",
+            "accuracy": "1 %",
+            "cost": [5.0] + [np.nan] * 4,
+            "dt_s": np.nan,
+            "why": why,
+            "lost": [w in (UNREACHABLE, FAILED) for w in why],
+        }
+    )
     results = Results(SpeedPlan((), (), QUICK, 0, 1), Measured())
     results.reached = reached
     row = results.pooled_reached.iloc[0]
@@ -59,7 +84,11 @@ def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
 def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_edge():
     """The one is accurate, and must not look failed."""
     table = pd.DataFrame(
-        [point(), point(step_size=1, cost=np.nan, error=0.05), point(step_size=2, cost=np.nan, error=np.inf)]
+        [
+            point(),
+            point(step_size=1, cost=np.nan, error=0.05),
+            point(step_size=2, cost=np.nan, error=np.inf),
+        ]
     )
     figure = charts.speed(table)
     edge = next(trace for trace in figure.data if trace.mode == "markers")
@@ -77,22 +106,35 @@ def sweep(value: str, step_size: int, **more: object) -> dict:
 
 def test_a_sweep_that_fails_most_scenes_stays_on_the_pooled_chart():
     """At the edge: a ratio of infinity. It was not drawn at all."""
-    rows = [row | {"scenario": scene} for scene in ("one", "two") for row in
-            (point(step_size=2), sweep("1", 0), sweep("9", 1, cost=np.nan, error=np.inf, failed=1))]  # fmt: skip
+    rows = [
+        row | {"scenario": scene}
+        for scene in ("one", "two")
+        for row in (
+            point(step_size=2),
+            sweep("1", 0),
+            sweep("9", 1, cost=np.nan, error=np.inf, failed=1),
+        )
+    ]
     pool = tables.pooled_sweeps(pd.DataFrame(rows))
-    edge = next(trace for trace in charts.sweeps(pool, relative=True).data if trace.mode == "markers")
+    edge = next(
+        trace for trace in charts.sweeps(pool, relative=True).data if trace.mode == "markers"
+    )
 
     assert pool.set_index("change").failed.to_dict() == {"": 0, "1": 0, "9": 2}
     assert "failed in 2 of 2" in edge.text[0]
 
 
 def test_a_scene_without_a_ratio_is_named():
-    """Right to the last bit, or failed: nothing to divide by; the pool says of how many scenes it is."""
+    """Right to the last bit, or failed: nothing to divide by; the pool says of how many scenes it
+    is."""
     rows = [
-        point("one", 2), sweep("1", 0),
-        point("exact", 2, error=0.0), sweep("1", 0, scenario="exact"),
-        point("gone", 2, cost=np.nan, error=np.inf), sweep("1", 0, scenario="gone"),
-    ]  # fmt: skip
+        point("one", 2),
+        sweep("1", 0),
+        point("exact", 2, error=0.0),
+        sweep("1", 0, scenario="exact"),
+        point("gone", 2, cost=np.nan, error=np.inf),
+        sweep("1", 0, scenario="gone"),
+    ]
     found = pd.DataFrame(rows)
 
     assert tables.without_ratio(found) == [("pymunk", "exact"), ("pymunk", "gone")]
@@ -101,12 +143,24 @@ def test_a_scene_without_a_ratio_is_named():
 
 def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
     """Beyond every ratio that there is."""
-    table = pd.DataFrame({
-        "scenario": ["one", "two"], "engine": "pymunk", "profile": "matched", "change": "no rotation",
-        "status": ["ok", "error"], "error_ratio": [1.5, np.inf], "cost_ratio": [1.0, np.nan],
-        "error_radii": [0.1, np.inf], "error_radii_plain": 0.1, "cost": [1.0, np.nan], "cost_plain": 1.0,
-        "low": 1.0, "high": 1.0, "best": 1.0,
-    })  # fmt: skip
+    table = pd.DataFrame(
+        {
+            "scenario": ["one", "two"],
+            "engine": "pymunk",
+            "profile": "matched",
+            "change": "no rotation",
+            "status": ["ok", "error"],
+            "error_ratio": [1.5, np.inf],
+            "cost_ratio": [1.0, np.nan],
+            "error_radii": [0.1, np.inf],
+            "error_radii_plain": 0.1,
+            "cost": [1.0, np.nan],
+            "cost_plain": 1.0,
+            "low": 1.0,
+            "high": 1.0,
+            "best": 1.0,
+        }
+    )
     for ratio in ("error_ratio", "cost_ratio"):
         figure = charts.options(table, ratio, "")
         trace = figure.data[-1]
@@ -116,8 +170,18 @@ def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
 
 def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_cross():
     """It has no cost at any size, and had no row."""
-    sample = {"kind": SIZE, "engine": "pymunk", "profile": "matched", "n": 3, "round": 0, "cost": 1e-6, "wrapping": 0.0}
-    measured = Measured(samples=pd.DataFrame([sample]), stopped={("box2d:matched", 3): "refused: no"})
+    sample = {
+        "kind": SIZE,
+        "engine": "pymunk",
+        "profile": "matched",
+        "n": 3,
+        "round": 0,
+        "cost": 1e-6,
+        "wrapping": 0.0,
+    }
+    measured = Measured(
+        samples=pd.DataFrame([sample]), stopped={("box2d:matched", 3): "refused: no"}
+    )
     costs, growth = tables.grown(measured)
     names = [trace.name for trace in charts.sizes(costs, growth).data]
 
@@ -128,10 +192,19 @@ def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_cross():
 def test_an_order_tells_how_many_steps_failed():
     """They have no part in its slope, which says nothing of them."""
     rows = [
-        {"kind": "scene", "scenario": "one", "engine": "pymunk", "profile": "matched", "seed": 0, "substeps": k,
-         "dt_s": 0.4 / k, "error_radii": error, "change_radii": 1.0}
+        {
+            "kind": "scene",
+            "scenario": "one",
+            "engine": "pymunk",
+            "profile": "matched",
+            "seed": 0,
+            "substeps": k,
+            "dt_s": 0.4 / k,
+            "error_radii": error,
+            "change_radii": 1.0,
+        }
         for k, error in ((1, 0.8), (2, 0.4), (4, 0.2), (8, np.inf))
-    ]  # fmt: skip
+    ]
     row = tables.orders(Measured(errors=pd.DataFrame(rows)), 0).iloc[0]
 
     assert (row.verdict, row.failed, row.steps) == (ORDER, 1, 4)
@@ -144,12 +217,16 @@ def own(scenario: str, cost: float) -> dict:
 
 
 def test_an_engine_that_is_cheaper_than_our_own_solver_is_named_with_the_scene():
-    """At cost 2 against 4 it is cheaper; without idle steps of 0.5 and 3.9, not; one scene was not timed."""
+    """At cost 2 against 4 it is cheaper; without idle steps of 0.5 and 3.9, not; one scene was not
+    timed."""
     rows = [
-        own("one", 1.0), point("one", cost=3.0),
-        own("two", 4.0) | {"idle": 3.9}, point("two", cost=2.0),
-        own("three", 1.0), point("three", cost=np.nan),
-    ]  # fmt: skip
+        own("one", 1.0),
+        point("one", cost=3.0),
+        own("two", 4.0) | {"idle": 3.9},
+        point("two", cost=2.0),
+        own("three", 1.0),
+        point("three", cost=np.nan),
+    ]
     row = versus.against_own(pd.DataFrame(rows), pd.DataFrame()).iloc[0]
 
     assert (row.cheaper, row.cheaper_in, row.scenes, row.not_timed_in) == (1, "two", 2, "three")
@@ -161,12 +238,29 @@ def test_an_engine_that_is_cheaper_than_our_own_solver_is_named_with_the_scene()
 def test_a_changed_setting_that_is_cheaper_than_our_own_solver_is_named():
     """Against our solver unchanged, in the same scene."""
     known = {"scenario": "one"}
-    options = pd.DataFrame([
-        known | {"engine": "reference", "profile": "exercise", "change": "float32", "cost": 9.0, "cost_plain": 2.0},
-        known | {"engine": "pymunk", "profile": "matched", "change": "sleeping", "cost": 1.0, "cost_plain": 5.0},
-    ])  # fmt: skip
+    options = pd.DataFrame(
+        [
+            known
+            | {
+                "engine": "reference",
+                "profile": "exercise",
+                "change": "float32",
+                "cost": 9.0,
+                "cost_plain": 2.0,
+            },
+            known
+            | {
+                "engine": "pymunk",
+                "profile": "matched",
+                "change": "sleeping",
+                "cost": 1.0,
+                "cost_plain": 5.0,
+            },
+        ]
+    )
     table = versus.against_own(pd.DataFrame([own("one", 2.0), point("one", cost=5.0)]), options)
     row = table.set_index("change").loc["sleeping"]
 
     assert (row.ratio, row.cheaper, row.cheaper_in) == (0.5, 1, "one")
-    assert versus.against_own(pd.DataFrame([point("one")]), options).empty  # our own solver was not asked for
+    # our own solver was not asked for
+    assert versus.against_own(pd.DataFrame([point("one")]), options).empty

@@ -19,7 +19,7 @@ from reports.speed.order import (
     median_interval,
     order_of,
     verdict_of,
-)  # fmt: skip
+)
 from reports.speed.pareto import FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach, front
 from tests.reports.speed.clockwork import Late
 
@@ -28,9 +28,12 @@ DT = 0.01 / np.array(STEP_SIZES)
 
 
 def measured(order: int, **how: float):
-    """dt, errors and changes of a method of known error, played through a scene without collisions in between."""
+    """dt, errors and changes of a method of known error, played through a scene without collisions
+    in between."""
     rows = ladder.errors_of("near_miss", 0, "late:own", partial(Late, order, **how), STEP_SIZES)
-    columns = (np.array([row[name] for row in rows]) for name in ("dt_s", "error_radii", "change_radii"))
+    columns = (
+        np.array([row[name] for row in rows]) for name in ("dt_s", "error_radii", "change_radii")
+    )
     dt, errors, changes = columns
     return dt, errors[None], changes[None]
 
@@ -64,7 +67,8 @@ def test_an_exact_method_has_no_order():
 
 
 def test_an_error_that_rises_with_a_finer_step_is_not_monotone():
-    """By more than a tenth; a rise below the finest accuracy asked for is rounding, and no matter."""
+    """By more than a tenth; a rise below the finest accuracy asked for is rounding, and no
+    matter."""
     changes = np.full(4, 1.0)
 
     assert verdict_of(np.array([1e-1, 1e-2, 3e-2, 1e-3]), changes) == UNSTEADY
@@ -73,7 +77,8 @@ def test_an_error_that_rises_with_a_finer_step_is_not_monotone():
 
 
 def test_a_scatter_as_wide_as_its_fall_is_no_order():
-    """The error falls from step to step, but once by 0.1 % and once by a thousandfold: the slope may be anything."""
+    """The error falls from step to step, but once by 0.1 % and once by a thousandfold: the slope
+    may be anything."""
     errors = np.array([[1.0, 0.999, 0.998, 0.001]])
 
     assert order_of(DT[:4], errors, np.ones((1, 4))).verdict == UNCLEAR
@@ -85,7 +90,8 @@ def test_too_few_points_are_no_order():
 
 
 def test_the_slope_of_many_draws_has_an_interval_that_holds_the_order():
-    """Errors c dt with c drawn anew for every seed and dt, as the phase of a collision in its step is."""
+    """Errors c dt with c drawn anew for every seed and dt, as the phase of a collision in its step
+    is."""
     rng = np.random.default_rng(0)
     errors = rng.uniform(0.2, 1.8, (64, len(DT))) * DT
     found = order_of(DT, errors, np.full(errors.shape, 1.0))
@@ -95,7 +101,8 @@ def test_the_slope_of_many_draws_has_an_interval_that_holds_the_order():
 
 
 def test_the_bootstrap_interval_covers_the_median_as_often_as_it_says():
-    """Medians of 16 normal numbers: 95 % intervals hold 0 in 90 % to 99 % of 400 trials (binomial: +- 3 %)."""
+    """Medians of 16 normal numbers: 95 % intervals hold 0 in 90 % to 99 % of 400 trials (binomial:
+    +- 3 %)."""
     rng = np.random.default_rng(1)
     held = 0
     for trial in range(400):
@@ -122,7 +129,8 @@ def test_a_failed_draw_widens_the_interval_up_to_infinity():
 
 
 def test_the_front_is_who_nobody_beats():
-    """Cheapest first; of equal cost the more accurate, of equal error the cheaper; without a cost: left out."""
+    """Cheapest first; of equal cost the more accurate, of equal error the cheaper; without a cost:
+    left out."""
     cost = np.array([1.0, 2.0, 2.0, 4.0, 8.0, np.nan, 16.0])
     error = np.array([9.0, 5.0, 4.0, 6.0, 4.0, 0.0, 1.0])
 
@@ -130,7 +138,8 @@ def test_the_front_is_who_nobody_beats():
 
 
 def test_the_cost_of_an_accuracy_is_that_of_the_cheapest_dt_that_keeps_it():
-    """Errors 0.5, 0.02, 0.2, 0.05, 0.01: a lucky second step size does not count, as a finer one is worse again."""
+    """Errors 0.5, 0.02, 0.2, 0.05, 0.01: a lucky second step size does not count, as a finer one is
+    worse again."""
     cost, error = 1.0 / DT, np.array([0.5, 0.02, 0.2, 0.05, 0.01])
 
     assert cost_to_reach(0.1, DT, cost, error, ORDER)[:2] == (cost[3], DT[3])

@@ -1,4 +1,5 @@
-"""`crosscheck speed` measures, keeps every sample, says what failed, and makes a page that opens offline."""
+"""`crosscheck speed` measures, keeps every sample, says what failed, and makes a page that opens
+offline."""
 
 from __future__ import annotations
 
@@ -34,9 +35,18 @@ pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half 
 
 SCENES = ("head_on_equal_e09", "asteroids")
 PLAYED = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
-LITTLE = replace(QUICK, seeds=3, most_steps=1000, rounds=2, budget=0.0, sizes=(3, 10, 100, 1000), patience=1.0,
-    option_scenes=("bouncing_ball_e1",), sweep_scenes=("slide_on_incline", "falling_box"),
-    budget_scenes=("head_on_equal_e09",))  # fmt: skip
+LITTLE = replace(
+    QUICK,
+    seeds=3,
+    most_steps=1000,
+    rounds=2,
+    budget=0.0,
+    sizes=(3, 10, 100, 1000),
+    patience=1.0,
+    option_scenes=("bouncing_ball_e1",),
+    sweep_scenes=("slide_on_incline", "falling_box"),
+    budget_scenes=("head_on_equal_e09",),
+)
 SAID = {"load": 0.0, "seconds": 1.0}
 
 
@@ -49,7 +59,8 @@ def measured() -> Measured:
 
 @pytest.fixture(scope="module")
 def results(measured: Measured) -> Results:
-    """The same with one engine that failed one step size of one scene, and one that refused all of it."""
+    """The same with one engine that failed one step size of one scene, and one that refused all of
+    it."""
     errors = measured.errors.copy()
     here = (errors.scenario == SCENES[0]) & (errors.engine == "pymunk") & (errors.kind == "scene")
     refused = here & (errors.profile == "shipped")
@@ -58,16 +69,28 @@ def results(measured: Measured) -> Results:
     errors.loc[crashed, ["status", "reason"]] = ["crashed", "worker died: SIGSEGV"]
     errors.loc[refused | crashed, "error_radii"] = np.inf
     samples = measured.samples
-    timed = (samples.scenario == SCENES[0]) & (samples.engine == "pymunk") & (samples.profile == "shipped")
-    changed = replace(measured, errors=errors, samples=samples[~(timed & (samples.kind == "scene"))])
+    timed = (
+        (samples.scenario == SCENES[0])
+        & (samples.engine == "pymunk")
+        & (samples.profile == "shipped")
+    )
+    changed = replace(
+        measured, errors=errors, samples=samples[~(timed & (samples.kind == "scene"))]
+    )
     return Results(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), changed)
 
 
 def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
     """A row a round for every engine, dt and copy; a row a seed for every engine and dt."""
     results.write(tmp_path)
-    samples, errors = (pd.read_csv(tmp_path / f"speed_{name}.csv") for name in ("samples", "errors"))
-    one = samples[(samples.kind == "scene") & (samples.engine == "event_driven") & (samples.scenario == SCENES[0])]
+    samples, errors = (
+        pd.read_csv(tmp_path / f"speed_{name}.csv") for name in ("samples", "errors")
+    )
+    one = samples[
+        (samples.kind == "scene")
+        & (samples.engine == "event_driven")
+        & (samples.scenario == SCENES[0])
+    ]
 
     assert sorted(one[one.copy_of == 1]["round"]) == [-1, 0, 1]
     assert (one.groupby(["dt_s", "copy_of"]).size() == 3).all()
@@ -79,15 +102,21 @@ def test_errors_are_those_of_the_comparison(results: Results):
     from adapters.engines import ENGINES
     from reports.compare.comparison import compare
 
-    row = results.points[(results.points.scenario == SCENES[0]) & (results.points.engine == "reference")].iloc[1]
+    row = results.points[
+        (results.points.scenario == SCENES[0]) & (results.points.engine == "reference")
+    ].iloc[1]
     scene = scenario(SCENES[0])
     run = play(ENGINES["reference:exercise"].make(), "reference:exercise", scene, row.dt_s)
     table = compare(scene, [run]).table
-    assert row.error == table[(table.metric == "position_max_radii") & (table.versus == "truth")].value.iloc[0]
+    assert (
+        row.error
+        == table[(table.metric == "position_max_radii") & (table.versus == "truth")].value.iloc[0]
+    )
 
 
 def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Results):
-    """Both stand above every error that was measured; the refused one in the corner, as nobody knows its cost."""
+    """Both stand above every error that was measured; the refused one in the corner, as nobody
+    knows its cost."""
     figure = charts.speed(results.points[results.points.scenario == SCENES[0]])
     top = 10 ** figure.layout.yaxis.range[1]
     edges = {trace.name: trace for trace in figure.data if trace.mode == "markers"}
@@ -117,8 +146,11 @@ def test_the_front_of_a_chart_is_the_event_driven_engine(results: Results):
 
 
 def test_what_cannot_be_reached_is_above_what_costs(results: Results):
-    """Refused: never. The reference comes to 1 % at a cost, but not to 1e-6 of a radius down to its finest dt."""
-    reached = results.reached[results.reached.scenario == SCENES[0]].set_index(["engine", "profile", "accuracy"])
+    """Refused: never. The reference comes to 1 % at a cost, but not to 1e-6 of a radius down to its
+    finest dt."""
+    reached = results.reached[results.reached.scenario == SCENES[0]].set_index(
+        ["engine", "profile", "accuracy"]
+    )
 
     assert reached.loc[("pymunk", "shipped", "10 %")].why == FAILED
     assert np.isfinite(reached.loc[("reference", "exercise", "1 %")].cost)
@@ -128,7 +160,9 @@ def test_what_cannot_be_reached_is_above_what_costs(results: Results):
 
 def test_a_random_scene_has_an_interval_over_its_seeds(results: Results):
     """The median error lies between the ends of its bootstrap interval, which are apart."""
-    row = results.points[(results.points.scenario == "asteroids") & (results.points.engine == "reference")].iloc[0]
+    row = results.points[
+        (results.points.scenario == "asteroids") & (results.points.engine == "reference")
+    ].iloc[0]
 
     assert row.seeds == 3
     assert row.error_low < row.error < row.error_high
@@ -136,13 +170,16 @@ def test_a_random_scene_has_an_interval_over_its_seeds(results: Results):
 
 def test_a_pooled_failure_counts_as_infinitely_wrong(results: Results):
     """One of two scenes failed: the upper quartile is infinite, and it is counted."""
-    row = results.pooled[(results.pooled.engine == "pymunk") & (results.pooled.profile == "shipped")].iloc[0]
+    row = results.pooled[
+        (results.pooled.engine == "pymunk") & (results.pooled.profile == "shipped")
+    ].iloc[0]
 
     assert (row.failed, np.isinf(row.error_high)) == (1, True)
 
 
 def test_every_option_of_an_engine_is_set_against_it_in_every_scene(results: Results):
-    """Time and error together; an engine changed in nothing reads 1 in both, so it is not listed."""
+    """Time and error together; an engine changed in nothing reads 1 in both, so it is not
+    listed."""
     expected = {option.change for option in OPTIONS if option.engine in PLAYED}
     table = results.options
 
@@ -153,14 +190,18 @@ def test_every_option_of_an_engine_is_set_against_it_in_every_scene(results: Res
 
 
 def test_float32_breaks_what_it_must(results: Results):
-    """Negative control of the option table: in a bouncing ball 2**-24 a step shows, and is not 1."""
-    row = results.options[(results.options.scenario == "bouncing_ball_e1") & (results.options.engine == "reference")]
+    """Negative control of the option table: in a bouncing ball 2**-24 a step shows, and is not
+    1."""
+    row = results.options[
+        (results.options.scenario == "bouncing_ball_e1") & (results.options.engine == "reference")
+    ]
 
     assert abs(row.error_ratio.iloc[0] - 1) > 1e-3
 
 
 def test_a_sweep_meets_its_engine_where_it_is_matched(results: Results):
-    """10 iterations are what pymunk has as matched: the same error, to the bit, and 1 of 1 where all are pooled."""
+    """10 iterations are what pymunk has as matched: the same error, to the bit, and 1 of 1 where
+    all are pooled."""
     table = results.sweeps
     here = table[(table.engine == "pymunk") & (table.scenario == "slide_on_incline")]
     turned = here[here.change == "10"].iloc[0]
@@ -174,7 +215,8 @@ def test_a_sweep_meets_its_engine_where_it_is_matched(results: Results):
 
 
 def test_the_line_of_a_sweep_goes_over_all_its_values_from_cheap_to_expensive(results: Results):
-    """Its ends are named; beside it the ladder of its engine, from four times its dt to an eighth of it."""
+    """Its ends are named; beside it the ladder of its engine, from four times its dt to an eighth
+    of it."""
     points = results.sweeps[results.sweeps.scenario == "falling_box"]
     drawn = {trace.name: trace for trace in charts.sweeps(points).data}
     sweep = drawn["pymunk:matched+iterations"]
@@ -195,7 +237,8 @@ def test_the_cheapest_model_is_named_for_every_scene(results: Results):
 
 
 def test_figures_come_back_as_they_were_kept(results: Results, tmp_path: Path):
-    """With machine and versions in comment lines; their ratios are within the gate of themselves."""
+    """With machine and versions in comment lines; their ratios are within the gate of
+    themselves."""
     path = tmp_path / "figures.csv"
     figures.write(path, results, about("crosscheck speed", 0) | SAID)
     kept = figures.ratios(figures.read(path))
@@ -225,11 +268,16 @@ def test_the_kept_figures_have_every_ratio_that_is_gated():
 
 
 def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
-    """How much one scene moves the curve, what failed, who costs less than our own solver; and of a budget that is cut,
-    which scene, when, of how long, and over how many seconds the share is. Without the cut scene none of the latter.
+    """How much one scene moves the curve, what failed, who costs less than our own solver; and of a
+    budget that is cut, which scene, when, of how long, and over how many seconds the share is.
+    Without the cut scene none of the latter.
     """
-    rows = [row for name in MECHANISMS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYED]
-    both = pd.concat([results.measured.budget, pd.DataFrame(rows, columns=results.measured.budget.columns)])
+    rows = [
+        row for name in MECHANISMS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYED
+    ]
+    both = pd.concat(
+        [results.measured.budget, pd.DataFrame(rows, columns=results.measured.budget.columns)]
+    )
     cut = Results(results.plan, replace(results.measured, budget=both))
     whole, shorter = (page_of(each, tmp_path) for each in (results, cut))
     (gas,) = extent(cut.explained).cuts
@@ -257,15 +305,22 @@ def page_of(results: Results, folder: Path) -> str:
 def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
     browser: Browser, results: Results, tmp_path: Path, width: int, scheme: str
 ):
-    """No request but for itself, no word on the console, nothing wider than the page, a figure in every place."""
+    """No request but for itself, no word on the console, nothing wider than the page, a figure in
+    every place."""
     page = tmp_path / "speed.html"
     write_page(page, results, about("crosscheck speed", 0) | SAID)
-    tab, heard = opened(browser, page.as_uri(), viewport={"width": width, "height": 900}, color_scheme=scheme)
+    tab, heard = opened(
+        browser, page.as_uri(), viewport={"width": width, "height": 900}, color_scheme=scheme
+    )
     for plot in tab.locator(".plot").all():
         plot.scroll_into_view_if_needed()
         plot.locator(".main-svg").first.wait_for()
     assert tab.locator(".plot").count() == 2 + 2 + 3 + 1 + 2 * len(SCENES)
     assert overhang(tab) <= 0
-    assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2  # with mechanisms: three engines; two switched off
-    assert tab.locator("text=no <b>such</b> thing").count() == 0 or tab.locator("b:text('such')").count() == 0
+    # with mechanisms: three engines; two switched off
+    assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2
+    assert (
+        tab.locator("text=no <b>such</b> thing").count() == 0
+        or tab.locator("b:text('such')").count() == 0
+    )
     assert heard == []

@@ -1,4 +1,5 @@
-"""The pooled curve is carried by half of the scenes: no one of them is the curve, and none that fails is dropped."""
+"""The pooled curve is carried by half of the scenes: no one of them is the curve, and none that
+fails is dropped."""
 
 from __future__ import annotations
 
@@ -15,14 +16,21 @@ from scenarios.model import Array
 
 MOST = 2.0  # the factor by which leaving out one scene of the quick form may move a pooled error
 BEFORE = (
-    "free_fall", "head_on_equal_e09", "oblique_e1", "bouncing_ball_e1", "line_gas", "cradle_with_gaps", "ship_thrust",
+    "free_fall",
+    "head_on_equal_e09",
+    "oblique_e1",
+    "bouncing_ball_e1",
+    "line_gas",
+    "cradle_with_gaps",
+    "ship_thrust",
     "asteroids",
-)  # fmt: skip
+)
 STEP_SIZES = 3  # those that every scene has
 
 
 def test_the_middle_half_of_known_values():
-    """Of four the two in the middle; of three the middle one counts 2/3 and each other 1/6; of one itself."""
+    """Of four the two in the middle; of three the middle one counts 2/3 and each other 1/6; of one
+    itself."""
     assert middle_half(np.array([1e9, 1.0, 100.0, 10.0])) == pytest.approx(np.sqrt(1000))
     assert middle_half(np.array([1.0, 8.0, 64.0])) == pytest.approx(8.0)
     assert middle_half(np.array([1.0, 1.0, 64.0])) == pytest.approx(64 ** (1 / 6))
@@ -31,7 +39,8 @@ def test_the_middle_half_of_known_values():
 
 
 def test_a_quarter_may_fail_or_be_exact_but_no_more():
-    """inf among the upper quarter and 0 among the lower have no weight; one more of the former, and all is infinite."""
+    """inf among the upper quarter and 0 among the lower have no weight; one more of the former, and
+    all is infinite."""
     values = np.array([0.0, 0.0, 2.0, 2.0, 2.0, 2.0, np.inf, np.inf])
 
     assert middle_half(values) == pytest.approx(2.0)
@@ -39,7 +48,8 @@ def test_a_quarter_may_fail_or_be_exact_but_no_more():
 
 
 def test_what_one_value_moves_is_found():
-    """Nothing where all are equal; below the floor nothing counts; one too many that fails moves it to infinity."""
+    """Nothing where all are equal; below the floor nothing counts; one too many that fails moves it
+    to infinity."""
     assert moved(np.full(8, 3.0)) == pytest.approx(np.ones(8))
     assert moved(np.array([1e-12, 1e-9, 1e-8]), floor=1e-6) == pytest.approx(np.ones(3))
     assert moved(np.array([1.0, 2.0, 4.0]), floor=0.0).max() > 1.2
@@ -53,7 +63,9 @@ def errors_of(scenes: tuple[str, ...], names: tuple[str, ...]) -> dict[tuple[str
     for scene in scenes:
         step_sizes = QUICK.ladder(ladder.open_scene(scene, 0))[:STEP_SIZES]
         for name in names:
-            for step_size, row in enumerate(ladder.errors_of(scene, 0, name, ENGINES[name].make, step_sizes)):
+            for step_size, row in enumerate(
+                ladder.errors_of(scene, 0, name, ENGINES[name].make, step_sizes)
+            ):
                 found.setdefault((name, step_size), []).append(row["error_radii"])
     return {key: np.array(errors) for key, errors in found.items()}
 
@@ -68,7 +80,10 @@ def median_moved(errors: dict[tuple[str, int], Array]) -> float:
     factors = [1.0]
     for each in errors.values():
         whole = max(np.percentile(each, 50, method="nearest"), FINEST)
-        others = [max(np.percentile(np.delete(each, k), 50, method="nearest"), FINEST) for k in range(len(each))]
+        others = [
+            max(np.percentile(np.delete(each, k), 50, method="nearest"), FINEST)
+            for k in range(len(each))
+        ]
         factors += [max(other / whole, whole / other) for other in others]
     return max(factors)
 
@@ -86,15 +101,17 @@ def test_no_one_scene_is_the_pooled_curve():
 
 
 def test_the_scenes_and_the_median_of_before_fail_both():
-    """Negative control: with the scenes of before the statistic moves by more, and their median was free_fall's own
-    closed form, a g dt t / 2 over the radius, at every step.
+    """Negative control: with the scenes of before the statistic moves by more, and their median was
+    free_fall's own closed form, a g dt t / 2 over the radius, at every step.
     """
     errors = errors_of(BEFORE, STEPPING)
     fall = ladder.held("free_fall", 0).scenario
     g, t = float(np.linalg.norm(fall.scene.gravity)), fall.duration
     for step_size in range(STEP_SIZES):
         medians = np.percentile(errors["reference:exercise", step_size], 50, method="nearest")
-        assert medians == pytest.approx(0.5 * fall.dt(2**step_size) * g * t / fall.scene.radius[0], rel=1e-9)
+        assert medians == pytest.approx(
+            0.5 * fall.dt(2**step_size) * g * t / fall.scene.radius[0], rel=1e-9
+        )
 
     assert most_moved(errors) > MOST
     assert median_moved(errors) > 10 * MOST
@@ -109,14 +126,23 @@ def test_no_one_scene_is_the_pooled_curve_of_any_engine():
 def points(costs: list[float], errors: list[float]) -> pd.DataFrame:
     """A row a scene of one engine at one step: failed where the error is infinite."""
     names = [f"scene_{k}" for k in range(len(costs))]
-    return pd.DataFrame({
-        "scenario": names, "engine": "some", "profile": "own", "step_size": 0, "cost": costs, "error": errors, "idle": 1.0,
-        "failed": np.isinf(errors).astype(int),
-    })  # fmt: skip
+    return pd.DataFrame(
+        {
+            "scenario": names,
+            "engine": "some",
+            "profile": "own",
+            "step_size": 0,
+            "cost": costs,
+            "error": errors,
+            "idle": 1.0,
+            "failed": np.isinf(errors).astype(int),
+        }
+    )
 
 
 def test_a_failed_scene_is_infinitely_dear_and_an_untimed_one_is_counted():
-    """Dropping the failed scene would make the engine cheaper: it was the dearest, which is why it failed."""
+    """Dropping the failed scene would make the engine cheaper: it was the dearest, which is why it
+    failed."""
     failed = pooled(points([1.0, 2.0, 4.0, np.nan], [0.1, 0.2, 0.4, np.inf])).iloc[0]
     untimed = pooled(points([1.0, 2.0, 4.0, np.nan], [0.1, 0.2, 0.4, 0.5])).iloc[0]
 
@@ -124,7 +150,9 @@ def test_a_failed_scene_is_infinitely_dear_and_an_untimed_one_is_counted():
     assert untimed.cost == pytest.approx(2.0)  # of 1, 2, 4
     assert [failed[name] for name in ("of", "failed", "timed")] == [4, 1, 4]
     assert [untimed[name] for name in ("of", "failed", "timed")] == [4, 0, 3]
-    assert "Scenes failed: some:own 1." in said_of_pool(pooled(points([1.0, np.nan], [0.1, np.inf])))
+    assert "Scenes failed: some:own 1." in said_of_pool(
+        pooled(points([1.0, np.nan], [0.1, np.inf]))
+    )
     assert "No engine failed a scene." in said_of_pool(pooled(points([1.0, 2.0], [0.1, 0.2])))
 
 
@@ -132,7 +160,9 @@ def test_a_pool_says_which_scene_moves_it_most():
     """Leaving out the only scene between small and large errors moves the middle most."""
     reported = pooled(points([1.0] * 5, [1e-3, 1e-3, 0.1, 10.0, 10.0]))
 
-    assert reported.moved.iloc[0] == pytest.approx(moved(reported_errors := np.array([1e-3, 1e-3, 0.1, 10, 10])).max())
+    assert reported.moved.iloc[0] == pytest.approx(
+        moved(reported_errors := np.array([1e-3, 1e-3, 0.1, 10, 10])).max()
+    )
     assert reported.moved_by.iloc[0] == f"scene_{moved(reported_errors).argmax()}"
     assert f"without {reported.moved_by.iloc[0]}" in said_of_pool(reported)
     assert said_of_pool(pooled(points([1.0], [0.1]))).startswith("One scene")

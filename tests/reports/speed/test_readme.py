@@ -26,11 +26,14 @@ def test_the_caption_of_the_picture_follows_from_the_kept_table():
 def stated(text: str) -> list[tuple[float, float]]:
     """Each "a to b" of what half a step divides the errors by, in the order of `LATE_BY_KIND`."""
     of_errors = " ".join(text.split()).split("divides the error ")[1].split(", and multiplies")[0]
-    return [(float(low), float(high)) for low, high in re.findall(r"by ([\d.]+) to ([\d.]+)", of_errors)]
+    return [
+        (float(low), float(high)) for low, high in re.findall(r"by ([\d.]+) to ([\d.]+)", of_errors)
+    ]
 
 
 def outside(kept: pd.DataFrame, text: str) -> set[str]:
-    """The engines with end-of-step detection for which what the text says of half a step is not true."""
+    """The engines with end-of-step detection for which what the text says of half a step is not
+    true."""
     falls, wrong = speed_figures.halving(kept)[0], set()
     for names, (low, high) in zip(speed_figures.LATE_BY_KIND.values(), stated(text), strict=True):
         for name in names:
@@ -41,9 +44,11 @@ def outside(kept: pd.DataFrame, text: str) -> set[str]:
 
 
 def test_what_half_a_step_buys_is_true_of_every_engine_with_end_of_step_detection():
-    """None is left out, and the ranges hold for each; one whose error grows is no exception without a word.
+    """None is left out, and the ranges hold for each; one whose error grows is no exception without
+    a word.
 
-    The control: with a tenth of the coarsest error an engine falls out of its range, whichever it is.
+    The control: with a tenth of the coarsest error an engine falls out of its range, whichever it
+    is.
     """
     kept, late = figures.read(figures.KEPT), {OWN, *LATE}
     spoken_of = [name for names in speed_figures.LATE_BY_KIND.values() for name in names]

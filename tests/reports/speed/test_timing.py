@@ -12,7 +12,15 @@ import pytest
 from reports.speed import ladder, sizes
 from reports.speed.effort import QUICK
 from reports.speed.estimate import READY, all_rounds
-from reports.speed.timing import FEWEST_ROUNDS, WARM_UP, Sample, Spent, Timed, interleaved, summed_up
+from reports.speed.timing import (
+    FEWEST_ROUNDS,
+    WARM_UP,
+    Sample,
+    Spent,
+    Timed,
+    interleaved,
+    summed_up,
+)
 from scenarios.catalogue import scenario
 from scenarios.model import Scene
 from tests.reports.speed.clockwork import Sleeper
@@ -32,17 +40,21 @@ def table(samples: list[Sample]) -> pd.DataFrame:
 
 
 def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
-    """Loading takes five times as long as a step, and hearing of collisions fifty times: neither is in it."""
+    """Loading takes five times as long as a step, and hearing of collisions fifty times: neither is
+    in it."""
     held = ladder.held("near_miss", 0).scenario
     steps = held.samples
-    samples = ladder.times_of("near_miss", 0, {("sleeper:own", 1, 0): partial(Sleeper, EACH)}, 3, 1.0)
+    samples = ladder.times_of(
+        "near_miss", 0, {("sleeper:own", 1, 0): partial(Sleeper, EACH)}, 3, 1.0
+    )
     best = summed_up(table(samples), ["key"]).best.iloc[0]
 
     assert steps * EACH / held.duration <= best <= (1 + SLACK) * steps * EACH / held.duration
 
 
 def test_what_wrapping_in_python_took_is_given_separately():
-    """A quarter of each step goes into wrapping: it is left out of the cost, and reported beside it."""
+    """A quarter of each step goes into wrapping: it is left out of the cost, and reported beside
+    it."""
     engines = {("sleeper:own", 1, 0): partial(Sleeper, EACH, EACH / 4)}
     row = summed_up(table(ladder.times_of("near_miss", 0, engines, 3, 1.0)), ["key"]).iloc[0]
 
@@ -52,7 +64,8 @@ def test_what_wrapping_in_python_took_is_given_separately():
 
 
 def test_an_engine_against_itself_reads_one():
-    """The noise floor of two sleepers is the clock's own: sleeping is never early, and the fastest is on time."""
+    """The noise floor of two sleepers is the clock's own: sleeping is never early, and the fastest
+    is on time."""
     engines = {("sleeper:own", 1, copy): partial(Sleeper, EACH) for copy in (0, 1)}
     best = summed_up(table(ladder.times_of("near_miss", 0, engines, 5, 1.0)), ["key"]).best
 
@@ -60,7 +73,8 @@ def test_an_engine_against_itself_reads_one():
 
 
 def test_every_round_visits_all_in_an_order_of_its_own_and_keeps_every_sample():
-    """Places are a permutation in each round, the rounds differ, and the same seed gives the same orders."""
+    """Places are a permutation in each round, the rounds differ, and the same seed gives the same
+    orders."""
     what = [fixed(0.1 * k) for k in range(1, 8)]
     samples, again = interleaved(what, 6, 100.0, seed=3), interleaved(what, 6, 100.0, seed=3)
     rounds = table(samples).groupby("round").key.agg(list)
@@ -73,7 +87,11 @@ def test_every_round_visits_all_in_an_order_of_its_own_and_keeps_every_sample():
 
 def test_what_is_slow_sits_out_the_rounds_left_but_not_the_first():
     """Its time is used up after one sample; the other goes on."""
-    rounds = table(interleaved([fixed(0.1), fixed(9.0)], 8, 1.0, seed=0)).groupby("key")["round"].agg(list)
+    rounds = (
+        table(interleaved([fixed(0.1), fixed(9.0)], 8, 1.0, seed=0))
+        .groupby("key")["round"]
+        .agg(list)
+    )
 
     assert rounds["9.0"] == list(range(WARM_UP, FEWEST_ROUNDS))
     assert rounds["0.1"] == list(range(WARM_UP, 8))
@@ -106,7 +124,8 @@ def test_the_summary_leaves_the_warm_up_out_and_has_quartiles_and_the_fastest():
 
 
 def test_what_grows_as_a_power_of_n_gives_the_power_and_stops_where_it_would_take_too_long():
-    """Cost n^1.5: the exponent is 1.5 with an interval of no width; foreseen costs follow the same law."""
+    """Cost n^1.5: the exponent is 1.5 with an interval of no width; foreseen costs follow the same
+    law."""
     n = np.array([10.0, 100.0, 1000.0, 10_000.0])
     course = [(int(k), float(k**1.5)) for k in n]
 
@@ -134,7 +153,8 @@ def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
 
 
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():
-    """A sleeper of 2 ms a step, the same for every size, is stopped only by a patience below that."""
+    """A sleeper of 2 ms a step, the same for every size, is stopped only by a patience below
+    that."""
     engines = {"sleeper:own": partial(Sleeper, 2e-3)}
     samples, stopped = sizes.costs(engines, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)
 
@@ -144,7 +164,8 @@ def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():
 
 
 def test_the_gas_of_any_size_covers_the_same_share_and_overlaps_nowhere():
-    """Area of the disks over that of the box; nearest neighbours and walls are farther than they reach."""
+    """Area of the disks over that of the box; nearest neighbours and walls are farther than they
+    reach."""
     for n in (3, 10, 100, 137):
         scene = sizes.gas(n, 0)
         side = scene.walls.max()

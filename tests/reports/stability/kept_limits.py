@@ -1,7 +1,8 @@
 """The limits of the pinned versions in the full form, which the quick one must find again.
 
-`crosscheck stability --full --out OUT && python -m tests.reports.stability.kept_limits OUT` makes the table anew. An
-stability report of some cases, or engines, replaces their rows and keeps the others.
+`crosscheck stability --full --out OUT && python -m tests.reports.stability.kept_limits OUT` makes
+the table anew. An stability report of some cases, or engines, replaces their rows and keeps the
+others.
 """
 
 from __future__ import annotations
@@ -17,12 +18,28 @@ from reports.stability.cases import CASES
 from reports.stability.limits import ONLY_BEYOND, Limit, engines_of
 
 FILE = Path(__file__).parents[3] / "tests" / "data" / "stability_limits.csv"
-COLUMNS = ("engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate", "verdict", "monotone",
-           "spacing", "seeds", "form", "reason", "tested")  # fmt: skip
+COLUMNS = (
+    "engine",
+    "profile",
+    "case",
+    "parameter",
+    "works_at",
+    "fails_at",
+    "unit",
+    "predicate",
+    "verdict",
+    "monotone",
+    "spacing",
+    "seeds",
+    "form",
+    "reason",
+    "tested",
+)
 
 
 class Kept(NamedTuple):
-    """A row of the file: case, engine, form, verdict, where it works and fails, its reason and how that was tested."""
+    """A row of the file: case, engine, form, verdict, where it works and fails, its reason and how
+    that was tested."""
 
     case: str
     engine: str
@@ -39,11 +56,18 @@ def kept() -> list[Kept]:
     """The file's rows."""
     return [
         Kept(
-            row["case"], engine_of(row), row["form"], row["verdict"], number(row["works_at"]),
-            number(row["fails_at"]), row["monotone"] == "True", row["reason"], row["tested"],
+            row["case"],
+            engine_of(row),
+            row["form"],
+            row["verdict"],
+            number(row["works_at"]),
+            number(row["fails_at"]),
+            row["monotone"] == "True",
+            row["reason"],
+            row["tested"],
         )
         for row in rows_of(FILE)
-    ]  # fmt: skip
+    ]
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -63,7 +87,8 @@ def number(text: str) -> float:
 
 
 def reaches(limit: Kept | Limit) -> tuple[float, float]:
-    """The bracket on a line on which harsher is larger: from what works to what fails; open where nothing does.
+    """The bracket on a line on which harsher is larger: from what works to what fails; open where
+    nothing does.
 
     What works only beyond a limit fails on the mild side of it: its line runs the other way.
     """
@@ -94,12 +119,20 @@ IN_README = {
     "column": "disks on each other",
     "fast_gas": "step displacement / radius, gas at e = 1",
 }
-VARIANTS = ("reference:exercise", "pymunk:matched", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
-           "box2d_v3:matched", "event_driven:float64")  # fmt: skip
+VARIANTS = (
+    "reference:exercise",
+    "pymunk:matched",
+    "box2d:shipped",
+    "box2d:matched",
+    "box2d_v3:shipped",
+    "box2d_v3:matched",
+    "event_driven:float64",
+)
 
 
 def readme_table() -> str:
-    """The table of reports/stability/README.md: where engines fail; a dash: not as far as was tried."""
+    """The table of reports/stability/README.md: where engines fail; a dash: not as far as was
+    tried."""
     found = {(row.case, row.engine): row for row in kept()}
     heads = [engine.replace(":", "<br>") for engine in VARIANTS]
     lines = [f"| fails at | {' | '.join(heads)} |", "|---|" + "---|" * len(VARIANTS)]
@@ -116,19 +149,24 @@ def in_words(row: Kept) -> str:
 
 
 def keep(folder: Path) -> None:
-    """Put the limits of a folder's stability report in its full form into the file, in the order of cases and
-    engines."""
+    """Put the limits of a folder's stability report in its full form into the file, in the order of
+    cases and engines."""
     found = rows_of(folder / "limits.csv")
     if not found or {row["form"] for row in found} != {"full"}:
         raise SystemExit(
-            f"{folder}: holds no full stability report; make one: crosscheck stability --full --out {folder}"
+            f"{folder}: holds no full stability report; make one: crosscheck stability --full --out"
+            f" {folder}"
         )
     rows = {(row["case"], engine_of(row)): row for row in [*rows_of(FILE), *found]}
     with FILE.open("w", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
-        writer.writerows(rows[key] for name, case in CASES.items() for engine in engines_of(case)
-                         if (key := (name, engine)) in rows)  # fmt: skip
+        writer.writerows(
+            rows[key]
+            for name, case in CASES.items()
+            for engine in engines_of(case)
+            if (key := (name, engine)) in rows
+        )
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
-"""An ablation is the reference with some of an engine's mechanisms: it has the engine's limit if it has the cause, else
-not."""
+"""An ablation is the reference with some of an engine's mechanisms: it has the engine's limit if it
+has the cause, else not."""
 
 from __future__ import annotations
 
@@ -11,8 +11,21 @@ from typing import Any
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.table import FLIGHT, FRICTION, MECHANISMS, POSITION_CORRECTION, RESTITUTION, mechanisms_of
-from reports.stability.ablations import ACTS_AT_END, END_OF_STEP, Ablations, reason_by_ablation, sufficient_mechanisms
+from adapters.mechanisms.table import (
+    FLIGHT,
+    FRICTION,
+    MECHANISMS,
+    POSITION_CORRECTION,
+    RESTITUTION,
+    mechanisms_of,
+)
+from reports.stability.ablations import (
+    ACTS_AT_END,
+    END_OF_STEP,
+    Ablations,
+    reason_by_ablation,
+    sufficient_mechanisms,
+)
 from reports.stability.cases import CASES
 from reports.stability.explain import explained
 from reports.stability.limits import QUICK, Limit, Trial
@@ -31,10 +44,12 @@ def found(case: str, engine: str) -> tuple[Search, Limit]:
 @pytest.mark.parametrize(
     ("case", "engine", "mechanisms"),
     [
-        ("dt_head_on_equal_e09", "pymunk:matched", END_OF_STEP),  # one collision, nothing accelerates
+        # one collision, nothing accelerates
+        ("dt_head_on_equal_e09", "pymunk:matched", END_OF_STEP),
         ("dt_head_on_equal_e09", "box2d_v3:matched", END_OF_STEP),
         ("dt_wall_to_wall", "reference:lesson", END_OF_STEP),
-        ("dt_wall_to_wall", "reference:exercise", POSITION_CORRECTION),  # each time it is set onto the wall
+        # each time it is set onto the wall
+        ("dt_wall_to_wall", "reference:exercise", POSITION_CORRECTION),
         ("dt_wall_to_wall", "pymunk:shipped", RESTITUTION),
         ("slow_collision", "box2d:shipped", RESTITUTION),  # its threshold of 1 m/s
         ("slow_collision", "box2d_v3:shipped", RESTITUTION),
@@ -50,7 +65,8 @@ def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, engine: str, m
 
 
 def test_an_ablation_without_the_cause_does_not_have_the_limit():
-    """Negative control: neither end-of-step detection alone, nor all of the engine's mechanisms but the threshold."""
+    """Negative control: neither end-of-step detection alone, nor all of the engine's mechanisms but
+    the threshold."""
     search, limit = found("slow_collision", "box2d:shipped")
     ablations = Ablations.of(search, limit)
     assert ablations is not None
@@ -63,7 +79,8 @@ def test_an_ablation_without_the_cause_does_not_have_the_limit():
 
 
 def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.MonkeyPatch):
-    """pymunk with a bug of its own, half of every elasticity, under the name of one that has none."""
+    """pymunk with a bug of its own, half of every elasticity, under the name of one that has
+    none."""
 
     def halved() -> Any:
         engine = ENGINES["pymunk:matched"].make()
@@ -93,7 +110,8 @@ def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does(
 
 @pytest.mark.parametrize("engine", ["reference:ordered", "event_driven:float64"])
 def test_of_an_engine_whose_mechanisms_nobody_knows_there_is_no_ablation(engine: str):
-    """End-of-step detection explains nothing in an engine that orders its collisions within the step."""
+    """End-of-step detection explains nothing in an engine that orders its collisions within the
+    step."""
     search = Search(CASES["overlap_recovery"], engine, QUICK)
     assert sufficient_mechanisms(search, search.limit()) == ""
 
@@ -103,13 +121,18 @@ def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_ablatio
     failing = Trial(10.0, 1, 1, 2.0, 0)
     limit = Limit("column", "pymunk:matched", "quick", "limit", 5.0, 10.0, (failing,))
     [kept, other, untested] = explained(
-        [replace(limit, mechanisms=f"{FLIGHT}, {POSITION_CORRECTION}"), replace(limit, mechanisms=FRICTION), limit]
+        [
+            replace(limit, mechanisms=f"{FLIGHT}, {POSITION_CORRECTION}"),
+            replace(limit, mechanisms=FRICTION),
+            limit,
+        ]
     )
 
     assert "corrected by a share per step" in kept.reason
     assert (
         kept.tested
-        == "the reference with end-of-step detection and the engine's flight and position correction has this limit"
+        == "the reference with end-of-step detection and the engine's flight and position"
+        " correction has this limit"
     )
     assert other.reason == "friction takes speed along the contact"
     assert other.source == "the engine's default"
@@ -122,7 +145,9 @@ def test_every_mechanism_has_words(engine: str):
     one = scenario("head_on_equal_e09")
     settings = play_as(engine, replace(one, substeps=(4,))).settings
     names = [
-        mechanism.name for mechanism in mechanisms_of(engine, settings, one.scene, one.dt(4)) if mechanism.parameters
+        mechanism.name
+        for mechanism in mechanisms_of(engine, settings, one.scene, one.dt(4))
+        if mechanism.parameters
     ]
     limit = Limit("slow_collision", engine, "quick", "never works", nan, 1.0, ())
 
@@ -130,4 +155,7 @@ def test_every_mechanism_has_words(engine: str):
     assert len(names) >= 2
     for name in names:
         assert reason_by_ablation(replace(limit, mechanisms=name))[0] not in ("", ACTS_AT_END)
-    assert reason_by_ablation(replace(limit, mechanisms=", ".join(names)))[0].count("; ") >= len(names) - 1
+    assert (
+        reason_by_ablation(replace(limit, mechanisms=", ".join(names)))[0].count("; ")
+        >= len(names) - 1
+    )

@@ -1,4 +1,5 @@
-"""`crosscheck stability`: its files, its page, what it says of bad input, and what a second run keeps."""
+"""`crosscheck stability`: its files, its page, what it says of bad input, and what a second run
+keeps."""
 
 from __future__ import annotations
 
@@ -24,7 +25,13 @@ from tests.reports.terminal.command_line import crosscheck
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
 ROOT = Path(__file__).parents[3]
-ASKED = ("slow_collision", "tunnelling_thin_wall", "scenes/two.toml", "dt_and_speed", "touching_break")
+ASKED = (
+    "slow_collision",
+    "tunnelling_thin_wall",
+    "scenes/two.toml",
+    "dt_and_speed",
+    "touching_break",
+)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +39,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A stability report of two cases, a scene file and a map, on two engines."""
     out = tmp_path_factory.mktemp("results") / "out"
     engines = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
-    done = crosscheck("stability", *ASKED, "--vary", "speed", *engines, "--out", out, cwd=ROOT / "tests" / "data")
+    done = crosscheck(
+        "stability", *ASKED, "--vary", "speed", *engines, "--out", out, cwd=ROOT / "tests" / "data"
+    )
     assert done.returncode == 0, done.stderr
     assert "stability.html" in done.stdout
     return out
@@ -46,7 +55,11 @@ def test_the_table_of_limits_is_a_file(results: Path):
     assert set(table.case) == {"slow_collision", "tunnelling_thin_wall", "scenes/two.toml:speed"}
     row = table[(table.case == "slow_collision") & (table.engine == "box2d")].iloc[0]
     assert row.fails_at < 1.0 < row.works_at
-    assert (row.unit, row.predicate, row.seeds) == ("m/s", "restitution off", CASES["slow_collision"].runs)
+    assert (row.unit, row.predicate, row.seeds) == (
+        "m/s",
+        "restitution off",
+        CASES["slow_collision"].runs,
+    )
     assert set(pd.read_csv(results / "maps.csv")["map"]) == {"dt_and_speed"}
 
 
@@ -58,8 +71,11 @@ def test_the_first_failing_run_is_kept(results: Path):
     assert "slow_collision.pymunk-matched.npz" not in found
 
 
-def test_the_same_journal_gives_the_same_table(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Table and page are made from what the journal holds, and from the scene file that it names."""
+def test_the_same_journal_gives_the_same_table(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Table and page are made from what the journal holds, and from the scene file that it
+    names."""
     monkeypatch.chdir(ROOT / "tests" / "data")
     again = tmp_path / "again"
     shutil.copytree(results, again)
@@ -72,7 +88,13 @@ def test_what_has_ended_is_not_played_again(results: Path, monkeypatch: pytest.M
     """Of an interrupted run of the same versions all is kept; of another version nothing."""
     monkeypatch.chdir(ROOT / "tests" / "data")  # where its scene file is
     plan = StabilityPlan(
-        ["slow_collision", "grazing"], ["dt_and_speed"], [], ["box2d:shipped", "pymunk:matched"], "quick", 1, ""
+        ["slow_collision", "grazing"],
+        ["dt_and_speed"],
+        [],
+        ["box2d:shipped", "pymunk:matched"],
+        "quick",
+        1,
+        "",
     )
     had, done = done_before(results, plan)
 
@@ -91,8 +113,11 @@ def test_what_has_ended_is_not_played_again(results: Path, monkeypatch: pytest.M
     assert done_before(other, plan) == (had, set())
 
 
-def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_else(results: Path, tmp_path: Path):
-    """Without --resume, or with it for other cases, it is refused, and the journal stays as it was."""
+def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_else(
+    results: Path, tmp_path: Path
+):
+    """Without --resume, or with it for other cases, it is refused, and the journal stays as it
+    was."""
     part = tmp_path / "out.part"
     shutil.copytree(results, part)
     before = (part / JOURNAL).read_bytes()
@@ -101,7 +126,10 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
     other = crosscheck("stability", "spin", *engines, "--out", "out", "--resume", cwd=tmp_path)
 
     assert (again.returncode, other.returncode) == (2, 2)
-    assert "out.part holds 10 results of an interrupted run: to go on with it, ask again with --resume" in again.stderr
+    assert (
+        "out.part holds 10 results of an interrupted run: to go on with it, ask again with --resume"
+        in again.stderr
+    )
     assert "interrupted run of something else" in other.stderr
     assert (part / JOURNAL).read_bytes() == before
 
@@ -110,7 +138,10 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
     ("words", "says"),
     [
         (["slow_collisions"], "case 'slow_collisions' is not known; did you mean slow_collision"),
-        (["scenes/two.toml", "--vary", "mass"], "--vary 'mass' is not known; did you mean mass_ratio?"),
+        (
+            ["scenes/two.toml", "--vary", "mass"],
+            "--vary 'mass' is not known; did you mean mass_ratio?",
+        ),
         (["--vary", "dt"], "--vary dt: varies a scene file, and none is named; name FILE.toml"),
         (["nowhere.toml"], "nowhere.toml: no such file or directory"),
         (["--engine", "bullet"], "engine 'bullet' is not known"),
@@ -118,8 +149,14 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
             ["slow_collision", "--engine", "../solvers/correct/plain.py"],
             "a file is not driven to its limits: crosscheck check",
         ),
-        (["scenes/still.toml", "--vary", "mass_ratio"], "still.toml: --vary mass_ratio: no disk moves"),
-        (["scenes/still.toml", "--vary", "dt"], "still.toml: --vary dt: it lasts less than ten steps of an eighth"),
+        (
+            ["scenes/still.toml", "--vary", "mass_ratio"],
+            "still.toml: --vary mass_ratio: no disk moves",
+        ),
+        (
+            ["scenes/still.toml", "--vary", "dt"],
+            "still.toml: --vary dt: it lasts less than ten steps of an eighth",
+        ),
     ],
 )
 def test_bad_input_is_one_clear_sentence(words: list[str], says: str):
@@ -142,21 +179,28 @@ def page(request: pytest.FixtureRequest, browser: Browser, results: Path):
 
 
 def test_a_failure_is_one_click_away_and_opens_just_before_it(page: Page):
-    """The button shows the engine's run; time stands before the event, and the event is in sight."""
+    """The button shows the engine's run; time stands before the event, and the event is in
+    sight."""
     section = page.locator("#c-tunnelling_thin_wall")
     section.scroll_into_view_if_needed()
     page.wait_for_function("() => window.engines && window.engines['tunnelling_thin_wall']")
     section.locator("button.watch").first.click()
-    page.wait_for_function("() => engines['tunnelling_thin_wall'].pack.layers[0].name === 'pymunk:matched'")
+    page.wait_for_function(
+        "() => engines['tunnelling_thin_wall'].pack.layers[0].name === 'pymunk:matched'"
+    )
     opens, event, end = page.evaluate(
-        "() => { const p = engines['tunnelling_thin_wall']; return [p.time, p.pack.event.t, p.until]; }"
+        "() => { const p = engines['tunnelling_thin_wall']; return [p.time, p.pack.event.t,"
+        " p.until]; }"
     )
 
     assert opens < event <= end
     assert "the collision is missed" in section.locator(".says").inner_text()
-    page.evaluate("() => engines['tunnelling_thin_wall'].seek(engines['tunnelling_thin_wall'].until)")
+    page.evaluate(
+        "() => engines['tunnelling_thin_wall'].seek(engines['tunnelling_thin_wall'].until)"
+    )
     truth, played = page.evaluate(
-        "() => ['truth', 'pymunk:matched'].map((name) => engines['tunnelling_thin_wall'].positions(name)[0][0])"
+        "() => ['truth', 'pymunk:matched'].map((name) =>"
+        " engines['tunnelling_thin_wall'].positions(name)[0][0])"
     )
     assert truth < 0 < played  # it is on the wrong side of the wall
 
@@ -175,22 +219,52 @@ def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, results: Path
 
 def test_the_stability_page_and_the_report_point_at_each_other_where_they_are_made(results: Path):
     """From folder to folder of the defaults; both ways."""
-    report, limits = Path("reports/out/latest/report.html"), Path("reports/out/stability/stability.html")
+    report, limits = (
+        Path("reports/out/latest/report.html"),
+        Path("reports/out/stability/stability.html"),
+    )
     parameter = inspect.signature(cli.stability).parameters["out"].default
     assert (cli.DEFAULT_OUT, parameter) == (report.parent, limits.parent)
     assert 'href="../latest/report.html"' in (results / "stability.html").read_text()
-    assert 'href="../stability/stability.html"' in (ROOT / "reports" / "page" / "page.html.j2").read_text()
+    assert (
+        'href="../stability/stability.html"'
+        in (ROOT / "reports" / "page" / "page.html.j2").read_text()
+    )
 
 
 def test_every_case_of_the_issue_is_there():
     """The names under which the eighteen cases stand."""
     wanted = {
-        "tunnelling_head_on", "tunnelling_offset", "tunnelling_thin_wall", "tunnelling_thick_wall", "near_miss",
-        "dt_gas_of_100", "bounce_drift", "slow_collision", "scale_up", "scale_down", "far_from_origin", "dense_gas",
-        "long_gas", "long_wrapped_gas",
-        "mass_ratio", "heavy_on_light", "heavy_in_gas", "column", "overlap_energy", "overlap_recovery", "overfull_box",
-        "pile_comes_to_rest", "ball_comes_to_rest", "grazing", "spin", "stiff_force", "insertion_order", "restart",
-        "thermometer", "equipartition",
-    }  # fmt: skip
+        "tunnelling_head_on",
+        "tunnelling_offset",
+        "tunnelling_thin_wall",
+        "tunnelling_thick_wall",
+        "near_miss",
+        "dt_gas_of_100",
+        "bounce_drift",
+        "slow_collision",
+        "scale_up",
+        "scale_down",
+        "far_from_origin",
+        "dense_gas",
+        "long_gas",
+        "long_wrapped_gas",
+        "mass_ratio",
+        "heavy_on_light",
+        "heavy_in_gas",
+        "column",
+        "overlap_energy",
+        "overlap_recovery",
+        "overfull_box",
+        "pile_comes_to_rest",
+        "ball_comes_to_rest",
+        "grazing",
+        "spin",
+        "stiff_force",
+        "insertion_order",
+        "restart",
+        "thermometer",
+        "equipartition",
+    }
 
     assert wanted <= set(CASES)

@@ -1,5 +1,5 @@
-"""The thermometer of the stability report: it reads the literature's numbers off an exact gas, and notices one that is
-wrong."""
+"""The thermometer of the stability report: it reads the literature's numbers off an exact gas, and
+notices one that is wrong."""
 
 from __future__ import annotations
 
@@ -55,13 +55,17 @@ def verdict(predicate, scenario: Scenario, trajectory: Trajectory):
 
 @pytest.mark.parametrize(("packing", "z"), [(0.1, 1.23614), (0.3, 2.06326), (0.5, 4.1063)])
 def test_the_virial_series_is_that_of_clisby_and_mccoy(packing: float, z: float):
-    """Their ten coefficients resummed; Henderson's (1 + eta2 / 8) / (1 - eta)2 is within 0.5 % up to 0.5."""
+    """Their ten coefficients resummed; Henderson's (1 + eta2 / 8) / (1 - eta)2 is within 0.5 % up
+    to 0.5."""
     assert compressibility(packing) == pytest.approx(z, abs=1e-4)
-    assert compressibility(packing) == pytest.approx((1 + packing**2 / 8) / (1 - packing) ** 2, rel=5e-3)
+    assert compressibility(packing) == pytest.approx(
+        (1 + packing**2 / 8) / (1 - packing) ** 2, rel=5e-3
+    )
 
 
 def test_in_a_large_box_the_rate_is_enskogs_and_the_pressure_that_of_the_bulk():
-    """4 / sqrt(pi) (Z - 1) sqrt(kT / m) / sigma collisions a disk; a wall of a million diameters is no matter."""
+    """4 / sqrt(pi) (Z - 1) sqrt(kT / m) / sigma collisions a disk; a wall of a million diameters is
+    no matter."""
     radius, packing, n = 0.5, 0.3, 10**12
     size = np.full(2, sqrt(n * pi * radius**2 / packing))
     found, z = gas_in_box(n, radius, size, 1.0), compressibility(packing)
@@ -72,9 +76,11 @@ def test_in_a_large_box_the_rate_is_enskogs_and_the_pressure_that_of_the_bulk():
 
 @pytest.mark.parametrize("packing", [0.2, 0.4, 0.6])
 def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literature(packing: float):
-    """Two gases of a hundred disks, within 1 % (scaled particle theory, corners) and four block errors.
+    """Two gases of a hundred disks, within 1 % (scaled particle theory, corners) and four block
+    errors.
 
-    The negative control: the pressure of a bulk of the same packing, without a thought of walls, is not within that.
+    The negative control: the pressure of a bulk of the same packing, without a thought of walls, is
+    not within that.
     """
     rates, forces = [], []
     for run in range(2):
@@ -86,7 +92,15 @@ def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literat
     scene = scenario.scene
     size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
     temperature = (scene.velocity**2).sum() / 2 / scene.n
-    bulk = compressibility(packing) * packing / (pi * RADIUS**2) * temperature * 2 * size.sum() / ought.force
+    bulk = (
+        compressibility(packing)
+        * packing
+        / (pi * RADIUS**2)
+        * temperature
+        * 2
+        * size.sum()
+        / ought.force
+    )
 
     def within(blocks: np.ndarray) -> bool:
         return abs(blocks.mean() - 1) < 0.01 + ERRORS * block_error(blocks)
@@ -101,7 +115,9 @@ def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
     for run in range(2):
         scenario = CASES["thermometer"].scene(0.4, run)
         assert not judge(WRONG_GAS, scenario, play_as(EXACT, scenario)).failed
-    hot = replace(scenario, scene=replace(scenario.scene, velocity=scenario.scene.velocity * sqrt(1.2)))
+    hot = replace(
+        scenario, scene=replace(scenario.scene, velocity=scenario.scene.velocity * sqrt(1.2))
+    )
     reading = verdict(WRONG_GAS, scenario, played(EXACT, hot))
 
     assert reading.failed
@@ -109,7 +125,8 @@ def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
 
 
 def test_speeds_that_are_not_maxwells_are_noticed():
-    """All disks equally fast, and all as drawn: only the second has a fifth of them in each fifth of the law."""
+    """All disks equally fast, and all as drawn: only the second has a fifth of them in each fifth
+    of the law."""
     rng, k, n = np.random.default_rng(0), 500, 100
     drawn = rng.normal(size=(k, n, 2))
     angle = rng.uniform(0, 2 * pi, (k, n))
@@ -127,11 +144,15 @@ def test_speeds_that_are_not_maxwells_are_noticed():
     assert shares["same"].max() == 1.0
     equal = one.velocity / np.linalg.norm(one.velocity, axis=2, keepdims=True)
     speed = np.linalg.norm(one.velocity[0], axis=1)
-    assert verdict(WRONG_GAS, scenario, replace(one, velocity=frozen(equal * speed.mean()))).broken == "not Maxwell"
+    assert (
+        verdict(WRONG_GAS, scenario, replace(one, velocity=frozen(equal * speed.mean()))).broken
+        == "not Maxwell"
+    )
 
 
-def test_equipartition_holds_in_an_exact_gas_up_to_a_mass_ratio_of_1e4_and_a_hotter_kind_is_noticed():
-    """Block errors tell chance from heat: disks of twice the temperature fail, whatever their mass."""
+def test_equipartition_holds_in_an_exact_gas_up_to_1e4_and_a_hotter_kind_is_noticed():
+    """Block errors tell chance from heat: disks of twice the temperature fail, whatever their
+    mass."""
     for ratio in (1.5, 100.0, 1e4):
         scenario = CASES["equipartition"].scene(ratio, 0)
         one = played(EXACT, scenario)
@@ -142,10 +163,15 @@ def test_equipartition_holds_in_an_exact_gas_up_to_a_mass_ratio_of_1e4_and_a_hot
 
 
 def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_noticed():
-    """float64 to 1e-14, float32 to 1e-6, in 1000 steps; one disk stopped at the end is one part in some twenty."""
+    """float64 to 1e-14, float32 to 1e-6, in 1000 steps; one disk stopped at the end is one part in
+    some twenty."""
     scenario = wrapped_run(1000.0, 0)
-    for engine, bound in (("reference:exercise", 1e-14), ("pymunk:matched", 1e-14), ("box2d:matched", 1e-6),
-                          ("box2d_v3:matched", 1e-6)):  # fmt: skip
+    for engine, bound in (
+        ("reference:exercise", 1e-14),
+        ("pymunk:matched", 1e-14),
+        ("box2d:matched", 1e-6),
+        ("box2d_v3:matched", 1e-6),
+    ):
         one = played(engine, scenario)
         reading = verdict(MOMENTUM_DRIFTS, scenario, one)
         assert not reading.failed
@@ -156,10 +182,12 @@ def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_
 
 
 def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
-    """At packing 0.6 an engine that detects at the end of a step has a tenth too few collisions; in order within it,
-    not."""
+    """At packing 0.6 an engine that detects at the end of a step has a tenth too few collisions; in
+    order within it, not."""
     scenario = CASES["thermometer"].scene(0.6, 0)
-    late, in_order = (judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in AT_END_AND_IN_ORDER)
+    late, in_order = (
+        judge(WRONG_GAS, scenario, play_as(name, scenario)) for name in AT_END_AND_IN_ORDER
+    )
     ought, one = literature(scenario), played(AT_END_AND_IN_ORDER[0], scenario)
     collisions = one.collisions
     rate = counted(one, collisions.j >= 0, np.ones(len(collisions))).mean() / ought.rate
@@ -173,7 +201,8 @@ def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
 
 
 def test_pymunk_loses_energy_by_impulses_that_a_contact_inherits():
-    """Shipped it remembers one for three steps: what it inherits is not given again, but may be taken back.
+    """Shipped it remembers one for three steps: what it inherits is not given again, but may be
+    taken back.
 
     Forgotten as soon as they part, contacts keep the energy but for what 50 iterations leave over.
     """
@@ -191,8 +220,11 @@ def test_pymunk_loses_energy_by_impulses_that_a_contact_inherits():
 
 
 @pytest.mark.parametrize("profile", ["shipped", "matched"])
-def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets_contacts(profile: str):
-    """A heavy disk drives a light one against a wall: in all, impulses of twice the heavy one's momentum, once each."""
+def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets_contacts(
+    profile: str,
+):
+    """A heavy disk drives a light one against a wall: in all, impulses of twice the heavy one's
+    momentum, once each."""
     scenario = SCENARIOS["galperin_314"]()
     dt = scenario.dt(4)
     reported = {}
@@ -211,7 +243,8 @@ def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["pymunk:shipped", "box2d:matched"])
 def test_the_limit_of_a_fast_gas_is_that_of_other_draws_too(engine: str):
-    """Sixteen other gases move it by less than a half; the first of them that fails comes at any value."""
+    """Sixteen other gases move it by less than a half; the first of them that fails comes at any
+    value."""
 
     def fails_at(seeds: int, by_chance: float) -> float:
         case = CASES["fast_gas"]

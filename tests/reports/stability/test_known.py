@@ -1,4 +1,5 @@
-"""What was known before the stability report comes out of it: thresholds, caps, closed forms, float32."""
+"""What was known before the stability report comes out of it: thresholds, caps, closed forms,
+float32."""
 
 from __future__ import annotations
 
@@ -19,9 +20,17 @@ from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, answers, 
 from reports.stability.variants import VARIANTS, Variant, play_as, played
 from scenarios.model import Trajectory
 
-PARTNERS = [f"{engine}:{profile}" for engine in ("box2d", "box2d_v3") for profile in ("shipped", "matched")]
-DISCRETE = ["reference:exercise", "reference:lesson", "pymunk:shipped", "pymunk:matched", "box2d:matched",
-            "box2d_v3:matched"]  # fmt: skip
+PARTNERS = [
+    f"{engine}:{profile}" for engine in ("box2d", "box2d_v3") for profile in ("shipped", "matched")
+]
+DISCRETE = [
+    "reference:exercise",
+    "reference:lesson",
+    "pymunk:shipped",
+    "pymunk:matched",
+    "box2d:matched",
+    "box2d_v3:matched",
+]
 
 
 @cache
@@ -34,35 +43,48 @@ def assert_fails_at(case: str, engine: str, value: float, slack: float = 1.0) ->
     """The bracket holds the value; `slack` times further out is still called holding."""
     found = limit(case, engine)
     low, high = sorted((found.works_at, found.fails_at))
-    assert low / slack <= value <= high * slack, f"{engine} in {case}: {value} is not in {low} .. {high}"
+    assert low / slack <= value <= high * slack, (
+        f"{engine} in {case}: {value} is not in {low} .. {high}"
+    )
 
 
 @pytest.mark.parametrize("engine", DISCRETE)
 @pytest.mark.parametrize(
     ("case", "value"),
-    [("tunnelling_head_on", 2.0), ("tunnelling_offset", 2 * sqrt(1 - 0.7**2)), ("tunnelling_thin_wall", 1.0)],
+    [
+        ("tunnelling_head_on", 2.0),
+        ("tunnelling_offset", 2 * sqrt(1 - 0.7**2)),
+        ("tunnelling_thin_wall", 1.0),
+    ],
 )
-def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(case: str, value: float, engine: str):
+def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(
+    case: str, value: float, engine: str
+):
     """v dt > 2R between disks head-on, 2R sqrt(1 - (b/2R)2) off centre, R at a thin wall."""
     assert_fails_at(case, engine, value)
 
 
-@pytest.mark.parametrize("engine", ["box2d:matched+bullets", "box2d_v3:matched+bullets", "event_driven:float64"])
+@pytest.mark.parametrize(
+    "engine", ["box2d:matched+bullets", "box2d_v3:matched+bullets", "event_driven:float64"]
+)
 @pytest.mark.parametrize("case", ["tunnelling_head_on", "tunnelling_thin_wall"])
 def test_nothing_is_missed_by_what_sweeps(case: str, engine: str):
-    """The change that shows it: the same engines with continuous collision and bullets, and no steps at all."""
+    """The change that shows it: the same engines with continuous collision and bullets, and no
+    steps at all."""
     assert limit(case, engine).verdict == "does not fail"
 
 
 def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
     """Both Box2Ds sweep moving disks against what is static, unasked."""
     assert all(
-        limit("tunnelling_thin_wall", f"{box}:shipped").verdict == "does not fail" for box in ("box2d", "box2d_v3")
+        limit("tunnelling_thin_wall", f"{box}:shipped").verdict == "does not fail"
+        for box in ("box2d", "box2d_v3")
     )
 
 
 def test_only_the_speculative_margin_makes_spurious_collisions():
-    """Box2D 3.1, within four slops: as shipped 0.02 m, 0.04 of the sum of the radii; nobody else."""
+    """Box2D 3.1, within four slops: as shipped 0.02 m, 0.04 of the sum of the radii; nobody
+    else."""
     found = {engine: limit("near_miss", engine).verdict for engine in (*DISCRETE, *PARTNERS)}
 
     spurious = {engine for engine, verdict in found.items() if verdict != "does not fail"}
@@ -73,7 +95,8 @@ def test_only_the_speculative_margin_makes_spurious_collisions():
 
 @pytest.mark.parametrize("box", ["box2d", "box2d_v3"])
 def test_the_threshold_is_1_m_per_s_and_goes_with_the_matched_profile(box: str):
-    """Closing slower than that is played as inelastic; a scene of a quarter of the size closes at it."""
+    """Closing slower than that is played as inelastic; a scene of a quarter of the size closes at
+    it."""
     assert_fails_at("slow_collision", f"{box}:shipped", 1.0)
     assert_fails_at("scale_down", f"{box}:shipped", 0.25)
     assert limit("slow_collision", f"{box}:matched").verdict == "does not fail"
@@ -88,7 +111,8 @@ def test_the_caps_on_speed_are_2_units_a_step_and_400_m_per_s():
 
 
 def test_the_caps_on_spin_are_a_quarter_and_an_eighth_of_a_turn_a_step():
-    """Matched refuses there; shipped is off by 2 % a little later, and 3.1 turns by atan(w h) a substep besides."""
+    """Matched refuses there; shipped is off by 2 % a little later, and 3.1 turns by atan(w h) a
+    substep besides."""
     assert_fails_at("spin", "box2d:matched", pi / 2)
     assert_fails_at("spin", "box2d_v3:matched", pi / 4)
     assert_fails_at("spin", "box2d:shipped", pi / 2 / 0.98)
@@ -96,38 +120,52 @@ def test_the_caps_on_spin_are_a_quarter_and_an_eighth_of_a_turn_a_step():
 
 
 def drift(engine: str | Variant, x: float, runs: int = 1) -> float:
-    """Gain of height per bounce over |v| dt, of balls dropped from 1.25 m and a little more; x = dt / fall time."""
+    """Gain of height per bounce over |v| dt, of balls dropped from 1.25 m and a little more; x = dt
+    / fall time."""
     found = []
     for scenario in (ball(x, run) for run in range(runs)):
-        trajectory = played(engine if isinstance(engine, Variant) else VARIANTS[engine], scenario).trajectory
+        trajectory = played(
+            engine if isinstance(engine, Variant) else VARIANTS[engine], scenario
+        ).trajectory
         assert trajectory is not None
         height = scenario.scene.position[0, 1] - scenario.scene.radius[0]
         found.append(
-            apex_drift(scenario, trajectory) * height / (sqrt(2 * 10 * height) * scenario.dt(scenario.substeps[0]))
+            apex_drift(scenario, trajectory)
+            * height
+            / (sqrt(2 * 10 * height) * scenario.dt(scenario.substeps[0]))
         )
     return float(np.mean(found))
 
 
 def test_a_bounce_gains_what_the_order_of_operations_says():
-    """Closed forms: pymunk 0, Box2D 2.3 +|v| dt; Box2D 3.1 with soft contacts about -|v| dt / substeps."""
+    """Closed forms: pymunk 0, Box2D 2.3 +|v| dt; Box2D 3.1 with soft contacts about -|v| dt /
+    substeps."""
     assert abs(drift("pymunk:matched", 0.02)) < 1e-9  # rounding of 1000 steps
-    # Higher orders in dt: a tenth at this step. Continuous collision takes the ball at the wall, and the gain with it.
-    no_ccd = Variant("box2d:matched+no_ccd", partial(changed, "box2d:matched", continuous=False, bullet=False))
+    # Higher orders in dt: a tenth at this step. Continuous collision takes the ball at the wall,
+    # and the gain with it.
+    no_ccd = Variant(
+        "box2d:matched+no_ccd", partial(changed, "box2d:matched", continuous=False, bullet=False)
+    )
     assert drift(no_ccd, 0.01) == pytest.approx(1.0, rel=0.1)
     assert abs(drift("box2d:matched", 0.01)) < 0.01
     assert drift("reference:lesson", 0.01) == pytest.approx(1.0, rel=0.1)
     # A soft contact gives back more or less with the phase of the collision in its step.
-    soft = Variant("box2d_v3:matched+soft", partial(changed, "box2d_v3:matched", length_unit=0.02, hertz=30.0))
+    soft = Variant(
+        "box2d_v3:matched+soft", partial(changed, "box2d_v3:matched", length_unit=0.02, hertz=30.0)
+    )
     assert drift(soft, 0.005, runs=6) == pytest.approx(-1 / 4, rel=0.25)
-    # The stiffest contacts, and a wider margin, take back a part of it; four times the substeps, all of it.
+    # The stiffest contacts, and a wider margin, take back a part of it; four times the substeps,
+    # all of it.
     assert -1 / 4 < drift("box2d_v3:matched", 0.01, runs=6) < -1 / 16
     assert abs(drift("box2d_v3:matched+16_substeps", 0.01, runs=6)) < 1 / 16
-    assert drift("box2d_v3:shipped", 0.01, runs=6) < -0.5  # its margin of 2 cm stops the ball before the floor
+    # its margin of 2 cm stops the ball before the floor
+    assert drift("box2d_v3:shipped", 0.01, runs=6) < -0.5
 
 
 @pytest.mark.parametrize("engine", PARTNERS)
 def test_float32_is_off_by_6_percent_at_10_km(engine: str):
-    """At 1 m/s and 1/240 s, exactly as adding up in float32 is; from 4096 m on it is more than 1 %."""
+    """At 1 m/s and 1/240 s, exactly as adding up in float32 is; from 4096 m on it is more than 1
+    %."""
     scenario = far(1e4, 0)
     trajectory = play_as(engine, scenario).trajectory
     x = np.float32(1e4)
@@ -140,9 +178,12 @@ def test_float32_is_off_by_6_percent_at_10_km(engine: str):
 
 
 @pytest.mark.parametrize(
-    ("engine", "factor"), [("pymunk:matched", 2.71), ("box2d:matched", 0.98), ("box2d_v3:matched", 1.44)]
+    ("engine", "factor"),
+    [("pymunk:matched", 2.71), ("box2d:matched", 0.98), ("box2d_v3:matched", 1.44)],
 )
-def test_a_force_read_off_the_positions_makes_an_oscillator_grow_as_published(engine: str, factor: float):
+def test_a_force_read_off_the_positions_makes_an_oscillator_grow_as_published(
+    engine: str, factor: float
+):
     """E / E0 after 400 steps at w dt = 0.05, engine_facts section 5."""
     trajectory: Trajectory | None = on_spring(VARIANTS[engine], oscillator(0.05, 0))[1].trajectory
     assert trajectory is not None
@@ -152,9 +193,14 @@ def test_a_force_read_off_the_positions_makes_an_oscillator_grow_as_published(en
 
 
 @pytest.mark.parametrize(
-    ("engine", "gain"), [("reference:lesson", 1.0), ("pymunk:matched", 1.0), ("box2d_v3:matched", 0.375),
-                         ("event_driven:float64", 0.5)]
-)  # fmt: skip
+    ("engine", "gain"),
+    [
+        ("reference:lesson", 1.0),
+        ("pymunk:matched", 1.0),
+        ("box2d_v3:matched", 0.375),
+        ("event_driven:float64", 0.5),
+    ],
+)
 def test_it_doubles_where_the_determinant_of_the_map_says(engine: str, gain: float):
     """1 + (1 - alpha) (w dt)2 a step, over 300 steps; symplectic Euler holds until w dt = 2."""
     assert_fails_at("stiff_force", engine, sqrt((2 ** (1 / 300) - 1) / gain))
@@ -162,7 +208,8 @@ def test_it_doubles_where_the_determinant_of_the_map_says(engine: str, gain: flo
 
 
 def test_a_restitution_of_a_pair_is_e_squared_only_in_pymunk_as_shipped():
-    """e - e2 reaches 0.01 at 1 - e = 0.0101; at e = 0 it is right again, so the limit is not monotone."""
+    """e - e2 reaches 0.01 at 1 - e = 0.0101; at e = 0 it is right again, so the limit is not
+    monotone."""
     assert_fails_at("restitution", "pymunk:shipped", 1 - (1 + sqrt(1 - 0.04)) / 2)
     assert not limit("restitution", "pymunk:shipped").monotone
     assert limit("restitution", "pymunk:matched").verdict == "does not fail"
@@ -170,7 +217,9 @@ def test_a_restitution_of_a_pair_is_e_squared_only_in_pymunk_as_shipped():
 
 def test_a_pair_keeps_its_velocities_up_to_a_mass_ratio_of_1e8():
     """Alone, no engine has trouble with unequal masses."""
-    assert all(limit("mass_ratio", engine).verdict == "does not fail" for engine in (*DISCRETE, *PARTNERS))
+    assert all(
+        limit("mass_ratio", engine).verdict == "does not fail" for engine in (*DISCRETE, *PARTNERS)
+    )
 
 
 def test_a_wrong_threshold_would_be_noticed():
@@ -199,11 +248,15 @@ GAPS_TRIED = (0.0, 0.01, 0.1)
         ("touching_break", "box2d_v3:matched", ("none", "none", PAIRS)),
     ],
 )
-def test_touching_disks_are_struck_after_the_law_that_the_engine_is_known_for(scene: str, engine: str, words: tuple):
-    """engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to neither.
+def test_touching_disks_are_struck_after_the_law_that_the_engine_is_known_for(
+    scene: str, engine: str, words: tuple
+):
+    """engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to
+    neither.
 
-    From a gap on that is wider than the way in a step, a thirty-second of a radius, everybody plays pair after pair.
-    Box2D 3.1 holds for touching what is within its margin: four slops, with a unit of half a radius a hundredth of it.
+    From a gap on that is wider than the way in a step, a thirty-second of a radius, everybody plays
+    pair after pair. Box2D 3.1 holds for touching what is within its margin: four slops, with a unit
+    of half a radius a hundredth of it.
     """
     found = law_of(scene, engine, GAPS_TRIED)
 
@@ -214,7 +267,8 @@ def test_touching_disks_are_struck_after_the_law_that_the_engine_is_known_for(sc
 
 
 def test_the_named_laws_keep_momentum_and_energy_at_every_gap():
-    """Whatever is compared with is at least possible; and a gap that goes to 0 comes to one of the answers there."""
+    """Whatever is compared with is at least possible; and a gap that goes to 0 comes to one of the
+    answers there."""
     for name, one in TOUCHING.items():
         for gap in GAPS:
             for velocity in (v for allowed in answers(name, gap).values() for v in allowed):
@@ -225,7 +279,8 @@ def test_the_named_laws_keep_momentum_and_energy_at_every_gap():
 
 
 def test_an_engine_that_keeps_to_no_law_is_not_given_one():
-    """The negative control: an answer in the middle between the two laws, and one that loses a twentieth."""
+    """The negative control: an answer in the middle between the two laws, and one that loses a
+    twentieth."""
     laws = answers("touching_break", 0.0)
     pairs, at_once = laws[PAIRS][0], laws[AT_ONCE][0]
 

@@ -1,4 +1,5 @@
-"""The quick form finds every limit of the full form again: a hidden failure, or another engine, shows up here."""
+"""The quick form finds every limit of the full form again: a hidden failure, or another engine,
+shows up here."""
 
 from __future__ import annotations
 
@@ -14,13 +15,23 @@ from reports.stability.variants import VARIANTS
 from tests.reports.stability.kept_limits import Kept, agrees, in_words, kept
 
 KEPT = kept()
-FAST = ("slow_collision", "scale_up", "scale_down", "far_from_origin", "spin", "near_miss", "restitution",
-        "tunnelling_head_on", "tunnelling_thin_wall")  # fmt: skip
+FAST = (
+    "slow_collision",
+    "scale_up",
+    "scale_down",
+    "far_from_origin",
+    "spin",
+    "near_miss",
+    "restitution",
+    "tunnelling_head_on",
+    "tunnelling_thin_wall",
+)
 # Every third: each of these cases, and each engine, is among them; the long test has the rest.
 SOME = [row for row in KEPT if row.case in FAST][::3]
 CHANGED = (
-    "the quick form is wrong, or an engine or a case has changed: look at it, then keep the new limits: "
-    "crosscheck stability CASE --full --out OUT && python -m tests.reports.stability.kept_limits OUT"
+    "the quick form is wrong, or an engine or a case has changed: look at it, then keep the new"
+    " limits: crosscheck stability CASE --full --out OUT && python -m"
+    " tests.reports.stability.kept_limits OUT"
 )
 
 
@@ -33,7 +44,9 @@ def quick(case: str, engine: str) -> Limit:
 def assert_agrees(row: Kept) -> None:
     """The quick form's bracket holds the full form's limit: strict both ways."""
     found = quick(row.case, row.engine)
-    assert agrees(found, row), f"{found.verdict}, {found.works_at} to {found.fails_at}, for {row}: {CHANGED}"
+    assert agrees(found, row), (
+        f"{found.verdict}, {found.works_at} to {found.fails_at}, for {row}: {CHANGED}"
+    )
 
 
 def name_of(row: Kept) -> str:
@@ -80,13 +93,18 @@ def test_an_engine_that_fails_earlier_or_later_is_noticed(factor: float):
     now = quick(row.case, row.engine)
 
     assert agrees(now, row)
-    assert not agrees(replace(now, works_at=now.works_at * factor, fails_at=now.fails_at * factor), row)
+    assert not agrees(
+        replace(now, works_at=now.works_at * factor, fails_at=now.fails_at * factor), row
+    )
     assert not agrees(quick(row.case, "reference:exercise"), row)
 
 
 def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
-    """The negative control: the scan as it was once, few heights of the ball and few values, called 0.057 a limit."""
-    row = next(row for row in KEPT if (row.case, row.engine) == ("bounce_drift", "reference:exercise"))
+    """The negative control: the scan as it was once, few heights of the ball and few values, called
+    0.057 a limit."""
+    row = next(
+        row for row in KEPT if (row.case, row.engine) == ("bounce_drift", "reference:exercise")
+    )
     flattering = Limit(row.case, row.engine, "quick", "limit", 0.0545, 0.0572, ())
 
     assert not agrees(flattering, row)
@@ -95,14 +113,18 @@ def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
 
 @pytest.mark.parametrize("engine", ["reference:exercise", "reference:lesson", "box2d:shipped"])
 def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(engine: str):
-    """At values, heights and phases that no form has played, the ball comes back wherever it is said to.
+    """At values, heights and phases that no form has played, the ball comes back wherever it is
+    said to.
 
-    Each of these loses or gains up to |v| dt of height a bounce, 2 dt over the fall time: 1 % from 0.005 on.
+    Each of these loses or gains up to |v| dt of height a bounce, 2 dt over the fall time: 1 % from
+    0.005 on.
     """
     found = quick("bounce_drift", engine)
     case = CASES["bounce_drift"]
     others = [0.0021, 0.0026, 0.0034, 0.0039, 0.0043, 0.0046]
-    search = Search(replace(case, scene=lambda x, run: case.scene(x, run + 100), runs=8), engine, QUICK)
+    search = Search(
+        replace(case, scene=lambda x, run: case.scene(x, run + 100), runs=8), engine, QUICK
+    )
 
     assert found.works_at <= 0.0053
     assert all(search.trial(x, 8).works for x in others if x < found.works_at)
@@ -111,7 +133,9 @@ def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(engine:
 
 def test_a_limit_that_is_not_the_only_edge_is_marked():
     """In a table the first failure, and a star."""
-    row = next(row for row in KEPT if row.case == "slow_collision" and row.engine == "box2d:shipped")
+    row = next(
+        row for row in KEPT if row.case == "slow_collision" and row.engine == "box2d:shipped"
+    )
 
     assert row.monotone
     assert in_words(row._replace(monotone=False)) == in_words(row) + "*"

@@ -1,4 +1,5 @@
-"""The reasons given for limits of a scene that nobody here wrote: what is changed until the failing run works."""
+"""The reasons given for limits of a scene that nobody here wrote: what is changed until the failing
+run works."""
 
 from __future__ import annotations
 
@@ -13,7 +14,15 @@ import pytest
 from reports.cli import VARIED
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
-from reports.stability.interventions import INTERVENTIONS, faster, intervention_of, larger, slower, smaller, why_played
+from reports.stability.interventions import (
+    INTERVENTIONS,
+    faster,
+    intervention_of,
+    larger,
+    slower,
+    smaller,
+    why_played,
+)
 from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
 from reports.stability.reasons import reason_of
 from reports.stability.search import Search
@@ -27,12 +36,14 @@ SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 
 @cache
 def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
-    """The limit on a scene of tests/data/scenes, with the intervention that removes its failure, asked without an
-    ablation."""
+    """The limit on a scene of tests/data/scenes, with the intervention that removes its failure,
+    asked without an ablation."""
     path = str(SCENES / scene)
     search = Search(case_of_file(path, what), engine, QUICK)
     limit = search.limit()
-    [known] = explained([replace(limit, case=f"{path}:{what}", intervention=intervention_of(search, limit))])
+    [known] = explained(
+        [replace(limit, case=f"{path}:{what}", intervention=intervention_of(search, limit))]
+    )
     return known
 
 
@@ -43,11 +54,16 @@ def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
         ("offset", "box2d_v3:matched", "positions are float32"),
         ("scale", "box2d:shipped", "threshold of restitution"),
         ("scale", "box2d_v3:shipped", "cap on speed"),
-        ("speed", "reference:exercise", "a collision takes effect at the end of the step in which it is found"),
+        (
+            "speed",
+            "reference:exercise",
+            "a collision takes effect at the end of the step in which it is found",
+        ),
     ],
 )
 def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, expected: str):
-    """Two disks head-on at 1 m/s and 1/200 s: the mechanisms known from the stability report come out by themselves."""
+    """Two disks head-on at 1 m/s and 1/200 s: the mechanisms known from the stability report come
+    out by themselves."""
     limit = found(what, engine)
 
     assert expected in limit.reason
@@ -56,24 +72,28 @@ def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, 
 
 
 def test_a_threshold_shows_where_the_scene_closes_at_it():
-    """Disks that meet at 2 m/s meet at less than 1 m/s in a scene half as large; later a collision is missing for
-    it."""
+    """Disks that meet at 2 m/s meet at less than 1 m/s in a scene half as large; later a collision
+    is missing for it."""
     assert 0 < found("scale", "box2d:shipped").fails_at < 0.5
     assert found("scale", "box2d:matched").verdict == "does not fail"
 
 
 def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_called_not_known():
-    """Where the step is what is varied, a finer one is no proof: end-of-step detection alone has the limit. Or nothing
-    helps."""
+    """Where the step is what is varied, a finer one is no proof: end-of-step detection alone has
+    the limit. Or nothing helps."""
     path = str(SCENES / "two.toml")
     search = Search(case_of_file(path, "dt"), "pymunk:matched", QUICK)
     [limit] = explained([tried_out(search, replace(search.limit(), case=f"{path}:dt"))])
     assert limit.why == "a collision takes effect at the end of the step in which it is found"
-    assert limit.tested == "the reference with end-of-step detection and nothing else has this limit"
+    assert (
+        limit.tested == "the reference with end-of-step detection and nothing else has this limit"
+    )
 
     failing = limit.failing
     assert failing is not None
-    nothing = replace(limit, case="x.toml:speed", mechanisms="", trials=(replace(failing, broken="collisions"),))
+    nothing = replace(
+        limit, case="x.toml:speed", mechanisms="", trials=(replace(failing, broken="collisions"),)
+    )
     reason, _, tested = why_played(nothing, "speed")
     assert reason.startswith(NOT_KNOWN)
     assert "in steps of an eighth" in reason
@@ -84,7 +104,8 @@ def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_cal
 @pytest.mark.parametrize("change", [faster, slower, larger, smaller])
 @pytest.mark.parametrize("engine", ["reference:exercise", "reference:ordered"])
 def test_a_solver_without_units_plays_a_similar_scene_to_the_same_bits(change, engine: str):
-    """So that none of these changes can help by chance: in it only what has a unit of its own plays otherwise."""
+    """So that none of these changes can help by chance: in it only what has a unit of its own plays
+    otherwise."""
     one = replace(read_scene_file(SCENES / "bumper.toml"), substeps=(1,))
     other = change(one)
     run, same = play_as(engine, one).trajectory, play_as(engine, other).trajectory
@@ -97,7 +118,8 @@ def test_a_solver_without_units_plays_a_similar_scene_to_the_same_bits(change, e
 
 
 def test_the_answer_of_a_similar_scene_is_the_one_of_the_scene():
-    """Against the oracle's own, where it can follow both: they differ by the last places of the scene's numbers."""
+    """Against the oracle's own, where it can follow both: they differ by the last places of the
+    scene's numbers."""
     one = read_scene_file(SCENES / "two.toml")
     for what, x in (("scale", 2.0), ("offset", 3.0)):
         scenario = varied(str(SCENES / "two.toml"), what, x, 0)
@@ -117,21 +139,32 @@ def test_the_answer_of_a_similar_scene_is_the_one_of_the_scene():
 
 
 def test_a_scene_in_which_nothing_can_go_wrong_has_limits_all_the_same():
-    """A disk alone, without walls, in the exercise's box under gravity: there is nothing to judge, and no crash."""
+    """A disk alone, without walls, in the exercise's box under gravity: there is nothing to judge,
+    and no crash."""
     assert found("speed", "pymunk:matched", "wrapped.toml").verdict == "does not fail"
 
 
 def test_every_change_is_tried_on_somebody():
     """None is left over."""
-    engines = ("reference:exercise", "pymunk:shipped", "box2d:shipped", "box2d:matched", "box2d_v3:shipped",
-               "box2d_v3:matched")  # fmt: skip
+    engines = (
+        "reference:exercise",
+        "pymunk:shipped",
+        "box2d:shipped",
+        "box2d:matched",
+        "box2d_v3:shipped",
+        "box2d_v3:matched",
+    )
     for name, intervention in INTERVENTIONS.items():
-        assert any(intervention.fits(engine, what) for engine in engines for what in ("dt", "speed", "offset")), name
+        assert any(
+            intervention.fits(engine, what)
+            for engine in engines
+            for what in ("dt", "speed", "offset")
+        ), name
 
 
 def test_a_collision_that_nobody_makes_fails_however_near_to_the_start_it_is():
-    """Within two steps of the start `match` lets it pass; a pair that should collision, and never does, is a wrong
-    collision."""
+    """Within two steps of the start `match` lets it pass; a pair that should collision, and never
+    does, is a wrong collision."""
     path = str(SCENES / "two.toml")
     search = Search(case_of_file(path, "speed"), "reference:exercise", QUICK)
     fast = search.trial(1000.0)
@@ -142,9 +175,14 @@ def test_a_collision_that_nobody_makes_fails_however_near_to_the_start_it_is():
 
 
 def test_a_disk_that_float32_keeps_where_it_is_fails():
-    """A million metres out the last place is 6 cm, and a step of 2 cm is none, whatever the velocity says."""
+    """A million metres out the last place is 6 cm, and a step of 2 cm is none, whatever the
+    velocity says."""
     path = str(SCENES / "two.toml")
-    far = {name: Search(case_of_file(path, "offset"), name, QUICK).trial(1e6) for name in VARIANTS if "+" not in name}
+    far = {
+        name: Search(case_of_file(path, "offset"), name, QUICK).trial(1e6)
+        for name in VARIANTS
+        if "+" not in name
+    }
 
     assert far["box2d:matched"].broken == "strays"
     assert not far["box2d:matched"].works
@@ -161,8 +199,8 @@ def test_a_disk_that_is_struck_twice_between_two_samples_is_not_called_stuck(x: 
 
 @pytest.mark.parametrize("name", ["tunnelling_mine.toml", "dt_mine.toml", "overlap_mine.toml"])
 def test_the_name_of_a_scene_file_does_not_pick_its_reason(name: str):
-    """The table's patterns are for the stability report' own cases; what every exact method refuses holds
-    everywhere."""
+    """The table's patterns are for the stability report' own cases; what every exact method refuses
+    holds everywhere."""
     failing = Trial(2.0, 1, 1, 2.0, 0, broken="refused")
     limit = Limit(f"{name}:speed", "box2d:matched", "quick", "limit", 1.0, 2.0, (failing,))
 
@@ -178,7 +216,16 @@ def test_the_help_names_what_can_be_varied():
 def test_what_ended_without_a_result_has_no_reason_of_physics():
     """A time-out or an error says itself what it is."""
     trial = Trial(nan, 1, 1, nan, 0, nan, "timeout: 3600 s", "timeout")
-    lost = Limit("tunnelling_head_on", "pymunk:matched", "quick", "never works", nan, nan, (trial,), status="timeout")
+    lost = Limit(
+        "tunnelling_head_on",
+        "pymunk:matched",
+        "quick",
+        "never works",
+        nan,
+        nan,
+        (trial,),
+        status="timeout",
+    )
     [known] = explained([lost])
 
     assert (known.reason, known.tested) == ("", "")

@@ -7,7 +7,8 @@ from reports.stability.phases import EDGE, phase
 
 
 def test_phases_are_spread_evenly_and_drawn_and_fewer_are_the_first_of_more():
-    """The step's very beginning first; no gap between 32 phases is wider than a sixteenth of a step."""
+    """The step's very beginning first; no gap between 32 phases is wider than a sixteenth of a
+    step."""
     phases = [phase(run) for run in range(32)]
 
     assert phases[0] == EDGE
@@ -15,4 +16,5 @@ def test_phases_are_spread_evenly_and_drawn_and_fewer_are_the_first_of_more():
     assert all(EDGE <= one <= 1 - EDGE for one in phases)
     assert np.diff(sorted(phases)).max() < 1 / 16 + 2 * EDGE
     drawn = phases[2::2]
-    assert min(abs(one * 32 - round(one * 32)) for one in drawn) > 1e-3  # what is drawn is no round share of a step
+    # what is drawn is no round share of a step
+    assert min(abs(one * 32 - round(one * 32)) for one in drawn) > 1e-3

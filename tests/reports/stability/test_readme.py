@@ -1,4 +1,5 @@
-"""What reports/stability/README.md says of limits is what the full form found, for every engine it names."""
+"""What reports/stability/README.md says of limits is what the full form found, for every engine it
+names."""
 
 from __future__ import annotations
 
@@ -16,11 +17,16 @@ FOUND = {(row.case, row.engine): row for row in kept()}
 
 
 def cells_of(text: str) -> dict[tuple[str, str], str]:
-    """(row, engine:profile) -> what stands there, of the table whose first heading is "fails at"."""
+    """(row, engine:profile) -> what stands there, of the table whose first heading is "fails
+    at"."""
     lines = text[text.index("| fails at |") :].split("\n\n")[0].splitlines()
     head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     engines = [name.replace("<br>", ":") for name in head[1:]]
-    return {(row[0], engine): cell for row in rows for engine, cell in zip(engines, row[1:], strict=True)}
+    return {
+        (row[0], engine): cell
+        for row in rows
+        for engine, cell in zip(engines, row[1:], strict=True)
+    }
 
 
 CELLS = cells_of(TEXT)
@@ -69,8 +75,10 @@ def test_what_is_said_of_the_two_forms_is_what_they_do():
 
     assert said is not None
     assert [int(number) for number in said.groups()] == [
-        max(case.runs for case in CASES.values()), round(100 * (QUICK.ratio - 1)), round(100 * (FULL.ratio - 1)),
-    ]  # fmt: skip
+        max(case.runs for case in CASES.values()),
+        round(100 * (QUICK.ratio - 1)),
+        round(100 * (FULL.ratio - 1)),
+    ]
 
 
 def test_what_the_readme_says_is_of_the_full_form():

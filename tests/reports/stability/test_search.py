@@ -1,4 +1,5 @@
-"""The search for a limit: brackets it, counts what failed, sees what works again, and says so when nothing fails."""
+"""The search for a limit: brackets it, counts what failed, sees what works again, and says so when
+nothing fails."""
 
 from __future__ import annotations
 
@@ -54,12 +55,19 @@ def case(reading: Callable[[float, int], float], values: tuple[float, ...], **mo
     """A case whose runs read what a function of the value and the number of the run gives."""
 
     def scene(x: float, run: int) -> Scenario:
-        return Scenario("made-up", "?", "", replace(SCENE, velocity=[[reading(x, run), 0]]), 1.0, 1.0, (1,))
+        return Scenario(
+            "made-up", "?", "", replace(SCENE, velocity=[[reading(x, run), 0]]), 1.0, 1.0, (1,)
+        )
 
     def play(_: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
         start = scenario.scene.state
-        arrays = [np.array([a, a]) for a in (start.position, start.velocity, start.angle, start.angular_velocity)]
-        return scenario, Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
+        arrays = [
+            np.array([a, a])
+            for a in (start.position, start.velocity, start.angle, start.angular_velocity)
+        ]
+        return scenario, Run(
+            "made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays)
+        )
 
     return Case("made-up", "", "?", "x", "1", values, scene, TOO_FAST, play=play, **more)
 
@@ -73,7 +81,9 @@ UP, DOWN = (1.0, 3.0, 10.0, 30.0, 100.0), (100.0, 30.0, 10.0, 3.0, 1.0)
 
 
 @pytest.mark.parametrize("form", [QUICK, FULL])
-@pytest.mark.parametrize(("values", "reading"), [(UP, lambda x, _: x / 17), (DOWN, lambda x, _: 17 / x)])
+@pytest.mark.parametrize(
+    ("values", "reading"), [(UP, lambda x, _: x / 17), (DOWN, lambda x, _: 17 / x)]
+)
 def test_the_bracket_holds_the_limit_and_is_as_close_as_the_form_says(form, values, reading):
     """Whether gentle is small or large: it works at 17 and just not beyond."""
     found = limit_of(case(reading, values), form)
@@ -109,7 +119,13 @@ def test_what_works_again_beyond_a_failure_is_seen():
 
     assert not found.monotone
     assert found.works_at <= 5 <= found.fails_at < 10
-    assert [trial.works for trial in found.trials if trial.value in UP] == [True, True, False, True, True]
+    assert [trial.works for trial in found.trials if trial.value in UP] == [
+        True,
+        True,
+        False,
+        True,
+        True,
+    ]
 
 
 def test_what_works_only_where_it_is_harsh_is_called_so():
@@ -146,7 +162,10 @@ def test_a_number_that_is_none_fails_and_a_run_that_broke_off_fails_with_its_rea
     assert (reading.failed, reading.broken, reading.event) == (True, "refused", "no such thing")
     nothing = TOO_FAST._replace(read=lambda _scenario, _played: Reading(float("nan")))
     start = scenario.scene.state
-    arrays = [np.array([a, a]) for a in (start.position, start.velocity, start.angle, start.angular_velocity)]
+    arrays = [
+        np.array([a, a])
+        for a in (start.position, start.velocity, start.angle, start.angular_velocity)
+    ]
     played = Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
     assert judge(nothing, scenario, played).failed
 
@@ -163,7 +182,8 @@ def test_a_statistic_may_fail_by_chance_in_one_run_of_sixteen_and_not_in_two():
 
 
 def test_the_limit_is_the_first_failure_and_what_works_beyond_is_seen_in_both_forms():
-    """Two stretches that fail: the search stops at the gentler, and says that there is more than one edge."""
+    """Two stretches that fail: the search stops at the gentler, and says that there is more than
+    one edge."""
     one = case(lambda x, _: 2.0 if 5 < x < 20 or x > 50 else 0.5, UP)
     quick, full = (limit_of(one, form) for form in (QUICK, FULL))
 
@@ -176,13 +196,15 @@ def test_the_limit_is_the_first_failure_and_what_works_beyond_is_seen_in_both_fo
 
 
 def test_the_values_of_the_quick_form_are_some_of_those_of_the_full_one():
-    """So that where both have all runs, which are the same, what fails in one fails in the other."""
+    """So that where both have all runs, which are the same, what fails in one fails in the
+    other."""
     for name, one in CASES.items():
         assert set(one.scan(QUICK)) <= set(one.scan(FULL)), name
 
 
 def test_what_few_runs_do_not_show_is_found_next_to_the_limit_by_all_of_them():
-    """Run 11 fails from 4 on, where the four runs of the way see nothing; they alone would say 17."""
+    """Run 11 fails from 4 on, where the four runs of the way see nothing; they alone would say
+    17."""
     one = case(lambda x, run: 2.0 if x > 17 or (run == 11 and x > 4) else 0.5, UP, runs=16)
     found = limit_of(one, QUICK)
 
@@ -191,19 +213,22 @@ def test_what_few_runs_do_not_show_is_found_next_to_the_limit_by_all_of_them():
 
 
 def test_a_value_is_left_at_its_first_failure_but_at_the_limit_all_is_played():
-    """Beyond the limit one run is enough to see that it does not work; the share that failed is that of all at it."""
+    """Beyond the limit one run is enough to see that it does not work; the share that failed is
+    that of all at it."""
     found = limit_of(case(lambda x, run: 2.0 if x > 17 and run >= 1 else 0.5, UP, runs=16), QUICK)
     failing = found.failing
 
     assert failing is not None
     assert (failing.runs, failing.failed, failing.first, failing.left) == (16, 15, 1, False)
-    assert [(trial.runs, trial.left) for trial in found.trials if trial.value == 100.0] == [(2, True)]
+    assert [(trial.runs, trial.left) for trial in found.trials if trial.value == 100.0] == [
+        (2, True)
+    ]
     assert [trial.runs for trial in found.trials if trial.value == 1.0] == [4]
 
 
 def test_one_phase_alone_would_overlook_the_limit():
-    """The negative control of the phases: with collisions in the middle of a step alone, tunnelling begins at 4, not
-    2."""
+    """The negative control of the phases: with collisions in the middle of a step alone, tunnelling
+    begins at 4, not 2."""
     one = CASES["tunnelling_head_on"]
     blind = replace(one, scene=lambda x, _run: at_speed(x, 1), runs=1)
 
@@ -226,7 +251,10 @@ def test_a_worker_that_dies_is_a_row_of_the_table():
 
 def test_a_limit_comes_back_from_the_journal_as_it_was():
     """Through JSON, where what is not a number is text."""
-    for found in (limit_of(case(lambda x, _: x / 17, UP)), limit_of(case(lambda _x, _run: 2.0, UP))):
+    for found in (
+        limit_of(case(lambda x, _: x / 17, UP)),
+        limit_of(case(lambda _x, _run: 2.0, UP)),
+    ):
         again = limit_from(json.loads(json.dumps(plain(asdict(found)))))
         assert repr(again) == repr(found)
 
@@ -236,7 +264,11 @@ def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
     slow = Search(CASES["slow_collision"], "box2d:shipped", QUICK).limit()
     free = Search(CASES["slow_collision"], "box2d:matched", QUICK).limit()
     elsewhere = replace(slow, works_at=4.0, fails_at=3.9)
-    [both, _], [alone], [wrong, _] = explained([slow, free]), explained([slow]), explained([elsewhere, slow])
+    [both, _], [alone], [wrong, _] = (
+        explained([slow, free]),
+        explained([slow]),
+        explained([elsewhere, slow]),
+    )
 
     assert both.tested == "predicts 1; box2d:matched gets farther"
     assert alone.tested == "predicts 1"
@@ -245,8 +277,8 @@ def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
 
 
 def test_of_a_failing_run_only_what_is_shown_is_kept_and_it_shows_the_same(tmp_path: Path):
-    """Of 4000 samples the 160 around the failure, with the collisions among them; packed for the page as the whole
-    would."""
+    """Of 4000 samples the 160 around the failure, with the collisions among them; packed for the
+    page as the whole would."""
     scenario = gas(0.3, 0, rows=3, columns=3, steps=4000, every=1)
     run = play_as("reference:exercise", scenario)
     whole = run.trajectory
@@ -285,11 +317,19 @@ def test_a_run_that_broke_off_is_kept_up_to_there():
     scenario = gas(0.3, 0, rows=3, columns=3, steps=100, every=1)
     whole = play_as("reference:exercise", scenario).trajectory
     assert whole is not None
-    until = replace(whole, t=whole.t[:50], position=whole.position[:50], velocity=whole.velocity[:50],
-                    angle=whole.angle[:50], angular_velocity=whole.angular_velocity[:50])  # fmt: skip
+    until = replace(
+        whole,
+        t=whole.t[:50],
+        position=whole.position[:50],
+        velocity=whole.velocity[:50],
+        angle=whole.angle[:50],
+        angular_velocity=whole.angular_velocity[:50],
+    )
     shown = np.arange(40, 61)
     part = part_of(until, shown, scenario)
-    head, _ = head_and_numbers(pack_layers(scenario, [(Run("made", "up", "gas", 1.0), part)], shown))
+    head, _ = head_and_numbers(
+        pack_layers(scenario, [(Run("made", "up", "gas", 1.0), part)], shown)
+    )
 
     assert len(part) == 10
     assert (head["layers"][0]["frames"], head["layers"][0]["ends"]) == (10, f"{part.t[-1]:.4g}")

@@ -1,4 +1,5 @@
-"""`crosscheck` as tests call it: in a process of its own, or, where that makes no difference, in this one, sooner."""
+"""`crosscheck` as tests call it: in a process of its own, or, where that makes no difference, in
+this one, sooner."""
 
 import contextlib
 import os
@@ -30,11 +31,14 @@ class Done(NamedTuple):
 
 def process(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
     """The command as a person starts it."""
-    return subprocess.run([CROSSCHECK, *words], cwd=cwd, capture_output=True, text=True, timeout=300)
+    return subprocess.run(
+        [CROSSCHECK, *words], cwd=cwd, capture_output=True, text=True, timeout=300
+    )
 
 
 def crosscheck(*words: str | Path, cwd: Path) -> Done:
-    """The command called here: a process of its own would spend seconds on loading what this one has."""
+    """The command called here: a process of its own would spend seconds on loading what this one
+    has."""
     argv = ["crosscheck", *map(os.fspath, words)]
     with contextlib.chdir(cwd), mock.patch.object(sys, "argv", argv):
         done = CliRunner().invoke(app, argv[1:], catch_exceptions=False)
@@ -44,7 +48,9 @@ def crosscheck(*words: str | Path, cwd: Path) -> Done:
 def forked(*words: str | Path, cwd: Path) -> Done:
     """The command in a process of its own that loads nothing, and is killed if it hangs."""
     with TemporaryDirectory() as folder:
-        process = start(crosscheck_in, [*map(os.fspath, words)], cwd, Path(folder), {"COLUMNS": "400"})
+        process = start(
+            crosscheck_in, [*map(os.fspath, words)], cwd, Path(folder), {"COLUMNS": "400"}
+        )
         process.join(120.0)
         if process.exitcode is None:
             process.kill()

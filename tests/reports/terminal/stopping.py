@@ -1,4 +1,5 @@
-"""Starts a command, waits until it is somewhere, signals it to stop, and looks what is left of it."""
+"""Starts a command, waits until it is somewhere, signals it to stop, and looks what is left of
+it."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ class Ended(NamedTuple):
 
 
 class Command:
-    """A command in a session of its own; `stalled`: MODULE:NAME of a function that never returns in it."""
+    """A command in a session of its own; `stalled`: MODULE:NAME of a function that never returns in
+    it."""
 
     def __init__(self, *words: str | Path, cwd: Path, stalled: str = "") -> None:
         self.cwd, self.mark = cwd, cwd / ".mark"
@@ -41,9 +43,14 @@ class Command:
         self.output, self.errors = cwd / ".stdout", cwd / ".stderr"
         with self.output.open("w") as output, self.errors.open("w") as errors:
             self.process = subprocess.Popen(
-                [CROSSCHECK, *words], cwd=cwd, env=os.environ | mine, stdout=output, stderr=errors,
-                start_new_session=True, preexec_fn=hears_ctrl_c,
-            )  # fmt: skip
+                [CROSSCHECK, *words],
+                cwd=cwd,
+                env=os.environ | mine,
+                stdout=output,
+                stderr=errors,
+                start_new_session=True,
+                preexec_fn=hears_ctrl_c,
+            )
 
     def when(self, here: Callable[[], object]) -> Command:
         """Wait until it is there; a command that has ended before is a fault."""
@@ -70,7 +77,8 @@ class Command:
         return Ended(128 - status if status < 0 else status, seconds, self.errors.read_text(), left)
 
     def others(self) -> list[int]:
-        """The living processes that come from this command: they have its mark among their variables."""
+        """The living processes that come from this command: they have its mark among their
+        variables."""
         mark, found = f"STALL_MARK={self.mark}".encode(), []
         for folder in Path("/proc").glob("[0-9]*"):
             try:
@@ -83,12 +91,14 @@ class Command:
 
 
 def hears_ctrl_c() -> None:
-    """A shell that puts tests into the background has them ignore Ctrl-C, and what they start does, too."""
+    """A shell that puts tests into the background has them ignore Ctrl-C, and what they start does,
+    too."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def busyness() -> float:
-    """How many times longer things take here now than on an idle machine: processes that want to run, over cores."""
+    """How many times longer things take here now than on an idle machine: processes that want to
+    run, over cores."""
     return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 

@@ -45,13 +45,15 @@ def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_help_loads_no_number_library():
     """`--help` answers at once because nothing heavy is imported for it."""
     code = (
-        "import sys, reports.cli\n"
-        "from typer.testing import CliRunner\n"
-        "assert CliRunner().invoke(reports.cli.app, ['run', '--help']).exit_code == 0\n"
-        "print([name for name in ('numpy', 'pandas', 'numba', 'plotly', 'pymunk') if name in sys.modules])"
+        "import sys, reports.cli\nfrom typer.testing import CliRunner\nassert"
+        " CliRunner().invoke(reports.cli.app, ['run', '--help']).exit_code == 0\nprint([name for"
+        " name in ('numpy', 'pandas', 'numba', 'plotly', 'pymunk') if name in sys.modules])"
     )
 
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+    assert (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip()
+        == "[]"
+    )
 
 
 def test_list_explains_every_engine_scenario_and_metric(tmp_path: Path):
@@ -90,15 +92,21 @@ def test_tables_are_made_again_from_the_journal(small_run: Path):
 
 
 @pytest.mark.slow
-def test_the_same_command_gives_the_same_numbers_whatever_the_workers(small_run: Path, tmp_path: Path):
-    """deviations.csv is byte for byte the same with one worker as with all, and in a process of its own."""
+def test_the_same_command_gives_the_same_numbers_whatever_the_workers(
+    small_run: Path, tmp_path: Path
+):
+    """deviations.csv is byte for byte the same with one worker as with all, and in a process of its
+    own."""
     assert process(*SMALL, "--workers", "1", "--out", "again", cwd=tmp_path).returncode == 0
-    assert (tmp_path / "again" / "deviations.csv").read_bytes() == (small_run / "deviations.csv").read_bytes()
+    assert (tmp_path / "again" / "deviations.csv").read_bytes() == (
+        small_run / "deviations.csv"
+    ).read_bytes()
 
 
 @pytest.mark.slow
 def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
-    """A TOML file is compared with the oracle's truth too; its run can be reported again without the file."""
+    """A TOML file is compared with the oracle's truth too; its run can be reported again without
+    the file."""
     scene = tmp_path / "mine.toml"
     scene.write_text((SCENES / "two.toml").read_text())
     done = crosscheck("run", scene, "--engine", "pymunk", "--out", "out", cwd=tmp_path)
@@ -113,8 +121,14 @@ def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["run", "head_on_equl_e1"], "scenario 'head_on_equl_e1' is not known; did you mean head_on_equal_e1"),
-        (["run", "slow_collision", "--engine", "pymonk"], "engine 'pymonk' is not known; did you mean pymunk"),
+        (
+            ["run", "head_on_equl_e1"],
+            "scenario 'head_on_equl_e1' is not known; did you mean head_on_equal_e1",
+        ),
+        (
+            ["run", "slow_collision", "--engine", "pymonk"],
+            "engine 'pymonk' is not known; did you mean pymunk",
+        ),
         (["run", "slow_collision", "--engine", "box2d:mached"], "did you mean box2d:matched"),
         (["run", "slow_collision", "--dt", "0.007"], "--dt 0.007 does not fit slow_collision"),
         (["run", "slow_collision", "--dt", "-1"], "--dt -1 does not fit slow_collision"),
@@ -140,7 +154,9 @@ def test_bad_input_is_one_clear_message_and_exit_2(words: list[str], said: str, 
 
 def test_truth_prints_the_exact_answer(tmp_path: Path):
     """For people with the ends of its list of collisions, for programs as JSON with all of them."""
-    reported, listed = (crosscheck("truth", "line_gas", *more, cwd=tmp_path).stdout for more in ([], ["--events"]))
+    reported, listed = (
+        crosscheck("truth", "line_gas", *more, cwd=tmp_path).stdout for more in ([], ["--events"])
+    )
     for word in ("closed form", "horizon", "error bound", "258 more: --events"):
         assert word in reported
     assert len(listed.splitlines()) > 272
@@ -172,7 +188,9 @@ def test_who_waits_for_an_exact_answer_sees_so_on_a_terminal_only(
     assert ("the exact answer to it" in capsys.readouterr().err) == terminal
 
 
-@pytest.mark.parametrize("words", [["run", "--out", "new"], ["truth"], ["stability", "--vary", "speed"], ["play"]])
+@pytest.mark.parametrize(
+    "words", [["run", "--out", "new"], ["truth"], ["stability", "--vary", "speed"], ["play"]]
+)
 def test_a_pipe_for_a_scene_hangs_no_command(words: list[str], tmp_path: Path):
     """Nobody writes into it."""
     os.mkfifo(tmp_path / "pipe.toml")
@@ -183,13 +201,21 @@ def test_a_pipe_for_a_scene_hangs_no_command(words: list[str], tmp_path: Path):
 
 
 def test_truth_tells_what_comes_to_rest_and_all_outcomes(tmp_path: Path):
-    """A rest is a line of the list; a break shot ends in a table of two outcomes, of which none is the truth."""
+    """A rest is a line of the list; a break shot ends in a table of two outcomes, of which none is
+    the truth."""
     reported = crosscheck("truth", str(SCENES / "settles.toml"), cwd=tmp_path).stdout
     assert "comes to rest" in reported
     broken = crosscheck("truth", str(SCENES / "break.toml"), cwd=tmp_path).stdout
-    for words in ("2 outcomes; none is the truth", "0: (-0.125, -0.216506)", "0: (-0.125, 0.216506)", "still known"):
+    for words in (
+        "2 outcomes; none is the truth",
+        "0: (-0.125, -0.216506)",
+        "0: (-0.125, 0.216506)",
+        "still known",
+    ):
         assert words in broken
-    answer = json.loads(crosscheck("truth", str(SCENES / "break.toml"), "--json", cwd=tmp_path).stdout)
+    answer = json.loads(
+        crosscheck("truth", str(SCENES / "break.toml"), "--json", cwd=tmp_path).stdout
+    )
     assert len(answer["outcomes"]) == 2
     assert answer["outcomes"][0]["order"]
     assert any("momentum" in said for said in answer["still_known"])
@@ -197,7 +223,9 @@ def test_truth_tells_what_comes_to_rest_and_all_outcomes(tmp_path: Path):
 
 def test_all_faults_of_all_scene_files_come_at_once(tmp_path: Path):
     """Two bad files, three faults, three lines."""
-    (tmp_path / "a.toml").write_text((SCENES / "two.toml").read_text().replace("radius = 0.25", "radius = -0.25"))
+    (tmp_path / "a.toml").write_text(
+        (SCENES / "two.toml").read_text().replace("radius = 0.25", "radius = -0.25")
+    )
     (tmp_path / "b.toml").write_text("name = 3\n")
     done = crosscheck("run", "a.toml", "b.toml", cwd=tmp_path)
 
@@ -208,7 +236,9 @@ def test_all_faults_of_all_scene_files_come_at_once(tmp_path: Path):
 
 def test_a_scene_file_may_not_take_a_name_that_is_taken(tmp_path: Path):
     """Two scenes of one name would be one row in the table."""
-    (tmp_path / "mine.toml").write_text((SCENES / "two.toml").read_text().replace('"two-disks"', '"slow_collision"'))
+    (tmp_path / "mine.toml").write_text(
+        (SCENES / "two.toml").read_text().replace('"two-disks"', '"slow_collision"')
+    )
     done = crosscheck("run", "mine.toml", cwd=tmp_path)
 
     assert done.returncode == 2
@@ -220,7 +250,10 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "thesis.txt").write_text("years of work")
     (small_run / "note.txt").write_text("mine")
-    done = crosscheck(*SMALL, "--out", "out", cwd=tmp_path), crosscheck(*SMALL, "--out", small_run, cwd=tmp_path)
+    done = (
+        crosscheck(*SMALL, "--out", "out", cwd=tmp_path),
+        crosscheck(*SMALL, "--out", small_run, cwd=tmp_path),
+    )
     (small_run / "note.txt").unlink()
 
     assert [one.returncode for one in done] == [2, 2]
@@ -231,7 +264,11 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
 @pytest.mark.parametrize(
     ("words", "file", "said"),
     [
-        (SMALL, "limits.csv", "holds limits.csv, and no made.json says that crosscheck run made it"),
+        (
+            SMALL,
+            "limits.csv",
+            "holds limits.csv, and no made.json says that crosscheck run made it",
+        ),
         (
             ["stability", "slow_collision"],
             "runs.csv",
@@ -239,7 +276,9 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
         ),
     ],
 )
-def test_a_folder_of_another_command_is_left_alone(words: list[str], file: str, said: str, tmp_path: Path):
+def test_a_folder_of_another_command_is_left_alone(
+    words: list[str], file: str, said: str, tmp_path: Path
+):
     """A run does not replace a stability report, nor a stability report a run."""
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / file).touch()
@@ -253,7 +292,9 @@ def test_a_folder_of_another_command_is_left_alone(words: list[str], file: str, 
 @pytest.mark.slow
 def test_an_earlier_run_is_replaced_as_a_whole(small_run: Path):
     """The second run into a folder leaves nothing of the first behind, and no folder beside it."""
-    again = crosscheck("run", "near_miss", "--engine", "pymunk:matched", "--out", "here", cwd=small_run.parent)
+    again = crosscheck(
+        "run", "near_miss", "--engine", "pymunk:matched", "--out", "here", cwd=small_run.parent
+    )
 
     assert again.returncode == 0
     assert set(pd.read_csv(small_run / "runs.csv").scenario) == {"near_miss"}
@@ -273,7 +314,9 @@ def test_a_trajectory_that_is_gone_is_a_failure_of_its_cell(small_run: Path, tmp
         path.unlink()
 
     assert some.returncode in (0, 1)  # 1 if it was the only cell of its engine
-    assert runs[runs.status == "error"].reason.str.contains("is not what was written").tolist() == [True]
+    assert runs[runs.status == "error"].reason.str.contains("is not what was written").tolist() == [
+        True
+    ]
     assert crosscheck("report", "copy", cwd=tmp_path).returncode == 1
     assert set(pd.read_csv(copy / "runs.csv").status) == {"error"}
 
@@ -281,7 +324,9 @@ def test_a_trajectory_that_is_gone_is_a_failure_of_its_cell(small_run: Path, tmp
 @pytest.mark.slow
 def test_a_scene_that_was_changed_after_it_was_played_is_not_reported(tmp_path: Path):
     """Trajectories are judged by the scene they were played from, or not at all."""
-    crosscheck("run", SCENES / "two.toml", "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path)
+    crosscheck(
+        "run", SCENES / "two.toml", "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path
+    )
     [stored] = (tmp_path / "out" / "scenes").iterdir()
     stored.write_text(stored.read_text().replace("mass = 2.0", "mass = 3.0"))
     done = crosscheck("report", "out", cwd=tmp_path)

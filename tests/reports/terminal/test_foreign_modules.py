@@ -1,4 +1,5 @@
-"""A folder full of modules that are called as Python's, or as this program's: none of them is ever imported."""
+"""A folder full of modules that are called as Python's, or as this program's: none of them is ever
+imported."""
 
 from __future__ import annotations
 
@@ -27,13 +28,31 @@ from tests.reports.run.control_engines import Controlled, row
 from tests.reports.terminal.command_line import CROSSCHECK
 from tests.solvers.mutants import CORRECT
 
-pytestmark = pytest.mark.usefixtures("fresh_workers")  # what they import as they start is asked here
+# what they import as they start is asked here
+pytestmark = pytest.mark.usefixtures("fresh_workers")
 ROOT = Path(__file__).parents[3]
 OURS = ("adapters", "reference_impl", "reports", "scenarios", "tests")
-LIBRARIES = ("Box2D", "flint", "gmpy2", "numba", "numpy", "pandas", "pyb2d3", "pydantic", "pymunk", "rich", "typer")
+LIBRARIES = (
+    "Box2D",
+    "flint",
+    "gmpy2",
+    "numba",
+    "numpy",
+    "pandas",
+    "pyb2d3",
+    "pydantic",
+    "pymunk",
+    "rich",
+    "typer",
+)
 BY_THEMSELVES = ("sitecustomize", "usercustomize", "conftest", "__main__")
-TRAP = "open({mark!r}, 'a').write({name!r} + ' ')\nraise SystemExit('{name}.py of the current folder was run')\n"
-SOLVERS = {path.name: path for path in CORRECT if path.name in ("plain.js", "plain.py", "arrays.py")}
+TRAP = (
+    "open({mark!r}, 'a').write({name!r} + ' ')\nraise SystemExit('{name}.py of the current folder"
+    " was run')\n"
+)
+SOLVERS = {
+    path.name: path for path in CORRECT if path.name in ("plain.js", "plain.py", "arrays.py")
+}
 
 
 def trapped(folder: Path, names: Iterable[str]) -> Callable[[], str]:
@@ -47,8 +66,11 @@ def trapped(folder: Path, names: Iterable[str]) -> Callable[[], str]:
 
 @pytest.fixture
 def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
-    """What shows which modules were run of the current folder, which has all names of Python's and of what we use."""
-    reported = trapped(tmp_path / "here", (*sys.stdlib_module_names, *OURS, *LIBRARIES, *BY_THEMSELVES))
+    """What shows which modules were run of the current folder, which has all names of Python's and
+    of what we use."""
+    reported = trapped(
+        tmp_path / "here", (*sys.stdlib_module_names, *OURS, *LIBRARIES, *BY_THEMSELVES)
+    )
     for name, path in SOLVERS.items():
         (tmp_path / "here" / f"my_{name}").write_text(path.read_text())
     monkeypatch.chdir(tmp_path / "here")
@@ -71,15 +93,21 @@ def in_a_worker() -> Any:
 def test_a_worker_imports_nothing_of_the_folder_it_is_started_in(
     ran, monkeypatch: pytest.MonkeyPatch, entry: list[str]
 ):
-    """The cell is played as anywhere else; so where the path ends with an empty entry, as Python's own for -c."""
+    """The cell is played as anywhere else; so where the path ends with an empty entry, as Python's
+    own for -c."""
     monkeypatch.setattr(sys, "path", [*sys.path, *entry])
     assert in_a_worker().run.status == "ok"
     assert ran() == ""
 
 
-def test_without_the_safe_path_a_worker_is_caught_and_its_cell_is_no_result(ran, monkeypatch: pytest.MonkeyPatch):
-    """The negative control: the traps work; and what came of it is said to lie outside the engine."""
-    monkeypatch.setattr(worker, "python", lambda statements: [sys.executable, "-c", f"import sys; {statements}"])
+def test_without_the_safe_path_a_worker_is_caught_and_its_cell_is_no_result(
+    ran, monkeypatch: pytest.MonkeyPatch
+):
+    """The negative control: the traps work; and what came of it is said to lie outside the
+    engine."""
+    monkeypatch.setattr(
+        worker, "python", lambda statements: [sys.executable, "-c", f"import sys; {statements}"]
+    )
     ended = in_a_worker()
 
     assert ran() != ""
@@ -97,17 +125,22 @@ def test_a_solver_imports_libraries_and_not_what_lies_beside_it(ran, name: str):
 
 
 def test_what_a_solver_imports_of_its_own_is_found(ran):
-    """A module beside it, a package, one that those import; a name of Python's is Python's there, too."""
+    """A module beside it, a package, one that those import; a name of Python's is Python's there,
+    too."""
     Path("package").mkdir()
-    Path("package", "__init__.py").write_text("from package.inner import TWO\nfrom .inner import THREE\n")
-    Path("package", "inner.py").write_text("import third_one\nTWO, THREE = third_one.random.choice([2]), 3\n")
+    Path("package", "__init__.py").write_text(
+        "from package.inner import TWO\nfrom .inner import THREE\n"
+    )
+    Path("package", "inner.py").write_text(
+        "import third_one\nTWO, THREE = third_one.random.choice([2]), 3\n"
+    )
     Path("third_one.py").write_text("import random\n")
     Path("folder").mkdir()
     Path("folder", "deep.py").write_text("FOUR = 4\n")
     Path("mine.py").write_text(
-        "import package, folder.deep\nassert (package.TWO, package.THREE, folder.deep.FOUR) == (2, 3, 4)\n"
-        "assert package.__file__.endswith('here/package/__init__.py')\n"
-        "def integrate(sphere, dt): pass\n"
+        "import package, folder.deep\nassert (package.TWO, package.THREE, folder.deep.FOUR) == (2,"
+        " 3, 4)\nassert package.__file__.endswith('here/package/__init__.py')\ndef"
+        " integrate(sphere, dt): pass\n"
     )
     solver = read_solver(Path("mine.py"))
     for path in (Path("third_one.py"), Path("package", "inner.py")):
@@ -115,13 +148,17 @@ def test_what_a_solver_imports_of_its_own_is_found(ran):
     with SolverProcess(solver) as process:
         assert process.functions["integrate"]
     assert [file for file, _ in solver.beside] == [
-        "folder/deep.py", "package/__init__.py", "package/inner.py", "third_one.py"
-    ]  # fmt: skip
+        "folder/deep.py",
+        "package/__init__.py",
+        "package/inner.py",
+        "third_one.py",
+    ]
     assert ran() == ""
 
 
 def imported_here() -> set[str]:
-    """The modules of Python's that this program imports, but for those that Python itself has imported before it."""
+    """The modules of Python's that this program imports, but for those that Python itself has
+    imported before it."""
     found = set()
     for path in (path for folder in OURS[:4] for path in (ROOT / folder).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -129,16 +166,28 @@ def imported_here() -> set[str]:
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             found |= {name.partition(".")[0] for name in names}
     code = "import sys; print(*sys.modules)"
-    before = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    return {name for name in found if name in sys.stdlib_module_names} - {name.partition(".")[0] for name in before}
+    before = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    return {name for name in found if name in sys.stdlib_module_names} - {
+        name.partition(".")[0] for name in before
+    }
 
 
 @pytest.mark.parametrize("path", [":", ":/nowhere", "."])
 def test_a_pythonpath_with_the_current_folder_runs_nothing_of_it(tmp_path: Path, path: str):
-    """An empty entry of PYTHONPATH is the current folder; all that this program imports is called so there."""
-    ran = trapped(tmp_path / "here", {*imported_here(), "secrets", "numbers", "random", "adapters", "scenarios"})
+    """An empty entry of PYTHONPATH is the current folder; all that this program imports is called
+    so there."""
+    ran = trapped(
+        tmp_path / "here",
+        {*imported_here(), "secrets", "numbers", "random", "adapters", "scenarios"},
+    )
     done = subprocess.run(
-        [CROSSCHECK, "list", "metrics"], cwd=tmp_path / "here", env={"PYTHONPATH": path}, capture_output=True, text=True
+        [CROSSCHECK, "list", "metrics"],
+        cwd=tmp_path / "here",
+        env={"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
     )
 
     assert (done.returncode, ran()) == (0, ""), done.stderr
@@ -167,14 +216,17 @@ def test_a_folder_that_modules_are_installed_in_stays_where_it_was_last(
     monkeypatch: pytest.MonkeyPatch, path: list[str], of: Any
 ):
     """Who stands in it has it on the path twice, for `python -m` before Python's own."""
-    monkeypatch.chdir(folder := (Path(of.__file__).parent if of is ast else Path(of.__file__).parents[1]))
+    monkeypatch.chdir(
+        folder := (Path(of.__file__).parent if of is ast else Path(of.__file__).parents[1])
+    )
     path[:] = [str(folder), "/else", str(folder), "/more"]
     safe_path.keep_path_safe()
     assert path == ["/else", str(folder), "/more"]
 
 
 def test_of_the_folder_of_the_program_only_its_packages_are_found():
-    """pyproject.toml beside them is no hindrance, nor a conftest.py; `tests` are found by who is reported of them."""
+    """pyproject.toml beside them is no hindrance, nor a conftest.py; `tests` are found by who is
+    reported of them."""
     found = safe_path.OwnPackages(safe_path.PACKAGES).find_spec
     assert all(found(name) is not None for name in OURS[:4])
     assert [found(name) for name in ("tests", "scipy", "conftest", "random")] == [None] * 4
@@ -183,35 +235,59 @@ def test_of_the_folder_of_the_program_only_its_packages_are_found():
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], str]]:
-    """A clone of the program with modules in its root that nobody asked for, and what shows which of them were run."""
+    """A clone of the program with modules in its root that nobody asked for, and what shows which
+    of them were run."""
     base = tmp_path_factory.mktemp("clone")
-    ran = trapped(base / "root", {"scipy", "yaml", "pyarrow", "cffi", "random", "secrets", "numbers", *LIBRARIES})
+    ran = trapped(
+        base / "root",
+        {"scipy", "yaml", "pyarrow", "cffi", "random", "secrets", "numbers", *LIBRARIES},
+    )
     for name in OURS[:4]:
-        shutil.copytree(ROOT / name, base / "root" / name, ignore=shutil.ignore_patterns("__pycache__", "out"))
+        shutil.copytree(
+            ROOT / name, base / "root" / name, ignore=shutil.ignore_patterns("__pycache__", "out")
+        )
     for name, solver in SOLVERS.items():
         (base / "root" / f"my_{name}").write_text(solver.read_text())
     return base / "root", ran
 
 
-@pytest.mark.parametrize("begin", [["-P", "-c", "from reports.__main__ import main; main()"], ["-m", "reports"]])
+@pytest.mark.parametrize(
+    "begin", [["-P", "-c", "from reports.__main__ import main; main()"], ["-m", "reports"]]
+)
 @pytest.mark.parametrize(
     "words",
     [
         ["list", "engines"],
         pytest.param(["check", "my_plain.py"], marks=pytest.mark.slow),
         pytest.param(["check", "my_plain.js"], marks=pytest.mark.slow),
-        pytest.param(["run", "head_on_equal_e09", "--dt", str(1 / 60), "--engine", "reference:exercise",
-                      "--engine", "my_arrays.py", "--out", "../out"], marks=pytest.mark.slow),
+        pytest.param(
+            [
+                "run",
+                "head_on_equal_e09",
+                "--dt",
+                str(1 / 60),
+                "--engine",
+                "reference:exercise",
+                "--engine",
+                "my_arrays.py",
+                "--out",
+                "../out",
+            ],
+            marks=pytest.mark.slow,
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_module_beside_readme_is_not_run_where_everybody_stands(
     clone: tuple[Path, Callable[[], str]], begin: list[str], words: list[str]
 ):
-    """The root on the path as an editable installation has it, at its end, or before all others, as `-m` does it."""
+    """The root on the path as an editable installation has it, at its end, or before all others, as
+    `-m` does it."""
     root, ran = clone
     at_end = f"import sys; sys.path.append({str(root)!r}); sys.argv[0] = 'crosscheck'; "
     begin = begin if begin[0] == "-m" else [*begin[:2], at_end + begin[2]]
-    done = subprocess.run([sys.executable, *begin, *words], cwd=root, capture_output=True, text=True, timeout=500)
+    done = subprocess.run(
+        [sys.executable, *begin, *words], cwd=root, capture_output=True, text=True, timeout=500
+    )
 
     assert ran() == "", done.stderr
     assert done.returncode == 0, done.stderr
@@ -232,12 +308,22 @@ def test_without_the_safe_path_a_module_beside_readme_is_run(clone: tuple[Path, 
 @pytest.mark.parametrize(
     "words",
     [
-        ["run", "head_on_equal_e09", "--dt", str(1 / 60), "--engine", "pymunk:matched", "--engine", "my_arrays.py",
-         "--out", "../out"],
+        [
+            "run",
+            "head_on_equal_e09",
+            "--dt",
+            str(1 / 60),
+            "--engine",
+            "pymunk:matched",
+            "--engine",
+            "my_arrays.py",
+            "--out",
+            "../out",
+        ],
         ["check", "my_plain.py"],
         ["truth", "head_on_equal_e09"],
     ],
-)  # fmt: skip
+)
 def test_a_command_runs_nothing_of_the_folder_it_is_started_in(ran, words: list[str]):
     """As a person starts it: exit 0."""
     done = subprocess.run([CROSSCHECK, *words], capture_output=True, text=True, timeout=300)

@@ -1,4 +1,5 @@
-"""Text that others wrote reaches no terminal as markup or escape codes, and every file is written in UTF-8."""
+"""Text that others wrote reaches no terminal as markup or escape codes, and every file is written
+in UTF-8."""
 
 import ast
 import json
@@ -18,8 +19,12 @@ from reports.terminal.progress import Progress
 from tests.reports.terminal.command_line import crosscheck
 
 ROOT = Path(__file__).parents[3]
-FILES = [path for folder in ("reference_impl", "scenarios", "adapters", "reports", ".ci")
-         for path in sorted((ROOT / folder).rglob("*.py")) if "out" not in path.parts]  # fmt: skip
+FILES = [
+    path
+    for folder in ("reference_impl", "scenarios", "adapters", "reports", ".ci")
+    for path in sorted((ROOT / folder).rglob("*.py"))
+    if "out" not in path.parts
+]
 HOSTILE = "[/nope] [red]x[/red] :warning: a\x1b[31mb\x1b]0;title\x07 c\rd \x9b2J \u202e \udcff"
 SHOWN = "[/nope] [red]x[/red] :warning: a\\x1b[31mb\\x1b]0;title\\x07 c\\rd \\x9b2J \\u202e \\udcff"
 SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
@@ -27,7 +32,8 @@ SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
 
 @given(st.text(alphabet=st.characters()))
 def test_legible_text_holds_nothing_that_acts_on_a_terminal(text: str):
-    """No control, format or surrogate character but the end of a line; what is plain stays as it is."""
+    """No control, format or surrogate character but the end of a line; what is plain stays as it
+    is."""
     found = legible(text)
 
     assert not [c for c in found if unicodedata.category(c) in ("Cc", "Cf", "Cs") and c != "\n"]
@@ -36,7 +42,8 @@ def test_legible_text_holds_nothing_that_acts_on_a_terminal(text: str):
 
 
 def test_the_console_prints_markup_as_it_is(capsys: pytest.CaptureFixture[str]):
-    """As a sentence, in a table, as its title and heading; a progress bar and standard error do, too."""
+    """As a sentence, in a table, as its title and heading; a progress bar and standard error do,
+    too."""
     table = Table(HOSTILE, title=HOSTILE)
     table.add_row(HOSTILE)
     console = Console(width=300)
@@ -59,7 +66,9 @@ def test_the_console_prints_markup_as_it_is(capsys: pytest.CaptureFixture[str]):
 @pytest.mark.parametrize("what", ["[/nope]", "\\u001b[31mred", "\\u0007", ":boom: [bold]"])
 def test_the_question_of_a_scene_is_printed_as_it_is(tmp_path: Path, what: str):
     """`truth` and a refusal show `asks` and a bad value, whatever they hold."""
-    (tmp_path / "x.toml").write_text(SCENE.read_text().replace("Does a head-on collision", f"{what} Does a collision"))
+    (tmp_path / "x.toml").write_text(
+        SCENE.read_text().replace("Does a head-on collision", f"{what} Does a collision")
+    )
     done = crosscheck("truth", "x.toml", cwd=tmp_path)
     (tmp_path / "x.toml").write_text(SCENE.read_text().replace('"two-disks"', f'"{what}"'))
     refused = crosscheck("truth", "x.toml", cwd=tmp_path)
@@ -71,30 +80,48 @@ def test_the_question_of_a_scene_is_printed_as_it_is(tmp_path: Path, what: str):
 
 
 def test_only_one_console_prints():
-    """No file but reports/terminal/console.py makes a console of rich's, or takes text as markup."""
-    users = {str(path.relative_to(ROOT)) for path in FILES if "rich.console" in path.read_text(encoding="utf-8")}
-    markup = {str(path.relative_to(ROOT)) for path in FILES if "rich.markup" in path.read_text(encoding="utf-8")}
+    """No file but reports/terminal/console.py makes a console of rich's, or takes text as
+    markup."""
+    users = {
+        str(path.relative_to(ROOT))
+        for path in FILES
+        if "rich.console" in path.read_text(encoding="utf-8")
+    }
+    markup = {
+        str(path.relative_to(ROOT))
+        for path in FILES
+        if "rich.markup" in path.read_text(encoding="utf-8")
+    }
 
     assert (users, markup) == ({"reports/terminal/console.py"}, set())
 
 
 def without_encoding(source: str) -> list[int]:
-    """The lines of a Python text in which a file is read or written as text in the encoding of the place it runs in."""
+    """The lines of a Python text in which a file is read or written as text in the encoding of the
+    place it runs in."""
     found = []
     for node in ast.walk(ast.parse(source)):
         if not isinstance(node, ast.Call):
             continue
-        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        called = (
+            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        )
         owner = node.func.value if isinstance(node.func, ast.Attribute) else None
         if isinstance(owner, ast.Name) and owner.id in ("os", "webbrowser") and called == "open":
             continue  # a descriptor, a page
         given = {word.arg: word.value for word in node.keywords}
-        modes = [mode.value for mode in (*node.args, *given.values()) if isinstance(mode, ast.Constant)]
-        binary = any(isinstance(mode, str) and "b" in mode and set(mode) <= set("rwaxb+") for mode in modes)
+        modes = [
+            mode.value for mode in (*node.args, *given.values()) if isinstance(mode, ast.Constant)
+        ]
+        binary = any(
+            isinstance(mode, str) and "b" in mode and set(mode) <= set("rwaxb+") for mode in modes
+        )
         as_text = called in ("read_text", "write_text", "TextIOWrapper") or (
             called in ("open", "fdopen") and not binary
         )
-        if (as_text or ("text" in given and called in ("run", "Popen"))) and "encoding" not in given:
+        if (
+            as_text or ("text" in given and called in ("run", "Popen"))
+        ) and "encoding" not in given:
             found.append(node.lineno)
     return found
 
@@ -130,7 +157,8 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyte
 
 
 def test_what_is_written_to_a_pipe_by_its_descriptor_arrives():
-    """As `--page /dev/stdout` is where a command is piped into another: a link to what has no path."""
+    """As `--page /dev/stdout` is where a command is piped into another: a link to what has no
+    path."""
     reading, writing = os.pipe()
     with open(reading, "rb") as pipe:
         with open(writing, "wb"):

@@ -1,4 +1,5 @@
-"""Places with other letters, few letters, and streams that nobody reads: a sentence each, and nothing is lost."""
+"""Places with other letters, few letters, and streams that nobody reads: a sentence each, and
+nothing is lost."""
 
 import os
 import shutil
@@ -12,20 +13,26 @@ from reports.terminal.streams import Outlet
 from tests.reports.terminal.command_line import CROSSCHECK
 
 SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
-SOLVER = Path(__file__).parents[3] / "tests" / "solvers" / "correct" / "plain.py"  # numba takes no such names
+# numba takes no such names
+SOLVER = Path(__file__).parents[3] / "tests" / "solvers" / "correct" / "plain.py"
 REFUSED = "cannot write to standard output: "
 
 
 def shell(line: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[bytes]:
     """A line of bash, in which $C is the command."""
     variables = os.environ | {"C": str(CROSSCHECK)} | environment
-    return subprocess.run(["bash", "-c", line], cwd=cwd, env=variables, capture_output=True, timeout=300)
+    return subprocess.run(
+        ["bash", "-c", line], cwd=cwd, env=variables, capture_output=True, timeout=300
+    )
 
 
 def test_an_outlet_takes_all_and_remembers_the_first_fault():
     """/dev/full refuses every byte; what is given to it later is dropped in silence."""
     with open("/dev/full", "wb") as full, open("/dev/null", "wb") as null:
-        lost, kept = Outlet(full.fileno(), "w", closefd=False), Outlet(null.fileno(), "w", closefd=False)
+        lost, kept = (
+            Outlet(full.fileno(), "w", closefd=False),
+            Outlet(null.fileno(), "w", closefd=False),
+        )
 
         assert (lost.write(b"four"), lost.write(memoryview(b"three"))) == (4, 5)
         assert lost.fault is not None
@@ -47,7 +54,9 @@ def test_an_outlet_takes_all_and_remembers_the_first_fault():
         ("PYTHONOPTIMIZE=2 $C list engines", 2, "PYTHONOPTIMIZE=2"),
     ],
 )
-def test_a_stream_that_takes_nothing_is_one_sentence(tmp_path: Path, line: str, code: int, said: str):
+def test_a_stream_that_takes_nothing_is_one_sentence(
+    tmp_path: Path, line: str, code: int, said: str
+):
     """Full, closed, or left by who read it; no traceback, no other line, and the right exit."""
     done = shell(line, tmp_path)
     text = done.stderr.decode()
@@ -58,10 +67,15 @@ def test_a_stream_that_takes_nothing_is_one_sentence(tmp_path: Path, line: str, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stream", [">/dev/full", ">&-", "| head -0; exit ${PIPESTATUS[0]}", "2>/dev/full", "2>&- >&-"])
+@pytest.mark.parametrize(
+    "stream", [">/dev/full", ">&-", "| head -0; exit ${PIPESTATUS[0]}", "2>/dev/full", "2>&- >&-"]
+)
 def test_what_was_computed_is_kept_whatever_becomes_of_the_streams(tmp_path: Path, stream: str):
-    """The run is whole in its place; a closed number of a stream is not taken by the journal and printed into."""
-    done = shell(f"$C run slow_collision --engine pymunk:matched --out out --workers 1 {stream}", tmp_path)
+    """The run is whole in its place; a closed number of a stream is not taken by the journal and
+    printed into."""
+    done = shell(
+        f"$C run slow_collision --engine pymunk:matched --out out --workers 1 {stream}", tmp_path
+    )
 
     assert done.returncode == (0 if stream == "2>/dev/full" else 1)
     assert b"Traceback" not in done.stderr
@@ -77,7 +91,9 @@ def latin(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     if shutil.which("localedef") is None:
         pytest.skip("no localedef")
     name = "de_DE.ISO-8859-1"
-    subprocess.run(["localedef", "-i", "de_DE", "-f", "ISO-8859-1", folder / name], capture_output=True)
+    subprocess.run(
+        ["localedef", "-i", "de_DE", "-f", "ISO-8859-1", folder / name], capture_output=True
+    )
     if not (folder / name).exists():
         pytest.skip("the system has no sources of locales")
     return {"LOCPATH": str(folder), "LC_ALL": name}
@@ -96,7 +112,8 @@ PLACES = {
 def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
     tmp_path: Path, place: str, request: pytest.FixtureRequest
 ):
-    """Folder, scene file and solver have bytes in their names that are no UTF-8: played, reported, compared.
+    """Folder, scene file and solver have bytes in their names that are no UTF-8: played, reported,
+    compared.
 
     Tables and page are UTF-8 all the same, and the scripts of the page the same bytes as elsewhere.
     """
@@ -106,17 +123,26 @@ def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
     (here / os.fsdecode(b"two\xe9.toml")).write_text(SCENE.read_text().split("[[wall]]")[0])
     shutil.copy(SOLVER, here / os.fsdecode(b"own\xe9.py"))
     played = shell(
-        "$C run two$'\\xe9'.toml --engine pymunk:matched --engine own$'\\xe9'.py --dt 0.01 --out o$'\\xff' --workers 1",
-        here, **variables,
-    )  # fmt: skip
+        "$C run two$'\\xe9'.toml --engine pymunk:matched --engine own$'\\xe9'.py --dt 0.01 --out"
+        " o$'\\xff' --workers 1",
+        here,
+        **variables,
+    )
     out = here / os.fsdecode(b"o\xff")
-    others = [shell(line, here, **variables) for line in ("$C report o$'\\xff'", "$C diff o$'\\xff' o$'\\xff'")]
+    others = [
+        shell(line, here, **variables)
+        for line in ("$C report o$'\\xff'", "$C diff o$'\\xff' o$'\\xff'")
+    ]
 
-    assert [one.returncode for one in (played, *others)] == [0, 0, 0], played.stderr.decode(errors="replace")
+    assert [one.returncode for one in (played, *others)] == [0, 0, 0], played.stderr.decode(
+        errors="replace"
+    )
     assert b"Traceback" not in played.stderr + others[0].stderr + others[1].stderr
     table = pd.read_csv(out / "deviations.csv")
     assert table.engine.nunique() == 2
     assert set(pd.read_csv(out / "runs.csv").status) == {"ok"}
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert (Path(__file__).parents[3] / "reports" / "page" / "page.js").read_text(encoding="utf-8") in page
+    assert (Path(__file__).parents[3] / "reports" / "page" / "page.js").read_text(
+        encoding="utf-8"
+    ) in page
     assert "own" in page

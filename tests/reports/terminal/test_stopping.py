@@ -1,4 +1,5 @@
-"""SIGTERM and Ctrl-C end every command within 3 s wherever it is, also in C code that never returns."""
+"""SIGTERM and Ctrl-C end every command within 3 s wherever it is, also in C code that never
+returns."""
 
 from __future__ import annotations
 
@@ -47,8 +48,9 @@ mass = 1.0
 """
 TWO = ["run", "two.toml", "slow_collision", "--engine", "pymunk:shipped", "--out", "out"]
 SOCKET = (  # RFC 6455, 1.2: a page opens its socket
-    "GET /fly HTTP/1.1\r\nHost: localhost:PORT\r\nOrigin: http://localhost:PORT\r\nUpgrade: websocket\r\n"
-    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    "GET /fly HTTP/1.1\r\nHost: localhost:PORT\r\nOrigin: http://localhost:PORT\r\nUpgrade:"
+    " websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key:"
+    " dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
 )
 # The stages of every command, each with what never returns there.
 STALLED = {
@@ -57,15 +59,22 @@ STALLED = {
     "the answer in report": (["report", "done"], TRUTH),
     "the comparison in report": (["report", "done"], "reports.compare.comparison:_measure"),
     "the answer in truth": (["truth", "two.toml"], TRUTH),
-    "the answer in speed": (["speed", "two.toml", "--engine", "pymunk:shipped", "--out", "out"], TRUTH),
+    "the answer in speed": (
+        ["speed", "two.toml", "--engine", "pymunk:shipped", "--out", "out"],
+        TRUTH,
+    ),
     "a limit in stability": (
-        ["stability", "two.toml", "--vary", "dt", "--engine", "pymunk:shipped", "--out", "out"], TRUTH,
+        ["stability", "two.toml", "--vary", "dt", "--engine", "pymunk:shipped", "--out", "out"],
+        TRUTH,
     ),
     "a scene in check": (["check", SOLVERS / "plain.py"], ANSWER),
     "a scene in check of a folder": (["check", SOLVERS], ANSWER),
-    "a lesson in lesson --export": (["lesson", "order", "--export", "order.html"], "reports.lessons.lesson:play"),
+    "a lesson in lesson --export": (
+        ["lesson", "order", "--export", "order.html"],
+        "reports.lessons.lesson:play",
+    ),
     "a cell in replay": (["replay", "", "--out", "done"], "reports.run.playing:play"),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +88,8 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def place(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where a command is started: the scene, and a run of which nothing has been compared. No answer is known."""
+    """Where a command is started: the scene, and a run of which nothing has been compared. No
+    answer is known."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     (tmp_path / "two.toml").write_text(FILE)
     shutil.copytree(done, tmp_path / "done")
@@ -90,8 +100,11 @@ def place(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("how", BOTH)
 @pytest.mark.parametrize("stage", STALLED)
-def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(place: Path, stage: str, how: int):
-    """Ctrl-C goes to the whole group, as from a terminal, SIGTERM to the command alone: no process outlives it."""
+def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(
+    place: Path, stage: str, how: int
+):
+    """Ctrl-C goes to the whole group, as from a terminal, SIGTERM to the command alone: no process
+    outlives it."""
     words, stalled = STALLED[stage]
     if words[0] == "replay":
         words = [words[0], pd.read_csv(place / "done" / "runs.csv").cell[0], *words[2:]]
@@ -104,8 +117,8 @@ def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(place: P
 @pytest.mark.slow
 @pytest.mark.parametrize("how", BOTH)
 def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: int):
-    """Signalled to stop while it compares: the sentence counts the cells, and --resume gives the bytes of a whole
-    run."""
+    """Signalled to stop while it compares: the sentence counts the cells, and --resume gives the
+    bytes of a whole run."""
     command = Command(*TWO, cwd=place, stalled="reports.compare.comparison:_measure").stalled()
     had = ended_in(place / "out.part")
     ended = command.stop(how)
@@ -113,17 +126,22 @@ def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: 
 
     assert_ended(ended, how)
     assert {signal.SIGTERM: "Terminated.", signal.SIGINT: "Interrupted."}[how] in ended.said
-    assert f"The {ended_in(place / 'out.part') or had} cells that were played are kept." in ended.said
+    assert (
+        f"The {ended_in(place / 'out.part') or had} cells that were played are kept." in ended.said
+    )
     assert resumed.returncode == 0, resumed.stderr
     assert (place / "out" / "deviations.csv").read_bytes() == (done / "deviations.csv").read_bytes()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("how", BOTH)
-@pytest.mark.parametrize("words", [["run"], ["list"], ["diff", "done", "done"], ["report", "done"], ["check", SOLVERS]])
+@pytest.mark.parametrize(
+    "words", [["run"], ["list"], ["diff", "done", "done"], ["report", "done"], ["check", SOLVERS]]
+)
 @pytest.mark.parametrize("after", [0.3, 1.0, 2.0])
 def test_a_command_ends_whenever_it_is_signalled(place: Path, words: list, how: int, after: float):
-    """While it imports, starts workers, writes: after so many s, wherever that is; what has ended by itself is done."""
+    """While it imports, starts workers, writes: after so many s, wherever that is; what has ended
+    by itself is done."""
     command = Command(*words, cwd=place)
     started = os.times().elapsed
     while os.times().elapsed - started < after and command.process.poll() is None:
@@ -142,15 +160,22 @@ def test_a_command_ends_whenever_it_is_signalled(place: Path, words: list, how: 
 @pytest.mark.parametrize(
     ("words", "stalled", "asked"),
     [
-        (["lesson"], "reports.lessons.lesson:play:waits", "GET /lesson/order HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+        (
+            ["lesson"],
+            "reports.lessons.lesson:play:waits",
+            "GET /lesson/order HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        ),
         (["play", "--engine", "reference"], "reports.game.session:Flight:waits", SOCKET),
     ],
 )
 def test_a_server_ends_though_a_page_never_gets_its_answer(
     place: Path, words: list, stalled: str, asked: str, how: int, status: int
 ):
-    """Ctrl-C is how it is stopped, and no fault; a page that has asked for what never comes is not waited for."""
-    command = Command(*words, cwd=place, stalled=stalled).when(lambda: "localhost:" in printed(place))
+    """Ctrl-C is how it is stopped, and no fault; a page that has asked for what never comes is not
+    waited for."""
+    command = Command(*words, cwd=place, stalled=stalled).when(
+        lambda: "localhost:" in printed(place)
+    )
     port = int(printed(place).split("localhost:")[1].split("/")[0])
     with socket.create_connection(("127.0.0.1", port)) as page:
         page.sendall(asked.replace("PORT", str(port)).encode())
@@ -168,7 +193,8 @@ def printed(place: Path) -> str:
 
 @pytest.mark.slow
 def test_what_takes_too_long_is_said_and_the_other_scene_is_judged(place: Path):
-    """--timeout reaches the exact answer: rows that say so, exit 1, and both commands that look at it say the same."""
+    """--timeout reaches the exact answer: rows that say so, exit 1, and both commands that look at
+    it say the same."""
     said = "two is not judged: the exact answer took longer than 2 s (--timeout)"
     run = Command(*TWO, "--timeout", "2", cwd=place, stalled=TRUTH)
     assert run.process.wait(300) == 1, run.errors.read_text()
@@ -194,7 +220,8 @@ def test_what_takes_too_long_is_said_and_the_other_scene_is_judged(place: Path):
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("number", STATUS)
 def test_a_command_is_signalled_until_it_ends(number: int):
-    """What is raised in a destructor is lost: a second later it is raised again, and not once it has been heard."""
+    """What is raised in a destructor is lost: a second later it is raised again, and not once it
+    has been heard."""
 
     class Deaf:
         def __del__(self) -> None:
@@ -216,8 +243,11 @@ def test_a_command_is_signalled_until_it_ends(number: int):
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
-def test_a_second_ctrl_c_does_not_cut_the_sentence_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    """Impatience while it is said what is kept: it is said, and the status is that of the first signal."""
+def test_a_second_ctrl_c_does_not_cut_the_sentence_off(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """Impatience while it is said what is kept: it is said, and the status is that of the first
+    signal."""
 
     def kept() -> str:
         signal.raise_signal(signal.SIGINT)
@@ -233,7 +263,8 @@ def test_a_second_ctrl_c_does_not_cut_the_sentence_off(tmp_path: Path, capsys: p
 def test_a_finished_run_takes_its_place_whole_whenever_it_is_signalled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    """SIGTERM between the two renames: the old run is gone, the new one is there, and it is said that all is done."""
+    """SIGTERM between the two renames: the old run is gone, the new one is there, and it is said
+    that all is done."""
     made, target, rename = tmp_path / "out.part", tmp_path / "out", Path.rename
     for folder, text in ((made, "new"), (target, "old")):
         folder.mkdir()
@@ -263,7 +294,8 @@ def test_a_finished_run_takes_its_place_whole_whenever_it_is_signalled(
     ],
 )
 def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: str, text: str):
-    """`kill -9` of a process that waits, for 60 s, for a call: the process of the file does not stay behind."""
+    """`kill -9` of a process that waits, for 60 s, for a call: the process of the file does not
+    stay behind."""
     (tmp_path / name).write_text(text)
     question = {"spheres": [[0.0] * 12], "calls": [["integrate", 0, 1e-3]], "world": False}
     asks = (

@@ -1,4 +1,5 @@
-"""Nothing that is somebody else's is replaced, moved or written over: whatever it is called, wherever it lies."""
+"""Nothing that is somebody else's is replaced, moved or written over: whatever it is called,
+wherever it lies."""
 
 from __future__ import annotations
 
@@ -16,7 +17,16 @@ import pytest
 
 from reports.commands import run as run_command
 from reports.run.folders import RUN, begun, made_anew, replace_folder
-from reports.run.made import MADE, Kind, Made, may_overwrite, put_made, read_made, stranger_in, writing
+from reports.run.made import (
+    MADE,
+    Kind,
+    Made,
+    may_overwrite,
+    put_made,
+    read_made,
+    stranger_in,
+    writing,
+)
 from reports.terminal.exits import FolderTaken
 from reports.terminal.foreign_text import put_text, whole
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
@@ -78,19 +88,35 @@ def written(path: Path) -> None:
 MEDDLING: dict[str, tuple[str, Callable[[Path], object], str]] = {
     "a file": ("notes.txt", written, "holds notes.txt, which crosscheck run did not make"),
     "a hidden file": (".notes", written, "holds .notes"),
-    "a scene": ("scenes/mine.toml", written, "holds scenes/mine.toml, which crosscheck run did not make"),
+    "a scene": (
+        "scenes/mine.toml",
+        written,
+        "holds scenes/mine.toml, which crosscheck run did not make",
+    ),
     "a trajectory": ("trajectories/mine.npz", written, "holds trajectories/mine.npz"),
     "a table": ("compared/mine.csv", written, "holds compared/mine.csv"),
     "a folder": ("mine", Path.mkdir, "holds mine, which"),
     "a folder in a folder": ("trajectories/mine/a.npz", written, "holds trajectories/mine, which"),
-    "a folder named as a file": ("trajectories/0123456789abcdef.npz", Path.mkdir, "holds trajectories/0123456789abc"),
+    "a folder named as a file": (
+        "trajectories/0123456789abcdef.npz",
+        Path.mkdir,
+        "holds trajectories/0123456789abc",
+    ),
     "a pipe": ("pipe", os.mkfifo, "holds pipe, which"),
     "a link": ("link", lambda path: path.symlink_to("/"), "holds link, which"),
     "a folder that was moved": ("trajectories", moved_and_linked, "holds trajectories, which"),
     "a page that was moved": ("report.html", moved_and_linked, "holds report.html, which"),
-    "another page": ("report.html", written, "holds report.html, which is not as crosscheck run left it"),
+    "another page": (
+        "report.html",
+        written,
+        "holds report.html, which is not as crosscheck run left it",
+    ),
     "an edited table": ("deviations.csv", written, "holds deviations.csv, which is not as"),
-    "an edited scene": ("scenes/two-disks.toml", written, "holds scenes/two-disks.toml, which is not as"),
+    "an edited scene": (
+        "scenes/two-disks.toml",
+        written,
+        "holds scenes/two-disks.toml, which is not as",
+    ),
 }
 
 
@@ -100,7 +126,8 @@ MEDDLING: dict[str, tuple[str, Callable[[Path], object], str]] = {
 def test_a_folder_in_which_somebody_has_put_something_stays_as_it_is(
     here: Path, what: str, name: str, words: tuple[str, ...]
 ):
-    """Finished or interrupted, to be made again or to be gone on with: exit 2, one line that names it, no byte less."""
+    """Finished or interrupted, to be made again or to be gone on with: exit 2, one line that names
+    it, no byte less."""
     if name != "out":
         (here / "out").rename(here / name)
     path, meddle, said = MEDDLING[what]
@@ -115,10 +142,16 @@ def test_a_folder_in_which_somebody_has_put_something_stays_as_it_is(
 
 
 def test_the_folder_of_a_run_is_known_for_what_it_is(finished: Path):
-    """The control of the test above: where nobody has put anything, nothing is found; a run is no measurement."""
+    """The control of the test above: where nobody has put anything, nothing is found; a run is no
+    measurement."""
     assert stranger_in(finished, RUN) == ""
-    assert {"machine.json", "scenes/two-disks.toml", "report.html"} <= set(read_made(finished).files)  # type: ignore[union-attr]
-    assert stranger_in(finished, Kind("crosscheck speed")) == "was made by crosscheck run, not by crosscheck speed"
+    assert {"machine.json", "scenes/two-disks.toml", "report.html"} <= set(
+        read_made(finished).files
+    )  # type: ignore[union-attr]
+    assert (
+        stranger_in(finished, Kind("crosscheck speed"))
+        == "was made by crosscheck run, not by crosscheck speed"
+    )
 
 
 # What somebody's own folder may hold.
@@ -126,26 +159,42 @@ FOREIGN: dict[str, dict[str, str]] = {
     "scenes": {"scenes/a.toml": SCENE},
     "trajectories": {"trajectories/a.npz": "mine"},
     "a page": {"report.html": "<html>mine</html>"},
-    "tables": {"matched.csv": "mine", "speed.csv": "mine", "limits.csv": "mine", "index.html": "mine"},
+    "tables": {
+        "matched.csv": "mine",
+        "speed.csv": "mine",
+        "limits.csv": "mine",
+        "index.html": "mine",
+    },
     "an empty journal and scenes": {"journal.jsonl": "", "scenes/a.toml": SCENE},
     "another journal": {"journal.jsonl": '{"dear": "diary"}\n{"header": "no"}'},
-    "a journal as ours": {"journal.jsonl": '{"header": {"versions": {"crosscheck2d": "1"}}}\n', "scenes/a.toml": SCENE},
+    "a journal as ours": {
+        "journal.jsonl": '{"header": {"versions": {"crosscheck2d": "1"}}}\n',
+        "scenes/a.toml": SCENE,
+    },
     "another made.json": {"made.json": "[1, 2]", "report.html": "mine"},
     "a made.json that is torn": {"made.json": '{"command": "crosscheck r'},
-    "a made.json of other types": {"made.json": '{"command": 1, "finished": 2, "files": 3}', "scenes/a.toml": SCENE},
+    "a made.json of other types": {
+        "made.json": '{"command": 1, "finished": 2, "files": 3}',
+        "scenes/a.toml": SCENE,
+    },
     "a made.json for what is no name": {
         "made.json": '{"command": "crosscheck run", "finished": true, "files": {}, "out": 5}',
         "scenes/a.toml": SCENE,
     },
-    "a made.json of another command": {"made.json": '{"command": "make", "finished": true, "files": {}}'},
+    "a made.json of another command": {
+        "made.json": '{"command": "make", "finished": true, "files": {}}'
+    },
 }
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("what", FOREIGN)
 @pytest.mark.parametrize("name", ["out", "out.part"])
-def test_no_command_writes_into_somebody_elses_folder(tmp_path: Path, command: str, what: str, name: str):
-    """Whatever its files are called; the first that is in the way is named. Only some commands write to OUT.part."""
+def test_no_command_writes_into_somebody_elses_folder(
+    tmp_path: Path, command: str, what: str, name: str
+):
+    """Whatever its files are called; the first that is in the way is named. Only some commands
+    write to OUT.part."""
     (tmp_path / "my.toml").write_text(SCENE)
     for path, text in FOREIGN[what].items():
         (tmp_path / name / path).parent.mkdir(parents=True, exist_ok=True)
@@ -163,7 +212,8 @@ def test_no_command_writes_into_somebody_elses_folder(tmp_path: Path, command: s
 
 @pytest.mark.parametrize("name", ["out", "out.part"])
 def test_a_scene_is_not_lost_to_the_run_that_plays_it(tmp_path: Path, name: str):
-    """`run proj/scenes/a.toml --out proj`, and OUT inside the scenes' folder, and the scenes' folder itself."""
+    """`run proj/scenes/a.toml --out proj`, and OUT inside the scenes' folder, and the scenes'
+    folder itself."""
     (tmp_path / "out" / "scenes").mkdir(parents=True)
     (tmp_path / "out" / "scenes" / "a.toml").write_text(SCENE)
     if name != "out":
@@ -193,13 +243,19 @@ def test_a_link_to_nothing_is_refused(tmp_path: Path, command: str, to: str):
 def test_where_there_is_no_current_folder_any_more_it_is_said(tmp_path: Path, command: str):
     """It was deleted under the feet of the command: exit 2, one line, nothing is made."""
     gone = (
-        "import os, sys; os.mkdir('gone'); os.chdir('gone'); os.rmdir('../gone'); os.execv(sys.argv[1], sys.argv[1:])"
+        "import os, sys; os.mkdir('gone'); os.chdir('gone'); os.rmdir('../gone');"
+        " os.execv(sys.argv[1], sys.argv[1:])"
     )
     words = [
-        word if word != "my.toml" else "slow_collision" for word in COMMANDS[command] if word not in ("--dt", "0.02")
+        word if word != "my.toml" else "slow_collision"
+        for word in COMMANDS[command]
+        if word not in ("--dt", "0.02")
     ]
     done = subprocess.run(
-        [sys.executable, "-c", gone, CROSSCHECK, *words], cwd=tmp_path, capture_output=True, text=True
+        [sys.executable, "-c", gone, CROSSCHECK, *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
     )
 
     assert done.returncode == 2
@@ -223,7 +279,9 @@ def test_a_folder_that_is_where_a_link_leads_is_replaced_there(here: Path):
     assert sorted(path.name for path in here.iterdir()) == ["far", "my.toml", "out"]
 
 
-@pytest.mark.parametrize("words", [(*AGAIN[:-1], "out.part"), ("run", "--resume", "out.part")], ids=["again", "resume"])
+@pytest.mark.parametrize(
+    "words", [(*AGAIN[:-1], "out.part"), ("run", "--resume", "out.part")], ids=["again", "resume"]
+)
 def test_an_interrupted_run_is_not_replaced_under_its_own_name(here: Path, words: tuple[str, ...]):
     """`--out OUT.part` would bury what has ended in it."""
     (here / "out").rename(here / "out.part")
@@ -236,8 +294,11 @@ def test_an_interrupted_run_is_not_replaced_under_its_own_name(here: Path, words
     assert all_of(here) == before
 
 
-def test_what_comes_during_a_run_is_kept_and_so_is_the_run(here: Path, monkeypatch: pytest.MonkeyPatch):
-    """Exit 1: both stay; when it is gone --resume puts the run in its place, and nothing is played again."""
+def test_what_comes_during_a_run_is_kept_and_so_is_the_run(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Exit 1: both stay; when it is gone --resume puts the run in its place, and nothing is played
+    again."""
     make_report = run_command.make_report
 
     def meddling(*words: object) -> object:
@@ -288,9 +349,15 @@ def folder(path: Path, finished: bool, text: str) -> Path:
 
 
 @pytest.mark.parametrize("name", ["out", "o" * 250])
-def test_what_is_replaced_is_there_again_if_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str):
-    """The second rename fails: both folders are as they were. A name as long as `.part` allows is no hindrance."""
-    made, target = folder(tmp_path / f"{name}.part", False, "new"), folder(tmp_path / name, True, "old")
+def test_what_is_replaced_is_there_again_if_that_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+):
+    """The second rename fails: both folders are as they were. A name as long as `.part` allows is
+    no hindrance."""
+    made, target = (
+        folder(tmp_path / f"{name}.part", False, "new"),
+        folder(tmp_path / name, True, "old"),
+    )
     (tmp_path / f"{name[:250]}.old").write_text("somebody's own")
     rename = Path.rename
 
@@ -325,7 +392,8 @@ def test_what_was_killed_between_two_renames_is_gone_on_with(here: Path):
 
 
 def test_what_was_being_written_when_it_was_killed_is_ours(tmp_path: Path):
-    """A torn table, and the rest of a file that was not renamed, do not keep a run from being gone on with."""
+    """A torn table, and the rest of a file that was not renamed, do not keep a run from being gone
+    on with."""
     part = tmp_path / "out.part"
     part.mkdir()
     begun(part, RUN, tmp_path / "out")
@@ -353,7 +421,8 @@ def test_what_is_refused_before_it_is_written_leaves_the_record_as_it_was(tmp_pa
 
 
 def test_what_is_made_anew_takes_its_place_whole_or_not_at_all(tmp_path: Path):
-    """The folder of lessons, and of settings: the old one stays if it fails, or if somebody has put something there."""
+    """The folder of lessons, and of settings: the old one stays if it fails, or if somebody has put
+    something there."""
     kind, target = Kind("crosscheck lesson"), tmp_path / "all"
 
     def make(text: str, fails: bool = False) -> None:
@@ -376,7 +445,8 @@ def test_what_is_made_anew_takes_its_place_whole_or_not_at_all(tmp_path: Path):
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path):
-    """The old one stays, no rest is left, a link stays a link, and what is no file is written to."""
+    """The old one stays, no rest is left, a link stays a link, and what is no file is written
+    to."""
     path, link = tmp_path / "page.html", tmp_path / "link.html"
     put_text(path, "old")
     link.symlink_to("page.html")
@@ -413,10 +483,15 @@ def test_a_file_that_a_check_did_not_write_is_not_written_over(tmp_path: Path, o
 @pytest.mark.slow
 def test_two_runs_at_once_are_one(finished: Path, here: Path):
     """The one that is second is refused, whichever that is; the folder is one of the two."""
-    both = [subprocess.Popen([CROSSCHECK, *AGAIN], cwd=here, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    both = [
+        subprocess.Popen([CROSSCHECK, *AGAIN], cwd=here, stderr=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
     ended = [(one.communicate()[1], one.returncode) for one in both]
 
     assert sorted(code for _, code in ended) in ([0, 0], [0, 2])
     assert not [said for said, _ in ended if "Traceback" in said]
-    assert (here / "out" / "deviations.csv").read_bytes() == (finished / "deviations.csv").read_bytes()
+    assert (here / "out" / "deviations.csv").read_bytes() == (
+        finished / "deviations.csv"
+    ).read_bytes()
     assert sorted(path.name for path in here.iterdir()) == ["my.toml", "out"]

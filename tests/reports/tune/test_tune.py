@@ -1,4 +1,5 @@
-"""The search for matched settings: what it counts, what it refuses, and that adapters and table agree."""
+"""The search for matched settings: what it counts, what it refuses, and that adapters and table
+agree."""
 
 from __future__ import annotations
 
@@ -12,7 +13,16 @@ from adapters.engines import changed
 from adapters.matched import chosen, searched
 from adapters.pymunk import MATCHED as PYMUNK
 from reports.tune.score import FLOOR, TrialScores, against, at_cost, faults_of, measured, posed
-from reports.tune.search import BETTER, CHOSEN, COLUMNS, NO_SEARCH, TUNED, Search, searched_of, shown
+from reports.tune.search import (
+    BETTER,
+    CHOSEN,
+    COLUMNS,
+    NO_SEARCH,
+    TUNED,
+    Search,
+    searched_of,
+    shown,
+)
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.families.tuning import FAMILIES, LADDER, LEAST_GAP, one_of, tuning
 from scenarios.model import Array, Scenario
@@ -57,7 +67,9 @@ def test_the_tuning_scenes_are_not_those_of_the_suite():
     assert not {one.name for one in mine} & {one.name for one in suite}
     for one in mine:
         assert not [
-            other.name for other in suite if other.scene.n == one.scene.n and np.allclose(start(other), start(one))
+            other.name
+            for other in suite
+            if other.scene.n == one.scene.n and np.allclose(start(other), start(one))
         ]
     assert len({float(one.scene.radius[0]) for one in mine}) > len(mine) / 2
 
@@ -83,7 +95,9 @@ def test_near_misses_miss_and_grazing_pairs_collide():
         assert len(truth.collisions) == graze.scene.n / 2
 
 
-def played(error: float, order: float = 1.0, gained: float = 0.0, missed: int = 0, spurious: int = 0) -> TrialScores:
+def played(
+    error: float, order: float = 1.0, gained: float = 0.0, missed: int = 0, spurious: int = 0
+) -> TrialScores:
     """Three scenes of one family, with an error of an order in dt."""
     step_sizes = np.tile(error / np.array(LADDER, float) ** order, (3, 1))
     full = np.ones_like(step_sizes)
@@ -138,7 +152,10 @@ def test_a_run_that_fails_breaks_and_one_that_failed_before_does_not():
 def test_a_length_unit_of_two_radii_makes_spurious_collisions_in_near_misses_and_a_small_one_none():
     """Why Box2D 3.1 may not have the length unit of the smallest error: its margin is 2 % of it."""
     scenes = posed(("near_miss",), (0, 1))
-    small, large = (measured(partial(changed, "box2d_v3:matched", length_unit=unit), scenes) for unit in (0.5, 2.0))
+    small, large = (
+        measured(partial(changed, "box2d_v3:matched", length_unit=unit), scenes)
+        for unit in (0.5, 2.0)
+    )
 
     assert small.spurious.sum() == 0
     assert large.spurious.sum() > 0
@@ -146,10 +163,12 @@ def test_a_length_unit_of_two_radii_makes_spurious_collisions_in_near_misses_and
 
 
 def test_a_smaller_slop_brings_a_column_in_pymunk_nearer():
-    """At 1e-6 radii for 1e-2, with the position correction as it comes: less than half of the error."""
+    """At 1e-6 radii for 1e-2, with the position correction as it comes: less than half of the
+    error."""
     scenes = posed(("column",), (0, 1))
     before, now = (
-        measured(partial(changed, "pymunk:matched", slop=slop, bias=0.9**60), scenes) for slop in (1e-2, 1e-6)
+        measured(partial(changed, "pymunk:matched", slop=slop, bias=0.9**60), scenes)
+        for slop in (1e-2, 1e-6)
     )
 
     assert against(now, before, 1.0, scenes).same_dt < 0.5
@@ -158,7 +177,8 @@ def test_a_smaller_slop_brings_a_column_in_pymunk_nearer():
 
 @pytest.mark.slow
 def test_a_search_finds_its_way_back_from_a_bad_setting(monkeypatch: pytest.MonkeyPatch):
-    """On two families: from a slop of 1 % it takes a smaller one, and from what is matched nothing."""
+    """On two families: from a slop of 1 % it takes a smaller one, and from what is matched
+    nothing."""
     whole = searched_of("pymunk")
     slop = replace(whole, settings={"slop": whole.settings["slop"]}, pairs=())
     monkeypatch.setattr("reports.tune.search.searched_of", lambda _: slop)
