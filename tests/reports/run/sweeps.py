@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from reports.run import folders
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, wait_for
 
 # 24 cells of ms
@@ -68,6 +69,7 @@ def broken_off(whole: Path, out: Path, after: int) -> Path:
     (part / "journal.jsonl").write_text("".join(journal[:after]) + journal[after][:50])
     for name in ("deviations.csv", "runs.csv", "report.html"):
         (part / name).unlink()
+    folders.begun(part, folders.RUN, out)
     return part
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from reports.run.folders import RUN, begun
 from reports.run.journal import JOURNAL
 from tests.reports.terminal.command_line import crosscheck
 
@@ -35,6 +36,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def journal_of(made: Path, to: Path) -> Path:
     """A copy of an interrupted command's folder, in `to`, and the scene beside it; its journal."""
     shutil.copytree(made, to / "out.part")
+    begun(to / "out.part", RUN, to / "out")
     (to / "my.toml").write_text(SCENE)
     return to / "out.part" / JOURNAL
 
@@ -115,7 +117,7 @@ def test_a_line_that_is_none_of_its_own_is_reported(
     for resume in ((), ("--resume",)):
         done = crosscheck(*COMMANDS[name], *resume, "--out", "out", cwd=tmp_path)
         assert done.returncode == 2
-        assert f"{JOURNAL}: line 2 is no line of" in done.stderr
+        assert f"{JOURNAL}: line 2: " in done.stderr
 
 
 def test_what_was_torn_beside_the_journal_does_not_keep_the_stability_run_from_its_end(
