@@ -79,10 +79,10 @@ ADDED: dict[str, list[Added]] = {
         ),
         Added(
             "adapters/engines.py",
-            '    "toy:plain": Row(_toy, "flies through everything", 0.5, FLOAT64,'
+            '    "toy:plain": EngineRow(_toy, "flies through everything", 0.5, FLOAT64,'
             ' distributions=("typer",),\n                     options={"as it is": {}},'
             ' variants={"as_it_is": Variant({}, "nothing")}),\n',
-            "}  # fmt: skip\n\nOWN",
+            "}\n\nOWN",
         ),
     ],
     "a scenario": [
@@ -123,10 +123,11 @@ ADDED: dict[str, list[Added]] = {
     "a lesson": [
         Added(
             "reports/lessons/toy.py",
-            "from reports.lessons.lesson import Chart, Curve, Lesson, Shown\n\n\ndef"
+            "from reports.lessons.lesson import LessonChart, Curve, Lesson, Shown\n\n\ndef"
             ' show(settings):\n    curve = Curve("toy:plain", np.arange(2.0), np.arange(2.0))\n   '
-            ' return Shown([Chart("a toy", "x", "y", [curve])], None, [])\n\n\nTOY = Lesson("toy",'
-            ' "9", "A toy lesson", "Is it here?", ["It is."], [], ["toy:plain"], show)\n',
+            ' return Shown([LessonChart("a toy", "x", "y", [curve])], None, [])\n\n\n'
+            'TOY = Lesson("toy", "9", "A toy lesson", "Is it here?", ["It is."], [],'
+            ' ["toy:plain"], show)\n',
         ),
         Added("reports/lessons/toy.py", "import numpy as np\n\n", "from reports.lessons.lesson"),
         Added("reports/lessons/catalogue.py", "from reports.lessons.toy import TOY\n", "\nALL"),
@@ -205,7 +206,7 @@ def test_all_that_is_added_is_known_everywhere(grown: Path):
 import json
 from adapters.conformance.conform import conform
 from adapters.engines import ENGINES
-from adapters.mechanisms.options import FEATURES
+from adapters.mechanisms.options import OPTIONS
 from reports.compare.metrics import METRICS
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.pages import lesson_page
@@ -213,7 +214,7 @@ from reports.page.charts import CHARTS
 from reports.page.style import PALETTE, look
 from reports.run.cells import versions
 from reports.speed.budget import budget_of
-from reports.stability.engines import PLAYED
+from reports.stability.variants import VARIANTS
 from scenarios.catalogue import SCENARIOS
 found = conform("toy:plain", ENGINES["toy:plain"])
 print(json.dumps({
@@ -222,11 +223,11 @@ print(json.dumps({
     "look": look("toy", "plain")[:2] + look("toy", "plain")[3:4] == PALETTE[0],
     "version": versions()["typer"],
     "alike": [name for name in ENGINES if look(*name.split(":"))[:2] == look("toy")[:2]],
-    "feature": [each.change for each in FEATURES if each.engine == "toy:plain"],
-    "variant": PLAYED["toy:plain+as_it_is"].switch,
-    "parts": [row["part"] for row in budget_of("free_fall", 0, "toy:plain", 4)],
+    "option": [each.change for each in OPTIONS if each.engine == "toy:plain"],
+    "variant": VARIANTS["toy:plain+as_it_is"].change,
+    "contributions": [row["contribution"] for row in budget_of("free_fall", 0, "toy:plain", 4)],
     "verdicts": {each.probe: each.verdict for each in found},
-    "lesson": lesson_page(LESSONS["toy"], LESSONS["toy"].at([]).reported()),
+    "lesson": lesson_page(LESSONS["toy"], LESSONS["toy"].at([]).to_json()),
 }))
 """
     found = json.loads(python(grown, "-c", code).splitlines()[-1])
@@ -235,9 +236,9 @@ print(json.dumps({
     assert found["look"]
     assert found["alike"] == ["toy:plain"]
     assert found["version"] == version("typer")
-    assert found["feature"] == ["as it is"]
+    assert found["option"] == ["as it is"]
     assert found["variant"] == "nothing"
-    assert "friction" in found["parts"]
+    assert "friction" in found["contributions"]
     assert found["verdicts"]["free_flight"] == "keeps"
     assert found["verdicts"]["restitution_0.5"] == "departs"  # it has no collisions
     assert "A toy lesson" in found["lesson"]

@@ -146,7 +146,7 @@ def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) ->
         for what in ("missed", "spurious"):
             n, had = (int(getattr(played, what)[its].sum()) for played in (now, before))
             if n > had + np.sqrt(had):
-                faults.append(f"{name}: {n} collisions {what}, not {had}")
+                faults.append(f"{name}: {n} {what} collisions, not {had}")
         rise, risen = (float(played.gained[its].max()) for played in (now, before))
         if rise > MORE_ENERGY * risen + SOME_ENERGY:
             faults.append(f"{name}: energy wrong by {rise:.2g}, not {risen:.2g}")

@@ -145,8 +145,8 @@ class Nearby:
         room, slope, growth = limit**2 - (here**2).sum(), (here * drift).sum(), (drift**2).sum()
         if not room > 0:  # or nan, after a graze that no float64 can follow
             self.diverged = min(self.diverged, self.t[i])
-        elif growth and (s := room / (slope + np.sqrt(slope**2 + growth * room))) < since:
-            self.diverged = min(self.diverged, self.t[i] + s)
+        elif room < since * (speed := slope + np.sqrt(slope**2 + growth * room)):
+            self.diverged = min(self.diverged, self.t[i] + room / speed)
         self.dx[i], self.t[i] = here + drift * since, until
 
     def bounce(self, i: int, hop: Hop) -> None:

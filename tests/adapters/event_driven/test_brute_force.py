@@ -194,7 +194,7 @@ def plain_kernels(right="", wrong=""):
     # the kernels use.
     quiet = np.errstate(divide="ignore", invalid="ignore")
     return SimpleNamespace(
-        **names | {name: quiet(names[name]) for name in ("begin", "advance", "acceleration")}
+        **names | {name: quiet(names[name]) for name in ("begin", "advance", "accelerate")}
     )
 
 

@@ -84,7 +84,7 @@ def test_the_horizon_of_a_chaotic_scene_is_reported(name):
     run = scenario(name)
     truth = float64_truth(run)
     assert 0 < truth.horizon < run.duration
-    assert "float64 cannot tell" in truth.reason
+    assert "float64 cannot decide" in truth.reason
     assert truth(run.times).t[-1] <= truth.horizon
     assert truth(run.times).error_bound == 1e-9
 

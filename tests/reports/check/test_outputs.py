@@ -232,8 +232,8 @@ def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
     page_path = folder / "page.html"
     write_page(page_path, check_file(folder / "ben" / "Exercise.js"), smallest)
     page, heard = opened(browser, page_path.as_uri(), viewport={"width": width, "height": 800})
-    page.wait_for_function("engines.smallest")
-    at_end = "name => { engines.smallest.seek(1); return engines.smallest.positions(name); }"
+    page.wait_for_function("players.smallest")
+    at_end = "name => { players.smallest.seek(1); return players.smallest.positions(name); }"
     shown = {name: page.evaluate(at_end, name) for name in ("Exercise.js:own", "truth")}
     fits = page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     title = page.locator("h1").inner_text()

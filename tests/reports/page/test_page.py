@@ -123,7 +123,7 @@ def page(desktop: tuple[Page, list[str]]) -> Iterator[Page]:
 def with_engine(page: Page, name: str) -> None:
     """Scroll to a scenario and wait until its engine is there."""
     page.evaluate("name => document.getElementById('s-' + name).scrollIntoView()", name)
-    page.wait_for_function("name => engines[name]", arg=name)
+    page.wait_for_function("name => players[name]", arg=name)
 
 
 def test_every_chart_is_drawn_once_it_is_in_view(page: Page) -> None:
@@ -144,21 +144,21 @@ def test_nothing_is_drawn_before_it_is_in_view(browser: Browser, path: Path) -> 
     page, _ = opened(browser, path.as_uri())
     drawn = (
         page.locator(f"#s-{ASTEROIDS} .main-svg").count(),
-        page.evaluate("name => name in engines", ASTEROIDS),
+        page.evaluate("name => name in players", ASTEROIDS),
     )
     page.context.close()
 
     assert drawn == (0, False)
 
 
-def test_the_engine_moves_disks(page: Page) -> None:
+def test_the_replay_moves_disks(page: Page) -> None:
     """Another time is another picture and other positions."""
     with_engine(page, HEAD_ON)
     picture = "name => document.querySelector('#s-' + name + ' canvas').toDataURL()"
     before = page.evaluate(picture, HEAD_ON)
     seek = (
-        "name => [0, 1].map(t => { engines[name].seek(t); return"
-        " engines[name].positions('pymunk:matched'); })"
+        "name => [0, 1].map(t => { players[name].seek(t); return"
+        " players[name].positions('pymunk:matched'); })"
     )
     start, later = page.evaluate(seek, HEAD_ON)
 
@@ -167,17 +167,17 @@ def test_the_engine_moves_disks(page: Page) -> None:
 
 
 @pytest.mark.parametrize("name", [HEAD_ON, ORBIT, ASTEROIDS])
-def test_the_engine_shows_the_trajectory(
+def test_the_replay_shows_the_trajectory(
     page: Page, comparisons: list[Comparison], name: str
 ) -> None:
     """At the packed instants positions are those of the run, to half a step of the position
     grid."""
     with_engine(page, name)
     comparison = next(each for each in comparisons if each.scenario.name == name)
-    instants = np.array(page.evaluate("name => engines[name].pack.t", name))
+    instants = np.array(page.evaluate("name => players[name].pack.t", name))
     at_all = (
-        "([p, layer]) => engines[p].pack.t.map(t => { engines[p].seek(t); return"
-        " engines[p].positions(layer); })"
+        "([p, layer]) => players[p].pack.t.map(t => { players[p].seek(t); return"
+        " players[p].positions(layer); })"
     )
     shown = [page.evaluate(at_all, [name, engine]) for engine in PLAYED]
     rows = np.rint(instants / comparison.scenario.sample_interval).astype(int)
@@ -198,7 +198,7 @@ def test_the_truth_is_not_drawn_beyond_its_horizon(
     with_engine(page, ORBIT)
     truth = comparisons[1].truth
     assert truth is not None
-    at = "([name, t]) => { engines[name].seek(t); return engines[name].positions('truth'); }"
+    at = "([name, t]) => { players[name].seek(t); return players[name].positions('truth'); }"
     before, after = (page.evaluate(at, [ORBIT, float(truth.horizon) + s]) for s in (-0.1, 0.1))
 
     assert before is not None
@@ -206,22 +206,22 @@ def test_the_truth_is_not_drawn_beyond_its_horizon(
     assert "truth ends at" in page.locator(f"#s-{ORBIT} .ended").inner_text()
 
 
-def test_the_engine_is_played_with_the_keyboard(page: Page) -> None:
+def test_the_replay_is_played_with_the_keyboard(page: Page) -> None:
     """Arrows step by a frame, space plays and stops; nothing plays by itself."""
     with_engine(page, HEAD_ON)
     engine = page.locator(f"#s-{HEAD_ON} .player")
     engine.focus()
-    page.evaluate("name => engines[name].seek(0)", HEAD_ON)
+    page.evaluate("name => players[name].seek(0)", HEAD_ON)
 
-    assert page.evaluate("name => engines[name].playing", HEAD_ON) is False
+    assert page.evaluate("name => players[name].playing", HEAD_ON) is False
     engine.press("ArrowRight")
-    assert page.evaluate("name => engines[name].time === engines[name].pack.t[1]", HEAD_ON)
+    assert page.evaluate("name => players[name].time === players[name].pack.t[1]", HEAD_ON)
     engine.press("ArrowLeft")
-    assert page.evaluate("name => engines[name].time", HEAD_ON) == 0
+    assert page.evaluate("name => players[name].time", HEAD_ON) == 0
     engine.press(" ")
-    page.wait_for_function("name => engines[name].time > 0.05", arg=HEAD_ON)
+    page.wait_for_function("name => players[name].time > 0.05", arg=HEAD_ON)
     engine.press(" ")
-    assert page.evaluate("name => engines[name].playing", HEAD_ON) is False
+    assert page.evaluate("name => players[name].playing", HEAD_ON) is False
 
 
 def test_the_legend_hides_an_engine_everywhere(page: Page) -> None:
@@ -233,7 +233,7 @@ def test_the_legend_hides_an_engine_everywhere(page: Page) -> None:
     visible = "plot => plot.data.find(trace => trace.name === 'pymunk:matched').visible"
     page.locator(f"#s-{HEAD_ON} .legend input[value='pymunk:matched']").uncheck()
 
-    assert page.evaluate("name => engines[name].hidden.has('pymunk:matched')", HEAD_ON)
+    assert page.evaluate("name => players[name].hidden.has('pymunk:matched')", HEAD_ON)
     assert plot.evaluate(visible) is False
     page.locator(f"#s-{HEAD_ON} .picks button").first.click()
     assert plot.evaluate(visible) is True

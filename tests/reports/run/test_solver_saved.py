@@ -240,5 +240,5 @@ def test_modules_beside_the_file_are_read_up_to_a_limit(tmp_path: Path):
         (tmp_path / "package" / f"part{k}.py").write_text("#" * (LARGEST // 2))
     (tmp_path / "solver.py").write_text("def f():\n    import package.part0\n")
 
-    with pytest.raises(NotASolver, match=r"solver\.py: imports more than 1 MB from beside it"):
+    with pytest.raises(NotASolver, match=r"solver\.py: imports more than 1 MB from its folder"):
         read_solver(tmp_path / "solver.py")

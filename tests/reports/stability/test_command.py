@@ -183,24 +183,24 @@ def test_a_failure_is_one_click_away_and_opens_just_before_it(page: Page):
     sight."""
     section = page.locator("#c-tunnelling_thin_wall")
     section.scroll_into_view_if_needed()
-    page.wait_for_function("() => window.engines && window.engines['tunnelling_thin_wall']")
+    page.wait_for_function("() => window.players && window.players['tunnelling_thin_wall']")
     section.locator("button.watch").first.click()
     page.wait_for_function(
-        "() => engines['tunnelling_thin_wall'].pack.layers[0].name === 'pymunk:matched'"
+        "() => players['tunnelling_thin_wall'].pack.layers[0].name === 'pymunk:matched'"
     )
     opens, event, end = page.evaluate(
-        "() => { const p = engines['tunnelling_thin_wall']; return [p.time, p.pack.event.t,"
+        "() => { const p = players['tunnelling_thin_wall']; return [p.time, p.pack.event.t,"
         " p.until]; }"
     )
 
     assert opens < event <= end
     assert "the collision is missed" in section.locator(".says").inner_text()
     page.evaluate(
-        "() => engines['tunnelling_thin_wall'].seek(engines['tunnelling_thin_wall'].until)"
+        "() => players['tunnelling_thin_wall'].seek(players['tunnelling_thin_wall'].until)"
     )
     truth, played = page.evaluate(
         "() => ['truth', 'pymunk:matched'].map((name) =>"
-        " engines['tunnelling_thin_wall'].positions(name)[0][0])"
+        " players['tunnelling_thin_wall'].positions(name)[0][0])"
     )
     assert truth < 0 < played  # it is on the wrong side of the wall
 

@@ -129,7 +129,7 @@ def test_an_error_of_no_order_gains_nothing_from_cheaper_steps_within_the_ladder
     ("worse", "said"),
     [
         ({"spurious": 1}, "9 spurious collisions, not 0"),
-        ({"missed": 1}, "9 collisions missed, not 0"),
+        ({"missed": 1}, "9 missed collisions, not 0"),
         ({"gained": 0.02}, "energy wrong by 0.02, not 0"),
     ],
 )
