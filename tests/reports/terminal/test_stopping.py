@@ -71,9 +71,9 @@ STALLED = {
     "a scene in check of a folder": (["check", SOLVERS], ANSWER),
     "a lesson in lesson --export": (
         ["lesson", "order", "--export", "order.html"],
-        "reports.lessons.lesson:play",
+        "reports.lessons.lesson:play_once",
     ),
-    "a cell in replay": (["replay", "", "--out", "done"], "reports.run.playing:play"),
+    "a cell in replay": (["replay", "", "--out", "done"], "reports.run.playing:play_once"),
 }
 
 
@@ -162,7 +162,7 @@ def test_a_command_ends_whenever_it_is_signalled(place: Path, words: list, how: 
     [
         (
             ["lesson"],
-            "reports.lessons.lesson:play:waits",
+            "reports.lessons.lesson:play_once:waits",
             "GET /lesson/order HTTP/1.1\r\nHost: localhost\r\n\r\n",
         ),
         (["play", "--engine", "reference"], "reports.game.session:Flight:waits", SOCKET),
