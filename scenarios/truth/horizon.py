@@ -159,10 +159,12 @@ class Nearby:
         """
         normal, u, g = np.array([float(hop.nx), float(hop.ny)]), float(hop.speed), float(hop.fall)
         e, k = self.scene.restitution, np.arange(BOUNCES)[:, None]
-        dt = -self.dx[i] @ normal / u
-        du = self.dv[i] @ normal - g * dt
         begins = 2 / g * (1 - e**k) / (1 - e)
-        off = u * e**k * np.abs(dt + begins * du) + 2 * u / g * e ** (2 * k) * np.abs(du)
+        # at e = 1e-308 a bounce has no speed that float64 could divide by
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            dt = -self.dx[i] @ normal / u
+            du = self.dv[i] @ normal - g * dt
+            off = u * e**k * np.abs(dt + begins * du) + 2 * u / g * e ** (2 * k) * np.abs(du)
         if (far := (off**2).sum(axis=1) > (DIVERGED * self.scene.radius[i]) ** 2).any():
             self.diverged = min(self.diverged, self.t[i] + u * float(begins[int(far.argmax()), 0]))
         for part in (self.dx, self.dv):

@@ -14,6 +14,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from reports import cli
+from reports.run.folders import RUN, begun
 from reports.run.journal import JOURNAL
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
@@ -120,6 +121,7 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
     was."""
     part = tmp_path / "out.part"
     shutil.copytree(results, part)
+    begun(part, RUN, tmp_path / "out")
     before = (part / JOURNAL).read_bytes()
     engines = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
     again = crosscheck("stability", "slow_collision", *engines, "--out", "out", cwd=tmp_path)
