@@ -55,7 +55,9 @@ def print_summary(report: Report, page: str) -> None:
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine", no_wrap=True)
     for column in overview.SUMMARY.values():
-        table.add_column(column.title.replace(" ", "\n"), justify="right", no_wrap=True)
+        # ten engines are to fit into 80 columns
+        heading = column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")
+        table.add_column(heading, justify="right", no_wrap=True)
     names = overview.names_of(report.comparisons)
     for name, cells in overview.summary(report.comparisons, names, report.untrusted).items():
         table.add_row(name, *(cell.text for cell in cells))
