@@ -98,7 +98,7 @@ class TrialRow(Line):
     at: Number
     event: Words
     broken: Words
-    disk: Some
+    disk: Annotated[int, Field(ge=-1, le=MOST)]  # -1: all
     allowed: Some
     left: bool
 

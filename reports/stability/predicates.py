@@ -218,7 +218,7 @@ COLLISIONS_MISSED = Predicate(
     "collisions missed",
     "collisions",
     0.0,
-    "a disk passes through another that it should collision",
+    "a disk passes through another that it should collide with",
     _collisions_missed,
 )
 COLLISIONS_SPURIOUS = Predicate(
