@@ -9,7 +9,7 @@ from tests.hostile.small_run import TWO
 
 SCENES = Path(__file__).parents[1] / "data" / "scenes"
 FILE = "two.toml"
-TRUTH = ("truth", FILE, "--timeout", "5")
+TRUTH = ("truth", FILE, "--timeout", "20")
 PLAYED = (
     "run",
     FILE,
@@ -60,8 +60,8 @@ HARD: dict[str, tuple[str, tuple[int, ...], str]] = {
     ),
     "a million seconds in a box": (
         scene("0 0 -2.1938 2.0846 0.3", SQUARE, "restitution = 1.0\nsubsteps = [1]", 1e6, 1.0),
-        (1,),
-        "longer than 5 s",
+        (0,),
+        "horizon",
     ),
     "a hundred thousand seconds at rest": (scene("0 0 0 0", "", "", 1e5, 1.0), (0,), "horizon"),
     "a bounce that takes ever less time": (

@@ -129,7 +129,7 @@ def unfinished(here: Path) -> None:
     moved("out", "out.part", here)
     made = json.loads((here / "out.part" / "made.json").read_text())
     (here / "out.part" / "made.json").write_text(
-        json.dumps(made | {"finished": False}, indent=1) + "\n"
+        json.dumps(made | {"finished": False, "out": "out"}, indent=1) + "\n"
     )
 
 

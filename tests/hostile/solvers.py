@@ -94,7 +94,7 @@ LOADING: dict[str, tuple[str, str | bytes, str]] = {
         ),
         "",
     ),
-    "input": ("mine.py", "n = input('how many? ')\n", "nobody is there to answer"),
+    "input": ("mine.py", "n = input('how many? ')\n", "input() is not available"),
     "a module that is not there": (
         "mine.py",
         "import nothing_of_the_kind\n",
