@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import FLOAT32, FLOAT64, Engine, EngineRow, Mark, Variant, Work
+from adapters.engine import Engine
+from adapters.engine_row import FLOAT32, FLOAT64, EngineRow, Mark, Variant, Work
 from adapters.matched import Searched
 
 

@@ -16,12 +16,13 @@ MAY_IMPORT = {
 # From the bottom up; what stands in one line does not import each other. A folder's own files are
 # its layer "".
 LAYERS = {
-    "scenarios": ["regular", "model", "no_truth", "truth", "families", "files", "catalogue"],
+    "scenarios": ["regular faults", "model", "no_truth", "truth", "families", "files", "catalogue"],
     "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines", "record", "exact"],
     "adapters": [
         "matched safe_path",
         "engine",
-        "float32 play",
+        "advance engine_row first_collisions float32 run runaway",
+        "play",
         "reference pymunk box2d box2d_v3 event_driven",
         "own_solver",
         "engines",

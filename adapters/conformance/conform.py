@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from adapters.conformance.contract import CONTRACT
 from adapters.conformance.physics import PHYSICS
 from adapters.conformance.probe import Probe, ProbeReading
-from adapters.engine import EngineRow, Unsupported
+from adapters.engine import Unsupported
+from adapters.engine_row import EngineRow
 
 PROBES: dict[str, Probe] = CONTRACT | PHYSICS
 

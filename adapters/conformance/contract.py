@@ -19,8 +19,8 @@ from adapters.conformance.probe import (
     reported,
     scene_of,
 )
-from adapters.engine import EngineRow
-from adapters.play import fault_of
+from adapters.engine_row import EngineRow
+from adapters.runaway import fault_of
 
 NONE = np.zeros(2)
 # a scale, an inverse mass, a product, a sum: no path from a force to a velocity rounds more often

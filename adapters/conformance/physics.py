@@ -17,7 +17,7 @@ from adapters.conformance.probe import (
     one_disk,
     scene_of,
 )
-from adapters.engine import EngineRow
+from adapters.engine_row import EngineRow
 
 SPEEDS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)  # m/s, on both sides of Box2D's threshold of 1
 ROUNDINGS = (

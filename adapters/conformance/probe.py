@@ -11,8 +11,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.engine import Engine, EngineRow
-from adapters.play import first_collisions
+from adapters.engine import Engine
+from adapters.engine_row import EngineRow
+from adapters.first_collisions import first_collisions
 from scenarios.model import Array, Scene, frozen
 
 DT = 1 / 256  # s; a power of two, so that a whole number of steps is a time without rounding

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import FLOAT32, NOT_REPORTED, Engine
+from adapters.engine import NOT_REPORTED, Engine
+from adapters.engine_row import FLOAT32
 from adapters.engines import row_of
 from adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReference
 from scenarios.model import Scene

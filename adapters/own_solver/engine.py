@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import FLOAT64, ContactImpulse, EngineRow, Unsupported
+from adapters.engine import ContactImpulse, Unsupported
+from adapters.engine_row import FLOAT64, EngineRow
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
 from scenarios.model import Array, Scene, State

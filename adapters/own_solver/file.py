@@ -48,7 +48,7 @@ class SolverFailed(Exception):
 
     @property
     def status(self) -> str:
-        """Of a run that it ends, one of `STATUSES` of play.py."""
+        """Of a run that it ends, one of `STATUSES` of run.py."""
         return self.kind if self.kind in ("timeout", "crashed") else "error"
 
     def __str__(self) -> str:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from importlib.metadata import version
 from pathlib import Path
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.check.rows import TASKS, shown
 from reports.check.smallest import DT, Smallest
 from reports.check.verdict import FileCheck

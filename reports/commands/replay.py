@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
-from adapters.engine import EngineRow
+from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, OWN, read_row, row_of
 from reports.run.archive import STATE, Archive, from_trail, load_trajectory, stored_trajectory
 from reports.run.arguments import go_where_files_are

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from rich.table import Table
 
-from adapters.play import STATUSES
+from adapters.run import STATUSES
 from adapters.thrust_grid import off_grid_note
 from reports.lessons.catalogue import LESSONS
 from reports.page import overview

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from adapters.engine import FLOAT64
+from adapters.engine_row import FLOAT64
 from adapters.engines import ENGINES
-from adapters.play import Run
+from adapters.run import Run
 from reports.compare.delays import Jumps, jumps_of
 from reports.compare.faces import SAME, interval
 from reports.compare.metrics import METRICS

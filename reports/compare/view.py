@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engine import FLOAT64
+from adapters.engine_row import FLOAT64
 from reports.compare import laws
 from reports.compare.collisions import Matched, match
 from reports.compare.delays import (

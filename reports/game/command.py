@@ -8,11 +8,11 @@ from contextlib import closing
 from math import inf
 from pathlib import Path
 
-from adapters.engine import EngineRow
+from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, OWN
 from adapters.own_solver.engine import engine_file
 from adapters.own_solver.file import KINDS
-from adapters.play import fault_of
+from adapters.runaway import fault_of
 from reports.game.flight import FRAME, field_scenario
 from reports.game.messages import MOST_ENGINES
 from reports.game.server import Game

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from adapters.advance import advance
 from adapters.engine import Engine
 from adapters.engines import ENGINES
-from adapters.play import RUNAWAY, advance, fault_of, first_collisions, reach, weight_impulse
+from adapters.first_collisions import first_collisions, weight_impulse
+from adapters.runaway import RUNAWAY, fault_of, reach
 from reports.game.divergence import Divergence, Touches, divergence
 from reports.game.pilot import SHIP, Pilot
 from scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.play import turned
+from adapters.advance import turned
 from reports.game.flight import EARTH, EARTH_SIZE, Flight, Flyer, field_scenario
 from reports.game.messages import Fly, Frames, Key, Message, read_message
 from reports.game.pilot import SHIP

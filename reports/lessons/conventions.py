@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from adapters.conformance.conform import PROBES, Finding, conform
-from adapters.engine import EngineRow
+from adapters.engine_row import EngineRow
 from reports.page.style import number
 
 ASKED = (

@@ -14,7 +14,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from adapters.engines import ENGINES
-from adapters.play import Run, play_once
+from adapters.play import play_once
+from adapters.run import Run
 from reports.compare.comparison import Comparison, answered, cut
 from reports.compare.laws import deviation
 from reports.page.replay import pack_layers, played, ratio_of

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from adapters.engines import ENGINES
-from adapters.play import Run
+from adapters.run import Run
 from reports.compare.comparison import Comparison
 from reports.lessons.lesson import Curve, Lesson, LessonChart, Settings, Shown, Slider
 from reports.page.style import TRUTH, number

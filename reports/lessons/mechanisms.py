@@ -19,7 +19,8 @@ from adapters.mechanisms.ablated import (
     PYMUNK,
     AblatedReference,
 )
-from adapters.play import Run, play, play_once
+from adapters.play import play, play_once
+from adapters.run import Run
 from reports.compare.comparison import answered
 from reports.lessons.lesson import (
     Curve,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import plotly.graph_objects as go
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.compare import laws, scales, violations
 from reports.compare.comparison import Comparison, cut
 from reports.compare.delays import jumps_of

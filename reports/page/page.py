@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.matched import searched
-from adapters.play import Run
+from adapters.run import Run
 from adapters.thrust_grid import off_grid_note
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.page.style import TRUTH
 from scenarios.model import Array, Scenario, Trajectory
 

@@ -7,7 +7,7 @@ import math
 from typing import NamedTuple
 from zlib import crc32
 
-from adapters.engine import Mark
+from adapters.engine_row import Mark
 from adapters.engines import ENGINES
 from reports.terminal.foreign_text import encoded
 

@@ -25,7 +25,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.run.journal import JOURNAL
 from reports.run.journal_lines import checked_lines, no_use
 from reports.run.run_lines import KINDS

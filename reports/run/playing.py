@@ -15,8 +15,9 @@ from typing import NamedTuple
 
 from adapters.conformance.conform import Finding, conform
 from adapters.conformance.probe import loaded, plain
-from adapters.engine import EngineRow
-from adapters.play import Run, play_once, unwatched
+from adapters.engine_row import EngineRow
+from adapters.play import play_once, unwatched
+from adapters.run import Run
 from reports.run.archive import packed, parts_of
 from reports.run.cells import Cell, source_hash, versions
 from reports.run.worker_process import allow, leave

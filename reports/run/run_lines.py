@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from adapters.play import STATUSES
+from adapters.run import STATUSES
 from reports.run.journal_lines import (
     Count,
     Digest,

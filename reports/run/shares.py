@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.compare.comparison import COLUMNS, Comparison, compare
 from reports.compare.view import NOT_JUDGED
 from reports.run.answers import Answer, answer_of, no_answer, put_answer, read_answer

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from adapters.conformance.conform import no_answer
-from adapters.engine import EngineRow
-from adapters.play import Run
+from adapters.engine_row import EngineRow
+from adapters.run import Run
 from reports.run.archive import Archive, digest, from_trail, packed, stored_scene, trajectory_file
 from reports.run.cells import Cell, content_key, scene_hash
 from reports.run.folders import RUN

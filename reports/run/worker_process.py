@@ -29,7 +29,7 @@ class Failure(NamedTuple):
     """A task without a result.
 
     Attributes:
-        status: "crashed", "timeout" or "error", as in `STATUSES` of play.py.
+        status: "crashed", "timeout" or "error", as in `STATUSES` of run.py.
         reason: why.
         trail: what it left.
         outside: whether it failed for a reason outside what it plays: the machine, the memory, this

@@ -17,7 +17,8 @@ import numpy as np
 from adapters.engine import Engine
 from adapters.engines import row_of
 from adapters.mechanisms.table import FLIGHT, Mechanism, mechanisms_of, with_mechanisms
-from adapters.play import Run, play_once
+from adapters.play import play_once
+from adapters.run import Run
 from reports.compare import laws, scales
 from reports.compare.comparison import cut
 from reports.compare.view import View

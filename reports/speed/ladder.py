@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from adapters.advance import advance
 from adapters.engine import Engine
-from adapters.play import advance, play_once
+from adapters.play import play_once
 from reports.compare import laws
 from reports.run.scenes import open_scene
 from reports.speed.timing import Sample, Spent, Timed, interleaved

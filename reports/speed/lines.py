@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
-from adapters.play import STATUSES
+from adapters.run import STATUSES
 from reports.run.journal_lines import (
     Count,
     EngineProfile,

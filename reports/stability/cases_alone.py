@@ -9,7 +9,8 @@ from math import sqrt
 import numpy as np
 
 from adapters.engine import Unsupported
-from adapters.play import Run, fault_of, gather
+from adapters.run import Run, gather
+from adapters.runaway import fault_of
 from reports.stability.limits import Case
 from reports.stability.phases import EDGE, phase, sampled
 from reports.stability.predicates import (

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator, default_rng
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.stability.limits import RARELY, Case
 from reports.stability.predicates_gas import (
     ENERGY_DRIFTS,

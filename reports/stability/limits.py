@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import nan, sqrt
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.stability.predicates import Predicate
 from reports.stability.variants import VARIANTS, Variant, played
 from scenarios.model import Scenario

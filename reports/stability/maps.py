@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from adapters.engines import ENGINES, changed
-from adapters.play import Run, play_once
+from adapters.play import play_once
+from adapters.run import Run
 from reports.stability.cases_collisions import flyby
 from reports.stability.cases_gas import gas
 from reports.stability.cases_stacks import column

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.page import style
 from reports.page.charts import ChartLine, Drawing, figure_of, packed_charts, shortened
 from reports.page.documents import CHARTED, render

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.play import Run
+from adapters.run import Run
 from scenarios.model import Array, Scenario, Trajectory
 
 

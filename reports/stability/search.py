@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isfinite, isnan, nan
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.stability.limits import (
     ALL,
     LIMIT,

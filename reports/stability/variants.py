@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 from adapters.engine import Engine
 from adapters.engines import ENGINES, changed
-from adapters.play import Run, play_once
+from adapters.play import play_once
+from adapters.run import Run
 from scenarios.model import Scenario, Scene
 
 

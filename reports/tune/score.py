@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from adapters.advance import advance
 from adapters.engine import Engine
-from adapters.play import advance, play_once
+from adapters.play import play_once
 from reports.compare import laws, scales
 from reports.compare.collisions import match
 from scenarios.families.tuning import FAMILIES, LADDER, one_of

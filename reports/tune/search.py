@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from adapters.conformance.conform import conform
-from adapters.engine import EngineRow
+from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES
 from adapters.matched import Searched
 from reports.tune.score import Against, Make, TrialScores, against, cost_of, measured, posed

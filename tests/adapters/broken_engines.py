@@ -9,7 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from adapters.engine import ContactImpulse, Engine, EngineRow, Unsupported
+from adapters.engine import ContactImpulse, Engine, Unsupported
+from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES
 from adapters.reference import Reference
 from reference_impl import exercise, ordered

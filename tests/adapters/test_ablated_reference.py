@@ -25,8 +25,9 @@ from adapters.mechanisms.table import (
     mechanisms_of,
     with_mechanisms,
 )
-from adapters.play import Run, play
+from adapters.play import play
 from adapters.reference import Reference
+from adapters.run import Run
 from reference_impl import exercise
 from scenarios.catalogue import scenario
 from scenarios.families.placing import lay_out

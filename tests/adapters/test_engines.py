@@ -11,11 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adapters.advance import thrust_steps
 from adapters.conformance.probe import first_difference, history, loaded, one_disk, plain
 from adapters.engine import NOT_REPORTED
 from adapters.engines import ENGINES
-from adapters.play import STATUSES, play, thrust_steps
+from adapters.play import play
 from adapters.reference import Reference
+from adapters.run import STATUSES
 from reference_impl import exercise
 from reports.run.cells import Cell
 from reports.run.playing import play_cell

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from adapters.engine import ContactImpulse, Engine, NotStarted, Unsupported
 from adapters.engines import ENGINES
-from adapters.play import first_collisions, play, play_once
+from adapters.first_collisions import first_collisions
+from adapters.play import play, play_once
 from scenarios.catalogue import scenario
 
 NAME, SCENE = "reference:exercise", scenario("slow_collision")

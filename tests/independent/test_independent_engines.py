@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.play import Run, play
+from adapters.play import play
+from adapters.run import Run
 from scenarios import catalogue
 from scenarios.model import Scenario
 from tests.independent.plain_engines import KNOWN, PLAIN, Samples

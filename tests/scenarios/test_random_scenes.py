@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from adapters.event_driven.engine import EventDriven
-from adapters.play import Run, play
+from adapters.play import play
+from adapters.run import Run
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.compare.comparison import compare
 from reports.compare.metrics import METRICS
 from reports.compare.view import LEAST_SHARE, NOT_JUDGED, Value

@@ -16,7 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from adapters.engines import ENGINES
-from adapters.play import Run, play
+from adapters.play import play
+from adapters.run import Run
 from reports.compare import collisions, delays, faces, view
 from reports.compare.comparison import compare
 from reports.compare.metrics import METRICS, Metric, _largest_of_disks

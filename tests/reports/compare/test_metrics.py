@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.play import Run, play
+from adapters.play import play
+from adapters.run import Run
 from reports.compare.comparison import COLUMNS, compare, cut
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS

@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 
 from adapters.engines import ENGINES
-from adapters.play import Run, play
+from adapters.play import play
+from adapters.run import Run
 from reports.compare.comparison import Comparison, compare, cut
 from reports.compare.delays import WINDOW
 from reports.compare.metrics import METRICS

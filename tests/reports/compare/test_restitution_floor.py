@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from adapters.engine import FLOAT32, FLOAT64
+from adapters.engine_row import FLOAT32, FLOAT64
 from adapters.engines import ENGINES
 from adapters.play import play
 from reports.compare import restitution

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.engine import FLOAT64
+from adapters.engine_row import FLOAT64
 from adapters.engines import ENGINES
 from adapters.play import play
 from reports.compare import restitution

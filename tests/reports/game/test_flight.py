@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engine import EngineRow
+from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES
 from adapters.play import play
 from reports.game.flight import EARTH, FRAME, Flight, field_scenario

@@ -14,7 +14,8 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from adapters.engines import ENGINES
-from adapters.play import Run, play
+from adapters.play import play
+from adapters.run import Run
 from reports.compare.comparison import Comparison, compare
 from reports.lessons.catalogue import LESSONS
 from reports.page.charts import CHARTS

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.engine import EngineRow
+from adapters.engine_row import EngineRow
 from scenarios.model import State
 
 FATAL = 100  # the step

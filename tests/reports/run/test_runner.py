@@ -10,7 +10,7 @@ from unittest import mock
 
 import pytest
 
-from adapters.engine import EngineRow
+from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES
 from reports.run import playing, worker
 from reports.run.archive import from_trail, load_trajectory, packed

@@ -14,7 +14,8 @@ import pytest
 from adapters.own_solver import process as solver_process
 from adapters.own_solver.engine import engine_file
 from adapters.own_solver.file import LARGEST, NotASolver, read_solver
-from adapters.play import Run, play
+from adapters.play import play
+from adapters.run import Run
 from reports.check.command import make_page
 from reports.check.verdict import check_file
 from reports.run import suite

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engine import EngineRow
+from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES
 from adapters.mechanisms.ablated import AblatedReference
 from adapters.mechanisms.table import (

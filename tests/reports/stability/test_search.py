@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.play import Run
+from adapters.run import Run
 from reports.page.replay import pack_layers
 from reports.run.journal import plain
 from reports.run.runner import run_all

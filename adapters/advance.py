@@ -1,0 +1,68 @@
+"""Advances an engine by steps, with the thrusts that act during them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import cos, sin
+from time import perf_counter
+
+import numpy as np
+
+from adapters.engine import Engine
+from scenarios.model import Array, Scenario, Thrust
+
+
+def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: float) -> float:
+    """Advance `count` steps from step number `first`, applying the thrusts that are on; the seconds
+    inside `step`."""
+    seconds = 0.0
+    for step, acting in thrust_steps(scenario.thrusts, first, count, dt):
+        for thrust, share in acting:
+            force, torque = world_force(thrust, engine) * share, thrust.torque * share
+            engine.apply_force(thrust.disk, force, torque)
+        started = perf_counter()
+        engine.step(step)
+        seconds += perf_counter() - started
+    return seconds
+
+
+def thrust_steps(
+    thrusts: Sequence[Thrust], first: int, count: int, dt: float
+) -> Iterator[tuple[int, list[tuple[Thrust, float]]]]:
+    """Cut steps first .. first + count into (how many, acting): one by one where a thrust is on,
+    else in one go.
+
+    A thrust carries the share of the step during which its thrust is on, so that its impulse is
+    exact. It acts over all of the step: what that displaces a disk by is reported by
+    thrust_grid.py.
+    """
+    if not thrusts:
+        yield count, []
+        return
+    free = 0
+    for step in range(first, first + count):
+        shares = [(t, min(t.stop / dt, step + 1) - max(t.start / dt, step)) for t in thrusts]
+        # less is rounding of start / dt
+        if acting := [(t, share) for t, share in shares if share > 1e-9]:
+            if free:
+                yield free, []
+            yield 1, acting
+            free = 0
+        else:
+            free += 1
+    if free:
+        yield free, []
+
+
+def world_force(thrust: Thrust, engine: Engine) -> Array:
+    """(2,) N in the world frame; a body-frame force is turned by the disk's angle at the start of
+    the step."""
+    if thrust.frame == "world":
+        return thrust.force
+    return turned(thrust.force, engine.read().angle[thrust.disk])
+
+
+def turned(force: Array, angle: float) -> Array:
+    """(2,) N, turned by `angle` rad."""
+    x, y = force
+    return np.array([cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y])

@@ -1,0 +1,63 @@
+"""The collisions of an engine: where each contact begins, of one that reports an impulse in every
+step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from adapters.engine import ContactImpulse, Engine
+from scenarios.model import NO_COLLISIONS, Collisions, Scene, frozen
+
+
+def collisions_of(engine: Engine, scene: Scene, dt: float) -> Collisions:
+    """Those of an engine that may have failed: none if it cannot say any more."""
+    try:
+        impulses = engine.collisions()
+    except Exception:  # the run already carries the reason
+        return NO_COLLISIONS
+    return first_collisions(impulses, dt, weight_impulse(scene, dt))
+
+
+def weight_impulse(scene: Scene, dt: float) -> float:
+    """N s, the largest impulse that the weight of everything can give a contact during one step."""
+    moving = scene.mass[~scene.static].sum()
+    return float(2 * moving * np.linalg.norm(scene.gravity) * dt)
+
+
+def first_collisions(
+    collisions: Sequence[ContactImpulse], dt: float, weight: float = 0.0
+) -> Collisions:
+    """One collision where the impulses of a pair begin; its time is the end of the step.
+
+    An impulse in the step after another of the same pair continues it if it is no larger than
+    `weight` N s, or if the engine does not report how large it is: else it is a collision of its
+    own. Impulses of less than a millionth of the pair's strongest are rounding, and left out.
+    """
+    if not collisions:
+        return NO_COLLISIONS
+    step, i, j = (np.array(column) for column in list(zip(*collisions))[:3])
+    impulse = np.array([collision.impulse for collision in collisions])
+    low, high = np.minimum(i, j), np.maximum(i, j)
+    disk, other = np.where(low < 0, high, low), np.where(low < 0, low, high)
+    order = np.lexsort((step, other, disk))
+    rows = step[order], disk[order], other[order], impulse[order]
+    starts = first_of_pair(rows[1], rows[2])
+    strongest = np.maximum.reduceat(np.nan_to_num(rows[3]), np.flatnonzero(starts))[
+        np.cumsum(starts) - 1
+    ]
+    step, disk, other, impulse = (row[~(rows[3] < 1e-6 * strongest)] for row in rows)
+    begins = first_of_pair(disk, other) | (np.diff(step, prepend=step[0]) > 1) | (impulse > weight)
+    order = np.flatnonzero(begins)[np.lexsort((other[begins], disk[begins], step[begins]))]
+    return Collisions(
+        t=frozen((step[order] + 1) * dt),
+        i=frozen(disk[order], np.int64),
+        j=frozen(other[order], np.int64),
+        impulse=frozen(impulse[order]),
+    )
+
+
+def first_of_pair(disk: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(h,) True where rows sorted by pair come to a new pair."""
+    return np.append(True, (np.diff(disk) != 0) | (np.diff(other) != 0))

@@ -1,0 +1,50 @@
+"""What one engine made of one scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
+
+STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What one engine made of one scenario at one dt."""
+
+    engine: str
+    profile: str
+    scenario: str  # its name
+    dt: float  # s
+    status: str = "ok"  # one of `STATUSES`
+    reason: str = ""  # why the status is not "ok"
+    trajectory: Trajectory | None = None  # up to where it failed; None if nothing was played
+    seconds: float = 0.0  # wall time inside `step`, with the collision log on; no benchmark
+    settings: dict[str, tuple[Any, Any]] = field(default_factory=dict)  # (asked for, resolved)
+    versions: dict[str, str] = field(default_factory=dict)  # library -> version
+
+    @property
+    def name(self) -> str:
+        """`engine:profile`, the key in `ENGINES`."""
+        return f"{self.engine}:{self.profile}"
+
+
+def run_of(name: str, scenario: Scenario, dt: float) -> Run:
+    """A run of `engine:profile` of which nothing is known yet."""
+    engine, profile = name.split(":")
+    return Run(engine, profile, scenario.name, dt)
+
+
+def gather(scenario: Scenario, states: Sequence[State], collisions: Collisions) -> Trajectory:
+    """States at the first samples of a scenario as a `Trajectory`."""
+    return Trajectory(
+        t=frozen(scenario.times[: len(states)]),
+        position=frozen([state.position for state in states]),
+        velocity=frozen([state.velocity for state in states]),
+        angle=frozen([state.angle for state in states]),
+        angular_velocity=frozen([state.angular_velocity for state in states]),
+        collisions=collisions,
+    )
