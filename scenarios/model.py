@@ -46,7 +46,6 @@ class Scene:
     wrap: Array | None = None
 
     def __post_init__(self) -> None:
-        """Fill in the defaults, copy, freeze and check."""
         given = {name: value for name, value in vars(self).items() if value is not None}
         for name, value in (self._defaults() | given).items():
             object.__setattr__(self, name, value if name == "restitution" else frozen(value))
@@ -87,7 +86,6 @@ class Thrust:
     frame: Literal["world", "body"] = "world"  # "body": the force turns with the disk's angle
 
     def __post_init__(self) -> None:
-        """Freeze and check."""
         object.__setattr__(self, "force", frozen(self.force))
         check_thrust(self)
 
@@ -111,7 +109,6 @@ class Scenario:
     seed: int | None = None  # of a random scene
 
     def __post_init__(self) -> None:
-        """Freeze and check."""
         object.__setattr__(self, "substeps", tuple(self.substeps))
         object.__setattr__(self, "thrusts", tuple(self.thrusts))
         check_scenario(self)
@@ -143,8 +140,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Collisions:
-    """Collisions in order of time: where the impulses of a contact begin, however long they
-    last."""
+    """Collisions in order of time, one where a contact begins, however long it lasts."""
 
     t: Array  # (h,) s; for a stepping engine the end of the step that resolved the collision
     i: NDArray[np.int64]  # (h,) index of the first disk
@@ -159,7 +155,6 @@ class Collisions:
         return Collisions(frozen(t), frozen(i, np.int64), frozen(j, np.int64), frozen(impulse))
 
     def __len__(self) -> int:
-        """Number of collisions."""
         return len(self.t)
 
 

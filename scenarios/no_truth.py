@@ -1,7 +1,8 @@
-"""The one refusal of everything that answers exactly, and the verb that asks for an answer at all
-the times given."""
+"""The one refusal of everything that answers exactly, and the verbs that ask for an answer."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from scenarios.model import Array, Scenario, Trajectory
 
@@ -33,3 +34,13 @@ def truth_at(scenario: Scenario, t: Array) -> Trajectory:
             until,
         )
     return truth
+
+
+def answered(scenario: Scenario) -> tuple[Scenario, Trajectory | None]:
+    """The scenario and its truth at its samples; where there is none, the scenario says why."""
+    if scenario.truth is None:
+        return scenario, None
+    try:
+        return scenario, scenario.truth(scenario.times)
+    except NoTruth as refusal:
+        return replace(scenario, truth=None, without_truth=str(refusal)), None

@@ -222,3 +222,18 @@ def test_the_front_page_is_short_and_leads_to_every_other():
     assert set(TEXTS) - {"README.md"} <= {
         f"{path}/README.md" if "." not in path else path for path in linked
     }
+
+
+def test_what_is_read_first_is_short():
+    """In half an hour: README and the five files that the folders say to start with."""
+    first = (
+        "README.md",
+        "scenarios/model.py",
+        "reference_impl/exercise.py",
+        "adapters/engine.py",
+        "adapters/play.py",
+        "reports/compare/comparison.py",
+    )
+
+    assert sum(len((ROOT / path).read_text("utf-8").splitlines()) for path in first) < 700
+    assert set(first[1:]) <= set(re.findall(r"`([\w/]+\.py)`", TEXTS["ARCHITECTURE.md"]))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -18,26 +18,28 @@ Law = TypeVar("Law", bound=Callable[..., Any])
 
 
 def once(law: Law) -> Law:
-    """The law, worked out once for the same objects (or equal floats) and forgotten with the first
-    of them.
+    """The law, worked out once for the same arguments and forgotten with the first of them.
 
-    A run is set against each other engine at its dt: without this its energy would be added up some
-    forty times.
+    Trajectories, scenes and scenarios are frozen, and equal only to themselves. A run is set
+    against each other engine at its dt: without this its energy would be added up some forty times.
     """
-    known: WeakKeyDictionary[Any, dict[tuple[float, ...], tuple[Any, Any]]] = WeakKeyDictionary()
+    known: WeakKeyDictionary[Any, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
 
     @wraps(law)
     def remembered(what: Any, *others: Any) -> Any:
         found = known.setdefault(what, {})
-        key = tuple(other if isinstance(other, float) else id(other) for other in others)
-        if key not in found:
-            value = law(what, *others)
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-            found[key] = others, value  # the others are kept, so that no other object gets their id
-        return found[key][1]
+        if others not in found:
+            found[others] = read_only(law(what, *others))
+        return found[others]
 
-    return remembered  # type: ignore[return-value]
+    return cast(Law, remembered)
+
+
+def read_only(value: Any) -> Any:
+    """The same; an array cannot be edited any more."""
+    if isinstance(value, np.ndarray):
+        value.setflags(write=False)
+    return value
 
 
 @once

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from adapters.engine_row import FLOAT64
+from adapters.engines import ENGINES
+from adapters.run import Run
 from reports.compare import laws
 from reports.compare.collisions import Matched, match
 from reports.compare.delays import (
@@ -19,7 +21,7 @@ from reports.compare.delays import (
     momentum_outside,
     nearest_velocity,
 )
-from reports.compare.faces import on_faces
+from reports.compare.faces import SAME, interval, on_faces
 from reports.compare.restitution import Restitutions, effective_restitution
 from scenarios.model import Array, Collisions, Scenario, Trajectory
 
@@ -216,3 +218,32 @@ class View:
     def matched(self) -> Matched:
         """The collisions of the two."""
         return match(*self.collisions, self.end, self.dt)
+
+
+def beside(scenario: Scenario, run: Run, other: Trajectory | None, jumps: Jumps | None) -> View:
+    """What a run played beside `other`, over the samples both have."""
+    assert run.trajectory is not None
+    # a solver's file keeps float64
+    rounding = ENGINES[run.name].rounding if run.name in ENGINES else FLOAT64
+    k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
+    other = None if other is None else cut(other, k)
+    return View(scenario, run.dt, cut(run.trajectory, k), other, jumps, rounding)
+
+
+def cut(trajectory: Trajectory, k: int) -> Trajectory:
+    """The first `k` samples and the collisions up to the last of them."""
+    if k == len(trajectory):
+        return trajectory
+    # Steps, and so collisions, lie on the grid of the samples: a collision at the last of them is
+    # kept, however it rounds.
+    found = trajectory.collisions
+    early = found.t <= trajectory.t[k - 1] + SAME * interval(trajectory)
+    return replace(
+        trajectory,
+        t=trajectory.t[:k],
+        position=trajectory.position[:k],
+        velocity=trajectory.velocity[:k],
+        angle=trajectory.angle[:k],
+        angular_velocity=trajectory.angular_velocity[:k],
+        collisions=Collisions(found.t[early], found.i[early], found.j[early], found.impulse[early]),
+    )

@@ -16,11 +16,13 @@ from numpy.typing import ArrayLike
 from adapters.engines import ENGINES
 from adapters.play import play_once
 from adapters.run import Run
-from reports.compare.comparison import Comparison, answered, cut
+from reports.compare.comparison import Comparison
 from reports.compare.laws import deviation
+from reports.compare.view import cut
 from reports.page.replay import pack_layers, played, ratio_of
 from reports.page.style import TRUTH, number
 from scenarios.model import Array, Scenario, Trajectory
+from scenarios.no_truth import answered
 
 POINTS = 400  # of a curve, at most: more than a chart has pixels for
 Settings = Mapping[str, Any]

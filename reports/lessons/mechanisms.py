@@ -21,7 +21,6 @@ from adapters.mechanisms.ablated import (
 )
 from adapters.play import play, play_once
 from adapters.run import Run
-from reports.compare.comparison import answered
 from reports.lessons.lesson import (
     Curve,
     Lesson,
@@ -37,6 +36,7 @@ from scenarios.families.lesson import free_fall
 from scenarios.families.placing import lay_out
 from scenarios.families.walls import bouncing_ball_e1
 from scenarios.model import Array, Scenario, Scene, Trajectory
+from scenarios.no_truth import answered
 from scenarios.truth.exact import with_oracle
 
 ABLATED, PLAIN, NO_CCD = "reference:ablated", "reference:exercise", "box2d:matched+no_ccd"

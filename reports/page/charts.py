@@ -13,9 +13,9 @@ import plotly.graph_objects as go
 
 from adapters.run import Run
 from reports.compare import laws, scales, violations
-from reports.compare.comparison import Comparison, cut
+from reports.compare.comparison import Comparison
 from reports.compare.delays import jumps_of
-from reports.compare.view import View
+from reports.compare.view import View, beside
 from reports.page import style
 from reports.page.documents import deflated
 from scenarios.model import Array, Trajectory
@@ -57,16 +57,13 @@ class Chart:
 
 def views(comparison: Comparison, other: Trajectory | None) -> list[tuple[Run, View]]:
     """What the middle dt's runs played, each beside `other` and cut to the samples both have."""
-    played, scenario = [], comparison.scenario
-    jumps = jumps_of(other, scenario) if other is not None and other is comparison.truth else None
-    for run in comparison.middle_runs:
-        if run.trajectory is not None and len(run.trajectory) > 1:
-            k = min(len(run.trajectory), len(other) if other is not None else len(run.trajectory))
-            mine = cut(run.trajectory, k)
-            played.append(
-                (run, View(scenario, run.dt, mine, cut(other, k) if other else None, jumps))
-            )
-    return played
+    scenario, truth = comparison.scenario, comparison.truth
+    jumps = jumps_of(other, scenario) if other is not None and other is truth else None
+    return [
+        (run, beside(scenario, run, other, jumps))
+        for run in comparison.middle_runs
+        if run.trajectory is not None and len(run.trajectory) > 1
+    ]
 
 
 def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None]) -> list[ChartLine]:

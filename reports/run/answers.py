@@ -12,13 +12,12 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from reports.compare.comparison import answered
 from reports.run.archive import digest
 from reports.run.scenes import open_scene
 from reports.run.worker_process import Failure
 from reports.terminal.foreign_text import put_bytes
 from scenarios.model import Scenario
-from scenarios.no_truth import NoTruth
+from scenarios.no_truth import NoTruth, answered
 from scenarios.regular import opened
 from scenarios.truth.cache import UNREADABLE, packed, unpacked
 from scenarios.truth.exact import CLOSED_FORM, OracleTruth, TruthRecord

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from reports.compare.comparison import COLUMNS
 from reports.compare.metrics import METRICS
+from reports.compare.table import COLUMNS
 from reports.compare.view import NOT_JUDGED
 from reports.run.archive import Archive
 from reports.run.tables import is_sealed

@@ -18,11 +18,11 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import pandas as pd
 
 from adapters.run import Run
-from reports.compare.comparison import COLUMNS, Comparison, compare
+from reports.compare.comparison import Comparison, compare
+from reports.compare.table import status_row, table_of
 from reports.compare.view import NOT_JUDGED
 from reports.run.answers import Answer, answer_of, no_answer, put_answer, read_answer
 from reports.run.archive import Archive, as_found, digest, run_of
@@ -194,11 +194,8 @@ def compared(folder: Path, records: Records, answer: Answer) -> Comparison:
 def not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
     """A row for each run that was played to its end and is, all the same, not set against
     `versus`."""
-    rest = ("status", -1, np.nan, "", versus, np.nan, f"{NOT_JUDGED}: {why}")  # as `COLUMNS`
-    rows = [
-        (run.scenario, run.engine, run.profile, run.dt, *rest) for run in runs if run.status == "ok"
-    ]
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    says = f"{NOT_JUDGED}: {why}"
+    return table_of([status_row(run, says, versus) for run in runs if run.status == "ok"])
 
 
 def scenario_of(folder: Path, records: Records) -> Scenario:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.compare.comparison import Comparison, answered
+from reports.compare.comparison import Comparison
 from reports.run.answers import Answer, read_answer
 from reports.run.archive import Archive, digest, run_of
 from reports.run.folders import RUN
@@ -38,6 +38,7 @@ from reports.run.shares import (
 from reports.run.worker_process import Failure
 from reports.terminal.exits import say as warn
 from reports.terminal.foreign_text import encoded, is_part, put_text, whole
+from scenarios.no_truth import answered
 from scenarios.regular import all_of
 
 TABLES = ("deviations.csv", "runs.csv")

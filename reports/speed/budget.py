@@ -20,8 +20,7 @@ from adapters.mechanisms.table import FLIGHT, Mechanism, mechanisms_of, with_mec
 from adapters.play import play_once
 from adapters.run import Run
 from reports.compare import laws, scales
-from reports.compare.comparison import cut
-from reports.compare.view import View
+from reports.compare.view import View, cut
 from reports.run.scenes import open_scene
 from reports.speed.ladder import held
 from scenarios.model import Array, Scenario, Trajectory

@@ -6,9 +6,10 @@ import numpy as np
 
 from reports.compare import laws, scales
 from reports.compare.collisions import match, pair_keys, who
-from reports.compare.comparison import answered, cut
+from reports.compare.view import cut
 from reports.stability.predicates import Predicate, Reading, first_above
 from scenarios.model import Collisions, Scenario, Trajectory
+from scenarios.no_truth import answered
 
 MOST_RISE, MOST_OVERLAP, MOST_LOST = 0.05, 0.1, 0.5  # of the energy at hand; radii; of a way
 LEAST_WAY = 0.01  # radii between two samples, less of which is rounding

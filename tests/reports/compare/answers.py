@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from reports.compare.comparison import answered, cut
 from reports.compare.delays import jumps_of
-from reports.compare.view import View
+from reports.compare.view import View, cut
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Trajectory
+from scenarios.no_truth import answered
 
 
 def truth_of(name: str) -> tuple[Scenario, Trajectory]:

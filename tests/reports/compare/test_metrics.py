@@ -8,10 +8,11 @@ import pytest
 from adapters.engines import ENGINES
 from adapters.play import play
 from adapters.run import Run
-from reports.compare.comparison import COLUMNS, compare, cut
+from reports.compare.comparison import compare
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
-from reports.compare.view import NOT_JUDGED, View
+from reports.compare.table import COLUMNS
+from reports.compare.view import NOT_JUDGED, View, cut
 from reports.page.findings import findings
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Scenario, Scene, Thrust

@@ -11,10 +11,10 @@ import pytest
 from adapters.engines import ENGINES
 from adapters.play import play
 from adapters.run import Run
-from reports.compare.comparison import Comparison, compare, cut
+from reports.compare.comparison import Comparison, compare
 from reports.compare.delays import WINDOW
 from reports.compare.metrics import METRICS
-from reports.compare.view import LEAST_SHARE, NOT_JUDGED, View
+from reports.compare.view import LEAST_SHARE, NOT_JUDGED, View, cut
 from reports.page import overview
 from reports.page.charts import CHARTS
 from reports.page.findings import findings

@@ -12,8 +12,8 @@ import pytest
 
 from adapters.engines import ENGINES
 from reports.commands.truth import waiting
-from reports.compare.comparison import COLUMNS
 from reports.compare.metrics import METRICS
+from reports.compare.table import COLUMNS
 from scenarios.catalogue import SCENARIOS
 from tests.reports.terminal.command_line import crosscheck, forked, process
 

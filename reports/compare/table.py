@@ -1,0 +1,43 @@
+"""The tidy table: one number a row, with what was played, by whom, and what it is measured
+against."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from adapters.run import Run
+from reports.compare.view import Value
+
+COLUMNS = (
+    "scenario",
+    "engine",
+    "profile",
+    "dt_s",
+    "metric",
+    "disk",
+    "value",
+    "unit",
+    "versus",
+    "at_s",
+    "note",
+)
+Row = tuple[str, str, str, float, str, int, float, str, str, float, str]  # as `COLUMNS`
+
+
+def row_of(run: Run, metric: str, value: Value, unit: str, versus: str) -> Row:
+    """A number of a run."""
+    whose = (run.scenario, run.engine, run.profile, run.dt, metric)
+    return (*whose, value.disk, value.value, unit, versus, value.at, value.note)
+
+
+def status_row(run: Run, why: str, versus: str = "itself") -> Row:
+    """In place of numbers: why there is none of a run."""
+    return row_of(run, "status", Value(np.nan, note=why), "", versus)
+
+
+def table_of(rows: Sequence[Row]) -> pd.DataFrame:
+    """The rows as a table; of none an empty one."""
+    return pd.DataFrame(rows, columns=list(COLUMNS))
