@@ -321,7 +321,7 @@ def fastest(scene: Scene) -> float:
     return float(np.sqrt((scene.velocity**2).sum(axis=1).max() + 2 * fall))
 
 
-class Listener(Box2D.b2ContactListener):
+class Listener(Box2D.b2ContactListener):  # type: ignore[misc]
     """Logs (step, i, j, impulse in the engine's units) of every contact with an impulse."""
 
     def __init__(self, engine: Box2DEngine) -> None:

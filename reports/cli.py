@@ -128,13 +128,11 @@ def run(
     from reports.commands import run as run_command
 
     means = run_command.means_of(workers, timeout, memory, scheduler)
-    if resume is None:
-        command = shlex.join(["crosscheck", *sys.argv[1:]])
-        run_command.run_plan(
-            scenes or [], engine or [], dt or [], full, seed, timings, out, means, command
-        )
-    asked = [scenes, engine, dt, full, seed, timings, out != DEFAULT_OUT]
-    run_command.resume(resume, means, alone=not any(asked))
+    what = scenes or [], engine or [], dt or [], full, seed, timings
+    if resume is not None:
+        run_command.resume(resume, means, alone=not any(what) and out == DEFAULT_OUT)
+    command = shlex.join(["crosscheck", *sys.argv[1:]])
+    run_command.run_plan(run_command.Asked(*what, out), means, command)
 
 
 @app.command()

@@ -327,14 +327,14 @@ def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array
     return Grid(pair(side), pair(shape), pair(span), pair(shift), torus is not None), low
 
 
-def pair(array: NDArray) -> Any:
+def pair(array: NDArray[Any]) -> Any:
     """(2,) as the two Python numbers in it."""
     return tuple(array.tolist())
 
 
 def walls_by_cell(
     scene: Scene, low: Array, side: Array, shape: NDArray[np.int64]
-) -> tuple[NDArray, NDArray]:
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """For each cell the walls that a disk in it may touch: where its list begins, (cells + 1,), and
     all lists."""
     centre = low + side * (

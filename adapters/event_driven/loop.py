@@ -61,45 +61,56 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
     counters[LOGGED] = 0; or ACCUMULATION, REENTRY or ROUND_END, with clock[STOP], counters[WHO] and
     counters[WHOM] when and for whom the answer ends.
     """
-    disks, clock = arena.disks, arena.clock
+    tree, clock = arena.tree, arena.clock
     while arena.counters[LEFT] > 0:
         arena.counters[LEFT] -= 1
-        now = arena.tree[1].time
-        i: Any = np.int64(arena.tree[1].who)
+        now: float = tree[1].time
+        i: Any = np.int64(tree[1].who)
         if clock[BASE] + now > until:
             return DONE
         if arena.counters[LOGGED] == len(arena.log):
             return LOG_FULL
         if now > EPOCH:
-            begin_epoch(disks, arena.tree, arena.runs, clock)
+            begin_epoch(arena.disks, tree, arena.runs, clock)
             continue
-        a = disks[i]
-        j: Any = np.int64(-1)
-        beyond: Any = np.int64(ALL)
-        fresh, status = True, GOES_ON
-        fly(a, now, scenery)
-        if a.pair_time <= a.own_time:
-            b = disks[a.partner]
-            if b.count == a.partner_count:
-                j = np.int64(a.partner)
-                fly(b, now, scenery)
-                status = collision(arena, scenery, i, j)
-        elif a.own_code < WRAP:
-            side = a.own_code - EDGE
-            cross(disks, arena.head, arena.grid, i, side)
-            # the contact in the record still holds: three cells are new
-            if not (len(scenery) and arena.rules.mixed):
-                fresh, beyond = False, np.int64(side)
-        elif len(scenery):
-            status = alone(arena, i)
+        status, partner, side = happen(arena, scenery, i, now)
         if status != GOES_ON:
             return status
-        # one place from which to search, for one copy of the search in the machine code
-        while i >= 0:
-            if disks[i].weight > 0.0:
-                renew(arena, scenery, i, fresh, beyond)
-            i, j = j, np.int64(-1)
+        renew_both(arena, scenery, i, partner, side)
     return GOES_ON
+
+
+@pasted
+def happen(arena: Arena, scenery: Scenery, i: int, now: float) -> tuple[int, int, int]:
+    """Let the event in the record of disk `i` happen at `now`.
+
+    Returns a status as `advance`; the other disk of a collision, or -1; the side over which the
+    disk came into a cell, its contact still the next, or ALL.
+    """
+    a = arena.disks[i]
+    fly(a, now, scenery)
+    if a.pair_time <= a.own_time:
+        j: Any = np.int64(a.partner)
+        b = arena.disks[j]
+        if b.count == a.partner_count:
+            fly(b, now, scenery)
+            return collision(arena, scenery, i, j), j, ALL
+        return GOES_ON, -1, ALL  # the record is stale
+    if a.own_code < WRAP:
+        side = a.own_code - EDGE
+        cross(arena.disks, arena.head, arena.grid, i, side)
+        # the contact in the record still holds: three cells are new
+        return GOES_ON, -1, ALL if len(scenery) and arena.rules.mixed else side
+    return alone(arena, i) if len(scenery) else GOES_ON, -1, ALL
+
+
+@pasted
+def renew_both(arena: Arena, scenery: Scenery, i: int, j: int, side: int) -> None:
+    """New records of who took part; in a loop, for one copy of the search in the machine code."""
+    while i >= 0:
+        if arena.disks[i].weight > 0.0:
+            renew(arena, scenery, i, side == ALL, side)
+        i, j = j, -1
 
 
 @pasted

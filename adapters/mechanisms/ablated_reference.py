@@ -29,6 +29,7 @@ from reference_impl.compiled import compiled
 from reference_impl.exercise import collide, collide_wall, touching, touching_wall, wrap
 from reference_impl.state import Disks, World
 
+Collision = tuple[int, int, int, float]  # step, i, j or -1 - wall, impulse N s
 STAGES = (
     "accelerate",
     "move",
@@ -94,7 +95,7 @@ class Parameters(NamedTuple):
 @compiled
 def advance(
     disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, count: int
-) -> list:
+) -> list[Collision]:
     """Advance `count` steps, each move by `h` s; return the collisions as `exercise.advance`
     does."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
@@ -118,7 +119,7 @@ def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of func
     kept: Contacts,
     h: float,
     k: int,
-    collisions: list,
+    collisions: list[Collision],
 ) -> None:
     """One stage."""
     if stage == ACCELERATE:
@@ -188,7 +189,7 @@ def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -
 
 
 @compiled
-def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list) -> None:
+def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list[Collision]) -> None:
     """Task 2 of the exercise for one pair of disks after the other."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
@@ -198,7 +199,7 @@ def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list) 
 
 
 @compiled
-def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list) -> None:
+def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list[Collision]) -> None:
     """The same for one disk and wall after the other."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
@@ -209,7 +210,7 @@ def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list) 
 
 @compiled
 def meet(
-    disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, collisions: list
+    disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, collisions: list[Collision]
 ) -> None:
     """One pair, by the exercise; where nothing is to be projected, both are set back to where they
     met."""

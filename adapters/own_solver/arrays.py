@@ -21,7 +21,7 @@ from scenarios.model import Scene
 LOW, HIGH = np.array([-5.0, -3.0]), np.array([5.0, 3.0])  # m, the exercise's box
 
 
-def as_functions(module: ModuleType, restitution: float = 0.9) -> dict[str, Callable]:
+def as_functions(module: ModuleType, restitution: float = 0.9) -> dict[str, Callable[..., Any]]:
     """`integrate`, `collide`, `step` and `wrap` on spheres, by `module.advance`."""
     world = World(restitution=restitution)
     boxed = world._replace(low=LOW, high=HIGH)
@@ -66,9 +66,10 @@ class Whole:
     def whole_read(self, _argument: Any) -> list[list[float]]:
         """Position, velocity, angle and angular velocity of every disk."""
         state = self.engine.read()
-        return np.column_stack(
+        rows: list[list[float]] = np.column_stack(
             [state.position, state.velocity, state.angle, state.angular_velocity]
         ).tolist()
+        return rows
 
     def whole_collisions(self, _argument: Any) -> list[list[float]]:
         """(step, i, j, impulse), as `advance` reported them."""

@@ -166,7 +166,8 @@ def spheres_of(scene: Scene) -> list[list[float]]:
         scene.inertia[:, None],
         scene.radius[:, None],
     )
-    return np.hstack(columns).tolist()
+    rows: list[list[float]] = np.hstack(columns).tolist()
+    return rows
 
 
 def read_restitution(process: SolverProcess) -> float:

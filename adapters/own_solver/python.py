@@ -65,7 +65,7 @@ class PythonSolver:
             "wrap": "projectObjects",
             "begin": "initScene",
         }
-        self.file: dict[str, Callable] = {
+        self.file: dict[str, Callable[..., Any]] = {
             k: vars(module)[f] for k, f in named.items() if callable(vars(module).get(f))
         }
         self.whole: Any = None  # plays whole scenes by `advance`, where the file has it

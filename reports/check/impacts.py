@@ -34,7 +34,8 @@ def along(normal: Callable[[PairCollision], Array]) -> Impulse:
 
 def unit(vector: Array) -> Array:
     """Its direction; NaN of a vector of no length."""
-    return vector / np.hypot(*vector)
+    direction: Array = vector / np.hypot(*vector)
+    return direction
 
 
 def tangent(h: PairCollision) -> Array:

@@ -7,6 +7,8 @@ Wanner, Geometric Numerical Integration, I.1).
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from reports.check.questions import QUESTIONS, Answer, Ball
@@ -163,8 +165,8 @@ def law_row(
     asked: str,
     unit: str,
     laws: dict[str, Law],
-    given: list[tuple],
-    came: list,
+    given: list[tuple[Any, ...]],
+    came: list[Any],
     words: dict[str, str],
 ) -> CheckRow:
     """A row whose cause is the law of the table that gives what came."""
@@ -185,7 +187,7 @@ def law_row(
     )
 
 
-def one_axis(laws: dict[str, Law], given: list[tuple], came: list) -> str | None:
+def one_axis(laws: dict[str, Law], given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
     """The mistakes in x and y where they are not the same, or one is right."""
     axes = []
     for axis in range(2):
@@ -199,7 +201,7 @@ def one_axis(laws: dict[str, Law], given: list[tuple], came: list) -> str | None
     return "; ".join(f"of {name}: {mistake}" for name, mistake in zip("xy", axes) if mistake)
 
 
-def damped(given: list[tuple], came: list) -> str | None:
+def damped(given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
     """Where the velocity is also multiplied by a constant: which."""
     coasting_v, coasting_came = np.asarray(given[2][0]), np.asarray(came[2], float)
     factor = float(np.mean(coasting_came / coasting_v))

@@ -210,7 +210,7 @@ def across_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
 def way_of(seen: list[tuple[Ball, Ball, Ball]]) -> str | None:
     """Along what one of a pair is moved, of (it before, the other, it after); "" along the normal,
     None if unknown."""
-    ways = {"": lambda n, one, other: n} | WAYS
+    ways: dict[str, Callable[[Array, Ball, Ball], Array]] = {"": lambda n, one, other: n} | WAYS
     for name, way in ways.items():
         crosses = []
         for one, other, after in seen:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,7 +55,7 @@ class Question(NamedTuple):
     """Spheres and what is called on them; `world`: they are the file's own ufo and asteroids."""
 
     balls: tuple[Ball, ...]
-    calls: tuple[tuple, ...]
+    calls: tuple[tuple[Any, ...], ...]
     world: bool = False
 
 
@@ -188,7 +188,7 @@ def ask(process: SolverProcess, asked: dict[str, Question]) -> dict[str, Answer]
     return {name: answered(reply) for name, reply in zip(asked, process.request(requests))}
 
 
-def answered(reply: dict | SolverFailed) -> Answer:
+def answered(reply: dict[str, Any] | SolverFailed) -> Answer:
     """An answer from what the worker sent."""
     if isinstance(reply, SolverFailed):
         return Answer([], failed=reply)

@@ -16,7 +16,8 @@ from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_a
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
 from scenarios.truth.closed_forms import world_thrusts
-from scenarios.truth.exact import TruthRecord, computed
+from scenarios.truth.exact import computed
+from scenarios.truth.record import TruthRecord
 
 DT = 1e-3  # s, the exercise's
 INTERVAL = 0.02  # s
@@ -156,7 +157,8 @@ def truth_of(scenario: Scenario, record: TruthRecord | None) -> Trajectory:
 def rounding(place: Array, rate: Array, t: Array, dt: float) -> Array:
     """(k,) what single precision may add, in the unit of `place`: every step rounds place and rate
     by 2^-24."""
-    return TOLERANCE + 2.0**-24 * t / dt * (np.abs(place).max() + np.abs(rate).max() * t / 2)
+    room: Array = TOLERANCE + 2.0**-24 * t / dt * (np.abs(place).max() + np.abs(rate).max() * t / 2)
+    return room
 
 
 def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
@@ -199,7 +201,8 @@ def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) 
     # A solver may be a step late, so that what a collision adds is allowed from a step before it
     # on.
     leg = np.searchsorted(known[:, 0] - dt, t, side="right") - 1
-    return SLACK * (known[leg, 1] + known[leg, 2] * np.abs(t - known[leg, 0]))
+    room: Array = SLACK * (known[leg, 1] + known[leg, 2] * np.abs(t - known[leg, 0]))
+    return room
 
 
 def first_wrong(scenario: Scenario, contacts: Array, dt: float) -> str:
@@ -248,7 +251,7 @@ def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
 
 
 # question, s, then a row x, y, vx, vy (m, m/s) for every sphere, radii m, masses kg
-MET: dict[str, tuple] = {
+MET: dict[str, tuple[Any, ...]] = {
     "head_on": (
         "Where are two unequal spheres after they meet head-on?",
         1.0,

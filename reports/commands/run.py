@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
@@ -39,28 +40,32 @@ from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
 
 
-def run_plan(
-    scenes: Sequence[str],
-    engines: Sequence[str],
-    dts: Sequence[float],
-    full: bool,
-    seed: int,
-    timings: int,
-    out: Path,
-    means: Means,
-    command: str,
-) -> NoReturn:
-    """Play, compare, report into `out`; exits 0, 1 (an engine or a scene could not be compared), 2,
-    130 or 143."""
-    with opening(out):
-        out, folder = place_of(out), os.getcwd()
+@dataclass(frozen=True)
+class Asked:
+    """What is to be played, as it was typed, and the folder for the results."""
+
+    scenes: Sequence[str]
+    engines: Sequence[str]
+    dts: Sequence[float]
+    full: bool
+    seed: int
+    timings: int
+    out: Path
+
+
+def run_plan(asked: Asked, means: Means, command: str) -> NoReturn:
+    """Play, compare, report into `asked.out`; exits 0, 1 (an engine or a scene could not be
+    compared), 2, 130 or 143."""
+    with opening(asked.out):
+        out, folder = place_of(asked.out), os.getcwd()
+    scenes = asked.scenes or list(SCENARIOS)
     plan = RunPlan(
-        scenes=checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
-        engines={name: row_of(name) for name in checked_engines(engines)},
-        seed=seed,
-        dts=dts,
-        full=full,
-        timings=timings,
+        scenes=checked_scenes(scenes, asked.dts, asked.full, asked.seed),
+        engines={name: row_of(name) for name in checked_engines(asked.engines)},
+        seed=asked.seed,
+        dts=asked.dts,
+        full=asked.full,
+        timings=asked.timings,
         command=command,
         folder=folder,
     )

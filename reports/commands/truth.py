@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from functools import partial
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from rich.table import Table
@@ -68,7 +68,7 @@ def waiting(what: str) -> Iterator[None]:
         yield
 
 
-def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
+def as_plain(scenario: Scenario, record: TruthRecord) -> dict[str, Any]:
     """The record for programs; numbers that are not finite are text or null, as JSON has none."""
     collisions = [
         {
@@ -80,7 +80,7 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
         }
         for t, i, j, impulse, cosine in record.events.tolist()
     ]
-    return plain(
+    written: dict[str, Any] = plain(
         {
             "scenario": scenario.name,
             "method": record.method,
@@ -95,9 +95,10 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict:
             "still_known": list(record.remains),
         }
     )
+    return written
 
 
-def outcomes(record: TruthRecord) -> list[dict]:
+def outcomes(record: TruthRecord) -> list[dict[str, Any]]:
     """How a simultaneous collision may end: the velocity (m/s) of each disk, and the collisions in
     one order that leads there."""
     return [

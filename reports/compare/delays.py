@@ -93,9 +93,10 @@ def nearest_velocity(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: fl
     round: both are tried.
     """
     window = WINDOW * dt
-    return nearest(
+    found: Array = nearest(
         played.t, played.velocity, truth.velocity, jumps.limits, jumps.when, jumps.change, window
     )
+    return found
 
 
 @njit(cache=True)

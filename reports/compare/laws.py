@@ -57,7 +57,8 @@ def moving_inertia(scene: Scene) -> Array:
 @once
 def momentum(trajectory: Trajectory, scene: Scene) -> Array:
     """(k, 2) kg m/s: sum of m v."""
-    return np.einsum("i,kia->ka", moving_mass(scene), trajectory.velocity)
+    total: Array = np.einsum("i,kia->ka", moving_mass(scene), trajectory.velocity)
+    return total
 
 
 @once
@@ -70,7 +71,10 @@ def momenta(trajectory: Trajectory, scene: Scene) -> Array:
 def energies(trajectory: Trajectory, scene: Scene) -> Array:
     """(k, n) J: what each disk adds to `energy`."""
     linear = (trajectory.velocity**2).sum(axis=2) / 2 - trajectory.position @ scene.gravity
-    return linear * moving_mass(scene) + trajectory.angular_velocity**2 * moving_inertia(scene) / 2
+    both: Array = (
+        linear * moving_mass(scene) + trajectory.angular_velocity**2 * moving_inertia(scene) / 2
+    )
+    return both
 
 
 @once
@@ -91,7 +95,8 @@ def angular_momentum(trajectory: Trajectory, scene: Scene) -> Array:
 def kinetic_energy(trajectory: Trajectory, scene: Scene) -> Array:
     """(k,) J: sum of m v2 / 2 + I w2 / 2."""
     linear = (trajectory.velocity**2).sum(axis=2) @ moving_mass(scene) / 2
-    return linear + trajectory.angular_velocity**2 @ moving_inertia(scene) / 2
+    both: Array = linear + trajectory.angular_velocity**2 @ moving_inertia(scene) / 2
+    return both
 
 
 @once
@@ -121,7 +126,8 @@ def penetration(trajectory: Trajectory, scene: Scene) -> Array:
 
 def distance_to_segment(x: Array, start: Array, end: Array) -> Array:
     """(k,) m from points x (k, 2) to the segment."""
-    return np.linalg.norm(x - nearest_on_segment(x, start, end), axis=1)
+    distance: Array = np.linalg.norm(x - nearest_on_segment(x, start, end), axis=1)
+    return distance
 
 
 def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
@@ -164,7 +170,8 @@ def nearer_way(way: Array, scene: Scene) -> Array:
     if scene.wrap is None:
         return way
     size = scene.wrap[1] - scene.wrap[0]
-    return way - size * np.round(way / size)
+    nearer: Array = way - size * np.round(way / size)
+    return nearer
 
 
 def lengths(vectors: Array) -> Array:

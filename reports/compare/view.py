@@ -88,7 +88,8 @@ class View:
         assert self.other is not None
         played, moving = self.played, ~self.scenario.scene.static
         if self.jumps is None:
-            judged = collision_free(played, self.dt) & collision_free(self.other, self.dt) & moving
+            free = collision_free(played, self.dt) & collision_free(self.other, self.dt)
+            judged: np.ndarray = free & moving
         else:
             judged = (played.t < self.other.t[-1] - WINDOW * self.dt)[:, None] & moving
         judged[0] = False

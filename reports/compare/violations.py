@@ -47,7 +47,8 @@ def angular_momentum(view: View) -> Array | None:
     lever = np.outer(t**2 / 2, m @ played.velocity[0])
     actual = laws.angular_momentum(played, scene)
     expected = actual[0] + lever[:, 0] * g[1] - lever[:, 1] * g[0]
-    return np.abs(actual - expected) / (scales.angular_momentum(view.scenario) or 1.0)
+    share: Array = np.abs(actual - expected) / (scales.angular_momentum(view.scenario) or 1.0)
+    return share
 
 
 def energy(view: View) -> Array | None:
@@ -61,7 +62,8 @@ def energy(view: View) -> Array | None:
         return None
     if view.other is None:
         actual = laws.energy(view.played, scenario.scene)
-        return np.abs(actual - actual[0]) / (scales.energy(scenario) or 1.0)
+        share: Array = np.abs(actual - actual[0]) / (scales.energy(scenario) or 1.0)
+        return share
     return np.abs(view.energy_deviation) / (scales.energy(scenario, view.other) or 1.0)
 
 

@@ -251,7 +251,8 @@ class Flight:
         if self.scenario.scene.wrap is not None:
             span = self.scenario.scene.wrap[1] - self.scenario.scene.wrap[0]
             gap = gap - span * np.round(gap / span)
-        return np.hypot(*gap.T)
+        distance: Array = np.hypot(*gap.T)
+        return distance
 
     def saved(self) -> Scenario:
         """The flight so far as a scenario, up to the frame before the ship first left: a scene has

@@ -132,9 +132,10 @@ def show_horizon(settings: Settings) -> Shown:
     scene = scenario.scene
 
     def energy(each: Trajectory) -> np.ndarray:
-        return (scene.mass * (each.velocity**2).sum(axis=2) / 2).sum(axis=1) / (
+        share: np.ndarray = (scene.mass * (each.velocity**2).sum(axis=2) / 2).sum(axis=1) / (
             (scene.mass * (scene.velocity**2).sum(axis=1)).sum() / 2
         )
+        return share
 
     charts = [
         LessonChart("Energy of motion, of what it was", "time in s", "", shown.curves(energy))

@@ -45,12 +45,14 @@ class Seen(NamedTuple):
 
 def way(each: Trajectory) -> Array:
     """(k,) m that the first disk has gone along x."""
-    return each.position[:, 0, 0] - each.position[0, 0, 0]
+    way: Array = each.position[:, 0, 0] - each.position[0, 0, 0]
+    return way
 
 
 def aside(each: Trajectory) -> Array:
     """(k,) m that it has been deflected."""
-    return each.position[:, 0, 1] - each.position[0, 0, 1]
+    way: Array = each.position[:, 0, 1] - each.position[0, 0, 1]
+    return way
 
 
 SEEN = {

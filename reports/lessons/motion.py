@@ -196,7 +196,8 @@ def show_box(settings: Settings) -> Shown:
 
     def energy(each: Trajectory) -> np.ndarray:
         moving = (scene.mass * (each.velocity**2).sum(axis=2) / 2).sum(axis=1)
-        return moving + (scene.mass * each.position[:, :, 1]).sum(axis=1) * 9.81
+        energy: np.ndarray = moving + (scene.mass * each.position[:, :, 1]).sum(axis=1) * 9.81
+        return energy
 
     facts = [
         ("collisions of " + run.name, str(len(run.trajectory.collisions)))

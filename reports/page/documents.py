@@ -72,7 +72,7 @@ def plotly_source() -> str:
     """The whole library; imported only now, as it takes longer than a page that has no chart."""
     from plotly.offline import get_plotlyjs
 
-    return get_plotlyjs()
+    return str(get_plotlyjs())
 
 
 @cache

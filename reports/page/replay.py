@@ -140,7 +140,7 @@ def ratio_of(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) ->
     """Height over width of what is shown, so that the page keeps room for it before it is
     unpacked."""
     left, bottom, right, top = view_of(scenario, [trajectory for _, trajectory in layers])
-    return round((top - bottom) / (right - left), 4)
+    return float(round((top - bottom) / (right - left), 4))
 
 
 def layer(

@@ -20,8 +20,9 @@ from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth, answered
 from scenarios.regular import opened
 from scenarios.truth.cache import UNREADABLE, packed, unpacked
-from scenarios.truth.exact import CLOSED_FORM, OracleTruth, TruthRecord
+from scenarios.truth.exact import CLOSED_FORM, OracleTruth
 from scenarios.truth.oracle.work import Clock
+from scenarios.truth.record import TruthRecord
 
 OK, NONE = "ok", "none"
 # of the time for an answer: its horizon takes up to three quarters as long as its events

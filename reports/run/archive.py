@@ -105,7 +105,7 @@ class Archive:
         )
 
 
-def what_of(record: dict[str, Any]) -> tuple:
+def what_of(record: dict[str, Any]) -> tuple[Any, ...]:
     """What the line of a cell is of."""
     return tuple(record[name] for name in ("scene", "seed", "engine", "profile", "substeps"))
 

@@ -67,6 +67,10 @@ class Timing(NamedTuple):
         return "better" if self.high < 1 and self.factor < 1 / FACTOR else "same"
 
 
+Name = tuple[str, str, float]  # scenario, `engine:profile` as the table has it, dt in s
+Cells = dict[Name, dict[str, Any]]  # -> the line of the cell
+
+
 @dataclass(frozen=True)
 class Difference:
     """What came out.
@@ -140,7 +144,7 @@ def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
     return said, like
 
 
-def by_name(archive: Archive) -> dict[tuple, dict[str, Any]]:
+def by_name(archive: Archive) -> Cells:
     """(scenario, `engine:profile` as the table has it, dt in s) -> the line of the cell."""
     return {
         (r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r
@@ -148,9 +152,7 @@ def by_name(archive: Archive) -> dict[tuple, dict[str, Any]]:
     }
 
 
-def equal_keys(
-    before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]
-) -> set[tuple]:
+def equal_keys(before: Cells, after: Cells) -> set[Name]:
     """(scenario, `engine:profile`, dt in s) of the cells whose scene, settings and versions are the
     same."""
     return {
@@ -158,9 +160,7 @@ def equal_keys(
     }
 
 
-def changed_statuses(
-    before: dict[tuple, dict[str, Any]], after: dict[tuple, dict[str, Any]]
-) -> list[Change]:
+def changed_statuses(before: Cells, after: Cells) -> list[Change]:
     """The cells that ended in another way, or were not played again: that is worse, too."""
     changes = []
     for name, record in before.items():
@@ -179,7 +179,7 @@ def changed_statuses(
 
 
 def changed_judgement(
-    before: pd.DataFrame, after: pd.DataFrame, both: Collection[tuple]
+    before: pd.DataFrame, after: pd.DataFrame, both: Collection[Name]
 ) -> list[Change]:
     """Which cells, of those that `both` have, are not judged any more, or are now: of that only one
     has numbers."""
@@ -196,7 +196,7 @@ def changed_judgement(
     return changes
 
 
-def reasons(table: pd.DataFrame) -> dict[tuple[tuple, str], str]:
+def reasons(table: pd.DataFrame) -> dict[tuple[Name, str], str]:
     """((scenario, `engine:profile`, dt in s), against what) -> why it is not judged."""
     rows = table[(table.metric == "status") & table.note.str.startswith(NOT_JUDGED)].to_dict(
         "records"
@@ -226,7 +226,7 @@ def table_of(folder: Path) -> pd.DataFrame:
 
 
 def changed_numbers(
-    before: pd.DataFrame, after: pd.DataFrame, equal: set[tuple]
+    before: pd.DataFrame, after: pd.DataFrame, equal: set[Name]
 ) -> tuple[list[Change], Counter[str]]:
     """Every number that both tables have and that is not the same, and how many are, by engine.
 
@@ -289,8 +289,8 @@ def ratio(was: float, now: float) -> float:
 def timings_of(
     one: Archive,
     other: Archive,
-    before: dict[tuple, dict[str, Any]],
-    after: dict[tuple, dict[str, Any]],
+    before: Cells,
+    after: Cells,
 ) -> list[Timing]:
     """Of every engine the ratio after : before, over the cells that were timed in both, round by
     round."""

@@ -57,37 +57,64 @@ def run_all(
     Raises:
         NoScheduler: nothing answers at `scheduler`, or not any more.
     """
-    waiting, urgent = deque(tasks.items()), deque[Any]() if urgent is None else urgent
-    under_way: dict[Future, tuple[Hashable, Task]] = {}
-    ended: SimpleQueue[Future] = SimpleQueue()
-    lost: Counter[Hashable] = Counter()
+    waiting, lost = deque(tasks.items()), Counter[Hashable]()
+    urgent = deque() if urgent is None else urgent
+    room = math.inf if scheduler else AHEAD * workers
+    under_way = UnderWay(timeout, memory, alone)
     with threads(workers) as here, cluster_or(here, scheduler) as anywhere:
-        room = math.inf if scheduler else AHEAD * workers
         while urgent or waiting or under_way:
-            while urgent or (waiting and len(under_way) < room):
-                executor, (key, task) = (
-                    (here, urgent.popleft()) if urgent else (anywhere, waiting.popleft())
-                )
-                future = executor.submit(in_worker, task, timeout, memory, key in alone)
-                under_way[future] = key, task
-                future.add_done_callback(ended.put)
-            future = ended.get()
-            key, task = under_way.pop(future)
-            try:
-                outcome = future.result()
-            except CancelledError as gone:
-                raise NoScheduler("the scheduler has gone") from gone
-            except (
-                Exception
-            ) as error:  # not the task, whose faults are outcomes, but what carried it
+            while urgent:
+                under_way.begin(here, *urgent.popleft())
+            while waiting and len(under_way) < room:
+                under_way.begin(anywhere, *waiting.popleft())
+            key, task, future = under_way.next_ended()
+            outcome, error = outcome_of(future)
+            if error is not None:
                 lost[key] += 1
                 if lost[key] < ATTEMPTS:
                     waiting.append((key, task))
                     continue
-                outcome = Failure(
-                    "crashed", f"no machine could carry it out: {error}", outside=True
-                )
-            yield key, pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
+                why = f"no machine could carry it out: {error}"
+                outcome = Failure("crashed", why, outside=True)
+            yield key, outcome
+
+
+class UnderWay:
+    """The tasks that executors have been given, each with `timeout` s, `memory` bytes, and a
+    process of its own if its key is in `alone`."""
+
+    def __init__(self, timeout: float, memory: int, alone: Collection[Hashable]) -> None:
+        self.timeout, self.memory, self.alone = timeout, memory, alone
+        self.tasks: dict[Future[Any], tuple[Hashable, Task]] = {}
+        self.ended: SimpleQueue[Future[Any]] = SimpleQueue()
+
+    def __len__(self) -> int:
+        return len(self.tasks)
+
+    def begin(self, executor: Executor, key: Hashable, task: Task) -> None:
+        """Give a task to an executor."""
+        future = executor.submit(in_worker, task, self.timeout, self.memory, key in self.alone)
+        self.tasks[future] = key, task
+        future.add_done_callback(self.ended.put)
+
+    def next_ended(self) -> tuple[Hashable, Task, Future[Any]]:
+        """The next task that has ended, as soon as one has."""
+        future = self.ended.get()
+        return *self.tasks.pop(future), future
+
+
+def outcome_of(future: Future[Any]) -> tuple[Any | Failure, Exception | None]:
+    """What a task gave, its own faults included; or what befell that which carried it out.
+
+    Raises `NoScheduler` if it was a cluster, which has gone.
+    """
+    try:
+        outcome = future.result()
+    except CancelledError as gone:
+        raise NoScheduler("the scheduler has gone") from gone
+    except Exception as error:
+        return None, error
+    return pickle.loads(outcome) if isinstance(outcome, bytes) else outcome, None
 
 
 def affordable(workers: int) -> int:

@@ -255,7 +255,7 @@ def share_file(folder: Path, records: Records, answer: Answer) -> Path:
     return named_by(folder, records, (files, judge(), answer.lost), ".csv")
 
 
-def named_by(folder: Path, records: Records, what: tuple, suffix: str) -> Path:
+def named_by(folder: Path, records: Records, what: tuple[Any, ...], suffix: str) -> Path:
     """A file of a scene that is another one when anything of `what` is."""
     digest = hashlib.sha256(repr(what).encode()).hexdigest()[:16]
     return folder / "compared" / f"{records[0]['scenario']}-{digest}{suffix}"

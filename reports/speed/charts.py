@@ -94,7 +94,7 @@ def fronts(
 
 def front_of(
     drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any], y_axis: dict[str, Any]
-) -> dict:
+) -> dict[str, Any]:
     """The edge of what the points that nobody beats beat: all above and right of it is slower or
     worse than one.
 
@@ -297,7 +297,7 @@ def line(
     y: Any,
     text: Sequence[str],
     more: dict[str, Any] | None = None,
-) -> dict:
+) -> dict[str, Any]:
     """A trace in the look of its engine, with what is said of each point."""
     look = style.look(engine, profile)
     return {
@@ -397,7 +397,7 @@ def edge(axis: dict[str, Any], label: str) -> float:
 
 
 def figure(
-    traces: list[dict[str, Any]], x_axis: dict, y_axis: dict, height: int | None
+    traces: list[dict[str, Any]], x_axis: dict[str, Any], y_axis: dict[str, Any], height: int | None
 ) -> go.Figure:
     """The figure; page.js adds what all share."""
     layout: dict[str, Any] = {"hovermode": "closest", "xaxis": x_axis, "yaxis": y_axis}

@@ -8,7 +8,7 @@ from math import ceil
 
 from adapters.engines import ENGINES
 from adapters.mechanisms.table import MECHANISMS
-from reports.speed import ladder
+from reports.run.scenes import open_scene
 from reports.speed.effort import Effort
 from reports.speed.plan import SCENE, Measurement, Reach, SpeedPlan
 from reports.speed.timing import FEWEST_ROUNDS, LEAST, WARM_UP
@@ -52,7 +52,7 @@ def step_of(scenario: Scenario) -> float:
 def seconds_to_play(measurement: Measurement, reach: Reach) -> float:
     """s, of all step sizes, read at every sample."""
     scenario, samples = (
-        ladder.open_scene(measurement.scene, measurement.seed),
+        open_scene(measurement.scene, measurement.seed),
         reach[measurement.scene, measurement.seed],
     )
     reading = len(measurement.step_sizes) * samples * (READ + scenario.scene.n * READ_DISK)
@@ -62,7 +62,7 @@ def seconds_to_play(measurement: Measurement, reach: Reach) -> float:
 def seconds_to_time(measurement: Measurement, reach: Reach, effort: Effort) -> float:
     """s, of all rounds of all step sizes; the middle one is there twice on a ladder of a scene."""
     scenario, samples = (
-        ladder.open_scene(measurement.scene, measurement.seed),
+        open_scene(measurement.scene, measurement.seed),
         reach[measurement.scene, measurement.seed],
     )
     step_sizes = [

@@ -83,15 +83,15 @@ class Kept:
         """How many had ended before."""
         return len(self.results)
 
-    def __contains__(self, task: tuple) -> bool:
+    def __contains__(self, task: tuple[Any, ...]) -> bool:
         """Whether it had ended."""
         return json.dumps(task) in self.results
 
-    def __getitem__(self, task: tuple) -> Any:
+    def __getitem__(self, task: tuple[Any, ...]) -> Any:
         """What it gave."""
         return numbered(self.results[json.dumps(task)])
 
-    def add(self, task: tuple, result: Any) -> None:
+    def add(self, task: tuple[Any, ...], result: Any) -> None:
         """Keep what a task gave."""
         self.journal.append({"task": task, "result": result})
 

@@ -146,7 +146,7 @@ class Samples(Line):
     @model_validator(mode="after")
     def whole(self) -> Samples:
         """No round is missing, and none is there twice."""
-        rounds = defaultdict[tuple, list[int]](list)
+        rounds = defaultdict[tuple[Any, ...], list[int]](list[Any])
         for row in self.result:
             what = (
                 row.kind,
@@ -279,7 +279,7 @@ KINDS = Kinds(
 )
 
 
-def scene_of(task: list) -> str:
+def scene_of(task: list[Any]) -> str:
     """The scene that a task is of; "" if it is of none."""
     if task[0] == "budget":
         return str(task[1])

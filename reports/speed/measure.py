@@ -15,6 +15,7 @@ from adapters.engines import row_of
 from adapters.mechanisms.table import MECHANISMS
 from reports.run.machine import busy_cores
 from reports.run.runner import run_all
+from reports.run.scenes import open_scene
 from reports.run.worker_process import Failure
 from reports.speed import budget, ladder, models, sizes
 from reports.speed.estimate import estimate
@@ -109,7 +110,7 @@ def measure_errors(
     return played
 
 
-def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict]:
+def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict[str, Any]]:
     """A ladder whose worker died or hung once more, each step size by itself, so that the others
     are kept."""
     rows: list[dict[str, Any]] = []
@@ -120,7 +121,7 @@ def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict
     ):
         if isinstance(result, Failure):
             engine, profile = measurement.name.split(":")
-            scenario = ladder.open_scene(measurement.scene, measurement.seed)
+            scenario = open_scene(measurement.scene, measurement.seed)
             result = [
                 {
                     "scenario": scenario.name,
@@ -190,12 +191,14 @@ def measure_times(
     measured.samples, measured.truths = pd.DataFrame(rows), pd.DataFrame(truths)
 
 
-def timings(plan: SpeedPlan, played: Sequence[Measurement]) -> dict[tuple, Callable[[], Any]]:
+def timings(
+    plan: SpeedPlan, played: Sequence[Measurement]
+) -> dict[tuple[Any, ...], Callable[[], Any]]:
     """The tasks of the second pass: all measurements of a kind in a scene in one, as they are
     compared."""
     often: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
     makes = {name: row_of(name).make for name in plan.engines}
-    tasks: dict[tuple, Callable[[], Any]] = {}
+    tasks: dict[tuple[Any, ...], Callable[[], Any]] = {}
     for (kind, scene), group in groupby(played, key=lambda one: one[:2]):
         tasks["time", kind, scene] = partial(
             scene_rows, kind, scene, plan.seed, in_turns(list(group)), often
@@ -210,7 +213,7 @@ def timings(plan: SpeedPlan, played: Sequence[Measurement]) -> dict[tuple, Calla
 
 def in_turns(
     measurements: Sequence[Measurement],
-) -> dict[tuple[tuple[str, str], int, int], Callable]:
+) -> dict[tuple[tuple[str, str], int, int], Callable[..., Any]]:
     """((name, change), substeps, copy) -> engine.
 
     On a ladder of a scene each takes part twice at its middle dt, which gives the noise floor.
@@ -228,10 +231,10 @@ def in_turns(
 
 
 def scene_rows(
-    kind: str, scene: str, seed: int, measurements: Mapping, often: Mapping[str, Any]
+    kind: str, scene: str, seed: int, measurements: Mapping[Any, Any], often: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
     """Rows of `Measured.samples` of measurements as `in_turns` gives them."""
-    scenario, rows = ladder.open_scene(scene, seed), []
+    scenario, rows = open_scene(scene, seed), []
     for sample in ladder.times_of(scene, seed, measurements, **often):
         (name, change), k, copy = sample.key
         identity = {
@@ -245,8 +248,8 @@ def scene_rows(
 
 
 def size_rows(
-    makes: Mapping[str, Callable], plan: SpeedPlan, often: Mapping[str, Any]
-) -> dict[str, list]:
+    makes: Mapping[str, Callable[..., Any]], plan: SpeedPlan, often: Mapping[str, Any]
+) -> dict[str, list[Any]]:
     """samples: rows of `Measured.samples` for every number of disks; stopped: (name, disks,
     why)."""
     found, stopped = sizes.costs(
@@ -257,7 +260,7 @@ def size_rows(
 
 
 def idle_rows(
-    makes: Mapping[str, Callable], seed: int, often: Mapping[str, Any]
+    makes: Mapping[str, Callable[..., Any]], seed: int, often: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
     """Rows of `Measured.samples` of worlds without anything to do."""
     found = sizes.driving(makes, seed=seed, **often)
@@ -290,7 +293,7 @@ def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[st
 
 
 def done(
-    tasks: Mapping,
+    tasks: Mapping[Any, Any],
     workers: int,
     progress: Progress,
     what: str,

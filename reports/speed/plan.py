@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from adapters.engine import Engine
 from adapters.engines import row_of
 from adapters.mechanisms.options import OPTIONS, SWEEPS, Option, Sweep
+from reports.run.scenes import open_scene
 from reports.speed import ladder
 from reports.speed.effort import Effort
 
@@ -35,7 +36,7 @@ class Measurement(NamedTuple):
     step_sizes: tuple[int, ...]
 
     @property
-    def task(self) -> tuple:
+    def task(self) -> tuple[Any, ...]:
         """What stands for it where results are kept."""
         return ("error", *self[:5], *self.step_sizes)
 
@@ -101,7 +102,7 @@ class SpeedPlan:
         drawn = {draw for draw, samples in reach.items() if samples}
         for scene, seed in (draw for draw in self.seeded_scenes if draw in drawn):
             if scene in self.scenes:
-                step_sizes = self.effort.ladder(ladder.open_scene(scene, seed))
+                step_sizes = self.effort.ladder(open_scene(scene, seed))
                 yield from (
                     Measurement(SCENE, scene, seed, name, PLAIN, row_of(name).make, step_sizes)
                     for name in self.engines
@@ -142,5 +143,5 @@ def around(here: int) -> tuple[int, ...]:
 
 def middle(scene: str) -> int:
     """Steps in a sample interval at the dt the report shows."""
-    step_sizes = ladder.open_scene(scene, 0).substeps
+    step_sizes = open_scene(scene, 0).substeps
     return step_sizes[len(step_sizes) // 2]

@@ -115,7 +115,7 @@ def foreseen(course: Sequence[tuple[int, float]], n: int) -> float:
     if len(course) < 2:
         return 0.0
     (n1, cost1), (n2, cost2) = course[-2:]
-    return cost2 * (n / n2) ** (np.log(cost2 / cost1) / np.log(n2 / n1))
+    return float(cost2 * (n / n2) ** (np.log(cost2 / cost1) / np.log(n2 / n1)))
 
 
 def exponent(n: Array, cost: Array) -> tuple[float, float, float]:

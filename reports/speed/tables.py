@@ -4,13 +4,14 @@ noise floor."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from adapters.engines import ENGINES
 from adapters.mechanisms.options import SWEEPS
-from reports.speed.ladder import open_scene
+from reports.run.scenes import open_scene
 from reports.speed.measure import IDLE, SIZE, Measured
 from reports.speed.order import FINEST, NEARER, Order, median_interval, order_of
 from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
@@ -79,7 +80,8 @@ def beside(found: pd.DataFrame) -> pd.DataFrame:
 
 def measurable(here: pd.DataFrame) -> pd.Series:
     """Whether there is something to divide by."""
-    return np.isfinite(here.cost_here) & np.isfinite(here.error_here) & (here.error_here > 0)
+    finite: pd.Series = np.isfinite(here.cost_here) & np.isfinite(here.error_here)
+    return finite & (here.error_here > 0)
 
 
 def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
@@ -181,7 +183,9 @@ def no_nearer(fitted: pd.DataFrame) -> pd.Series:
     return ~falls & (fitted.finest_error > FINEST) & (fitted.failed < fitted.steps)
 
 
-def ladders(measured: Measured) -> Iterator[tuple[tuple, np.ndarray, np.ndarray, np.ndarray]]:
+def ladders(
+    measured: Measured,
+) -> Iterator[tuple[tuple[Any, ...], np.ndarray, np.ndarray, np.ndarray]]:
     """(scenario, engine, profile), dt (k,), errors and changes (seeds, k), coarse to fine."""
     errors = measured.errors[measured.errors.kind == SCENE]
     for keys, group in errors.groupby(["scenario", *WHO], sort=False):
@@ -196,7 +200,7 @@ def ladders(measured: Measured) -> Iterator[tuple[tuple, np.ndarray, np.ndarray,
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
     """A row a scenario, engine and accuracy: accuracy (radii), cost (µs per simulated second),
     dt_s, why it is not, and lost: it is not at any dt, or failed."""
-    verdicts: dict[tuple, str] = dict(
+    verdicts: dict[tuple[Any, ...], str] = dict(
         zip(zip(fitted.scenario, fitted.engine, fitted.profile), fitted.verdict)
     )
     rows = []

@@ -71,7 +71,8 @@ def truth_of(scenario: Scenario) -> Trajectory:
 
 def gain(trajectory: Trajectory) -> Array:
     """(n,) m/s by which each disk's velocity differs between start and end."""
-    return np.linalg.norm(trajectory.velocity[-1] - trajectory.velocity[0], axis=1)
+    change: Array = np.linalg.norm(trajectory.velocity[-1] - trajectory.velocity[0], axis=1)
+    return change
 
 
 def _collisions_missed(scenario: Scenario, played: Trajectory) -> Reading:
@@ -195,7 +196,8 @@ def apexes(scenario: Scenario, played: Trajectory) -> Array:
     top = np.concatenate([[1], top[top > 1]])
     before, at, after = y[top - 1], y[top], y[top + 1]
     bend = before - 2 * at + after
-    return (at - (after - before) ** 2 / (8 * bend)) / y[0]
+    heights: Array = (at - (after - before) ** 2 / (8 * bend)) / y[0]
+    return heights
 
 
 def apex_drift(scenario: Scenario, played: Trajectory) -> float:

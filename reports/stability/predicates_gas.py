@@ -153,7 +153,8 @@ def shares_of_speeds(played: Trajectory) -> Array:
     share = energy / energy.sum(axis=1, keepdims=True)
     rank = 1 - (1 - share) ** (n - 1)
     bins = np.clip((rank * RANGES).astype(int), 0, RANGES - 1)
-    return (bins[:, :, None] == np.arange(RANGES)).mean(axis=1)
+    shares: Array = (bins[:, :, None] == np.arange(RANGES)).mean(axis=1)
+    return shares
 
 
 ENERGY_DRIFTS = Predicate(

@@ -128,7 +128,8 @@ def at_cost(error: Array, cost: float) -> Array:
     beyond = wanted - np.clip(wanted, ladder[0], ladder[-1])
     with np.errstate(invalid="ignore"):
         logs = [np.interp(wanted, ladder, row[::-1]) + beyond for row in np.log(error)]
-    return np.exp(np.array(logs)[:, ::-1])
+    points: Array = np.exp(np.array(logs)[:, ::-1])
+    return points
 
 
 def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) -> list[str]:

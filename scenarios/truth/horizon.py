@@ -191,7 +191,8 @@ class Nearby:
             if c.kind == "wall"
         ]
         if len(spans) == 1 and (speed := float(spans[0] @ along(leg, t)[1])):
-            return -self.dx[i] @ spans[0] / speed
+            late: Array = -self.dx[i] @ spans[0] / speed
+            return late
         return self.late if t == self.instant else np.zeros_like(self.late)
 
     def hold(self, i: int, wall: int | None) -> None:

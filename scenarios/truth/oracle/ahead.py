@@ -4,6 +4,7 @@ doubt."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -237,7 +238,7 @@ class Ahead:
         return [self.touch(contact, now) for contact in found.values()]
 
 
-def key(contact: Contact) -> tuple:
+def key(contact: Contact) -> tuple[Any, ...]:
     """The same for both members of a pair, and for each side of a wall apart."""
     return ("body", *sorted((contact.i, contact.j))) if contact.kind == "body" else tuple(contact)
 

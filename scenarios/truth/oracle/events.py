@@ -19,7 +19,7 @@ from scenarios.truth.oracle.contacts import Pressed
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 from scenarios.truth.oracle.path import Ends, Event, Path, Recent, Record, ambiguous
 from scenarios.truth.oracle.resting import lie_down, next_in_line, press, settle
-from scenarios.truth.oracle.ties import Blow, Contact, Outcome, Touch
+from scenarios.truth.oracle.ties import Blow, Contact, Outcome, Touch, Velocities
 from scenarios.truth.oracle.work import Work
 
 MOST_IDLE = 100  # contacts on end without a collision: their signs contradict each other
@@ -197,44 +197,57 @@ class Motion:
 
     def collide(self, contacts: list[Contact]) -> None:
         """Resolve the contacts of one instant; where their order matters there is no answer."""
-        bodies, now = self.bodies, float(self.now)
-        if odd := [contact for contact in contacts if contact.kind in ("edge", "end")]:
-            where = (
-                "the edge of the wrap" if odd[0].kind == "edge" else f"the end of wall {odd[0].j}"
-            )
-            raise Ends(
-                now, f"disk {odd[0].i} comes to {where} while it touches another", [odd[0].i]
-            )
-        alone = len(contacts) == 1 and self.ahead.alone(contacts[0], now)
-        touches = (
-            [self.ahead.touch(c, self.now) for c in contacts]
-            if alone
-            else self.ahead.cluster(contacts, self.now)
-        )
-        disks = sorted({i for touch in touches for i in touch.contact.disks})
-        v = {i: bodies.velocity_at(i, self.now) for i in disks}
+        self.refuse_corners(contacts)
+        alone = len(contacts) == 1 and self.ahead.alone(contacts[0], float(self.now))
         if alone:
-            after, blow = bodies.matter.collision(touches[0], v)
-            outcome = Outcome(after, [blow], frozenset(contacts if bodies.matter.sticks else ()))
+            touches = [self.ahead.touch(contacts[0], self.now)]
         else:
-            resting = frozenset(c for held in bodies.held for c in held)
-            ends, tried = bodies.matter.outcomes(touches, v, resting, bodies.upright)
-            self.work.left -= tried
-            if len(ends) != 1 or not ends[0].velocities:
-                names = ", ".join(str(i) for i in disks if i < self.scene.n)
-                raise Ends(
-                    now, ambiguous(names, ends), disks, [end for end in ends if end.velocities]
-                )
-            outcome = ends[0]
-        arriving = {key(contact) for contact in contacts}
-        for blow in outcome.blows:
-            self.log(blow, key(blow.contact) in arriving)
-            arriving.discard(key(blow.contact))
-        self.idle = 0 if outcome.blows else self.idle + 1
-        if self.idle > MOST_IDLE:
-            raise Ends(now, f"the digits of {self.k.bits} bits are used up")
+            touches = self.ahead.cluster(contacts, self.now)
+        disks = sorted({i for touch in touches for i in touch.contact.disks})
+        v = {i: self.bodies.velocity_at(i, self.now) for i in disks}
+        outcome = self.after_one(touches[0], v) if alone else self.after_all(touches, v)
+        self.log_all(outcome.blows, contacts)
         touched = {i for blow in outcome.blows for i in blow.contact.disks} or set(disks)
         self.go_on(outcome, touches, touched)
+
+    def refuse_corners(self, contacts: Sequence[Contact]) -> None:
+        """No answer where a disk that touches another comes to an edge of the wrap, or to the end
+        of its wall."""
+        for contact in contacts:
+            if contact.kind in ("edge", "end"):
+                end = f"the end of wall {contact.j}"
+                where = "the edge of the wrap" if contact.kind == "edge" else end
+                reason = f"disk {contact.i} comes to {where} while it touches another"
+                raise Ends(float(self.now), reason, [contact.i])
+
+    def after_one(self, touch: Touch, v: Velocities) -> Outcome:
+        """The outcome of a contact that no other touches."""
+        matter = self.bodies.matter
+        after, blow = matter.collision(touch, v)
+        return Outcome(after, [blow], frozenset([touch.contact] if matter.sticks else ()))
+
+    def after_all(self, touches: Sequence[Touch], v: Velocities) -> Outcome:
+        """The one outcome of contacts at one instant, in whatever order they are resolved."""
+        bodies = self.bodies
+        resting = frozenset(contact for held in bodies.held for contact in held)
+        ends, tried = bodies.matter.outcomes(touches, v, resting, bodies.upright)
+        self.work.left -= tried
+        if len(ends) == 1 and ends[0].velocities:
+            return ends[0]
+        names = ", ".join(str(i) for i in v if i < self.scene.n)
+        known = [end for end in ends if end.velocities]
+        raise Ends(float(self.now), ambiguous(names, ends), list(v), known)
+
+    def log_all(self, blows: Sequence[Blow], contacts: Sequence[Contact]) -> None:
+        """Write the collisions of one instant down; those of `contacts` that come first are new."""
+        arriving = {key(contact) for contact in contacts}
+        for blow in blows:
+            self.log(blow, key(blow.contact) in arriving)
+            arriving.discard(key(blow.contact))
+        self.idle = 0 if blows else self.idle + 1
+        if self.idle > MOST_IDLE:
+            reason = f"the digits of {self.k.bits} bits are used up"
+            raise Ends(float(self.now), reason)
 
     def go_on(self, outcome: Outcome, touches: Sequence[Touch], touched: set[int]) -> None:
         """New legs after the collisions of one instant; a bounce off a wall may be the first of the

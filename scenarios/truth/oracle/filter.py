@@ -191,9 +191,8 @@ def wall_bound(one: Row, wall: Array, radius: float, side: float) -> float:
         under = speed * speed - 2 * acceleration * gap * (1 - SLACK)
         return inf if speed >= 0.0 or under < 0.0 else 2 * gap / (sqrt(under) - speed) * (1 - SLACK)
     root = sqrt(speed * speed - 2 * acceleration * gap)
-    return (2 * gap / (root - speed) if speed < 0.0 else (speed + root) / -acceleration) * (
-        1 - SLACK
-    )
+    late: float = 2 * gap / (root - speed) if speed < 0.0 else (speed + root) / -acceleration
+    return late * (1 - SLACK)
 
 
 @kernel

@@ -70,7 +70,8 @@ def mpfr(bits: int) -> Numbers:
         return 1 if x > tie else -1 if x < -tie else 0
 
     def precise() -> AbstractContextManager[Any]:
-        return gmpy2.context(gmpy2.get_context(), precision=bits)
+        context: AbstractContextManager[Any] = gmpy2.context(gmpy2.get_context(), precision=bits)
+        return context
 
     def exact(x: float) -> Number:
         # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -143,7 +144,8 @@ def travel(bodies: Bodies, states: Array, left: float, thrusts: Sequence[Thrust]
     hops = np.array([0.0 if leg.hop is None else float(leg.hop.speed) ** 2 for leg in bodies.legs])
     energy = (mass[moves] * ((states[moves, 2:4] ** 2).sum(axis=1) + hops[moves])).sum() / 2
     speed = np.sqrt(energy) + np.sqrt(mass[moves].sum() / 2) * acceleration * left
-    return np.sqrt(2 / mass) * speed * left
+    rise: Array = np.sqrt(2 / mass) * speed * left
+    return rise
 
 
 def hop_height(leg: Leg) -> float:
@@ -243,7 +245,7 @@ def start(ahead: Ahead) -> list[tuple[Contact, Fraction]]:
         NoTruth: bodies overlap.
     """
     bodies, scene = ahead.bodies, ahead.scene
-    faults, found = [], dict[tuple, tuple[Contact, Fraction]]()
+    faults, found = [], dict[tuple[Any, ...], tuple[Contact, Fraction]]()
     for i in np.flatnonzero(~scene.static).tolist():
         count = touching(
             bodies.table, bodies.radii, bodies.asleep, scene.walls, i, 0.0, ahead.codes

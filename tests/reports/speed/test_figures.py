@@ -11,6 +11,7 @@ import pytest
 
 from adapters.engines import ENGINES
 from adapters.mechanisms.table import MECHANISMS
+from reports.run.scenes import open_scene
 from reports.speed import budget, explained, figures, ladder, tables
 from reports.speed.budget import budget_of
 from reports.speed.effort import FULL, QUICK
@@ -35,7 +36,7 @@ def test_the_kept_orders_are_those_of_the_code(name: str):
     """One scene on the ladder of the full form: verdict, slope and the error at the finest step, of
     every engine."""
     scene = "head_on_unequal_e09"
-    step_sizes = FULL.ladder(ladder.open_scene(scene, 0))
+    step_sizes = FULL.ladder(open_scene(scene, 0))
     rows = ladder.errors_of(scene, 0, name, ENGINES[name].make, step_sizes)
     now = tables.orders(Measured(errors=pd.DataFrame(rows).assign(kind=SCENE)), 0).iloc[0]
     kept = kept_row(figures.ORDERS, scene, name)

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from adapters.engines import ENGINES
+from reports.run.scenes import open_scene
 from reports.speed import ladder
 from reports.speed.effort import QUICK
 from reports.speed.order import FINEST
@@ -61,7 +62,7 @@ def errors_of(scenes: tuple[str, ...], names: tuple[str, ...]) -> dict[tuple[str
     """(engine, step_size) -> errors in radii, a scene each, of the steps that all scenes have."""
     found: dict[tuple[str, int], list[float]] = {}
     for scene in scenes:
-        step_sizes = QUICK.ladder(ladder.open_scene(scene, 0))[:STEP_SIZES]
+        step_sizes = QUICK.ladder(open_scene(scene, 0))[:STEP_SIZES]
         for name in names:
             for step_size, row in enumerate(
                 ladder.errors_of(scene, 0, name, ENGINES[name].make, step_sizes)
