@@ -1,4 +1,4 @@
-"""All scenarios by name, in reading order."""
+"""All scenarios by name, in reading order, and the families under whose headings they stand."""
 
 from __future__ import annotations
 
@@ -13,10 +13,20 @@ from scenarios.families.thrusts import THRUSTS
 from scenarios.families.walls import WALLS
 from scenarios.model import Scenario
 
-SCENARIOS: dict[str, Callable[..., Scenario]] = {
-    builder().name: builder
-    for builder in (*LESSON, *PAIRS, *WALLS, *ROWS, *THRUSTS, *EXERCISE, *CROWDS)
+Build = Callable[..., Scenario]
+FAMILIES: dict[str, dict[str, Build]] = {
+    heading: {build().name: build for build in family}
+    for heading, family in (
+        ("The lesson", LESSON),
+        ("Two disks meet", PAIRS),
+        ("Walls, floors and fixed disks", WALLS),
+        ("Disks in a row", ROWS),
+        ("Thrusts and spin", THRUSTS),
+        ("The exercise", EXERCISE),
+        ("Crowds", CROWDS),
+    )
 }
+SCENARIOS = {name: build for family in FAMILIES.values() for name, build in family.items()}
 RANDOM = {"falling_box", "asteroids", "gas_of_100"}
 """Scenarios that are random (seed n); the others are the same for every seed."""
 
@@ -28,3 +38,8 @@ def scenario(name: str, seed: int = 0) -> Scenario:
         KeyError: no scenario has that name.
     """
     return SCENARIOS[name](seed=seed) if name in RANDOM else SCENARIOS[name]()
+
+
+def family_of(name: str) -> str:
+    """The heading under which a scenario stands; "" if it is not of the catalogue."""
+    return next((heading for heading, family in FAMILIES.items() if name in family), "")

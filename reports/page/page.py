@@ -22,19 +22,10 @@ from reports.page.replay import frames, name_of, pack, played, ratio_of
 from reports.page.trust import how_far_to_trust
 from reports.run.known_answers import MEANING
 from reports.terminal.foreign_text import put_text
-from scenarios.catalogue import SCENARIOS
+from scenarios.catalogue import family_of
 
 GENERATOR = "crosscheck run"
 VERDICTS = ("keeps", "departs", "breaks")
-FAMILIES = {
-    "scenarios.families.lesson": "The lesson",
-    "scenarios.families.pairs": "Two disks meet",
-    "scenarios.families.walls": "Walls, floors and fixed disks",
-    "scenarios.families.rows": "Disks in a row",
-    "scenarios.families.thrusts": "Thrusts and spin",
-    "scenarios.families.exercise": "The exercise",
-    "scenarios.families.crowds": "Crowds",
-}
 OWN = "Scenes of your own"
 
 
@@ -118,12 +109,10 @@ def section_of(
     """All that the page shows of one scenario; of its settings those that are not `common`."""
     own = {key: pair for key, pair in overview.settings(comparison).items() if key not in common}
     drawings = {key: chart.draw(comparison) for key, chart in CHARTS.items()}
-    builder = SCENARIOS.get(comparison.scenario.name)
     layers = played(comparison)
-    module = getattr(getattr(builder, "func", builder), "__module__", "")
     return ScenarioSection(
         comparison=comparison,
-        family=FAMILIES.get(module, OWN),
+        family=family_of(comparison.scenario.name) or OWN,
         dt=comparison.middle_dt,
         failures=overview.failures(comparison),
         drawings=drawings,
