@@ -63,7 +63,7 @@ def game(browser: Browser, url: str) -> None:
 
 
 def lesson(browser: Browser, url: str) -> None:
-    """The ball that bounces ever higher, with the mechanism switched on."""
+    """The ball that bounces ever higher, with the mechanism enabled."""
     tab = browser.new_page(viewport={"width": 980, "height": 900})
     tab.goto(f"{url}/lesson/gravity")
     tab.wait_for_function("() => window.lesson")

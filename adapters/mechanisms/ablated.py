@@ -1,5 +1,5 @@
 """The ablated reference as an engine: the exercise's solver with the mechanisms of other engines
-switched on or off."""
+enabled or disabled."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ class AblatedReference(Reference):
         self.steps += count
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """What is switched on."""
+        """What is enabled."""
         reported = {
             "mixing": self.mixing,
             "substeps": self.substeps,

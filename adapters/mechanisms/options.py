@@ -68,7 +68,7 @@ OPTIONS: tuple[Option, ...] = tuple(
     )
 )
 """What an engine cannot be changed in is not here: pymunk has no CCD and always starts warm, Box2D
-3.1 hides its warm start, and no outside engine lets its broad phase be switched off."""
+3.1 hides its warm start, and no outside engine lets its broad phase be disabled."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The mechanisms of every engine: what it does otherwise than exact flight with end-of-step
 detection.
 
-Each can be switched on in `adapters.mechanisms.ablated_reference`; some can be switched off in the
+Each can be enabled in `adapters.mechanisms.ablated_reference`; some can be disabled in the
 engine, too. The numbers are read off the engine. With all of its mechanisms the reference plays
 what the engine plays, mostly to rounding.
 """
@@ -49,7 +49,7 @@ class Mechanism:
     Attributes:
         name: one of `NAMES`.
         parameters: of `AblatedReference`; none: the reference does not have the mechanism.
-        on_top: the mechanisms it acts on, and is therefore switched on with.
+        on_top: the mechanisms it acts on, and is therefore enabled with.
         without: makes the engine without it, where it has a parameter for that.
     """
 

@@ -310,7 +310,7 @@ def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
         scenario = Scenario(
             name=name,
             asks=asks,
-            source="drawn for this check",
+            source="sampled for this check",
             scene=scene_of(rows, radius, mass, e),
             duration=duration,
             sample_interval=INTERVAL,

@@ -1,4 +1,4 @@
-"""The smallest scene that shows a fault: drawn and shrunk by hypothesis, each judged by closed
+"""The smallest scene that shows a fault: sampled and shrunk by hypothesis, each judged by closed
 forms alone."""
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from scenarios.truth.exact import computed
 DT = 1e-2
 SECONDS = 1.5  # for drawing and shrinking together
 DURATION, INTERVAL = 1.0, 0.02  # s
-DRAWS = 400
+EXAMPLES = 400
 # m or rad: every step of single precision may round 4 m that much
 SINGLE = 2.0**-24 * DURATION / DT * 4 / TOLERANCE
 GAP = 0.05  # m, least distance of two surfaces at the start
 
 Sphere = tuple[int, int, int, int, int, int]
 """x, y in half metres, vx, vy in m/s, radius in quarters of a metre, mass in kg."""
-Drawn = tuple[list[Sphere], tuple[int, int, int]]
+Example = tuple[list[Sphere], tuple[int, int, int]]
 """The spheres, and the thrust of one that is alone: force x, y in N, torque in tenths of a N m."""
-# Tried before any is drawn: on a busy machine the time may be up before a pair that collides is.
-FIRST: list[Drawn] = [
+# Tried before any is sampled: on a busy machine the time may be up before a pair that collides is.
+FIRST: list[Example] = [
     ([(0, 0, 1, 1, 1, 2)], (1, 2, 1)),
     ([(-1, 0, 1, 0, 1, 1), (1, 0, 0, 0, 1, 2)], (0, 0, 0)),
     ([(-1, 0, 1, 0, 1, 1), (1, 1, -1, 0, 2, 3)], (0, 0, 0)),
@@ -58,14 +58,14 @@ class Smallest:
 
 def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
     """The smallest that is found within `SECONDS`; None if none shows a fault."""
-    best = next((drawn for drawn in FIRST if fault_of(process, *drawn, e)), None)
+    best = next((example for example in FIRST if fault_of(process, *example, e)), None)
     deadline = monotonic() + SECONDS
 
-    def faulty(drawn: Drawn) -> bool:
+    def faulty(example: Example) -> bool:
         nonlocal best
-        if monotonic() > deadline or not fault_of(process, *drawn, e):
+        if monotonic() > deadline or not fault_of(process, *example, e):
             return False
-        best = drawn if best is None else min(best, drawn, key=size)
+        best = example if best is None else min(best, example, key=size)
         return True
 
     sphere = st.tuples(ints(4), ints(3), ints(2), ints(2), st.integers(1, 2), st.integers(1, 3))
@@ -73,7 +73,7 @@ def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
         st.lists(sphere, min_size=1, max_size=3), st.tuples(ints(2), ints(2), ints(1))
     )
     rules = settings(
-        max_examples=DRAWS,
+        max_examples=EXAMPLES,
         derandomize=True,
         database=None,
         deadline=None,
@@ -86,9 +86,9 @@ def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
     return shown_by(process, *without_idlers(process, *best, e), e) if best else None
 
 
-def size(drawn: Drawn) -> tuple[int, int]:
+def size(example: Example) -> tuple[int, int]:
     """How many spheres a scene has, and how large its numbers are."""
-    spheres, thrust = drawn
+    spheres, thrust = example
     return len(spheres), sum(map(abs, thrust)) + sum(
         abs(number) for sphere in spheres for number in sphere
     )
@@ -144,7 +144,7 @@ def scenario_of(
     return Scenario(
         name="smallest",
         asks="Which scene is the smallest that shows the fault?",
-        source="drawn and shrunk",
+        source="sampled and shrunk",
         scene=scene_of(rows, radius, mass, e),
         duration=DURATION,
         sample_interval=interval,

@@ -143,14 +143,14 @@ def momentum_outside(
     The range: the truth's at that instant, less any part of each impulse from outside just before,
     and with any part of each just after.
     """
-    apart = laws.momentum(played, scene) - laws.momentum(truth, scene)
+    difference = laws.momentum(played, scene) - laws.momentum(truth, scene)
     first, past, now, last = windows(played, jumps, dt)
-    off = laws.lengths(apart)
+    off = laws.lengths(difference)
     for k in np.flatnonzero(first < last):
         impulses = np.concatenate(
             [-jumps.impulse[first[k] : now[k]], jumps.impulse[past[k] : last[k]]]
         )
-        off[k] = distance_to_range(apart[k], impulses)
+        off[k] = distance_to_range(difference[k], impulses)
     return off
 
 

@@ -27,7 +27,8 @@ class Restitutions(NamedTuple):
     unfinished: int
 
 
-# of the change of velocity; float32 leaves about 1e-7 of the velocity, an untold collision far more
+# of the change of velocity; float32 leaves about 1e-7 of the velocity, an unreported collision
+# far more
 CLEAN = 1e-4
 # times the rounding of the velocities that a change must have: e is then read to a hundredth or so
 FLOOR = 100
@@ -86,9 +87,9 @@ def effective_restitution(
             continue
         later = around(trajectory, scene, (after, after), when)[1]
         turned = np.abs(spin[after] - spin[k]) * scene.radius
-        closing, parting = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
+        closing, separating = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
         if closing > max(slowest, 0.0) * (after - k):
-            values.append(parting / closing)
+            values.append(separating / closing)
             times.append(when)
         elif closing > max(slowest, 0.0):
             unfinished += 1
@@ -152,17 +153,16 @@ def speeds_along_normal(
     normal = between / (np.linalg.norm(between) or 1.0)
     if j >= 0 and not scene.static[j]:
         kicks = scene.mass[i] * one, scene.mass[j] * two
-        untold = np.linalg.norm(kicks[0] + kicks[1]) > CLEAN * max(map(np.linalg.norm, kicks))
+        unreported = np.linalg.norm(kicks[0] + kicks[1]) > CLEAN * max(map(np.linalg.norm, kicks))
         slid = (turned[[i, j]] > CLEAN * laws.lengths(change[[i, j]])).any()
     elif j < 0:
         start, end = scene.walls[-1 - j]
-        untold = abs(one @ (end - start)) > CLEAN * np.linalg.norm(end - start) * np.linalg.norm(
-            one
-        )
+        slack = CLEAN * np.linalg.norm(end - start) * np.linalg.norm(one)
+        unreported = abs(one @ (end - start)) > slack
         slid = turned[i] > CLEAN * np.linalg.norm(one)
     else:
-        untold, slid = False, turned[i] > CLEAN * np.linalg.norm(one)
-    if untold or slid:
+        unreported, slid = False, turned[i] > CLEAN * np.linalg.norm(one)
+    if unreported or slid:
         return np.nan, np.nan
     before, after = (
         (earlier[i] - earlier[j], later[i] - later[j]) if j >= 0 else (earlier[i], later[i])

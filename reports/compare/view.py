@@ -162,10 +162,10 @@ class View:
         energies = (laws.energies(one, self.scenario.scene) for one in (self.played, self.other))
         return self._summed(next(energies) - next(energies))
 
-    def _summed(self, apart: Array) -> Array:
+    def _summed(self, difference: Array) -> Array:
         """Over the judged disks of (k, n, ...); nan where none is."""
-        judged = self.judged.reshape(*self.judged.shape, *[1] * (apart.ndim - 2))
-        return np.where(judged.any(axis=1), np.where(judged, apart, 0.0).sum(axis=1), np.nan)
+        judged = self.judged.reshape(*self.judged.shape, *[1] * (difference.ndim - 2))
+        return np.where(judged.any(axis=1), np.where(judged, difference, 0.0).sum(axis=1), np.nan)
 
     @cached_property
     def angle_deviation(self) -> Array:

@@ -71,8 +71,8 @@ def divergence(
     """The collision after which the velocities (n, 2) m/s of solid and ghost differ, if they do by
     frame `frame`."""
     latest = np.maximum(solid.frame, ghost.frame)
-    apart = np.hypot(*(velocity - other).T) > DIVERGED
-    found = np.flatnonzero(apart & (latest >= 0) & (frame - latest >= WAIT))
+    diverged = np.hypot(*(velocity - other).T) > DIVERGED
+    found = np.flatnonzero(diverged & (latest >= 0) & (frame - latest >= WAIT))
     if not len(found):
         return None
     disk = int(found[np.argmin(latest[found])])

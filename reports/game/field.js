@@ -6,7 +6,7 @@ const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const SHIP = 0;
 
 // The same sky and the same rocks on every visit (a linear congruential generator; Numerical Recipes, 7.1).
-function drawn(seed) {
+function random(seed) {
   let state = seed >>> 0;
   return () => { state = (Math.imul(state, 1664525) + 1013904223) >>> 0; return state / 4294967296; };
 }
@@ -63,7 +63,7 @@ class Field {
     dusk.addColorStop(1, "#1b1f3f");
     pen.fillStyle = dusk;
     pen.fillRect(0, 0, width, height);
-    const next = drawn(7);
+    const next = random(7);
     for (let k = 0; k < width / 3; k++) {
       pen.globalAlpha = 0.15 + 0.6 * next() ** 3;
       pen.fillStyle = next() < 0.15 ? "#ffdcae" : "#dfe8ff";
@@ -112,7 +112,7 @@ class Field {
 
   // An outline within the disk, and craters, in units of the radius.
   rock(disk) {
-    const next = drawn(disk * 7919 + 13);
+    const next = random(disk * 7919 + 13);
     const outline = Array.from({ length: 11 }, (_, k) => [(k / 11) * 2 * Math.PI, 0.84 + 0.16 * next()]);
     const craters = Array.from({ length: 3 }, () => [0.55 * (2 * next() - 1), 0.55 * (2 * next() - 1), 0.1 + 0.13 * next()]);
     const grey = Math.round(112 + 46 * next());

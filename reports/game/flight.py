@@ -203,7 +203,7 @@ class Flight:
             flyer.left = f"the ship cannot be set back: {error}"
 
     def compare(self) -> None:
-        """Note who parts from the solid one at the end of this frame, and whether the game is
+        """Note who diverges from the solid one at the end of this frame, and whether the game is
         won."""
         solid = self.solid
         for ghost in self.flyers:
@@ -225,23 +225,23 @@ class Flight:
         """The exercise's rule as written: a squared distance below a size, no absolute value of the
         spin."""
         ship = self.solid.state
-        apart, speed = ship.position[SHIP] - np.array(EARTH), ship.velocity[SHIP]
-        near = float(apart @ apart) < EARTH_SIZE and float(speed @ speed) < SLOW
+        way, speed = ship.position[SHIP] - np.array(EARTH), ship.velocity[SHIP]
+        near = float(way @ way) < EARTH_SIZE and float(speed @ speed) < SLOW
         return self.is_game and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
 
     def measures(self, flyer: Flyer) -> dict[str, Any]:
         """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid
         one's m, collisions."""
         scene, state = self.scenario.scene, flyer.state
-        apart = self.distances(self.solid.state.position, state.position)
+        deviation = self.distances(self.solid.state.position, state.position)
         moving = ~scene.static
         mass, inertia = scene.mass[moving], scene.inertia[moving]
         speed2 = (state.velocity[moving] ** 2).sum(axis=1)
         return {
             "momentum": (mass @ state.velocity[moving]).tolist(),
             "energy": float(mass @ speed2 + inertia @ state.angular_velocity[moving] ** 2) / 2,
-            "ship_deviation": float(apart[SHIP]),
-            "deviation": float(apart.max()),
+            "ship_deviation": float(deviation[SHIP]),
+            "deviation": float(deviation.max()),
             "collisions": flyer.earlier + flyer.collisions,
         }
 

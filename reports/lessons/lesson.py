@@ -232,8 +232,10 @@ class Simulation:
         for run in self.runs:
             if run.trajectory is not None:
                 k = min(len(run.trajectory), len(self.truth))
-                apart = deviation(cut(run.trajectory, k), cut(self.truth, k), self.scenario.scene)
-                curves.append(Curve(run.name, self.truth.t[:k], apart.max(axis=1)))
+                distances = deviation(
+                    cut(run.trajectory, k), cut(self.truth, k), self.scenario.scene
+                )
+                curves.append(Curve(run.name, self.truth.t[:k], distances.max(axis=1)))
         return curves
 
 

@@ -1,4 +1,4 @@
-"""Lesson 6, how engines differ: one page a mechanism, switched on in the reference until the curves
+"""Lesson 6, how engines differ: one page a mechanism, enabled in the reference until the curves
 coincide."""
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def asked(scene: Scene, duration: float) -> Scenario:
 def runs_of(
     names: Sequence[str], on: AblatedReference, scenario: Scenario, substeps: int
 ) -> list[Run]:
-    """The engines, the reference as it is, and the reference with what is switched on."""
+    """The engines, the reference as it is, and the reference with what is enabled."""
     runs = [run_of(name, scenario, substeps) for name in (*names, PLAIN)]
     return [*runs, play(on, ABLATED, scenario, scenario.dt(substeps))]
 
@@ -72,10 +72,10 @@ def over_time(runs: Sequence[Run], read: Read) -> list[Curve]:
 def distance(curves: Sequence[Curve], name: str, unit: str) -> tuple[str, str]:
     """How far the ablated reference's curve is from an engine's, at the most."""
     found = {curve.name: np.asarray(curve.y, float) for curve in curves}
-    apart = np.nanmax(np.abs(found[ABLATED] - found[name]))
+    deviation = np.nanmax(np.abs(found[ABLATED] - found[name]))
     return (
         f"largest distance of the ablated reference from {name}",
-        f"{number(float(apart), 2)} {unit}".strip(),
+        f"{number(float(deviation), 2)} {unit}".strip(),
     )
 
 
@@ -306,7 +306,7 @@ def show_row(settings: Settings) -> Shown:
         restitution=1.0,
     )
     scenario = asked(scene, 1.0)
-    order = {"pair by pair": EXERCISE, "all at once": BOX2D}[settings["order"]]
+    order = {"pair by pair": EXERCISE, "together": BOX2D}[settings["order"]]
     names = ["box2d:matched", "pymunk:matched"]
     runs = runs_of(
         names,
@@ -456,7 +456,7 @@ MECHANISMS = (
         " again: what comes out depends on how often.",
         ["box2d:matched", "pymunk:matched"],
         show_row,
-        Slider("order", "Contacts", ("pair by pair", "all at once"), 0),
+        Slider("order", "Contacts", ("pair by pair", "together"), 0),
         Slider("iterations", "Iterations", (1, 2, 4, 8, 50), 3),
         Slider("n", "Disks in the row", (2, 3, 5), 1),
     ),

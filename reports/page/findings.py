@@ -54,8 +54,8 @@ def closest(off: pd.DataFrame) -> str:
     """Who comes closest to the exact answers."""
     if off.columns.empty and len(off):
         return (
-            "No engine that counts was played to its end in a scene with an exact answer, so nobody"
-            " is scored."
+            "No engine that counts was played to its end in a scene with an exact answer, so none is"
+            " scored."
         )
     if off.empty:
         return (
@@ -107,7 +107,7 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     cells = f"{failed} of {len(statuses)} cells were not played to their end."
     lost = off > FAR_OFF
     if off.empty or not lost.any(axis=None):
-        return f"Nobody is off by more than a radius; {cells}" if not off.empty else cells
+        return f"No engine is off by more than a radius; {cells}" if not off.empty else cells
     counts = lost.sum().sort_values(ascending=False, kind="stable")
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)

@@ -1,4 +1,4 @@
-"""Where an engine's error comes from: its mechanisms switched on in the reference one at a time,
+"""Where an engine's error comes from: its mechanisms enabled in the reference one at a time,
 and what is left over.
 
 As vectors, disk by disk and sample by sample, the contributions close: engine - truth =
@@ -101,7 +101,7 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
     the contribution changes, the energy in contributions of that at hand; share, by which it makes
     up the position's total (1 in all;
     negative: it makes up for others); off_engine_radii, off_reference_radii and
-    off_deviation_radii: what switching it off changes in the engine, in the reference with all the
+    off_deviation_radii: what disabling it changes in the engine, in the reference with all the
         rest, and their deviation;
     closed_deviation_radii: how far the flight's contribution is from its closed form up to the
     first collision; note: why there are no numbers.
@@ -217,7 +217,7 @@ class Budget:
         """What each mechanism changes, then interplay, the residual, the sum, all together, and the
         engine.
 
-        Each is switched on by itself in the reference with end-of-step detection, or on top of
+        Each is enabled by itself in the reference with end-of-step detection, or on top of
         those it acts on; for a mechanism that the reference does not have, the engine is compared
         with itself without it.
         """
@@ -250,8 +250,8 @@ class Budget:
         }
 
     def ablated_in_both(self) -> dict[str, dict[str, float]]:
-        """contribution -> what switching it off changes in the engine, and in the reference with
-        all the rest switched on."""
+        """contribution -> what disabling it changes in the engine, and in the reference with
+        all the rest enabled."""
         found = {}
         for mechanism in self.mechanisms:
             if mechanism.parameters and mechanism.without is not None:

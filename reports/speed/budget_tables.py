@@ -105,7 +105,7 @@ def overview(budget: pd.DataFrame) -> BudgetTable:
 
 
 def ablated_in_both(budget: pd.DataFrame) -> list[dict[str, Any]]:
-    """Every mechanism that can be switched off in the engine, where that changes anything: the
+    """Every mechanism that can be disabled in the engine, where that changes anything: the
     change in both."""
     rows = budget[budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST]
     return [{str(key): value for key, value in row.items()} for row in rows.to_dict("records")]

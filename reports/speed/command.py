@@ -174,7 +174,7 @@ def said_of_noise(results: Results) -> str:
     """The noise floor in a sentence, and what to do where it is too loud."""
     noise = results.noise_summary()
     if not noise["pairs"]:
-        return "Nobody was timed against itself, so the noise floor is not known."
+        return "No engine was timed against itself, so the noise floor is not known."
     said = (
         f"Noise floor: an engine against itself reads {noise['median']:.3f}, half of"
         f" {noise['pairs']} pairs from {noise['low']:.3f} to {noise['high']:.3f}."

@@ -72,7 +72,7 @@ def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach
     """(scene, seed) -> how many sample intervals have an exact answer; those that have none are
     reported."""
     # In workers, which can be stopped whatever they are doing.
-    asked = {draw: partial(ladder.reach_of, *draw) for draw in plan.seeded_scenes}
+    asked = {seeded: partial(ladder.reach_of, *seeded) for seeded in plan.seeded_scenes}
     results = dict(done(asked, plan.workers, progress, "exact answer"))
     reach = {}
     for (scene, seed), result in results.items():

@@ -59,7 +59,7 @@ def order_of(dt: Array, errors: Array, changes: Array, seed: int = 0) -> Order:
         fitted, low, high = line_interval(x, np.log(middle[used]))
         return Order(fitted, low, high, seen(verdict, low))
     logs = np.log(np.maximum(errors[:, used], FINEST))
-    low, high = bootstrap(logs, lambda drawn: slope(x, np.median(drawn, axis=0)), seed)
+    low, high = bootstrap(logs, lambda sample: slope(x, np.median(sample, axis=0)), seed)
     return Order(slope(x, np.log(middle[used])), low, high, seen(verdict, low))
 
 
@@ -102,11 +102,11 @@ def line_interval(x: Array, y: Array) -> tuple[float, float, float]:
 def bootstrap(
     values: Array, statistic: Callable[[Array], float], seed: int = 0
 ) -> tuple[float, float]:
-    """The 95 % interval of `statistic` of values (m, ...), drawn again along the first axis
+    """The 95 % interval of `statistic` of values (m, ...), sampled again along the first axis
     (Efron's percentiles)."""
     rng = np.random.default_rng(seed)
-    drawn = rng.integers(len(values), size=(RESAMPLES, len(values)))
-    low, high = np.percentile([statistic(values[pick]) for pick in drawn], [2.5, 97.5])
+    picks = rng.integers(len(values), size=(RESAMPLES, len(values)))
+    low, high = np.percentile([statistic(values[pick]) for pick in picks], [2.5, 97.5])
     return float(low), float(high)
 
 
@@ -116,7 +116,7 @@ def median_interval(values: Array, seed: int = 0) -> tuple[float, float]:
     if len(values) == 1:
         return float(values[0]), float(values[0])
     rng = np.random.default_rng(seed)
-    drawn = values[rng.integers(len(values), size=(RESAMPLES, len(values)))]
+    samples = values[rng.integers(len(values), size=(RESAMPLES, len(values)))]
     # failed ones are inf
-    low, high = np.percentile(np.median(drawn, axis=1), [2.5, 97.5], method="nearest")
+    low, high = np.percentile(np.median(samples, axis=1), [2.5, 97.5], method="nearest")
     return float(low), float(high)

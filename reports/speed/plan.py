@@ -98,9 +98,9 @@ class SpeedPlan:
         return seeded + [(scene, self.seed) for scene in self.budget_scenes if scene not in scenes]
 
     def measurements(self, reach: Reach) -> Iterator[Measurement]:
-        """Everybody, in every draw that has an exact answer."""
-        drawn = {draw for draw, samples in reach.items() if samples}
-        for scene, seed in (draw for draw in self.seeded_scenes if draw in drawn):
+        """Every engine, in every scene and seed that has an exact answer."""
+        answered = {seeded for seeded, samples in reach.items() if samples}
+        for scene, seed in (seeded for seeded in self.seeded_scenes if seeded in answered):
             if scene in self.scenes:
                 step_sizes = self.effort.ladder(open_scene(scene, seed))
                 yield from (

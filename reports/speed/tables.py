@@ -142,7 +142,7 @@ def in_us(table: pd.DataFrame) -> pd.DataFrame:
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
     """A row a scenario and engine: slope, low, high, verdict, see `order.Order`; coarsest_error and
     finest_error in radii (medians over the seeds), the latter at finest_dt_s; steps, how many were
-    played, and failed, at how many of them a draw failed: what failed has no part in slope and
+    played, and failed, at how many of them a seed failed: what failed has no part in slope and
     verdict.
     """
     rows = []

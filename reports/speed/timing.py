@@ -48,8 +48,8 @@ class Sample(NamedTuple):
 
 
 def interleaved(what: Sequence[Timed], rounds: int, budget: float, seed: int) -> list[Sample]:
-    """Samples of all of `what`, warm-up round first; each round visits all of it, in an order drawn
-    anew.
+    """Samples of all of `what`, warm-up round first; each round visits all of it, in a new
+    random order.
 
     What has spent `budget` s of its own sits out the rounds left, but never the first
     `FEWEST_ROUNDS`. Slow change of the machine (heat, clock, neighbours) thus meets all alike. The

@@ -2,7 +2,7 @@
 fails where the engine does.
 
 What an engine does otherwise than exact flight with end-of-step detection is a table of mechanisms
-(`adapters.mechanisms.table`), each of them to be switched on in
+(`adapters.mechanisms.table`), each of them to be enabled in
 `adapters.mechanisms.ablated_reference`. An ablation is the reference with some; one that has the
 engine's limit shows the cause.
 """

@@ -73,7 +73,7 @@ def gas(
 
 
 def maxwell(rng: Generator, mass: Array, speed: float) -> Array:
-    """(n, 2) m/s, drawn so that disks of each mass have the same temperature exactly, a mass of 1
+    """(n, 2) m/s, sampled so that disks of each mass have the same temperature exactly, a mass of 1
     the rms `speed`."""
     velocity = rng.normal(size=(len(mass), 2))
     for kind in np.unique(mass):

@@ -39,9 +39,9 @@ def dense_ladder(one: Scenario) -> tuple[float, ...]:
     """s, as `ladder`, and from the sample interval on four to a factor of two, or two where a run
     is long.
 
-    Where nothing in a scene is drawn, each dt has its collisions elsewhere in their steps: failures
-    begin here and there, and only neighbours close to each other find the first. Finer steps fail
-    seldom and cost most. Both forms scan the same.
+    Where nothing in a scene is random, each dt has its collisions elsewhere in their steps:
+    failures begin here and there, and only neighbours close to each other find the first. Finer
+    steps fail seldom and cost most. Both forms scan the same.
     """
     steps = one.duration / one.sample_interval * 8
     close = ladder(one, 2 if one.scene.n * steps > LONG else 4)

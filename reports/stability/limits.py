@@ -41,7 +41,7 @@ class Form:
 
 
 # A gas comes upon a bad cluster of contacts sooner or later: one in 20 of pymunk's is off by 1 %
-# from v dt = 0.25 R on, half of them at none up to 2 R. The first of them is a matter of the draw;
+# from v dt = 0.25 R on, half of them at none up to 2 R. The first of them is a matter of the seed;
 # that more than a quarter are is not.
 RARELY = 1 / 4
 ALL = 10**6  # runs: more than any case has
@@ -77,10 +77,10 @@ class Case:
         quick_values: to scan in the quick form, where a run is long: some of `values`.
         refines: whether the first edge is bisected, and the full form scans between the values (not
             with `by_chance`).
-        ratio: how close the bracket is made at best, where a run is long or what is drawn differs
+        ratio: how close the bracket is made at best, where a run is long or what is sampled differs
             much.
         by_chance: share of the runs at a value that may fail by chance, where what is read is a
-            statistic or the worst of it depends on what is drawn.
+            statistic or the worst of it depends on what is sampled.
         beside: what a failing run is shown beside.
     """
 

@@ -1,4 +1,4 @@
-"""Where in its step a collision happens in the runs of a case: evenly spread and drawn, few the
+"""Where in its step a collision happens in the runs of a case: evenly spread and random, few the
 first of many."""
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def phase(run: int) -> float:
     """Where in its step the collision of a run happens, from 0 to 1, its beginning and its end.
 
     Run 0 has it at the step's very beginning, found latest of all; of the others every second is
-    spread evenly (van der Corput, 1/2, 1/4, 3/4, 1/8 ...), and the rest are drawn: what repeats
+    spread evenly (van der Corput, 1/2, 1/4, 3/4, 1/8 ...), and the rest are random: what repeats
     with the step could miss the even ones alone.
     """
     if run == 0:

@@ -1,5 +1,4 @@
-"""What failing means for gases at e = 1: what drifts, and where they part from what the literature
-says of them."""
+"""What failing means for gases at e = 1: what drifts, and what departs from the literature."""
 
 from __future__ import annotations
 
@@ -43,12 +42,12 @@ def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
 
 
 def _gas_parts(scenario: Scenario, played: Trajectory) -> Reading:
-    apart = (
+    drift = (
         np.linalg.norm(played.position - truth_of(scenario).position, axis=2)
         / scenario.scene.radius
     )
-    off = apart.max(axis=1)
-    worst = int(np.argmax(apart[-1]))
+    off = drift.max(axis=1)
+    worst = int(np.argmax(drift[-1]))
     return Reading(
         float(off.max()),
         first_above(played.t, off, GAS_PARTS.bound),

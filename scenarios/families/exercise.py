@@ -25,7 +25,7 @@ TURNS = ((0.60, 1.80, 1), (2.20, 3.40, -1), (4.80, 5.20, -1))  # A, D, D
 
 
 def asteroids(seed: int = 0) -> Scenario:
-    """The ship at rest among twenty asteroids, drawn as the exercise draws them but for
+    """The ship at rest among twenty asteroids, sampled as in the exercise but for
     overlaps."""
     question = Scenario(
         name="asteroids",
@@ -33,7 +33,7 @@ def asteroids(seed: int = 0) -> Scenario:
             "Do the engines agree on where a ship and twenty asteroids are after 10 s of"
             " collisions?"
         ),
-        source=f"{SOURCE}; overlapping draws are drawn again",
+        source=f"{SOURCE}; what overlaps is sampled again",
         scene=asteroid_field(seed),
         duration=10.0,
         sample_interval=INTERVAL,
@@ -44,7 +44,7 @@ def asteroids(seed: int = 0) -> Scenario:
 
 
 def asteroid_field(seed: int, count: int = 20, restitution: float = 0.9) -> Scene:
-    """The ship, disk 0, at rest among `count` asteroids; overlapping draws are drawn again."""
+    """The ship, disk 0, at rest among `count` asteroids; what overlaps is sampled again."""
     rng = np.random.default_rng(seed)
     size = rng.uniform(0.08, 0.3, count)
     radius = np.append(SHIP_RADIUS, size)

@@ -57,7 +57,7 @@ def head_on_equal(restitution: float) -> Scenario:
     """Two equal disks, both moving, on one line."""
     return _pairs(
         f"head_on_equal_{TAG[restitution]}",
-        f"Do two equal disks part from a head-on collision as e = {restitution:g} says?",
+        f"Do two equal disks separate after a head-on collision as e = {restitution:g} says?",
         position=[[-1.7, 0], [1.9, 0]],
         velocity=[[1.1, 0], [-0.7, 0]],
         mass=[1, 1],
@@ -85,8 +85,8 @@ def oblique(restitution: float) -> Scenario:
     alone."""
     return _pairs(
         f"oblique_{TAG[restitution]}",
-        f"Do two disks that meet off centre part at the angles of e = {restitution:g}, their spin"
-        " untouched?",
+        f"Do two disks that meet off centre separate at the angles of e = {restitution:g}, their"
+        " spin untouched?",
         position=[[-1.8, -0.1], [1.7, 0.2]],
         velocity=[[1.2, 0.1], [-0.7, 0.05]],
         mass=[1, 2],

@@ -1,4 +1,4 @@
-"""How a scene is laid out: from lists, with walls, with drawn disks."""
+"""How a scene is laid out: from lists, with walls, with random disks."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ def scatter(
     radius: Array,
     first: ArrayLike | None = None,
 ) -> Array:
-    """(n, 2) m, centres drawn uniformly between the corners, each again until its disk meets none
+    """(n, 2) m, centres sampled uniformly between the corners, each again until its disk meets none
     before it.
 
-    radius (n,) m. first (2,) m: where disk 0 stands, if it is not drawn. For sparse disks only:
+    radius (n,) m. first (2,) m: where disk 0 stands, if it is not sampled. For sparse disks only:
     equal ones close four times their own area to the next, so up to a quarter of the box a free
     place always remains.
     """
     centres: list[Array] = [] if first is None else [np.asarray(first, float)]
     while len(centres) < len(radius):
-        drawn, n = rng.uniform(low, high), len(centres)
-        if all(np.hypot(*(drawn - centre)) > r + radius[n] for centre, r in zip(centres, radius)):
-            centres.append(drawn)
+        centre, n = rng.uniform(low, high), len(centres)
+        if all(np.hypot(*(centre - other)) > r + radius[n] for other, r in zip(centres, radius)):
+            centres.append(centre)
     return np.array(centres)

@@ -24,7 +24,7 @@ def _on_line(x: Array, v: Array) -> Motion:
 def line_gas() -> Scenario:
     """Fifteen equal disks between two walls."""
     n, radius, length = 15, 0.25, 12.0
-    # As irregular as a random draw, without one; plain multiples i sqrt(2) would make simultaneous
+    # As irregular as random numbers, without any; plain multiples i sqrt(2) would make simultaneous
     # collisions.
     squares = np.arange(1, n + 2) ** 2
     gap = 0.2 + (squares * np.sqrt(5)) % 1

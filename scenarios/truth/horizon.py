@@ -10,8 +10,8 @@ wall). The derivative is wanted to a few per cent, so it is float64 along a path
 near miss by less than a rounding has no derivative and is not seen.
 
 The limit is set on the standard deviation over roundings of all numbers at once, each on its own.
-One rounded start strays by a normal number times that, less than it in two of three draws:
-falling_box ends at 0.409 s, and single draws pass the limit from 0.395 to 0.47 s, most of them at
+One rounded start strays by a normal number times that, less than it in two of three samples:
+falling_box ends at 0.409 s, and single samples pass the limit from 0.395 to 0.47 s, most of them at
 0.43 to 0.45 s.
 
 The rounding is that of the largest coordinate in the scene, also where that belongs to a disk that
@@ -116,7 +116,7 @@ class Nearby:
         self.dx, self.dv = roundings(scene)
         self.struck, self.v = np.full(scene.n, -1.0), np.zeros((scene.n, 2))
         self.instant, self.late = 0.0, np.zeros(self.dx.shape[1])
-        self.switches = {
+        self.starts_and_stops = {
             edge for thrust in scenario.thrusts for edge in (thrust.start, thrust.stop)
         }
         self.diverged = np.inf
@@ -174,8 +174,8 @@ class Nearby:
         """Put disk i onto its next leg, which begins at `t` s."""
         before, leg = self.path.legs[i][self.leg[i] : self.leg[i] + 2]
         self.leg[i] += 1
-        # A collision has seen to what follows it, and a thrust switches when it switches.
-        if t != self.struck[i] and t not in self.switches:
+        # A collision has seen to what follows it, and a thrust starts and stops when it does.
+        if t != self.struck[i] and t not in self.starts_and_stops:
             self.dv[i] += np.outer(
                 self.release(i, before, t), acceleration(before) - acceleration(leg)
             )

@@ -47,7 +47,7 @@ def positions(engine: Any, scene: Scenario, dt: float) -> Array:
 @pytest.mark.parametrize(
     "name", ["oblique_e09", "falling_box", "asteroids", "ship_thrust", "disk_between_static_disks"]
 )
-def test_with_nothing_switched_on_it_is_the_exercise_to_the_bit(name: str):
+def test_with_nothing_enabled_it_is_the_exercise_to_the_bit(name: str):
     """Pairs, walls, the wrap, forces, and disks that stand still; positions and collisions."""
     scene = scenario(name)
     plain, ablated = (
@@ -166,7 +166,7 @@ def test_with_all_its_mechanisms_the_reference_is_the_engine(
         ("box2d:shipped", "box_billiard", "friction"),
     ],
 )
-def test_what_is_switched_off_in_the_engine_is_what_is_left_out_in_the_reference(
+def test_what_is_disabled_in_the_engine_is_what_is_left_out_in_the_reference(
     name: str, scene: str, mechanism: str
 ):
     """The engine without it is the reference with all but it."""

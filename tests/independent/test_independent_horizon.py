@@ -5,9 +5,9 @@ The definition: every number of the start is off by a rounding, each on its own:
 2 ** -52 of the largest coordinate, or speed. The horizon is when the standard deviation of some
 disk's position reaches a billionth of its radius.
 
-How far draws can be held to it: the motion stretches one direction far more than all others, so
+How far samples can be held to it: the motion stretches one direction far more than all others, so
 that a disk's distance in a draw is about a normal number times its standard deviation. The mean
-square of eight draws over its expectation is then chi squared with 8 degrees of freedom over 8,
+square of eight samples over its expectation is then chi squared with 8 degrees of freedom over 8,
 which is between 0.107 and 3.27 but for one in a thousand either side: their root mean square at the
 horizon must be 0.33 to 1.81 billionths, and below before it. Over all scenes the mean of those
 squares has a standard deviation of sqrt(2 / (8 scenes)): it must be 1 within three.
@@ -33,8 +33,8 @@ pytestmark = pytest.mark.independent
 
 Record = Callable[[str, object], None]
 
-DRAWS = 8
-LEAST, MOST = 0.33, 1.81  # of the root mean square of eight draws over its expectation
+SAMPLES = 8
+LEAST, MOST = 0.33, 1.81  # of the root mean square of eight samples over its expectation
 BILLIONTH = 1e-9
 ULP = np.spacing
 FAR = 10**6  # events: none of these motions has as many
@@ -67,13 +67,13 @@ def nudges(scene: Scene, rng: np.random.Generator) -> list[tuple[Vector, Vector]
     return [(mpc(*map(float, s[:2] * length)), mpc(*map(float, s[2:] * speed))) for s in signs]
 
 
-def distances(one: Scenario, end: float, draws: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times (k,) s up to `end`, and (k,) the largest root mean square distance over the draws of
+def distances(one: Scenario, end: float, samples: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times (k,) s up to `end`, and (k,) the largest root mean square distance over the samples of
     any disk, in radii."""
     short = Scenario(one.name, "?", "?", one.scene, end, end, thrusts=one.thrusts)
     rng = np.random.default_rng(seed)
     exact = Motion(short, FAR)
-    moved = [Motion(short, FAR, nudges(one.scene, rng)) for _ in range(draws)]
+    moved = [Motion(short, FAR, nudges(one.scene, rng)) for _ in range(samples)]
     assert not any(motion.reason for motion in (exact, *moved))
     times = np.linspace(0, end, 201)
     square = np.zeros((len(times), one.scene.n))
@@ -81,7 +81,7 @@ def distances(one: Scenario, end: float, draws: int, seed: int) -> tuple[np.ndar
         here = exact.at(float(t))
         for motion in moved:
             square[k] += [float(gmpy2.norm(p.x - q.x)) for p, q in zip(here, motion.at(float(t)))]
-    return times, (np.sqrt(square / draws) / one.scene.radius).max(axis=1)
+    return times, (np.sqrt(square / samples) / one.scene.radius).max(axis=1)
 
 
 def verdict(times: np.ndarray, distance: np.ndarray, horizon: float) -> str:
@@ -93,7 +93,7 @@ def verdict(times: np.ndarray, distance: np.ndarray, horizon: float) -> str:
 
 
 def crossing(times: np.ndarray, distance: np.ndarray) -> float:
-    """s, when the draws first are a billionth of a radius apart; inf if they never are."""
+    """s, when the samples first are a billionth of a radius apart; inf if they never are."""
     late = np.flatnonzero(distance > BILLIONTH)
     return float(times[late[0]]) if len(late) else np.inf
 
@@ -117,15 +117,15 @@ def test_at_the_horizon_starts_a_rounding_apart_are_a_billionth_of_a_radius_apar
     lines, found, wrong = [], [], []
     for seed, one in enumerate(scenes):
         horizon = computed(one).float64_horizon
-        times, distance = distances(one, min(1.15 * horizon, one.duration), DRAWS, seed)
+        times, distance = distances(one, min(1.15 * horizon, one.duration), SAMPLES, seed)
         found.append((times, distance, horizon))
         lines.append(f"{one.name} {horizon:.3f} ({crossing(times, distance):.3f})")
         wrong += [f"{one.name}: {fault}"] if (fault := verdict(times, distance, horizon)) else []
-    summary = f"horizons, s (from {DRAWS} draws): {', '.join(lines)}"
+    summary = f"horizons, s (from {SAMPLES} samples): {', '.join(lines)}"
     record_property("found", f"{summary}; mean square {mean_square(found, 1):.2f} of the expected")
 
     assert not wrong
-    three_deviations = 3 * sqrt(2 / (DRAWS * len(scenes)))
+    three_deviations = 3 * sqrt(2 / (SAMPLES * len(scenes)))
     assert abs(mean_square(found, 1) - 1) < three_deviations
     for share in (0.9, 1.1):
         assert abs(mean_square(found[:GASES], share) - 1) > three_deviations

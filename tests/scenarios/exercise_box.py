@@ -13,7 +13,7 @@ COUNT = 20
 
 
 def boxed(seed: int, restitution: float = 1.0, gravity: float = 0.0) -> Scene:
-    """Twenty-one disks in a box of 10 m by 6 m; sizes, speeds and masses as the exercise draws
+    """Twenty-one disks in a box of 10 m by 6 m; sizes, speeds and masses as the exercise samples
     them."""
     rng = np.random.default_rng(seed)
     size = rng.uniform(0.08, 0.3, COUNT)

@@ -15,7 +15,9 @@ from scenarios.model import Array, Scenario, Scene, Thrust
 
 Draw = np.random.Generator
 
-INTERVAL = 1 / 16  # s; thrusts switch at samples, so that every step is under a thrust as a whole
+INTERVAL = (
+    1 / 16
+)  # s; thrusts start and stop at samples, so that every step is under a thrust as a whole
 RESTITUTIONS = (0.0, 0.02, 0.5, 0.9, 1.0, None)  # None: anything from 0 to 1
 NEAREST = 1e-3  # m between things that do not touch
 GRID = 1 / 8  # m; multiples of it are exact in float64, and so is whether disks on it touch
@@ -28,7 +30,7 @@ def random_scenarios(count: int, seed: int = 0) -> list[Scenario]:
 
 
 def random_scenario(seed: int, number: int) -> Scenario:
-    """The scenario of this number: its layout goes round, all else is drawn."""
+    """The scenario of this number: its layout goes round, all else is random."""
     draw = np.random.default_rng([seed, number])
     layout = list(LAYOUTS)[number % len(LAYOUTS)]
     walls = LAYOUTS[layout](draw)

@@ -8,7 +8,7 @@ import pytest
 from scenarios.catalogue import RANDOM, SCENARIOS, scenario
 
 ANSWERED = [name for name in SCENARIOS if scenario(name).truth]
-# Among the hundreds of collisions of a drawn scene some fall on a step, in every draw.
+# Among the hundreds of collisions of a random scene some fall on a step, with every seed.
 MOVING = [
     name
     for name in ANSWERED
@@ -138,7 +138,7 @@ def test_same_seed_same_scene_and_another_seed_another(name):
 
 
 def test_other_scenarios_do_not_depend_on_the_seed():
-    """Only what `RANDOM` lists is drawn."""
+    """Only what `RANDOM` lists is random."""
     for name in set(SCENARIOS) - RANDOM:
         one, other = scenario(name, 3), scenario(name, 4)
         assert one.seed is None

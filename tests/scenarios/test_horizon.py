@@ -185,7 +185,7 @@ def test_the_derivatives_of_these_motions_pass_every_kind_of_change():
 )
 def test_at_the_horizon_moved_starts_are_as_far_off_as_it_says(name: str, seed: int):
     """Twelve starts in many digits, each number a unit in the last place up or down: the disk that
-    is off the most is off by `DIVERGED` radii, root mean square. Twelve draws tell that to 20 %,
+    is off the most is off by `DIVERGED` radii, root mean square. Twelve samples show that to 20 %,
     and the largest of many is taken.
     """
     one = scenario(name, seed)

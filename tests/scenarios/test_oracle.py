@@ -34,7 +34,9 @@ def states(scene: Scenario, record: TruthRecord):
     return replace(record, float64_horizon=np.inf).sampled(scene.scene, scene.thrusts, scene.times)
 
 
-def drawn(seed: int, n: int = 5, restitution: float = 1.0, gravity: float = 0.0, **fields) -> Scene:
+def sampled(
+    seed: int, n: int = 5, restitution: float = 1.0, gravity: float = 0.0, **fields
+) -> Scene:
     """Disks of several sizes and masses in a box of 2 m."""
     rng = np.random.default_rng(seed)
     radius = rng.uniform(0.05, 0.2, n)
@@ -52,7 +54,7 @@ def drawn(seed: int, n: int = 5, restitution: float = 1.0, gravity: float = 0.0,
 
 @pytest.fixture(scope="module")
 def records() -> dict[str, TruthRecord]:
-    """The records of the drawn scenes, computed here and now."""
+    """The records of the random scenes, computed here and now."""
     return {name: computed(scenario(name)) for name in RANDOM}
 
 
@@ -95,7 +97,7 @@ def test_it_finds_what_the_closed_form_says(name: str):
 
 
 @pytest.mark.parametrize("name", RANDOM)
-def test_the_drawn_scenes_are_answered_to_their_end(name: str, records: dict[str, TruthRecord]):
+def test_the_random_scenes_are_answered_to_their_end(name: str, records: dict[str, TruthRecord]):
     """No reason to stop, no overlap at any sample, as many collisions as ever."""
     one, record = scenario(name), records[name]
     truth = states(one, record)
@@ -121,7 +123,7 @@ def test_it_finds_the_collisions_of_a_float64_simulation(
     digits."""
     # what comes to rest stops the clock of the simulation
     gravity = gravity if restitution > 0.5 else 0.0
-    one = asked(drawn(seed, 4, restitution, gravity), 1.0)
+    one = asked(sampled(seed, 4, restitution, gravity), 1.0)
     found = states(one, computed(one)).collisions.t[:10]
     path = simulate(one.scene, float(found[-1]) + 1e-9 if len(found) else 1.0)[1:]
 
@@ -132,7 +134,7 @@ def test_it_finds_the_collisions_of_a_float64_simulation(
 def test_all_numbers_give_the_same(records: dict[str, TruthRecord]):
     """Decimals and mpfr, at one and at two precisions, agree in every leg; gravity and a static
     disk included."""
-    walled = drawn(3, 5, 0.9, -2.0)
+    walled = sampled(3, 5, 0.9, -2.0)
     mass = np.append(walled.mass[:-1], np.inf)
     velocity = np.vstack([walled.velocity[:-1], [[0, 0]]])
     one = asked(replace(walled, mass=mass, velocity=velocity, inertia=None), 1.5)
@@ -147,7 +149,7 @@ def test_all_numbers_give_the_same(records: dict[str, TruthRecord]):
 
 @pytest.mark.skipif(not has_balls(), reason="python-flint is an extra")
 def test_interval_arithmetic_proves_every_comparison(records: dict[str, TruthRecord]):
-    """The drawn scenes are certified; balls that are too wide say so instead of guessing."""
+    """The random scenes are certified; balls that are too wide say so instead of guessing."""
     assert {name: record.method for name, record in records.items()} == dict.fromkeys(
         RANDOM, "certified"
     )
@@ -163,7 +165,7 @@ def last_of(path: Path) -> np.ndarray:
 
 def test_the_order_of_the_disks_does_not_matter():
     """Permuted, the same motion."""
-    scene, order = drawn(5, 6, 0.9, -1.0), np.random.default_rng(1).permutation(6)
+    scene, order = sampled(5, 6, 0.9, -1.0), np.random.default_rng(1).permutation(6)
     names = ("position", "velocity", "radius", "mass", "inertia", "angle", "angular_velocity")
     permuted = replace(scene, **{name: getattr(scene, name)[order] for name in names})
     here, there = (last_of(trace(each, [], 2.0, mpfr(256))) for each in (scene, permuted))
@@ -173,7 +175,7 @@ def test_the_order_of_the_disks_does_not_matter():
 
 def test_a_mirrored_scene_moves_as_the_mirror_image():
     """Left and right swapped, bit for bit."""
-    scene, flip = drawn(6, 6, 0.9, -1.0), np.array([-1.0, 1.0])
+    scene, flip = sampled(6, 6, 0.9, -1.0), np.array([-1.0, 1.0])
     mirrored = replace(
         scene,
         position=scene.position * flip,
@@ -187,7 +189,7 @@ def test_a_mirrored_scene_moves_as_the_mirror_image():
 
 def test_time_runs_backwards_at_restitution_one():
     """From the end state in float64, with reversed velocities, back to the start."""
-    one = asked(drawn(7, 6), 3.0)
+    one = asked(sampled(7, 6), 3.0)
     truth = states(one, computed(one))
     assert len(truth.collisions) > 20
     back = asked(replace(one.scene, position=truth.position[-1], velocity=-truth.velocity[-1]), 3.0)

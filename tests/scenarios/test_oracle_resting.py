@@ -19,7 +19,7 @@ from scenarios.truth.oracle.numbers import has_balls, mpfr
 from scenarios.truth.record import TruthRecord
 from tests.scenarios.exercise_box import boxed, lasting
 from tests.scenarios.test_catalogue import smallest_gap
-from tests.scenarios.test_oracle import asked, drawn, states
+from tests.scenarios.test_oracle import asked, sampled, states
 
 FLOOR = [[[-9, 0], [9, 0]]]
 KINDS = [None, mpfr]
@@ -194,7 +194,7 @@ def test_energy_falls_nothing_overlaps_and_mirror_and_order_do_not_matter(
     seed: int, restitution: float
 ):
     """Three disks fall in a box and settle; up to where the answer ends."""
-    scene = drawn(seed, 3, restitution, -9.81)
+    scene = sampled(seed, 3, restitution, -9.81)
     one = asked(scene, 2.0)
     record = computed(one)
     truth = states(one, record)

@@ -112,8 +112,8 @@ def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: flo
     here, there = (record.sampled(one.scene, one.thrusts, t) for record in (short, whole))
     known = min(len(here), len(there))
 
-    apart = np.abs(here.position[:known] - there.position[:known]).max()
-    assert apart <= short.error_bound + whole.error_bound
+    deviation = np.abs(here.position[:known] - there.position[:known]).max()
+    assert deviation <= short.error_bound + whole.error_bound
     assert short.error_bound <= 1e-9 * one.scene.radius.min()
 
 

@@ -41,7 +41,7 @@ class Motion:
         self.path = Path([[self.bodies.legs[i]] for i in range(scene.n)])
         self.recent = Recent(scene.n)
         # From the last to the first, so that the next one can be popped.
-        self.switches = sorted(
+        self.starts_and_stops = sorted(
             ((t, p.disk) for p in thrusts for t in (p.start, p.stop) if t < until), reverse=True
         )
         self.thrusts = thrusts
@@ -65,8 +65,8 @@ class Motion:
 
     def begin(self) -> None:
         """Set the thrusts on from the start, rest what lies still, predict all."""
-        while self.switches and self.switches[-1][0] == 0:
-            self.set_thrusts(self.switches.pop()[1])
+        while self.starts_and_stops and self.starts_and_stops[-1][0] == 0:
+            self.set_thrusts(self.starts_and_stops.pop()[1])
         for contact in lie_down(self.ahead):
             self.rest(contact)
         self.follow_up(set(np.flatnonzero(~self.scene.static).tolist()))
@@ -74,8 +74,8 @@ class Motion:
     def advance(self) -> bool:
         """Do what comes next; False if nothing does before `until`."""
         soonest = self.due.min()
-        if self.switches and self.switches[-1][0] <= soonest:
-            t, disk = self.switches.pop()
+        if self.starts_and_stops and self.starts_and_stops[-1][0] <= soonest:
+            t, disk = self.starts_and_stops.pop()
             self.now = self.k.exact(t)
             self.set_thrusts(disk)
             self.follow_up({disk})

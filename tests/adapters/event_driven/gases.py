@@ -36,7 +36,7 @@ def gas(n: int, packing: float, seed: int = 0) -> tuple[Scene, np.ndarray]:
 
 def boxed_gas(n: int, packing: float, seed: int = 0) -> Scene:
     """The gas of `gas` between four walls instead, which the disks cover by `packing`, in an order
-    drawn by `seed`."""
+    sampled by `seed`."""
     free, torus = gas(n, packing, seed)
     side = torus[1, 0]
     spread = free.position - free.position.min(axis=0)
@@ -54,8 +54,8 @@ def boxed_gas(n: int, packing: float, seed: int = 0) -> Scene:
 
 
 def boxed_asteroids(seed: int, restitution: float = 1.0, gravity: float = 0.0) -> Scene:
-    """The exercise's ship and twenty asteroids between walls at the edges of its world, drawn as it
-    draws them."""
+    """The exercise's ship and twenty asteroids between walls at the edges of its world, sampled as
+    there."""
     rng = np.random.default_rng(seed)
     radius = np.append(SHIP_RADIUS, rng.uniform(0.08, 0.3, 20))
     position = scatter(rng, np.array(LOW) + 0.3, np.array(HIGH) - 0.3, radius, first=SHIP)

@@ -37,7 +37,8 @@ def test_the_committed_figures_are_those_of_the_literature(packing):
             < 4 * row[f"{name}_error"] + row[f"{name}_reference"] / 1024**1.5
         )
     check(row, 0.002)
-    # <v4> / <v2>2 = 2 N / (N + 1); 1024 draws of an exponential: standard deviation 2 sqrt(5 / N).
+    # <v4> / <v2>2 = 2 N / (N + 1); 1024 samples of an exponential: their standard
+    # deviation is 2 sqrt(5 / N).
     assert abs(row["v4_over_v2_squared"] - 2) < 4 * 2 * np.sqrt(5 / 1024)
 
 

@@ -66,7 +66,7 @@ def test_the_committed_table_is_what_comes_out(tmp_path: Path):
 
 
 def test_the_same_file_gets_the_same_rows():
-    """Nothing is drawn by chance, and no clock is read."""
+    """Nothing is random, and no clock is read."""
     path = CORRECT[-1]
 
     assert check_solver(path) == check_solver(str(path))

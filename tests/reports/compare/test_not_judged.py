@@ -238,7 +238,7 @@ def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
 
     assert (
         alone
-        == "No engine that counts was played to its end in a scene with an exact answer, so nobody"
-        " is scored."
+        == "No engine that counts was played to its end in a scene with an exact answer, so none is"
+        " scored."
     )
     assert without.startswith("No scene here has an exact answer")

@@ -71,9 +71,9 @@ def test_keys_move_the_ship_as_the_exercise_says(name: str):
     thrusting = sum(thrust.stop - thrust.start for thrust in scenario.thrusts if thrust.force.any())
     offset = abs(ENGINES[name].alpha - 0.5) * 0.25 * flight.dt * thrusting
     rounding = ENGINES[name].rounding * 160 * 16 * 4  # one a step, of coordinates up to 4 m
-    apart = np.abs(flight.solid.state.position[SHIP] - truth.position[SHIP]).max()
+    deviation = np.abs(flight.solid.state.position[SHIP] - truth.position[SHIP]).max()
 
-    assert apart <= offset + rounding
+    assert deviation <= offset + rounding
     assert (
         abs(flight.solid.state.angle[SHIP] - truth.angle[SHIP])
         <= 160 * FRAME * flight.dt + rounding

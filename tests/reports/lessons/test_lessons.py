@@ -32,7 +32,7 @@ EVERY = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for
 
 
 @pytest.mark.parametrize("name", ["oblique_e09", "bouncing_ball_e1", "free_fall"])
-def test_with_nothing_switched_on_the_mechanisms_give_the_reference(name: str):
+def test_with_nothing_enabled_the_mechanisms_give_the_reference(name: str):
     """To the bit."""
     scene = scenario(name)
     plain = run_of("reference:exercise", scene, 2).trajectory
@@ -72,15 +72,15 @@ def test_the_ablated_reference_lies_on_the_engine(
     """Within the rounding of the engine where the right mechanism is on; far off with another
     setting."""
 
-    def apart(places: tuple[int, ...]) -> float:
+    def deviation(places: tuple[int, ...]) -> float:
         curves = {
             curve.name: np.asarray(curve.y, float)
             for curve in LESSONS[name].at(places).charts[0].curves
         }
         return float(np.nanmax(np.abs(curves[ABLATED] - curves[engine])))
 
-    assert apart(on) <= bound
-    assert apart(off) > 300 * bound
+    assert deviation(on) <= bound
+    assert deviation(off) > 300 * bound
 
 
 @pytest.mark.parametrize("name", LESSONS)

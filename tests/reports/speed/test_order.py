@@ -89,9 +89,9 @@ def test_too_few_points_are_no_order():
     assert order_of(DT[:2], np.array([[1.0, 0.5]]), np.array([[np.nan, 0.5]])).verdict == UNKNOWN
 
 
-def test_the_slope_of_many_draws_has_an_interval_that_holds_the_order():
-    """Errors c dt with c drawn anew for every seed and dt, as the phase of a collision in its step
-    is."""
+def test_the_slope_of_many_samples_has_an_interval_that_holds_the_order():
+    """Errors c dt with c sampled anew for every seed and dt, as the phase of a collision in its
+    step is."""
     rng = np.random.default_rng(0)
     errors = rng.uniform(0.2, 1.8, (64, len(DT))) * DT
     found = order_of(DT, errors, np.full(errors.shape, 1.0))
@@ -115,13 +115,13 @@ def test_the_bootstrap_interval_covers_the_median_as_often_as_it_says():
 def test_the_bootstrap_of_a_mean_is_as_wide_as_theory_says():
     """The mean of m numbers of unit spread: 2 x 1.96 / sqrt(m), to 15 % (1000 resamples)."""
     values = np.random.default_rng(2).normal(size=400)
-    low, high = bootstrap(values, lambda drawn: float(drawn.mean()))
+    low, high = bootstrap(values, lambda sample: float(sample.mean()))
 
     assert high - low == pytest.approx(2 * 1.96 * values.std() / 20, rel=0.15)
 
 
 def test_a_failed_draw_widens_the_interval_up_to_infinity():
-    """Half of the draws failed: the median may be anything above."""
+    """Half of the samples failed: the median may be anything above."""
     low, high = median_interval(np.array([1.0, 2.0, np.inf, np.inf]))
 
     assert low == 1.0

@@ -317,7 +317,7 @@ def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
         plot.locator(".main-svg").first.wait_for()
     assert tab.locator(".plot").count() == 2 + 2 + 3 + 1 + 2 * len(SCENES)
     assert overhang(tab) <= 0
-    # with mechanisms: three engines; two switched off
+    # with mechanisms: three engines; two disabled
     assert tab.locator("#budget tbody tr").count() == 2 * 3 + 2
     assert (
         tab.locator("text=no <b>such</b> thing").count() == 0

@@ -111,7 +111,7 @@ def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literat
 
 
 def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
-    """All of it, for two draws; a gas hotter by a fifth collides more often by a tenth."""
+    """All of it, for two seeds; a gas hotter by a fifth collides more often by a tenth."""
     for run in range(2):
         scenario = CASES["thermometer"].scene(0.4, run)
         assert not judge(WRONG_GAS, scenario, play_as(EXACT, scenario)).failed
@@ -125,10 +125,10 @@ def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
 
 
 def test_speeds_that_are_not_maxwells_are_noticed():
-    """All disks equally fast, and all as drawn: only the second has a fifth of them in each fifth
+    """All disks equally fast, and all as sampled: only the second has a fifth of them in each fifth
     of the law."""
     rng, k, n = np.random.default_rng(0), 500, 100
-    drawn = rng.normal(size=(k, n, 2))
+    sampled = rng.normal(size=(k, n, 2))
     angle = rng.uniform(0, 2 * pi, (k, n))
     same = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     scenario = CASES["thermometer"].scene(0.4, 0)
@@ -136,11 +136,11 @@ def test_speeds_that_are_not_maxwells_are_noticed():
     late = scenario.times[: k + 1][1:]
     shares = {
         name: in_blocks(shares_of_speeds(replace(one, t=late, velocity=frozen(velocity))))
-        for name, velocity in (("drawn", drawn), ("same", same))
+        for name, velocity in (("sampled", sampled), ("same", same))
     }
 
-    assert shares["drawn"].shape == (BLOCKS, 5)
-    assert np.abs(shares["drawn"].mean(axis=0) - 0.2).max() < 0.005  # 50 000 draws: 0.0018
+    assert shares["sampled"].shape == (BLOCKS, 5)
+    assert np.abs(shares["sampled"].mean(axis=0) - 0.2).max() < 0.005  # 50 000 samples: 0.0018
     assert shares["same"].max() == 1.0
     equal = one.velocity / np.linalg.norm(one.velocity, axis=2, keepdims=True)
     speed = np.linalg.norm(one.velocity[0], axis=1)

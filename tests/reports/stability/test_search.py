@@ -171,7 +171,7 @@ def test_a_number_that_is_none_fails_and_a_run_that_broke_off_fails_with_its_rea
 
 
 def test_a_statistic_may_fail_by_chance_in_one_run_of_sixteen_and_not_in_two():
-    """Of what is drawn and read with an error; a run of four that fails is too many."""
+    """Of what is sampled and read with an error; a run of four that fails is too many."""
     one = case(lambda x, run: 2.0 if run < x else 0.5, (1.0, 2.0, 4.0), runs=16, by_chance=1 / 16)
     found = limit_of(one)
 
