@@ -42,23 +42,21 @@ def effective_restitution(
     One can be read if neither disk has another in the same sample interval or the next, and none of
     them changes its spin (friction): then the change of velocity points along the normal n, and e =
     -(dv'.n) / (dv.n). Two disks must also change their momenta by as much, and a disk at a wall
-    along the wall's
-    normal: else something was struck of which the engine did not tell. Those closing slower than
-    `slowest` m/s are left out.
+    along the wall's normal: else there was a collision that the engine did not report. Those
+    closing slower than `slowest` m/s are left out.
 
     An engine with soft contacts takes several steps for a collision: it is read at the first sample
     at which the two no longer approach. Two that a law leaves approaching pass through each other,
     and then move apart, so that such a law is read too: with e < 0, as they still have some of the
     velocity they came with. A collision is counted as unfinished if it is never over, not before
-    another of either disk, or so late that gravity
-    reports: those that take m sample intervals must close m times as fast.
+    another of either disk, or so late that gravity matters: those that take m sample intervals must
+    close m times as fast.
 
     Those that change the velocities by no more than `FLOOR` times their rounding, which is
-    relative, are below the
-    floor: their normal, and with it e, would be noise. What gravity adds before and after is taken
-    out with the velocities, and rounded as they are. Engines tell such collisions of a contact that
-    lasts: Box2D 3.1 of a disk that slides along a wall whenever it comes nearer at any speed at
-        all.
+    relative, are below the floor: their normal, and with it e, would be noise. What gravity adds
+    before and after is taken out with the velocities, and rounded as they are. Engines report such
+    collisions during a contact that lasts: Box2D 3.1 does where a disk slides along a wall,
+    whenever it comes nearer at any speed at all.
     """
     t, spin, collisions = trajectory.t, trajectory.angular_velocity, on_faces(trajectory, scene)
     # A collision at the instant of a sample, at the end of its step, belongs to the interval that

@@ -54,8 +54,8 @@ def closest(off: pd.DataFrame) -> str:
     """Who comes closest to the exact answers."""
     if off.columns.empty and len(off):
         return (
-            "No engine that counts was played to its end in a scene with an exact answer, so none is"
-            " scored."
+            "No engine that counts was played to its end in a scene with an exact answer, so none"
+            " is scored."
         )
     if off.empty:
         return (

@@ -34,7 +34,7 @@ TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (
     "residual",
 )
 TOTALS = (SUM, ALL, TOTAL)
-COLUMNS = [
+WHOSE = [
     "scenario",
     "seed",
     "engine",
@@ -43,6 +43,9 @@ COLUMNS = [
     "until_s",
     "horizon_s",
     "duration_s",
+]
+COLUMNS = [
+    *WHOSE,
     "contribution",
     "position_radii",
     "energy",

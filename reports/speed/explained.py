@@ -7,23 +7,11 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from reports.speed.budget import LIMIT, RESIDUAL, TOTAL
+from reports.speed.budget import LIMIT, RESIDUAL, TOTAL, WHOSE
 
 LEAST = 1e-9  # radii: a smaller error is rounding, and nothing to explain
 TO = (0.01, 0.001)  # of an error: what may be left over
-COLUMNS = [
-    "scenario",
-    "seed",
-    "engine",
-    "profile",
-    "dt_s",
-    "until_s",
-    "horizon_s",
-    "duration_s",
-    "error_radii",
-    "residual_radii",
-    "note",
-]
+COLUMNS = [*WHOSE, "error_radii", "residual_radii", "note"]
 
 
 class Cut(NamedTuple):
