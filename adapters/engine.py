@@ -36,8 +36,8 @@ class ContactImpulse(NamedTuple):
 class Engine(Protocol):
     """The protocol: `load`, then `step` and `read` as often as is wanted, and `close`."""
 
-    # Whether collisions are logged; set before `load`. Off where speed is measured: to hear of
-    # every collision in Python costs more than some engines' whole step.
+    # Whether collisions are logged; set before `load`. Off where speed is measured: to log every
+    # collision in Python costs more than some engines' whole step.
     listening: bool = True
     # s spent in Python on setting disks onto the opposite edge, by an engine that knows no such
     # edge; part of what `step` takes. Whoever measures sets it to 0.

@@ -57,8 +57,8 @@ Timeout = Annotated[
         max=1e6,
         metavar="S",
         help=(
-            "That a cell, or an exact answer, may take; then it is stopped, in C too (truth: given"
-            " up to there)."
+            "Time limit of a cell, and of an exact answer. A cell is stopped then, also inside an"
+            " engine's C code; of an exact answer the part up to there is given."
         ),
     ),
 ]

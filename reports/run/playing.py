@@ -45,8 +45,8 @@ def play_cell(
 
 
 class Begun:
-    """What looks on while a cell is played: at the start, when the engine is loaded, the clock of
-    the cell begins."""
+    """Is given the samples of a cell as it is played: with the first, when the engine is loaded,
+    the clock of the cell begins."""
 
     def __init__(self, then: Callable[[State], None] = unwatched) -> None:
         self.begun, self.then = False, then

@@ -19,7 +19,7 @@ from scenarios.model import Scenario
 # machine of `figures.csv`; elsewhere half or twice as much.
 STEP, STEP_DISK, FORCE, WRAP_DISK = 1.0e-6, 0.17e-6, 16e-6, 0.75e-6
 READ, READ_DISK, READY = 20e-6, 1.5e-6, 1.5e-3
-LISTENING = 1.5  # times a step where collisions are heard of, too
+LISTENING = 1.5  # times a step where collisions are logged, too
 STARTING = 12.0  # s until the workers have imported and compiled
 BUDGET = 0.2  # s, for the error budget of one engine in one scene
 PAGE = 8.0  # s
