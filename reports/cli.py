@@ -132,7 +132,7 @@ def run(
     if resume is not None:
         run_command.resume(resume, means, alone=not any(what) and out == DEFAULT_OUT)
     command = shlex.join(["crosscheck", *sys.argv[1:]])
-    run_command.run_plan(run_command.Asked(*what, out), means, command)
+    run_command.run_plan(run_command.RunRequest(*what, out), means, command)
 
 
 @app.command()

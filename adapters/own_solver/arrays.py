@@ -83,7 +83,8 @@ def begin(module: ModuleType) -> None:
     """Give the module a ufo and 20 asteroids in a grid, as the exercise's file has them."""
     places = [(-4.0 + 2.0 * (k % 5), -2.2 + 1.2 * (k // 5)) for k in range(20)]
     parked = [sphere_of([x, y, *[0.0] * 7, 1.0, 1.0, 0.1]) for x, y in places]
-    module.ufo, module.asteroids = sphere_of([-3.5, 0.0, *[0.0] * 7, 1.0, 1.0, 0.3]), parked  # type: ignore[attr-defined]
+    ufo = sphere_of([-3.5, 0.0, *[0.0] * 7, 1.0, 1.0, 0.3])
+    vars(module).update(ufo=ufo, asteroids=parked)
 
 
 def disks_of(spheres: list[Any]) -> Disks:

@@ -58,8 +58,8 @@ class Fault(Exception):
 class RowItem(pytest.Item):
     """A row as a test."""
 
-    def __init__(self, *, row: CheckRow, **given: object) -> None:
-        super().__init__(**given)  # type: ignore[arg-type]
+    def __init__(self, *, row: CheckRow, **given: Any) -> None:
+        super().__init__(**given)
         self.row = row
 
     def runtest(self) -> None:

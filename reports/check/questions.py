@@ -83,11 +83,11 @@ class Answer:
         return self.balls[-1]
 
 
-def forced(dt: float, **changes: object) -> Question:
+def forced(dt: float, **changes: Any) -> Question:
     """A sphere with a force and a torque, integrated once; its mass and inertia are those of no
     solid disk."""
     plain = Ball((0.3, -0.7), (1.1, -0.4), (2.0, 3.0), 0.2, 0.9, 0.7, 1.7, 0.6, 0.25)
-    return Question((plain._replace(**changes),), (("integrate", 0, dt),))  # type: ignore[arg-type]
+    return Question((plain._replace(**changes),), (("integrate", 0, dt),))
 
 
 def pair(a: Ball, b: Ball, first: int = 0) -> Question:

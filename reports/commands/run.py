@@ -41,7 +41,7 @@ from scenarios.catalogue import SCENARIOS
 
 
 @dataclass(frozen=True)
-class Asked:
+class RunRequest:
     """What is to be played, as it was typed, and the folder for the results."""
 
     scenes: Sequence[str]
@@ -53,19 +53,19 @@ class Asked:
     out: Path
 
 
-def run_plan(asked: Asked, means: Means, command: str) -> NoReturn:
-    """Play, compare, report into `asked.out`; exits 0, 1 (an engine or a scene could not be
+def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
+    """Play, compare, report into `request.out`; exits 0, 1 (an engine or a scene could not be
     compared), 2, 130 or 143."""
-    with opening(asked.out):
-        out, folder = place_of(asked.out), os.getcwd()
-    scenes = asked.scenes or list(SCENARIOS)
+    with opening(request.out):
+        out, folder = place_of(request.out), os.getcwd()
+    scenes = request.scenes or list(SCENARIOS)
     plan = RunPlan(
-        scenes=checked_scenes(scenes, asked.dts, asked.full, asked.seed),
-        engines={name: row_of(name) for name in checked_engines(asked.engines)},
-        seed=asked.seed,
-        dts=asked.dts,
-        full=asked.full,
-        timings=asked.timings,
+        scenes=checked_scenes(scenes, request.dts, request.full, request.seed),
+        engines={name: row_of(name) for name in checked_engines(request.engines)},
+        seed=request.seed,
+        dts=request.dts,
+        full=request.full,
+        timings=request.timings,
         command=command,
         folder=folder,
     )

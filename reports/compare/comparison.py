@@ -11,7 +11,7 @@ import pandas as pd
 from adapters.run import Run
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
-from reports.compare.table import Row, row_of, status_row, table_of
+from reports.compare.table import TableRow, row_of, status_row, table_of
 from reports.compare.view import View, beside, not_judged
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
@@ -44,7 +44,7 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     """
     scenario, truth = answered(scenario)
     jumps = None if truth is None else jumps_of(truth, scenario)
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for run in runs:
         if run.status != "ok":
             rows.append(status_row(run, f"{run.status}: {run.reason}"))
@@ -67,7 +67,7 @@ def _opponents(
             yield other.name, other.trajectory
 
 
-def _measure(run: Run, view: View, versus: str) -> list[Row]:
+def _measure(run: Run, view: View, versus: str) -> list[TableRow]:
     """A row for each metric that applies."""
     kind = versus if versus in ("itself", "truth") else "engine"
     rows = []

@@ -24,20 +24,20 @@ COLUMNS = (
     "at_s",
     "note",
 )
-Row = tuple[str, str, str, float, str, int, float, str, str, float, str]  # as `COLUMNS`
+TableRow = tuple[str, str, str, float, str, int, float, str, str, float, str]  # as `COLUMNS`
 
 
-def row_of(run: Run, metric: str, value: Value, unit: str, versus: str) -> Row:
+def row_of(run: Run, metric: str, value: Value, unit: str, versus: str) -> TableRow:
     """A number of a run."""
     whose = (run.scenario, run.engine, run.profile, run.dt, metric)
     return (*whose, value.disk, value.value, unit, versus, value.at, value.note)
 
 
-def status_row(run: Run, why: str, versus: str = "itself") -> Row:
+def status_row(run: Run, why: str, versus: str = "itself") -> TableRow:
     """In place of numbers: why there is none of a run."""
     return row_of(run, "status", Value(np.nan, note=why), "", versus)
 
 
-def table_of(rows: Sequence[Row]) -> pd.DataFrame:
+def table_of(rows: Sequence[TableRow]) -> pd.DataFrame:
     """The rows as a table; of none an empty one."""
     return pd.DataFrame(rows, columns=list(COLUMNS))

@@ -4,7 +4,7 @@ write a number."""
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from zlib import crc32
 
 from adapters.engine_row import Mark
@@ -146,12 +146,12 @@ def css_variables(dark: bool) -> str:
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def number(value: object, digits: int = 3) -> str:
+def number(value: Any, digits: int = 3) -> str:
     """`value` to so many significant digits: 0.0123, 1.23×10⁻⁵, 0, ∞, – for nan; text as it is."""
     if isinstance(value, bool | str) or value is None:
         return {True: "yes", False: "no", None: "–", "": "–"}.get(value, str(value))
     try:
-        x = float(value)  # type: ignore[arg-type]
+        x = float(value)
     except (TypeError, ValueError):
         return str(value)
     if not math.isfinite(x):
