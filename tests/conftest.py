@@ -1,16 +1,30 @@
-"""What the tests of all pages share: one browser a file; and what the independent checks have to
-say."""
+"""What all tests share: forked workers, one browser, how many examples a property is tried with;
+and what the independent checks have to say."""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 from playwright.sync_api import Browser
 
 from reports.run import worker
 from tests.forks import FRESH, Forked
 from tests.reports.page.browsing import chromium
+
+# Images of containers forbid Python to keep what it has compiled. Each process of the tests would
+# then compile all libraries again, which takes three quarters of the time of its start.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+# How many examples a property is tried with, unless it says so itself: `few` each time, `many` by
+# `--hypothesis-profile many`. No deadline: the first example may load a compiled kernel.
+settings.register_profile("few", max_examples=25, deadline=None)
+settings.register_profile("many", max_examples=200, deadline=None)
+settings.load_profile("few")
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -29,9 +43,10 @@ def fresh_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker, "start", FRESH)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    """Debian's Chromium; where it is missing the tests are skipped, in CI they fail."""
+    """Debian's Chromium, started once, each test with a context of its own; where it is missing the
+    tests are skipped, in CI they fail."""
     with chromium() as browser:
         yield browser
 

@@ -14,7 +14,7 @@ from reference_impl.neighbours import LASTS, build_list
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
 from tests.adapters.event_driven.gases import boxed_gas
 
-steady = settings(deadline=None, derandomize=True, max_examples=100)
+steady = settings(derandomize=True)
 DT = 1 / 60
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reports.run.answers import record_of
@@ -73,7 +73,6 @@ def test_a_thrust_out_of_scale_is_refused_at_once(force: float):
         record_of(under_thrust(force))
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.floats(-1e6, 1e6),
     st.floats(-1e5, 1e5),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.catalogue import scenario
@@ -115,7 +115,6 @@ def test_the_random_scenes_are_answered_to_their_end(name: str, records: dict[st
     restitution=st.sampled_from([1.0, 0.9, 0.5]),
     gravity=st.sampled_from([0.0, -3]),
 )
-@settings(max_examples=25, deadline=None)
 def test_it_finds_the_collisions_of_a_float64_simulation(
     seed: int, restitution: float, gravity: float
 ):

@@ -308,7 +308,8 @@ def test_accumulation_in_plain_python_is_the_same(monkeypatch):
         # seconds.
         pytest.param("if run.collisions < COLLISIONS:", "if True:", marks=pytest.mark.slow),
         pytest.param("if abs(gap) < ROUNDING", "if gap < ROUNDING", marks=pytest.mark.slow),
-        ("fall_into(walls, a, w, k) > 0.0", "False"),  # it is left to the first of its two walls
+        # it is left to the first of its two walls
+        pytest.param("fall_into(walls, a, w, k) > 0.0", "False", marks=pytest.mark.slow),
     ],
 )
 def test_a_planted_bug_in_accumulation_is_caught(right, wrong, monkeypatch):

@@ -151,7 +151,7 @@ def compare_all(seeds):
         compare(seed)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_a_brute_force_algorithm_finds_the_same_collisions(seed):
     """All pairs, all images, all walls and their ends; all roots at once."""

@@ -2,6 +2,7 @@
 and verdicts."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,14 @@ def compared(one: Scenario, *, substeps: tuple[int, ...] = (1, 2, 4)) -> Compari
     return compare(one, runs)
 
 
+@cache
+def table_of(name: str, samples: int = 0) -> pd.DataFrame:
+    """The table that all of a scenario's metrics are read off; of a truth that is known at so many
+    samples, if any."""
+    one = known_until(name, samples) if samples else scenario(name)
+    return compared(replace(one, substeps=(1, 2, 4))).table
+
+
 def against_truth(table: pd.DataFrame, metric: str, dt: float) -> pd.DataFrame:
     """Its rows at a step size."""
     return table[(table.metric == metric) & (table.versus == "truth") & (table.dt_s == dt)]
@@ -65,8 +74,7 @@ def against_truth(table: pd.DataFrame, metric: str, dt: float) -> pd.DataFrame:
 def test_a_crowded_scene_is_judged_at_every_step_size(name: str, metric: str):
     """From nearly all of its samples, and says from how many; a stepping engine has no perfect
     score."""
-    one = replace(scenario(name), substeps=(1, 2, 4))
-    rows = compared(one).table.query("metric == @metric and versus == 'truth'")
+    rows = table_of(name).query("metric == @metric and versus == 'truth'")
 
     for row in rows.to_dict("records"):
         judged, samples = (int(word) for word in row["note"].split(" samples")[0].split(" of "))
@@ -89,8 +97,7 @@ def test_nothing_is_judged_by_the_start_alone():
 def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
     """Within three steps of its end a truth does not say which velocity may come early: of 3
     samples 2 are left at dt / 4, none at dt."""
-    one = known_until("wall_to_wall", 4)
-    table = compared(one).table
+    one, table = scenario("wall_to_wall"), table_of("wall_to_wall", 4)
     fine, coarse = (against_truth(table, metric, one.dt(k)) for k in (4, 1))
 
     assert np.isfinite(fine.value).all()

@@ -119,7 +119,7 @@ def test_the_same_keys_give_the_same_flight():
     assert bits(one) != bits(other)
 
 
-@pytest.mark.parametrize("substeps", [2, 16])
+@pytest.mark.parametrize("substeps", [2, pytest.param(16, marks=pytest.mark.slow)])
 def test_a_saved_flight_replays_to_the_same_bits(tmp_path: Path, substeps: int):
     """Flown again, and played by `crosscheck run`'s own loop: every engine ends in the same
     state."""
@@ -228,10 +228,17 @@ def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
     assert state.velocity[SHIP] == pytest.approx([-0.25 * since * flight.dt, 0.0], abs=1e-13)
 
 
-def test_looking_at_every_step_near_an_edge_changes_no_bit():
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["reference:exercise", "pymunk:matched", "box2d:matched", "box2d_v3:matched"],
+        pytest.param(list(ENGINES), marks=pytest.mark.slow),
+    ],
+    ids=["some", "all"],
+)
+def test_looking_at_every_step_near_an_edge_changes_no_bit(names: list[str]):
     """The ship turns round 0.1 m before the edge, where it is looked at step by step; `play` looks
     once a frame."""
-    names = list(ENGINES)
     keys = [(0, "s", True), (150, "s", False), (151, "w", True)]
     flight = flown(names, 400, keys, seed=4, asteroids=8)
     scenario = flight.saved()

@@ -82,7 +82,10 @@ def test_a_right_solver_flies_as_the_reference_does(
 
 @pytest.mark.parametrize(
     ("act", "reason"),
-    [("throw new Error('out of fuel')", "out of fuel"), (FOREVER, "does not come back")],
+    [
+        ("throw new Error('out of fuel')", "out of fuel"),
+        pytest.param(FOREVER, "does not come back", marks=pytest.mark.slow),
+    ],
 )
 def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, act: str, reason: str

@@ -101,6 +101,7 @@ def test_keys_held_and_released_move_the_ship(page: Page):
     assert angle == pytest.approx((32 * FRAME) ** 2 * 1.5 + dt * 32 * FRAME / 2, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_scripted_flight_wins(page: Page):
     """With the keys of `steered_home` pressed and released in the page."""
     wish(page, asteroids=0)
@@ -173,6 +174,7 @@ def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Pa
     )
 
 
+@pytest.mark.slow
 def test_a_saved_flight_is_shown_again_to_the_same_bits(
     browser: Browser, page: Page, tmp_path: Path
 ):

@@ -226,7 +226,7 @@ def test_what_cannot_be_shown_is_reported(url: str, path: str, status: int, said
 def test_a_slider_that_is_dragged_asks_for_where_it_stops(browser: Browser, url: str):
     """Not for every place it passes: a lesson that takes a second would answer half a minute
     later."""
-    page, heard = opened(browser, f"{url}/horizon", viewport={"width": 1280, "height": 900})
+    page, heard = opened(browser, f"{url}/gravity", viewport={"width": 1280, "height": 900})
     page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))

@@ -6,7 +6,15 @@ from reports.run.known_answers import KNOWN_ANSWERS, KnownAnswer, mean_squared_e
 
 
 @pytest.mark.parametrize(
-    "known", KNOWN_ANSWERS, ids=lambda known: f"{known.column} {known.made_by} {known.dt_s:g}"
+    "known",
+    [
+        pytest.param(
+            known,
+            id=f"{known.column} {known.made_by} {known.dt_s:g}",
+            marks=pytest.mark.slow if known.dt_s < 1e-3 else (),
+        )
+        for known in KNOWN_ANSWERS
+    ],
 )
 def test_a_published_number_comes_out_digit_for_digit(known: KnownAnswer):
     """ODE's column out of pymunk and out of a step that falls or reflects, Bullet's out of one that

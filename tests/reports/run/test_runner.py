@@ -19,7 +19,7 @@ from reports.run.playing import CellResult, play_cell, play_here
 from reports.run.runner import NoScheduler, cluster, run_all
 from reports.run.worker_process import Failure
 from scenarios.catalogue import scenario
-from tests.forks import FRESH
+from tests.forks import FRESH, Forked
 from tests.reports.run.control_engines import (
     CONTROLS,
     FATAL,
@@ -47,15 +47,15 @@ def cells(rows: dict[str, EngineRow]) -> dict[str, partial]:
     }
 
 
-@pytest.fixture(scope="module")
-def ended() -> dict[str, CellResult | Failure]:
-    """How 24 good cells ended and nine bad ones among them, on two workers."""
+@pytest.fixture(scope="module", params=["forked", pytest.param("fresh", marks=pytest.mark.slow)])
+def ended(request: pytest.FixtureRequest) -> dict[str, CellResult | Failure]:
+    """How 24 good cells ended and nine bad ones among them, on two workers: forked here, and each
+    an interpreter of its own, as users have it."""
     mixed = {**dict(list(GOOD.items())[:12]), **CONTROLS, **dict(list(GOOD.items())[12:])}
     tasks = cells(mixed)
     # by itself, for the others may need long on a busy machine
     hang = {"hangs:control": tasks.pop("hangs:control")}
-    # as users have it: how it ends is what is asked
-    with mock.patch.object(worker, "start", FRESH):
+    with mock.patch.object(worker, "start", FRESH if request.param == "fresh" else Forked):
         results = [
             *run_all(tasks, workers=2, memory=500_000_000),
             *run_all(hang, workers=1, timeout=3.0),

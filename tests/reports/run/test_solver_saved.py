@@ -67,7 +67,11 @@ def place(folder: Path, file: str, factor: int) -> Path:
     return folder / "solver.py"
 
 
-SAVED = [*TEXTS, "beside", "compiled", "compiled beside"]
+QUICK = ("plain.js", "plain.py", "compiled beside")
+SAVED = [
+    pytest.param(file, marks=() if file in QUICK else pytest.mark.slow)
+    for file in (*TEXTS, "beside", "compiled", "compiled beside")
+]
 
 
 def played(row) -> Run:
@@ -99,7 +103,9 @@ def test_the_text_that_was_read_is_played_whatever_is_saved_since(
     assert before.source != after.source
 
 
-@pytest.mark.parametrize("file", ["compiled", "compiled beside"])
+@pytest.mark.parametrize(
+    "file", [pytest.param("compiled", marks=pytest.mark.slow), "compiled beside"]
+)
 def test_what_numba_keeps_would_be_taken_for_another_text(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):

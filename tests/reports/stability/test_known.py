@@ -198,7 +198,7 @@ def test_a_force_read_off_the_positions_makes_an_oscillator_grow_as_published(
         ("reference:lesson", 1.0),
         ("pymunk:matched", 1.0),
         ("box2d_v3:matched", 0.375),
-        ("event_driven:float64", 0.5),
+        pytest.param("event_driven:float64", 0.5, marks=pytest.mark.slow),
     ],
 )
 def test_it_doubles_where_the_determinant_of_the_map_says(engine: str, gain: float):

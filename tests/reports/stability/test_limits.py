@@ -111,7 +111,14 @@ def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
     assert row.fails_at < 0.006
 
 
-@pytest.mark.parametrize("engine", ["reference:exercise", "reference:lesson", "box2d:shipped"])
+@pytest.mark.parametrize(
+    "engine",
+    [
+        "reference:exercise",
+        pytest.param("reference:lesson", marks=pytest.mark.slow),
+        pytest.param("box2d:shipped", marks=pytest.mark.slow),
+    ],
+)
 def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(engine: str):
     """At values, heights and phases that no form has played, the ball comes back wherever it is
     said to.

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -156,7 +156,8 @@ def test_what_a_solver_imports_of_its_own_is_found(ran):
     assert ran() == ""
 
 
-def imported_here() -> set[str]:
+@cache
+def imported_here() -> frozenset[str]:
     """The modules of Python's that this program imports, but for those that Python itself has
     imported before it."""
     found = set()
@@ -169,9 +170,8 @@ def imported_here() -> set[str]:
     before = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
-    return {name for name in found if name in sys.stdlib_module_names} - {
-        name.partition(".")[0] for name in before
-    }
+    ours = {name for name in found if name in sys.stdlib_module_names}
+    return frozenset(ours - {name.partition(".")[0] for name in before})
 
 
 @pytest.mark.parametrize("path", [":", ":/nowhere", "."])

@@ -34,6 +34,8 @@ from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 SCENE = (Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml").read_text()
 ONE = ("--engine", "reference:exercise", "--dt", "0.02")
 AGAIN = ("run", "my.toml", *ONE, "--out", "out")
+# Not every pair in the fast suite, but each member of every pair.
+THOROUGH = pytest.mark.slow
 # A command line of each that makes a folder.
 COMMANDS = {
     "run": AGAIN,
@@ -120,8 +122,15 @@ MEDDLING: dict[str, tuple[str, Callable[[Path], object], str]] = {
 }
 
 
-@pytest.mark.parametrize("words", [AGAIN, ("run", "--resume", "out")], ids=["again", "resume"])
-@pytest.mark.parametrize("name", ["out", "out.part"])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        pytest.param("out", AGAIN, id="finished-again"),
+        pytest.param("out", ("run", "--resume", "out"), id="finished-resume", marks=THOROUGH),
+        pytest.param("out.part", AGAIN, id="interrupted-again", marks=THOROUGH),
+        pytest.param("out.part", ("run", "--resume", "out"), id="interrupted-resume"),
+    ],
+)
 @pytest.mark.parametrize("what", MEDDLING)
 def test_a_folder_in_which_somebody_has_put_something_stays_as_it_is(
     here: Path, what: str, name: str, words: tuple[str, ...]
@@ -187,8 +196,16 @@ FOREIGN: dict[str, dict[str, str]] = {
 }
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("what", FOREIGN)
+@pytest.mark.parametrize(
+    ("command", "what"),
+    [
+        pytest.param(
+            command, what, marks=() if command == "run" or what == "a page" else THOROUGH
+        )
+        for command in COMMANDS
+        for what in FOREIGN
+    ],
+)
 @pytest.mark.parametrize("name", ["out", "out.part"])
 def test_no_command_writes_into_somebody_elses_folder(
     tmp_path: Path, command: str, what: str, name: str
