@@ -285,6 +285,30 @@ def speed(
     )
 
 
+@app.command()
+def advise(
+    scene: Annotated[str, typer.Argument(metavar="SCENARIO|FILE.toml")],
+    error: Annotated[
+        str, typer.Option(metavar="E", help="The largest error allowed: 1% or 0.01.")
+    ] = "1%",
+    purpose: Annotated[
+        str,
+        typer.Option(
+            "--for",
+            metavar="PURPOSE",
+            help="What the error is of: trajectory, energy or statistics.",
+        ),
+    ] = "trajectory",
+    engine: Engines = None,
+    seed: Seed = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Find the cheapest engine and step size for a scene, and what the scene does not need."""
+    from reports.speed.advise import give_advice
+
+    give_advice(scene, error, purpose, engine or [], seed, as_json)
+
+
 VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
 
 

@@ -1,0 +1,323 @@
+"""The cheapest engine and step size that keep a given error in one scene, and what that scene does
+not need: all from runs of the scene itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import groupby
+from math import inf, isfinite, isnan, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from adapters.engine import FLOAT64, Engine
+from adapters.engines import ENGINES, row_of
+from adapters.mechanisms.options import OPTIONS
+from adapters.mechanisms.table import MECHANISMS
+from adapters.play import play_once
+from reports.compare.comparison import cut
+from reports.compare.delays import jumps_of
+from reports.compare.view import View
+from reports.run.machine import busy_cores
+from reports.run.runner import run_all
+from reports.run.worker_process import Failure
+from reports.speed import ladder
+from reports.speed.budget import INTERPLAY, RESIDUAL, TIME, TOTALS, budget_of
+from reports.speed.effort import MOST_STEP_SIZES
+from reports.speed.plan import PLAIN
+from reports.speed.purposes import PURPOSES
+from reports.speed.timing import WARM_UP, Sample
+from reports.terminal.progress import Progress
+from scenarios.model import Scenario
+from scenarios.no_truth import NoTruth
+
+PATIENCE, ALL_ROUNDS = 60.0, 600.0  # s that a run, and all timings together, may take
+ROUNDS, BUDGET = 11, 0.4  # of timing, and s of it for one engine
+# steps times disks of one run: some seconds of the slowest engine; of less than `FEW` disks a step
+# costs no less
+MOST_WORK, FEW = 1_000_000, 10
+TOO_FAR_OFF, SAVES_TIME, NEARER, NO_GAIN = "too far off", "saves time", "more accurate", "no gain"
+HALF = 0.5  # of the error is left: more accurate
+
+
+class NoAdvice(Exception):
+    """Nothing can be advised for the scene, and why."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One engine at one step size.
+
+    Attributes:
+        name: `engine:profile`.
+        change: a row of `OPTIONS`, or `PLAIN`.
+        substeps: steps in a sample interval.
+        dt: s.
+        error: of the purpose; inf where the run failed, nan where it cannot be judged.
+        reason: why it failed, else "".
+        cost: s per simulated second, nan where not timed.
+    """
+
+    name: str
+    change: str
+    substeps: int
+    dt: float
+    error: float
+    reason: str = ""
+    cost: float = nan
+
+    @property
+    def make(self) -> Callable[[], Engine]:
+        """How to make the engine."""
+        made = {(option.engine, option.change): option.make for option in OPTIONS}
+        return made.get((self.name, self.change)) or row_of(self.name).make
+
+    def keeps(self, bound: float) -> bool:
+        """Whether its error is known and at most `bound`."""
+        return self.error <= bound
+
+
+class Change(NamedTuple):
+    """An engine with one thing changed beside the engine as it is, at the same step size."""
+
+    plain: Attempt
+    changed: Attempt
+
+    def verdict(self, bound: float, noise: float) -> str:
+        """What the change does: to the error, else to the cost if by more than `noise`."""
+        ratio = self.changed.cost / self.plain.cost
+        if not self.changed.keeps(bound):
+            return TOO_FAR_OFF
+        if ratio < 1 - noise:
+            return SAVES_TIME
+        return NEARER if self.changed.error <= HALF * self.plain.error else NO_GAIN
+
+
+class Short(NamedTuple):
+    """An engine that keeps the error at no step size: its best attempt, and why it is no better."""
+
+    best: Attempt
+    why: str
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What was found.
+
+    Attributes:
+        scene: its name.
+        until, duration: s, how far the exact answer goes and how long the scene is.
+        step_sizes: s, those that were tried, coarse to fine.
+        keeping: of every engine that keeps the error its coarsest step size that does, as does
+            every finer one; cheapest first.
+        short: the engines that do not.
+        changes: options of the engines that keep it, one changed at a time.
+        noise: by how much an engine against itself differs from 1 in three of four pairs.
+        busy: cores that others kept busy when the timing began; nan where unknown.
+    """
+
+    scene: str
+    until: float
+    duration: float
+    step_sizes: Sequence[float]
+    keeping: Sequence[Attempt]
+    short: Sequence[Short]
+    changes: Sequence[Change]
+    noise: float
+    busy: float
+
+
+def advise(
+    scene: str,
+    seed: int,
+    purpose: str,
+    bound: float,
+    names: Sequence[str],
+    workers: int,
+    progress: Progress,
+) -> Advice:
+    """Which of the engines `names` keeps the error of a purpose of `PURPOSES` within `bound` at the
+    least cost.
+
+    Every engine is played at every step size of the scene's ladder; those that keep the error are
+    timed, together with their options, alone on the machine.
+
+    Raises:
+        NoAdvice: the scene has no exact answer, or the timing failed.
+    """
+    run = partial(attempts, scene, seed, purpose, workers, progress)
+    scenario = held_by(scene, seed)
+    step_sizes = ladder_of(scenario)
+    tried = run([(name, PLAIN, k) for name in names for k in step_sizes])
+    of_engine = [list(group) for _, group in groupby(tried, key=lambda one: one.name)]
+    found = [(one, coarsest_that_keeps(one, bound)) for one in of_engine]
+    keeping = [best for _, best in found if best is not None]
+    changed = run([(one.name, change, one.substeps) for one in keeping for change in changes(one)])
+    priced, noise, busy = timed(scene, seed, [*keeping, *changed], progress)
+    plain = {one.name: one for one in priced if one.change == PLAIN}
+    short = [min(rungs, key=smallest) for rungs, best in found if best is None]
+    return Advice(
+        scenario.name,
+        scenario.duration,
+        ladder.open_scene(scene, seed).duration,
+        [scenario.dt(k) for k in step_sizes],
+        sorted(plain.values(), key=lambda one: one.cost),
+        reasons(scene, seed, purpose, short, step_sizes[-1], workers, progress),
+        [Change(plain[one.name], one) for one in priced if one.change != PLAIN],
+        noise,
+        busy,
+    )
+
+
+def held_by(scene: str, seed: int) -> Scenario:
+    """The scenario up to the horizon of its exact answer; raises `NoAdvice` without one."""
+    try:
+        return ladder.held(scene, seed).scenario
+    except NoTruth as refusal:
+        raise NoAdvice(f"no exact answer: {refusal}") from refusal
+
+
+def ladder_of(scenario: Scenario) -> list[int]:
+    """Steps in a sample interval, doubling from the scenario's own coarsest; two at least."""
+    each = scenario.samples * max(scenario.scene.n, FEW)
+    doubled = [scenario.substeps[0] * 2**k for k in range(MOST_STEP_SIZES)]
+    return [k for place, k in enumerate(doubled) if place < 2 or k * each <= MOST_WORK]
+
+
+def changes(one: Attempt) -> list[str]:
+    """The options of its engine."""
+    return [option.change for option in OPTIONS if option.engine == one.name]
+
+
+def smallest(one: Attempt) -> float:
+    """Its error; what failed or cannot be judged comes last."""
+    return one.error if isfinite(one.error) else inf
+
+
+def coarsest_that_keeps(rungs: Sequence[Attempt], bound: float) -> Attempt | None:
+    """Of attempts from coarse to fine the first that keeps the error, as do all after it.
+
+    An attempt that keeps it by luck, with a larger error at a finer step, does not count.
+    """
+    best = None
+    for one in reversed(rungs):
+        if not one.keeps(bound):
+            break
+        best = one
+    return best
+
+
+def attempts(
+    scene: str,
+    seed: int,
+    purpose: str,
+    workers: int,
+    progress: Progress,
+    asked: Iterable[tuple[str, str, int]],
+) -> list[Attempt]:
+    """(`engine:profile`, change, substeps) played, in their order; each in a worker process."""
+    dt = held_by(scene, seed).dt
+    wanted = [Attempt(name, change, k, dt(k), nan) for name, change, k in asked]
+    tasks = {one: partial(error_of, scene, seed, purpose, one) for one in wanted}
+    outcomes = dict(carried_out(tasks, workers, PATIENCE, progress, "playing"))
+    return [
+        replace(one, error=inf, reason=f"{outcome.status}: {outcome.reason}")
+        if isinstance(outcome := outcomes[one], Failure)
+        else replace(one, error=outcome[0], reason=outcome[1])
+        for one in wanted
+    ]
+
+
+def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, str]:
+    """The error of one run up to the horizon; inf and why if it failed."""
+    scenario, truth = ladder.held(scene, seed)
+    run = play_once(one.make, one.name, scenario, one.dt)
+    if run.status != "ok" or run.trajectory is None:
+        return inf, f"{run.status}: {run.reason}"
+    rounding = ENGINES[one.name].rounding if one.name in ENGINES else FLOAT64
+    played = cut(run.trajectory, len(truth))
+    view = View(scenario, one.dt, played, truth, jumps_of(truth, scenario), rounding)
+    error = PURPOSES[purpose].error(view)
+    return error, "" if not isnan(error) else "too little of it can be judged"
+
+
+def timed(
+    scene: str, seed: int, played: Sequence[Attempt], progress: Progress
+) -> tuple[list[Attempt], float, float]:
+    """The attempts with their costs, the noise, and how many cores others kept busy."""
+    if not played:
+        return [], nan, nan
+    makes = {
+        ((one.name, one.change), one.substeps, copy): one.make
+        for one in played
+        for copy in ((0, 1) if one.change == PLAIN else (0,))
+    }
+    task = partial(ladder.times_of, scene, seed, makes, ROUNDS, BUDGET)
+    busy = busy_cores()
+    [(_, samples)] = carried_out({"time": task}, 1, ALL_ROUNDS, progress, "timing")
+    if isinstance(samples, Failure):
+        raise NoAdvice(f"the timing ended: {samples.status}: {samples.reason}")
+    cost = medians(samples)
+    pairs = [cost[key[0], key[1], 1] / cost[key] for key in cost if (key[0], key[1], 1) in cost]
+    noise = float(np.percentile(np.abs(np.log(pairs)), 75))
+    priced = [replace(one, cost=cost[(one.name, one.change), one.substeps, 0]) for one in played]
+    return priced, noise, busy
+
+
+def medians(samples: Sequence[Sample]) -> dict[Any, float]:
+    """key -> the median cost over its rounds, without the warm-up."""
+    costs: dict[Any, list[float]] = {}
+    for sample in samples:
+        if sample.round != WARM_UP:
+            costs.setdefault(sample.key, []).append(sample.cost)
+    return {key: float(np.median(values)) for key, values in costs.items()}
+
+
+def reasons(
+    scene: str,
+    seed: int,
+    purpose: str,
+    short: Sequence[Attempt],
+    finest: int,
+    workers: int,
+    progress: Progress,
+) -> list[Short]:
+    """What most of the error of each is made of at the finest step, by the error budget."""
+    tasks = {
+        one: partial(budget_of, scene, seed, one.name, finest)
+        for one in short
+        if one.name in MECHANISMS and isfinite(one.error)
+    }
+    budgets = dict(carried_out(tasks, workers, PATIENCE, progress, "error budget"))
+    measure = "energy" if purpose == "energy" else "position_radii"
+    return [Short(one, one.reason or largest(budgets.get(one), measure)) for one in short]
+
+
+def largest(budget: Any, measure: str) -> str:
+    """The mechanism that changes most, or that none known does."""
+    if budget is None or isinstance(budget, Failure):
+        return ""
+    left_out = (*TOTALS, INTERPLAY)
+    parts = [row for row in budget if row["contribution"] not in left_out and measure in row]
+    if not parts:
+        return ""
+    most = max(parts, key=lambda row: row[measure])["contribution"]
+    return "mostly " + {TIME: "end-of-step detection", RESIDUAL: "unknown"}.get(most, most)
+
+
+def carried_out(
+    tasks: Mapping[Any, Callable[[], Any]],
+    workers: int,
+    patience: float,
+    progress: Progress,
+    what: str,
+) -> Iterable[tuple[Any, Any]]:
+    """The tasks in worker processes, which are stopped after `patience` s; results as they come."""
+    if not tasks:
+        return
+    progress.start(len(tasks), len(tasks), what)
+    for task, outcome in run_all(tasks, workers, patience):
+        progress.done(what, "ok", "")
+        yield task, outcome

@@ -1,0 +1,174 @@
+"""`crosscheck advise`: the cheapest engine and step size that keep an error in one scene, and what
+the scene does not need."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from math import isfinite
+from typing import Any, NoReturn
+
+from rich.table import Table
+
+from reports.page.style import number
+from reports.run.arguments import checked_engines, checked_scenes, unknown
+from reports.speed.advice import Advice, Attempt, NoAdvice, advise
+from reports.speed.purposes import PURPOSES
+from reports.terminal.console import Console
+from reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
+from reports.terminal.progress import Progress
+
+SHOWN = 3  # the cheapest and the next two
+LOUD, BUSY = 0.1, 0.5  # noise, and cores kept busy, beyond which a time is worth little
+
+
+def give_advice(
+    scene: str, error: str, purpose: str, engines: Sequence[str], seed: int, as_json: bool
+) -> NoReturn:
+    """Measure and print; exits 0, 1 where no engine keeps the error or there is no exact answer,
+    2 on bad input."""
+    if purpose not in PURPOSES:
+        refuse([unknown("purpose", purpose, PURPOSES) + f"; allowed: {', '.join(PURPOSES)}"])
+    bound = bound_of(error)
+    (checked,) = checked_scenes([scene], [], False, seed)
+    names = checked_engines(engines)
+    with stoppable(), Progress() as progress:
+        try:
+            advice = advise(checked, seed, purpose, bound, names, os.cpu_count() or 1, progress)
+        except NoAdvice as why:
+            say(f"{scene}: {why}")
+            sys.exit(FAILED)
+    if as_json:
+        print(json.dumps(as_plain(advice, purpose, bound), indent=1, allow_nan=False))
+    else:
+        print_advice(advice, purpose, bound)
+    sys.exit(DONE if advice.keeping else FAILED)
+
+
+def bound_of(error: str) -> float:
+    """The number that "1%" or "0.01" stands for; exits 2 on what is no positive number."""
+    text, scale = (error[:-1], 0.01) if error.endswith("%") else (error, 1.0)
+    try:
+        bound = float(text) * scale
+    except ValueError:
+        bound = 0.0
+    if not (isfinite(bound) and bound > 0):
+        refuse([f"--error {error!r} is no positive number; write 1% or 0.01"])
+    return bound
+
+
+def as_plain(advice: Advice, purpose: str, bound: float) -> dict[str, Any]:
+    """All of it for programs; what is not finite is null, as JSON has no such numbers."""
+    return {
+        "scenario": advice.scene,
+        "purpose": purpose,
+        "error_at_most": bound,
+        "until_s": advice.until,
+        "duration_s": advice.duration,
+        "dt_s_tried": list(advice.step_sizes),
+        "cheapest_first": [row_of_attempt(one) for one in advice.keeping],
+        "not_within": [row_of_attempt(short.best) | {"why": short.why} for short in advice.short],
+        "changes": [
+            row_of_attempt(change.changed)
+            | {
+                "change": change.changed.change,
+                "error_without": finite(change.plain.error),
+                "cost_ratio": finite(change.changed.cost / change.plain.cost),
+                "verdict": change.verdict(bound, advice.noise),
+            }
+            for change in advice.changes
+        ],
+        "noise": finite(advice.noise),
+        "cores_busy": finite(advice.busy),
+    }
+
+
+def row_of_attempt(one: Attempt) -> dict[str, Any]:
+    """An attempt for programs."""
+    return {
+        "engine": one.name,
+        "dt_s": one.dt,
+        "error": finite(one.error),
+        "us_per_simulated_s": finite(one.cost * 1e6),
+    }
+
+
+def finite(value: float) -> float | None:
+    """The number, None where it is none."""
+    return value if isfinite(value) else None
+
+
+def print_advice(advice: Advice, purpose: str, bound: float) -> None:
+    """What to take, what does not get there, what the scene does not need, how sure the times
+    are."""
+    console = Console()
+    console.print(
+        f"{advice.scene}: {PURPOSES[purpose].what}, at most {number(bound)},"
+        f" up to {number(advice.until)} of {number(advice.duration)} s",
+        highlight=False,
+    )
+    if advice.keeping:
+        console.print(table_of_choices(advice))
+    else:
+        console.print("None of the engines keeps it at any step size that was tried.", style="bold")
+    if advice.short:
+        console.print(table_of_short(advice))
+    if advice.changes:
+        console.print(table_of_changes(advice, bound))
+    console.print(sentence_on_times(advice), highlight=False)
+
+
+def plain_table(title: str, *headings: str) -> Table:
+    """A table without lines; numbers stand on the right."""
+    table = Table(title=f"\n{title}", title_justify="left", box=None, padding=(0, 2, 0, 0))
+    for k, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if k == 0 else "right", overflow="fold")
+    return table
+
+
+def table_of_choices(advice: Advice) -> Table:
+    """The cheapest and the next two."""
+    table = plain_table("Cheapest first", "engine", "dt, ms", "error", "µs per simulated s")
+    for one in advice.keeping[:SHOWN]:
+        table.add_row(one.name, number(one.dt * 1e3), number(one.error), number(one.cost * 1e6))
+    return table
+
+
+def table_of_short(advice: Advice) -> Table:
+    """Those that keep the error at no step size."""
+    coarse, *_, fine = advice.step_sizes
+    title = f"Not within it at any step size from {number(coarse * 1e3)} to {number(fine * 1e3)} ms"
+    table = plain_table(title, "engine", "least error", "at dt, ms")
+    table.add_column("why", overflow="fold")
+    for best, why in advice.short:
+        table.add_row(best.name, number(best.error), number(best.dt * 1e3), why)
+    return table
+
+
+def table_of_changes(advice: Advice, bound: float) -> Table:
+    """What each option of the engines above costs and does here."""
+    title = "What the scene does not need: one option changed, at the same step size"
+    table = plain_table(title, "engine, with", "error", "cost")
+    table.add_column("verdict", no_wrap=True)
+    for change in advice.changes:
+        table.add_row(
+            f"{change.plain.name}, {change.changed.change}",
+            f"{number(change.plain.error, 2)} → {number(change.changed.error, 2)}",
+            f"× {number(change.changed.cost / change.plain.cost, 2)}",
+            change.verdict(bound, advice.noise),
+        )
+    return table
+
+
+def sentence_on_times(advice: Advice) -> str:
+    """How far the times can be trusted."""
+    if not advice.keeping:
+        return ""
+    said = (
+        f"\nAn engine against itself differs by {advice.noise:.0%}; what is nearer costs the same."
+    )
+    if advice.noise > LOUD or advice.busy > BUSY:
+        said += " The machine is busy: measure again when it is idle."
+    return said

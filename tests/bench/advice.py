@@ -1,0 +1,79 @@
+"""Whether what `crosscheck advise` says is right, by measuring anew:
+`python -m tests.bench.advice [SCENE ...]`, a quarter of an hour alone on the machine.
+
+Every engine is played at every step size of every scene, and all that keeps the error at that and
+every finer step size is timed. What was advised must be among it, and nothing may cost less by more
+than an engine differs from itself.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from itertools import groupby
+
+from adapters.engines import ENGINES
+from reports.speed.advice import (
+    Attempt,
+    NoAdvice,
+    advise,
+    attempts,
+    coarsest_that_keeps,
+    held_by,
+    ladder_of,
+    timed,
+)
+from reports.speed.plan import PLAIN
+from reports.terminal.progress import Progress
+from scenarios.catalogue import SCENARIOS
+
+BOUND, PURPOSE, SEED = 0.01, "trajectory", 0
+FLOOR = 0.1  # of a cost, where the noise is less
+
+
+def main(scenes: list[str]) -> int:
+    """Print a line a scene; 1 if any advice is wrong."""
+    wrong = 0
+    for scene in scenes:
+        with Progress() as progress:
+            try:
+                line, right = measured_anew(scene, progress)
+            except NoAdvice as why:
+                line, right = str(why), True
+        print(f"{scene:28} {'' if right else 'WRONG: '}{line}", flush=True)
+        wrong += not right
+    print(f"{len(scenes) - wrong} of {len(scenes)} right")
+    return int(bool(wrong))
+
+
+def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
+    """What was advised and what costs least when all is measured again; whether they agree."""
+    workers = os.cpu_count() or 1
+    advice = advise(scene, SEED, PURPOSE, BOUND, list(ENGINES), workers, progress)
+    asked = [(name, PLAIN, k) for name in ENGINES for k in ladder_of(held_by(scene, SEED))]
+    tried = attempts(scene, SEED, PURPOSE, workers, progress, asked)
+    keeping = [one for rungs in by_engine(tried) for one in those_that_keep(rungs)]
+    if not advice.keeping or not keeping:
+        return "none", not advice.keeping and not keeping
+    again, noise, _ = timed(scene, SEED, keeping, progress)
+    cheapest = min(again, key=lambda one: one.cost)
+    best = advice.keeping[0]
+    same = [one for one in again if (one.name, one.substeps) == (best.name, best.substeps)]
+    ratio = same[0].cost / cheapest.cost if same else float("inf")
+    said = f"{best.name} at {best.dt:.3g} s, {ratio:.2f} of the least ({cheapest.name})"
+    return said, ratio <= 1 + max(noise, FLOOR)
+
+
+def by_engine(tried: list[Attempt]) -> list[list[Attempt]]:
+    """The attempts of each engine, coarse to fine."""
+    return [list(group) for _, group in groupby(tried, key=lambda one: one.name)]
+
+
+def those_that_keep(rungs: list[Attempt]) -> list[Attempt]:
+    """From the coarsest on that keeps the error, as do all finer ones."""
+    best = coarsest_that_keeps(rungs, BOUND)
+    return [] if best is None else rungs[rungs.index(best) :]
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:] or list(SCENARIOS)))

@@ -1,0 +1,142 @@
+"""`crosscheck advise`: what it advises keeps the error, what it leaves out does not, and every
+purpose sees a wrong engine."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from itertools import pairwise
+from math import inf, nan
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adapters.engines import ENGINES
+from adapters.play import play
+from reports.compare.delays import jumps_of
+from reports.compare.view import View
+from reports.speed import ladder
+from reports.speed.advice import (
+    NEARER,
+    NO_GAIN,
+    SAVES_TIME,
+    TOO_FAR_OFF,
+    Attempt,
+    Change,
+    coarsest_that_keeps,
+    ladder_of,
+)
+from reports.speed.plan import PLAIN
+from reports.speed.purposes import PURPOSES
+from scenarios.catalogue import SCENARIOS
+from tests.adapters.broken_engines import DoublesSpeed, Freezes, GainsEnergy
+from tests.reports.terminal.command_line import crosscheck
+
+attempt = partial(Attempt, "pymunk:matched", PLAIN)
+
+
+@given(st.lists(st.floats(0, 2) | st.sampled_from([inf, nan]), min_size=1, max_size=9))
+def test_the_advised_step_and_every_finer_one_keep_the_error(errors: list[float]):
+    """And the next coarser one does not: luck at one step size does not count."""
+    rungs = [attempt(2**k, 0.1 / 2**k, error) for k, error in enumerate(errors)]
+
+    best = coarsest_that_keeps(rungs, 1.0)
+
+    first = len(rungs) if best is None else rungs.index(best)
+    assert all(one.error <= 1.0 for one in rungs[first:])
+    assert first == 0 or not rungs[first - 1].error <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("error", "cost", "verdict"),
+    [
+        (2.0, 0.5, TOO_FAR_OFF),
+        (nan, 0.5, TOO_FAR_OFF),
+        (0.5, 0.5, SAVES_TIME),
+        (0.1, 2.0, NEARER),
+        (0.5, 2.0, NO_GAIN),
+        (0.5, 0.97, NO_GAIN),
+    ],
+)
+def test_a_change_is_judged_by_its_error_first_and_then_by_its_cost(
+    error: float, cost: float, verdict: str
+):
+    """Set against an error of 0.5 within 1 and a cost of 1 s; a saving within the noise is none."""
+    plain = attempt(1, 0.1, 0.5, cost=1.0)
+
+    assert Change(plain, attempt(1, 0.1, error, cost=cost)).verdict(1.0, 0.05) == verdict
+
+
+@pytest.mark.parametrize("purpose", PURPOSES)
+@pytest.mark.parametrize("control", [DoublesSpeed, Freezes, GainsEnergy])
+def test_every_purpose_sees_an_engine_that_is_wrong(purpose: str, control: type):
+    """Negative controls in a scene of flight and bounces; the engine that they are made from is
+    right."""
+    scenario, truth = ladder.held("box_billiard", 0)
+    dt = scenario.dt(scenario.substeps[-1])
+
+    def error(engine) -> float:
+        run = play(engine, "reference:ordered", scenario, dt)
+        view = View(scenario, dt, run.trajectory, truth, jumps_of(truth, scenario))
+        return PURPOSES[purpose].error(view)
+
+    assert error(ENGINES["reference:ordered"].make()) < 1e-3
+    assert error(control()) > 0.01
+
+
+def test_a_ladder_begins_at_the_steps_of_the_scene_and_halves_them():
+    """Two step sizes at least, so that one finer can speak for a coarser."""
+    for name in SCENARIOS:
+        scenario = ladder.open_scene(name, 0)
+        steps = ladder_of(scenario)
+        assert steps[0] == scenario.substeps[0]
+        assert len(steps) >= 2
+        assert all(fine == 2 * coarse for coarse, fine in pairwise(steps))
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["no_such_scene"], "scenario 'no_such_scene' is not known"),
+        (["free_fall", "--error", "0"], "--error '0' is no positive number; write 1% or 0.01"),
+        (["free_fall", "--error", "nan%"], "--error 'nan%' is no positive number"),
+        (["free_fall", "--for", "trajctory"], "did you mean trajectory?"),
+        (["free_fall", "--engine", "pymonk"], "did you mean pymunk"),
+    ],
+)
+def test_bad_input_is_one_clear_sentence(words: list[str], says: str, tmp_path: Path):
+    """Exit 2, and nothing is measured."""
+    done = crosscheck("advise", *words, cwd=tmp_path)
+
+    assert (done.returncode, done.stdout) == (2, "")
+    assert says in done.stderr
+
+
+@pytest.mark.slow
+def test_advice_names_those_that_keep_the_error_and_those_that_do_not(tmp_path: Path):
+    """Whatever the times are; an engine stands in one of the two lists, with the error it has."""
+    words = ["bouncing_ball_e09", "--engine", "reference", "--engine", "pymunk:shipped", "--json"]
+
+    done = crosscheck("advise", *words, "--error", "0.1%", cwd=tmp_path)
+
+    advice = json.loads(done.stdout)
+    assert done.returncode == 0
+    assert [one["engine"] for one in advice["cheapest_first"]] == ["reference:ordered"]
+    assert all(one["error"] <= 0.001 for one in advice["cheapest_first"])
+    short = {one["engine"]: one for one in advice["not_within"]}
+    assert set(short) == {"reference:exercise", "reference:lesson", "pymunk:shipped"}
+    assert all(one["error"] > 0.001 and one["why"] for one in short.values())
+
+
+@pytest.mark.slow
+def test_where_no_engine_keeps_the_error_the_answer_is_none_and_why(tmp_path: Path):
+    """Exit 1, as a comparison that was asked for could not be made."""
+    words = ["bouncing_ball_e09", "--engine", "box2d:shipped", "--error", "1e-6"]
+
+    done = crosscheck("advise", *words, cwd=tmp_path)
+
+    assert done.returncode == 1
+    assert "None of the engines keeps it" in done.stdout
+    assert "mostly" in done.stdout
