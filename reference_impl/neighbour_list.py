@@ -166,7 +166,7 @@ def find_by_cells(near: NeighbourList, x, radius, skin: float) -> None:  # type:
     cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))
     first, second = near_pairs(cells, skin)
     near.count[PAIRS] = NO_ROOM
-    if 0 < len(cells.disk) and len(first) <= len(near.first):
+    if len(cells.disk) > 0 and len(first) <= len(near.first):
         near.count[PAIRS] = count = len(first)
         put_in_order(near.first[:count], near.second[:count], first, second, len(x))
         for p in range(count):

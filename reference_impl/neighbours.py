@@ -11,7 +11,15 @@ import numpy as np
 
 from reference_impl import exercise
 from reference_impl.compiled import compiled, kernel, pasted
-from reference_impl.exercise import collide, collide_wall, collide_walls, touching_wall, wrap, outside, wrap_disk
+from reference_impl.exercise import (
+    collide,
+    collide_wall,
+    collide_walls,
+    outside,
+    touching_wall,
+    wrap,
+    wrap_disk,
+)
 from reference_impl.neighbour_list import (
     EDGES,
     HALF_SKIN,

@@ -15,8 +15,8 @@ from reports.terminal.exits import refuse
 app = typer.Typer(
     name="crosscheck",
     help=(
-        "Cross-validation of 2D disk solvers: the same scenes through every engine, each against an"
-        " exact answer."
+        "Play the same scenes of 2D disks through several physics engines, and measure each against"
+        " the exact answer. Without a command: all scenes, all engines, to reports/out/latest/."
     ),
     no_args_is_help=False,
     add_completion=False,
@@ -24,32 +24,43 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 DEFAULT_OUT = Path("reports/out/latest")
+VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
 
 Scenes = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[SCENARIO|FILE.toml]...", help="Default: all scenarios."),
+    typer.Argument(
+        metavar="SCENARIO|FILE.toml",
+        help="Scenes: names of crosscheck list, or files. Default: all scenarios.",
+    ),
 ]
 Engines = Annotated[
     list[str] | None,
     typer.Option(
-        "--engine", metavar="NAME[:PROFILE]|FILE", help="Play only this engine; repeatable."
+        "--engine",
+        metavar="NAME[:PROFILE]|FILE",
+        help="Only this engine, or this solver's file; may be given again.",
     ),
 ]
 Dts = Annotated[
     list[float] | None,
     typer.Option(
-        "--dt", metavar="S", help="Use this step size instead of the scenario's own; repeatable."
+        "--dt",
+        metavar="S",
+        help="This step size instead of the scene's own ones; may be given again.",
     ),
 ]
-Full = Annotated[bool, typer.Option("--full", help="Add two finer step sizes to every scenario.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of random scenes.")]
+Full = Annotated[bool, typer.Option("--full", help="Add two finer step sizes to every scene.")]
+Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of random scenes.")]
 Out = Annotated[
     Path,
     typer.Option(
-        help="Folder for the results; an earlier run there is replaced when this one is done."
+        metavar="DIR",
+        help="Folder for the results. An earlier run there is replaced once this one is done.",
     ),
 ]
-Workers = Annotated[int, typer.Option(min=0, help="Number of processes; 0: one per core.")]
+Workers = Annotated[
+    int, typer.Option(min=0, metavar="N", help="Number of processes; 0: one for each core.")
+]
 Timeout = Annotated[
     float,
     typer.Option(
@@ -68,7 +79,7 @@ Memory = Annotated[
         min=0,
         max=10**9,
         metavar="MB",
-        help="Memory limit of a process; 0: its share of this machine's.",
+        help="Memory limit of a process; 0: the machine's memory shared among all.",
     ),
 ]
 Scheduler = Annotated[
@@ -80,17 +91,22 @@ Timings = Annotated[
         min=0,
         max=10_000,
         metavar="N",
-        help="Rounds of timings after the run, one process at a time.",
+        help="Time every engine N times after the run, one process at a time.",
     ),
 ]
 Resume = Annotated[
     Path | None,
     typer.Option(
-        metavar="OUT", help="Complete an earlier run: play what is missing or has changed."
+        metavar="OUT", help="Go on with the run in OUT: play what is missing or has changed."
     ),
 ]
-Port = Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")]
-Opens = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
+Port = Annotated[
+    int,
+    typer.Option(
+        min=1, max=65535, metavar="N", help="Port on this machine; if taken, the next free one."
+    ),
+]
+Opens = Annotated[bool, typer.Option("--open", help="Open the page in a browser.")]
 
 
 def place(text: str) -> Path:
@@ -103,8 +119,7 @@ def place(text: str) -> Path:
 
 @app.callback(invoke_without_command=True)
 def default(context: typer.Context) -> None:
-    """Without a command: the main job, all scenarios through all engines, to
-    reports/out/latest/."""
+    """Without a command: all scenes through all engines, to reports/out/latest/."""
     if context.invoked_subcommand is None:
         run()
 
@@ -124,7 +139,7 @@ def run(
     scheduler: Scheduler = "",
     resume: Resume = None,
 ) -> None:
-    """Play some scenarios or scene files through some engines, compare, and report."""
+    """Play scenes through engines, and write the report."""
     from reports.commands import run as run_command
 
     means = run_command.means_of(workers, timeout, memory, scheduler)
@@ -137,9 +152,14 @@ def run(
 
 @app.command()
 def report(
-    out: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="The folder of a run, finished or not.")
+    ],
 ) -> None:
-    """Make the tables and the page of a run again, from its journal."""
+    """Write the tables and the page of a run again.
+
+    Nothing is played again: they are made from the journal of the run and its trajectories.
+    """
     from reports.commands.report import report_again
 
     report_again(out)
@@ -147,12 +167,21 @@ def report(
 
 @app.command()
 def replay(
-    cell: Annotated[str, typer.Argument(help="Cell of runs.csv, or its first characters.")],
-    out: Annotated[Path, typer.Option(help="The folder of the run.")] = DEFAULT_OUT,
+    cell: Annotated[
+        str,
+        typer.Argument(
+            metavar="CELL",
+            help="From the column cell of runs.csv; its first characters are enough.",
+        ),
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder of the run.")] = DEFAULT_OUT,
     timeout: Timeout = 60.0,
 ) -> None:
-    """Play one cell again, step by step: a failed one from its last good state, others from the
-    start."""
+    """Play one cell of a run again, step by step.
+
+    A cell that failed begins at its last good state, any other at the start. What the engine prints
+    is shown.
+    """
     from reports.commands import replay as replay_command
 
     replay_command.replay(cell, out, timeout)
@@ -163,7 +192,11 @@ def diff(
     before: Annotated[Path, typer.Argument(metavar="OUT_A", help="The folder of a run.")],
     after: Annotated[Path, typer.Argument(metavar="OUT_B", help="The folder of a later one.")],
 ) -> None:
-    """What changed between two runs: statuses, numbers, timings; exit 1 if something got worse."""
+    """Show what changed between two runs.
+
+    How cells ended, their numbers, and how long they took. The exit status is 1 if anything got
+    worse.
+    """
     from reports.commands import diff as diff_command
 
     diff_command.show_difference(before, after)
@@ -171,15 +204,24 @@ def diff(
 
 @app.command()
 def truth(
-    scene: Annotated[str, typer.Argument(metavar="SCENARIO|FILE.toml")],
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."
+        ),
+    ],
     events: Annotated[
-        bool, typer.Option("--events", help="All collisions, not only the first and last ten.")
+        bool,
+        typer.Option("--events", help="Print all collisions, not only the first and last ten."),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     seed: Seed = 0,
     timeout: Timeout = 60.0,
 ) -> None:
-    """Print the exact answer to a scene: its collisions, its horizon, and its error bound."""
+    """Print the exact answer to a scene.
+
+    Its collisions, its horizon (up to when it holds, and what ends it), and its error bound.
+    """
     from reports.commands.truth import show_truth
 
     show_truth(scene, seed, events, as_json, timeout)
@@ -192,24 +234,31 @@ def check(
         typer.Argument(
             metavar="FILE|DIR",
             parser=place,
-            help="An Exercise.js, a solver.py, or a folder of them.",
+            help="An Exercise.js, a solver.py, or a folder of them, one for each student.",
         ),
     ],
-    as_json: Annotated[bool, typer.Option("--json", help="Print all rows as JSON.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print every question and its answer as JSON.")
+    ] = False,
     junit: Annotated[
         Path | None,
-        typer.Option(metavar="PATH", parser=place, help="Write the rows as JUnit XML, too."),
+        typer.Option(
+            metavar="PATH", parser=place, help="Write every question as a JUnit test, too."
+        ),
     ] = None,
     page: Annotated[
         Path | None,
-        typer.Option(metavar="PATH", parser=place, help="File of the page.  [default: check.html]"),
+        typer.Option(
+            metavar="PATH", parser=place, help="Where to write the page.  [default: check.html]"
+        ),
     ] = None,
 ) -> None:
-    """Check a hand-written solver of the exercise, and say what is wrong with it. The file is run
-    as you.
+    """Check a hand-written solver of the exercise.
 
-    A Python file may import installed packages, and modules in its own folder whose names differ
-    from theirs.
+    It says what is right, what is wrong, and what likely causes it.
+
+    A solver.py runs with all your permissions. It may import installed packages, and modules beside
+    it that are not named like one of those.
     """
     from reports.check.command import check as check_and_say
 
@@ -220,13 +269,16 @@ def check(
 def play(
     flight: Annotated[
         Path | None,
-        typer.Argument(metavar="[FLIGHT.toml]", parser=place, help="Fly a saved flight again."),
+        typer.Argument(metavar="FLIGHT.toml", parser=place, help="A saved flight to fly again."),
     ] = None,
     engine: Engines = None,
     port: Port = 8000,
     opens: Opens = False,
 ) -> None:
-    """Fly the exercise's spaceship through several engines at once, in a browser."""
+    """Fly the exercise's spaceship through several engines.
+
+    All engines get the same thrusts at once; a browser shows how they diverge.
+    """
     from reports.commands import serve
 
     serve.play(flight, engine or [], port, opens)
@@ -234,7 +286,9 @@ def play(
 
 @app.command()
 def lesson(
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Lesson to begin with.")] = "",
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="A lesson. Default: the list of them.")
+    ] = "",
     port: Port = 8000,
     opens: Opens = False,
     export: Annotated[
@@ -242,12 +296,14 @@ def lesson(
         typer.Option(
             metavar="PATH",
             parser=place,
-            help="Write NAME as one page that needs no server, or all to a folder.",
+            help="Write lesson NAME to a file, or all lessons to a folder, to open offline.",
         ),
     ] = None,
 ) -> None:
-    """Learn why engines differ: short pages with scenes that run and the exact answer beside
-    them."""
+    """Show why engines differ, in lessons with sliders.
+
+    Each is a page in a browser: a scene that runs, the exact answer beside it, and sliders.
+    """
     if export is None:
         from reports.commands import serve
 
@@ -260,18 +316,39 @@ def lesson(
 
 @app.command()
 def speed(
-    scenes: Scenes = None,
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="SCENARIO|FILE.toml",
+            help=(
+                "Scenes: names of crosscheck list, or files. Default: one of each kind, or with"
+                " --full all."
+            ),
+        ),
+    ] = None,
     engine: Engines = None,
     full: Annotated[
-        bool, typer.Option("--full", help="All scenarios, finer steps, more rounds, more disks.")
+        bool,
+        typer.Option(
+            "--full", help="All scenarios, finer steps, more rounds, up to 100 000 disks."
+        ),
     ] = False,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Continue an interrupted run in --out.")
+        bool, typer.Option("--resume", help="Go on with an interrupted run into --out.")
     ] = False,
     seed: Seed = 0,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("reports/out/speed"),
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="DIR",
+            help="Folder for the results. Earlier ones there are replaced once these are done.",
+        ),
+    ] = Path("reports/out/speed"),
 ) -> None:
-    """Measure error against time for every engine. Do not use the machine meanwhile."""
+    """Measure error against time for every engine.
+
+    Let nothing else run on the machine meanwhile.
+    """
     from reports.speed.command import run_speed
 
     run_speed(
@@ -309,36 +386,46 @@ def advise(
     give_advice(scene, error, purpose, engine or [], seed, as_json)
 
 
-VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
-
-
 @app.command()
 def stability(
     cases: Annotated[
-        list[str] | None, typer.Argument(metavar="[CASE|FILE.toml]...", help="Default: all.")
+        list[str] | None,
+        typer.Argument(
+            metavar="CASE|FILE.toml",
+            help="Cases: rows of limits.csv, or scene files. Default: all cases.",
+        ),
     ] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            help=(
-                "Of FILE.toml, repeatable: dt, speed, mass_ratio, restitution, scale, offset."
-                " Default: all."
-            )
+            metavar="WHAT",
+            help=f"What to vary in FILE.toml: {VARIED}; may be given again. Default: each of them.",
         ),
     ] = None,
     engine: Engines = None,
     full: Annotated[
-        bool, typer.Option("--full", help="16 runs per value, all values, narrower brackets.")
+        bool,
+        typer.Option(
+            "--full", help="All runs at every value, more values, brackets of 1 % instead of 5 %."
+        ),
     ] = False,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Continue an interrupted run in --out.")
+        bool, typer.Option("--resume", help="Go on with an interrupted run into --out.")
     ] = False,
     out: Annotated[
-        Path, typer.Option(help="Folder for the stability report; one that is there is replaced.")
+        Path,
+        typer.Option(
+            metavar="DIR",
+            help="Folder for the results. Earlier ones there are replaced once these are done.",
+        ),
     ] = Path("reports/out/stability"),
     workers: Workers = 0,
 ) -> None:
-    """Find the limit of every engine, and keep the first failing run."""
+    """Find where each engine fails.
+
+    Each is driven from gentle to harsh along one parameter until it fails. The failing run is kept
+    and shown.
+    """
     from reports.stability.command import find_limits
 
     command = "crosscheck " + shlex.join(sys.argv[1:])
@@ -348,20 +435,32 @@ def stability(
 @app.command()
 def tune(
     engine: Annotated[
-        list[str] | None, typer.Argument(metavar="[ENGINE]...", help="Default: all with settings.")
+        list[str] | None,
+        typer.Argument(
+            metavar="ENGINE", help="Engines to search. Default: all that have settings to search."
+        ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for matched.csv.")] = Path("reports/out/tune"),
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for matched.csv.")] = Path(
+        "reports/out/tune"
+    ),
 ) -> None:
-    """Search the public settings of engines for those nearest to the exact answers at equal
-    cost."""
+    """Search the public settings of engines.
+
+    Those are found that come nearest to the exact answers at equal cost.
+    """
     from reports.tune.command import tune as search_settings
 
     search_settings(engine or [], out)
 
 
 @app.command(name="list")
-def list_(what: Annotated[str, typer.Argument(metavar="[engines|scenarios|metrics]")] = "") -> None:
-    """List engines, scenarios and metrics, with one line each."""
+def list_(
+    what: Annotated[
+        str,
+        typer.Argument(metavar="engines|scenarios|metrics", help="Default: all three."),
+    ] = "",
+) -> None:
+    """List engines, scenarios and metrics, and say what each is."""
     from reports.commands.listing import explain
 
     explain(what)

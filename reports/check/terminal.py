@@ -13,7 +13,9 @@ from adapters.own_solver.file import printable
 from reports.check.rows import TASKS
 from reports.check.verdict import FileCheck
 from reports.terminal.console import Console
+from reports.terminal.counts import counted
 from reports.terminal.foreign_text import legible
+from reports.terminal.tables import print_table
 
 STYLE = {"right": "green", "fault": "bold red", "note": "yellow", "not asked": "dim"}
 SHORT = {"right": "ok", "note": "ok", "fault": "FAULT", "not asked": "-"}
@@ -64,15 +66,16 @@ def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
     """A row a file, a verdict for every task or "-" if it is no solver; below, of each the sentence
     to begin with."""
     console = Console()
-    table = Table("solver", *TASKS, box=None, padding=(0, 1, 0, 0))
     widest = {
         task: max(len(task), *(len(SHORT[one.tasks[task]]) for one in checks)) for task in TASKS
     }
-    room = console.width - sum(width + 1 for width in widest.values()) - 1
+    # beside all tasks, or on a narrow terminal beside some of them
+    room = max(console.width // 2, console.width - sum(width + 1 for width in widest.values()))
+    rows: list[list[str | Text]] = []
     for one in checks:
         words = [Text(SHORT[word], STYLE[word]) for word in one.tasks.values()]
-        table.add_row(elided(name_in(folder, one), room), *words)
-    console.print(table)
+        rows.append([elided(name_in(folder, one), room), *words])
+    print_table(console, ["solver", *TASKS], rows, left=list(TASKS))
     first = {
         name_in(folder, one): one.sentences[0].removeprefix(f"{one.path}: ")
         for one in checks
@@ -85,6 +88,5 @@ def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
         console.print(Padding(begin, (0, 0, 0, 2)), highlight=False)
     right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
     rest = f"; {refused} not checked" if refused else ""
-    console.print(
-        f"\n{right} of {len(checks) - refused} files without a fault{rest}.", highlight=False
-    )
+    files = counted(len(checks) - refused, "file")
+    console.print(f"\n{right} of {files} without a fault{rest}.", highlight=False)

@@ -8,14 +8,24 @@ from math import inf
 from pathlib import Path
 from typing import NoReturn
 
-from rich.table import Table
-
 from reports.run.diff import FACTOR, Change, Difference, Timing, difference
 from reports.run.folders import found
 from reports.terminal.console import Console
+from reports.terminal.counts import counted
 from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse
+from reports.terminal.tables import print_list, print_table
 
 SHOWN = 12  # changes, the worst first
+HEADINGS = (
+    "engine",
+    "status\nworse",
+    "status\nbetter",
+    "numbers\nthe same",
+    "numbers\nworse",
+    "numbers\nbetter",
+    "numbers\nother",
+    "time\ntaken",
+)
 
 
 def show_difference(before: Path, after: Path) -> NoReturn:
@@ -31,34 +41,27 @@ def show_difference(before: Path, after: Path) -> NoReturn:
         console.print(
             f"differs in {warning}" if ":" in warning else warning, style="yellow", highlight=False
         )
-    console.print(by_engine(changed))
+    print_table(console, HEADINGS, by_engine(changed), "What changed", left=HEADINGS[-1:])
+    console.print()
+    total = len(changed.statuses) + len(changed.numbers)
     if worst := sorted((*changed.statuses, *changed.numbers), key=gravity)[:SHOWN]:
-        console.print(changes_of(worst, len(changed.statuses) + len(changed.numbers)))
+        shown = f"The {len(worst)} largest of {total} changes" if total > SHOWN else "The changes"
+        console.print(f"{shown}, before → after", style="italic", highlight=False)
+        print_list(console, map(in_words, worst))
+        console.print()
     console.print(sentence(changed), highlight=False)
     sys.exit(FAILED if changed.worse else DONE)
 
 
-def by_engine(changed: Difference) -> Table:
+def by_engine(changed: Difference) -> list[list[str]]:
     """A row an engine: statuses and numbers that changed, and how much longer it takes."""
-    table = Table(box=None, padding=(0, 1, 0, 0), title="What changed", title_justify="left")
-    for column in (
-        "engine",
-        "status worse",
-        "better",
-        "numbers the same",
-        "worse",
-        "better",
-        "other",
-        "time taken",
-    ):
-        left = column in ("engine", "time taken")
-        table.add_column(column, justify="left" if left else "right", no_wrap=column == "engine")
     timings = {timing.engine: timing for timing in changed.timings}
     every = (
         *changed.same,
         *(change.engine for change in (*changed.statuses, *changed.numbers)),
         *timings,
     )
+    rows = []
     for engine in dict.fromkeys(every):
         statuses, numbers = (
             [one for one in kind if one.engine == engine]
@@ -72,8 +75,14 @@ def by_engine(changed: Difference) -> Table:
             count(numbers, "better"),
             count(numbers, "other"),
         ]
-        table.add_row(engine, *counts, said_of(timings.get(engine)))
-    return table
+        rows.append([engine, *counts, said_of(timings.get(engine))])
+    return rows
+
+
+def in_words(change: Change) -> str:
+    """A change in a line."""
+    values = f"{change.before or 'nan'} → {change.after or 'nan'}"
+    return f"{change.verdict}: {change.engine}, {change.what}: {values}"
 
 
 def count(changes: list[Change], verdict: str) -> str:
@@ -96,34 +105,12 @@ def gravity(change: Change) -> tuple[bool, bool, float]:
     return change.verdict != "worse", not change.what.endswith("status"), -change.factor
 
 
-def changes_of(changes: list[Change], total: int) -> Table:
-    """The changes, a row each."""
-    title = (
-        f"The gravest {len(changes)} of {total} changes" if total > len(changes) else "The changes"
-    )
-    table = Table(box=None, padding=(0, 1, 0, 0), title=title, title_justify="left")
-    for column in ("engine", "what", "before", "after", ""):
-        table.add_column(column, overflow="fold")
-    for change in changes:
-        table.add_row(
-            change.engine,
-            change.what,
-            change.before or "nan",
-            change.after or "nan",
-            change.verdict,
-        )
-    return table
-
-
 def sentence(changed: Difference) -> str:
     """What it comes to."""
-    said = f"{changed.worse} got worse." if changed.worse else "Nothing got worse."
+    said = f"{counted(changed.worse, 'result') if changed.worse else 'Nothing'} got worse."
     if not changed.timings:
-        return (
-            f"{said} Timings were not compared: that takes two runs on one machine with"
-            " --timings 5."
-        )
+        return f"{said} No times were compared: run both on one machine with --timings 5."
     return (
-        f"{said} A time is called worse if the 99 % interval of its rounds lies above 1, "
-        f"and the least of them has grown by more than ×{FACTOR:g}."
+        f"{said} A time counts as worse if its factor is above {FACTOR:g} and its whole 99 %"
+        " interval above 1."
     )

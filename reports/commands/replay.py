@@ -28,7 +28,7 @@ from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import legible
 from scenarios.model import Scenario, Trajectory
 
-REMEMBERED = ", the last good state (the engine's internal state begins anew)"
+REMEMBERED = ", the last good state (what the engine remembered of earlier steps is lost)"
 
 
 def replay(
@@ -47,28 +47,28 @@ def replay(
     except FolderTaken as fault:
         refuse([str(fault)])
     except KeyError as gone:
-        refuse([f"{gone.args[0]} was played, but is not known to this version"])
+        refuse([f"{gone.args[0]} was played by another version, and this one does not know it"])
     except (OSError, ValueError) as fault:
         refuse([str(fault)])
     cell = Cell(record["scene"], record["seed"], engine, record["substeps"])
     if row.source and record["cell"] != cell.key(record["scene_hash"], row.source):
         say(
-            f"{engine.removesuffix(OWN)} or a version has changed since: what is played is what is"
-            " there now"
+            f"{engine.removesuffix(OWN)}, or a version, has changed since the run; the present one"
+            " is played"
         )
     k = len(before) - 1 if before is not None and record["status"] != "ok" else 0
     substeps = record["substeps"]
     show(f"{record['scenario']}  {record['engine']}:{record['profile']}  dt {record['dt_s']:.4g} s")
-    show(f"was:    {ending(record['status'], record['reason'])}")
+    show(f"was:     {ending(record['status'], record['reason'])}")
     show(
-        f"from:   step {k * substeps}, {scenario.times[k]:g} s{REMEMBERED if k else ', the start'}"
+        f"from:    step {k * substeps}, {scenario.times[k]:g} s{REMEMBERED if k else ', the start'}"
     )
     status, reason, after = again(record, row, continued(scenario, substeps, before, k), timeout)
     step = k * substeps + (len(after) - 1 if after is not None else 0)
-    show(f"now:    {ending(status, reason)}")
-    show(f"as far: step {step} of {scenario.samples * substeps}, {step * record['dt_s']:g} s")
+    show(f"now:     {ending(status, reason)}")
+    show(f"reached: step {step} of {scenario.samples * substeps}, {step * record['dt_s']:g} s")
     if record["status"] == status == "ok":
-        show(f"bits:   {'as' if same(before, after, substeps) else 'other than'} recorded")
+        show(f"bits:    {'as' if same(before, after, substeps) else 'not as'} recorded")
     sys.exit(DONE if status == "ok" else FAILED)
 
 
@@ -92,7 +92,7 @@ def record_of(archive: Archive, name: str) -> dict[str, Any]:
     failed = [key for key, record in keys.items() if record["status"] not in ("ok", "unsupported")]
     near = matching or difflib.get_close_matches(name, keys, n=3, cutoff=0.5) or failed
     named = ", ".join(f"{key} ({keys[key]['scenario']} {keys[key]['engine']})" for key in near[:3])
-    why = "is no cell" if not matching else f"begins {len(matching)} cells"
+    why = "is no cell" if not matching else f"begins the names of {len(matching)} cells"
     hint = (
         f"did you mean {named}?"
         if near
@@ -136,7 +136,7 @@ def again(
     if outcome is None:
         return (
             "crashed",
-            "its process ended as if from outside",
+            "its process was ended from outside",
             from_trail(worker.left(), scenario),
         )
     if isinstance(outcome, bytes):

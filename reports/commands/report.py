@@ -7,8 +7,6 @@ import sys
 from pathlib import Path
 from typing import NoReturn
 
-from rich.table import Table
-
 from adapters.run import STATUSES
 from adapters.thrust_grid import off_grid_note
 from reports.lessons.catalogue import LESSONS
@@ -17,8 +15,10 @@ from reports.page.report import Report, make_report
 from reports.run.arguments import refusing
 from reports.run.folders import found
 from reports.terminal.console import Console
+from reports.terminal.counts import counted
 from reports.terminal.exits import DONE, FAILED, say
 from reports.terminal.progress import Progress
+from reports.terminal.tables import print_list, print_table
 
 
 def finish(report: Report, out: Path) -> NoReturn:
@@ -48,38 +48,46 @@ def report_again(out: Path) -> NoReturn:
 def print_summary(report: Report, page: str) -> None:
     """Medians over the scenarios at their middle step, the finding, and where the page is."""
     console = Console()
-    title = (
-        "Largest error, median over the scenarios, each at the middle of its dt ladder; lower is"
-        " better"
-    )
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
-    table.add_column("engine", no_wrap=True)
+    headings = ["engine"]
     for column in overview.SUMMARY.values():
         # ten engines are to fit into 80 columns
-        heading = column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")
-        table.add_column(heading, justify="right", no_wrap=True)
+        headings += [column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")]
     names = overview.names_of(report.comparisons)
-    for name, cells in overview.summary(report.comparisons, names, report.untrusted).items():
-        table.add_row(name, *(cell.text for cell in cells))
-    console.print(table)
-    for sentence in report.findings:
-        console.print(sentence, highlight=False)
-    for comparison in report.comparisons:
-        if note := off_grid_note(comparison.scenario):
-            console.print(f"{comparison.scenario.name}: {note}.", highlight=False)
-    console.print(statuses(report), highlight=False)
+    found = overview.summary(report.comparisons, names, report.untrusted)
+    rows = [[name, *(cell.text for cell in cells)] for name, cells in found.items()]
+    print_table(console, headings, rows, title_of(len(report.comparisons)))
+    console.print()
+    print_list(console, [*report.findings, *off_grid(report), statuses(report)])
     if failed := failures(report, Path(page).parent):
         console.print(failed, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
+
+
+def title_of(scenes: int) -> str:
+    """What the numbers of the summary are."""
+    if scenes == 1:
+        return "Largest error in the scene, at the middle one of its step sizes; lower is better"
+    return (
+        f"Largest error in a scene, at the middle one of its step sizes: median of {scenes} scenes;"
+        " lower is better"
+    )
+
+
+def off_grid(report: Report) -> list[str]:
+    """Of each scene whose thrusts do not start and stop at a step: how far off every engine is."""
+    scenarios = [comparison.scenario for comparison in report.comparisons]
+    notes = {scenario.name: off_grid_note(scenario) for scenario in scenarios}
+    return [f"{name}: {note}." for name, note in notes.items() if note]
 
 
 def statuses(report: Report) -> str:
     """How many cells ended how, and whether all of them did."""
     counts = report.runs.status.value_counts()
     said = ", ".join(f"{counts[status]} {status}" for status in STATUSES if status in counts)
+    ended = counted(len(report.runs), "cell")
     if report.archive.complete:
-        return f"All {len(report.runs)} cells have ended: {said}."
-    return f"Not finished: {len(report.runs)} cells have ended so far: {said}."
+        return f"{ended} ended: {said}."
+    return f"Not finished: {ended} ended so far: {said}."
 
 
 def failures(report: Report, out: Path) -> str:
@@ -89,4 +97,4 @@ def failures(report: Report, out: Path) -> str:
         return ""
     first = runs.iloc[0]
     what = f"{first.scenario} on {first.engine}:{first.profile}"
-    return f"To look into one, e.g. {what}: crosscheck replay {first.cell} --out {out}"
+    return f"To play the failure of {what} again: crosscheck replay {first.cell} --out {out}"

@@ -35,6 +35,7 @@ from reports.run.folders import (
 from reports.run.journal import JOURNAL, Journal
 from reports.run.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
 from reports.run.suite import Means, OtherVersions, RunPlan, carry_out
+from reports.terminal.counts import counted
 from reports.terminal.exits import FAILED, broken_off, refuse, say
 from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
@@ -175,6 +176,7 @@ def what_is_kept(out: Path) -> str:
     if not ended:
         return "Nothing was played yet."
     return (
-        f"The {ended} cells that were played are kept.\n"
-        f"To go on:  crosscheck run --resume {out}\nTo look:   crosscheck report {part}"
+        f"Kept: {counted(ended, 'finished cell')}.\n"
+        f"To go on:               crosscheck run --resume {out}\n"
+        f"To see what there is:   crosscheck report {part}"
     )

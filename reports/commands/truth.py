@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
-from rich.table import Table
 
 from reports.page.style import number
 from reports.run.answers import no_answer, record_here
@@ -23,11 +22,12 @@ from reports.run.worker_process import Failure
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, say
 from reports.terminal.progress import Progress
+from reports.terminal.tables import print_table, print_texts
 from scenarios.model import Scenario
 from scenarios.truth.record import TruthRecord
 
 SHOWN = 10  # collisions at the start and at the end
-HEADINGS = ("t, s", "disk", "other", "impulse, N s", "cos of impact angle")
+HEADINGS = ("t, s", "disk", "with", "impulse, N s", "cosine of\nimpact angle")
 
 
 def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float) -> NoReturn:
@@ -116,35 +116,34 @@ def outcomes(record: TruthRecord) -> list[dict[str, Any]]:
 def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
     """The record for people."""
     console = Console()
-    ends = (
-        f"{number(min(record.horizon, scenario.duration), 6)} s of {number(scenario.duration, 6)} s"
-    )
+    duration = scenario.duration
+    whole = record.horizon >= duration
     lines = {
         "scenario": f"{scenario.name}: {scenario.asks}",
         "method": record.method,
         "precision": precision(record),
-        "horizon": ends,
-        "ends because": (
-            record.reason or "it is asked for no longer" * (record.horizon >= scenario.duration)
-        ),
-        "horizon of float64": (
-            f"up to {number(min(record.float64_horizon, record.horizon, scenario.duration), 6)} s"
-        ),
+        "horizon": f"{seconds(min(record.horizon, duration))} of {seconds(duration)}",
+        "ends because": record.reason or ("the scenario ends there" if whole else ""),
+        "horizon of float64": seconds(min(record.float64_horizon, record.horizon, duration)),
         "error bound": (
             f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64"
         ),
         "still known": "\n".join(record.remains),
         "collisions": str(int((record.events[:, 3] != 0).sum())),
     }
-    grid = Table.grid(padding=(0, 2))
-    for name, text in lines.items():
-        if text:
-            grid.add_row(name, text)
-    console.print(grid)
+    print_texts(console, {name: text for name, text in lines.items() if text})
     if len(record.events):
-        console.print(table_of_collisions(record, every))
-    if len(record.outcomes):
-        console.print(table_of_outcomes(record))
+        console.print()
+        headings, *rows = rows_of_collisions(record, every)
+        print_table(console, headings, rows, left=HEADINGS[2:4])
+    for title, texts in outcomes_in_words(record).items():
+        console.print()
+        print_texts(console, texts, title)
+
+
+def seconds(t: float) -> str:
+    """A time with its unit."""
+    return f"{number(t, 6)} s"
 
 
 def precision(record: TruthRecord) -> str:
@@ -156,38 +155,36 @@ def precision(record: TruthRecord) -> str:
     )
 
 
-def table_of_collisions(record: TruthRecord, every: bool) -> Table:
-    """The collisions, or the first and the last ten."""
-    table, rows = Table(*HEADINGS), record.events.tolist()
-    skipped = 0 if every else max(0, len(rows) - 2 * SHOWN)
-    for k, (t, i, j, impulse, cosine) in enumerate(rows):
-        if skipped and k == SHOWN:
-            table.add_row("...", "", "", f"{skipped} more: --events", "")
-        if skipped and SHOWN <= k < len(rows) - SHOWN:
-            continue
-        other, angle = name(j), "" if np.isnan(cosine) else f"{cosine:.6g}"
-        kick, angle = (f"{impulse:.6g}", angle) if impulse else ("comes to rest", "")
-        table.add_row(f"{t:.12g}", str(int(i)), other, kick, angle)
-    return table
+def rows_of_collisions(record: TruthRecord, every: bool) -> list[list[str]]:
+    """The headings, then the collisions, or the first and the last ten; without the angle where
+    none has one."""
+    rows = [list(HEADINGS)]
+    for t, i, j, impulse, cosine in record.events.tolist():
+        shown = f"{impulse:.6g}" if impulse else "comes to rest"
+        angle = f"{cosine:.6g}" if impulse and not np.isnan(cosine) else ""
+        rows.append([f"{t:.12g}", str(int(i)), name(j), shown, angle])
+    if not any(row[-1] for row in rows[1:]):
+        rows = [row[:-1] for row in rows]
+    skipped = 0 if every else max(0, len(rows) - 1 - 2 * SHOWN)
+    if skipped:
+        rows[1 + SHOWN : -SHOWN] = [[f"{skipped} more: --events", *[""] * (len(rows[0]) - 1)]]
+    return rows
 
 
-def table_of_outcomes(record: TruthRecord) -> Table:
-    """All ends a simultaneous contact may have; none of them is the truth."""
+def outcomes_in_words(record: TruthRecord) -> dict[str, dict[str, str]]:
+    """A heading for each end that a simultaneous collision may have, none of which is the truth ->
+    the velocities after it, and one order of collisions that leads there."""
     found = outcomes(record)
-    table = Table(
-        "outcome",
-        "velocities, m/s",
-        "one order of collisions",
-        title=f"{len(found)} outcomes; none is the truth",
-    )
-    for k, end in enumerate(found, 1):
-        velocities = (
-            f"{disk}: ({vx:.6g}, {vy:.6g})" for disk, (vx, vy) in end["velocities_m_s"].items()
-        )
-        table.add_row(
-            str(k), "\n".join(velocities), ", ".join(f"{i} on {name(j)}" for i, j in end["order"])
-        )
-    return table
+    return {
+        f"Outcome {k} of {len(found)}; none is the truth": {
+            "velocities, m/s": "\n".join(
+                f"disk {disk}: ({vx:.6g}, {vy:.6g})"
+                for disk, (vx, vy) in end["velocities_m_s"].items()
+            ),
+            "one order": ", ".join(f"{i} on {name(j)}" for i, j in end["order"]),
+        }
+        for k, end in enumerate(found, 1)
+    }
 
 
 def name(j: float) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
+from inspect import getdoc
 
 import numpy as np
 
@@ -234,8 +235,8 @@ class Metric:
 
     @property
     def summary(self) -> str:
-        """The first line of the function's docstring."""
-        return (self.of.__doc__ or "").splitlines()[0]
+        """The first paragraph of the function's docstring, in one line."""
+        return " ".join((getdoc(self.of) or "").split("\n\n")[0].split())
 
 
 TRUTH, ITSELF, ENGINE = "truth", "itself", "engine"

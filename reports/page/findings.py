@@ -10,6 +10,7 @@ import pandas as pd
 
 from reports.compare.comparison import Comparison
 from reports.page.overview import MAPPED, values
+from reports.terminal.counts import counted
 
 FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
 
@@ -103,11 +104,14 @@ def worth_of_settings(off: pd.DataFrame) -> str:
 
 def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     """Scenes in which an engine ends up more than a radius away, and cells without a result."""
-    failed = sum(status != "ok" for status in statuses)
-    cells = f"{failed} of {len(statuses)} cells were not played to their end."
+    cells = played_to_the_end(statuses)
     lost = off > FAR_OFF
     if off.empty or not lost.any(axis=None):
-        return f"No engine is off by more than a radius; {cells}" if not off.empty else cells
+        return (
+            f"No engine is off by more than a radius; {cells}"
+            if not off.empty
+            else cells[0].upper() + cells[1:]
+        )
     counts = lost.sum().sort_values(ascending=False, kind="stable")
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
@@ -116,3 +120,12 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
         f" hardest is {defeated.idxmax()}, too much for {defeated.max()} of {lost.shape[1]};"
         f" {cells}"
     )
+
+
+def played_to_the_end(statuses: Sequence[str]) -> str:
+    """How many cells were not, as the end of a sentence."""
+    failed = sum(status != "ok" for status in statuses)
+    if not failed:
+        return "every cell was played to its end."
+    cells = counted(len(statuses), "cell")
+    return f"{failed} of {cells} {'was' if failed == 1 else 'were'} not played to the end."

@@ -21,6 +21,7 @@ from reports.run.made import (
     read_made,
     stranger_in,
 )
+from reports.terminal.counts import counted
 from reports.terminal.exits import FolderTaken, unbroken
 
 RUN = Kind(
@@ -110,8 +111,8 @@ def open_new(out: Path) -> Journal:
     with given_back(journal):
         if had := ended_in(journal):
             raise FolderTaken(
-                f"{part} holds an interrupted run, in which {had} cells have ended: to go on with"
-                f" it, crosscheck run --resume {out}; to begin anew, name another --out, or"
+                f"{part} holds an interrupted run with {counted(had, 'finished cell')}: to go on"
+                f" with it, crosscheck run --resume {out}; to begin anew, name another --out, or"
                 " delete it"
             )
         os.truncate(journal.path, 0)

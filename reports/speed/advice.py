@@ -12,16 +12,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.engine import FLOAT64, Engine
+from adapters.engine import Engine
+from adapters.engine_row import FLOAT64
 from adapters.engines import ENGINES, row_of
 from adapters.mechanisms.options import OPTIONS
 from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play_once
-from reports.compare.comparison import cut
 from reports.compare.delays import jumps_of
-from reports.compare.view import View
+from reports.compare.view import View, cut
 from reports.run.machine import busy_cores
 from reports.run.runner import run_all
+from reports.run.scenes import open_scene
 from reports.run.worker_process import Failure
 from reports.speed import ladder
 from reports.speed.budget import INTERPLAY, RESIDUAL, TIME, TOTALS, budget_of
@@ -161,7 +162,7 @@ def advise(
     return Advice(
         scenario.name,
         scenario.duration,
-        ladder.open_scene(scene, seed).duration,
+        open_scene(scene, seed).duration,
         [scenario.dt(k) for k in step_sizes],
         sorted(plain.values(), key=lambda one: one.cost),
         reasons(scene, seed, purpose, short, step_sizes[-1], workers, progress),
@@ -303,7 +304,7 @@ def largest(budget: Any, measure: str) -> str:
     parts = [row for row in budget if row["contribution"] not in left_out and measure in row]
     if not parts:
         return ""
-    most = max(parts, key=lambda row: row[measure])["contribution"]
+    most = str(max(parts, key=lambda row: row[measure])["contribution"])
     return "mostly " + {TIME: "end-of-step detection", RESIDUAL: "unknown"}.get(most, most)
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import asdict, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
-
-from rich.table import Table
 
 from adapters.engines import OWN, row_of
 from reports.page import style
@@ -32,10 +30,13 @@ from reports.speed.plan import SpeedPlan
 from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal.console import Console
+from reports.terminal.counts import counted
 from reports.terminal.exits import DONE, FAILED, broken_off, say
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
+from reports.terminal.tables import print_list, print_table, print_texts
 
+NEVER, NOT_REACHED = "never", "–"
 MACHINE, FIGURES, PAGE = "machine.json", "speed_figures.csv", "speed.html"
 SPEED = Kind("crosscheck speed", r"journal\.jsonl")
 
@@ -83,7 +84,7 @@ def nothing_measured(part: Path, results: Results) -> NoReturn:
     discard(part, SPEED)
     for what, why in results.left_out:
         say(f"{what}: {why}")
-    say("no scene that was asked for has an exact answer, so there is no error to set against time")
+    say("no scene that was asked for has an exact answer, so no error can be measured")
     sys.exit(FAILED)
 
 
@@ -114,7 +115,7 @@ def carry_out(
     """All that was measured, and the header that tables and page carry."""
     with Progress() as progress:
         if resume:
-            progress.note(f"tasks of the same plan and versions that had ended: {len(kept)}")
+            progress.note(f"Kept from the interrupted run: {counted(len(kept), 'task')}.")
         results = Results(plan, measure(plan, progress, kept))
         progress.say("writing the tables and the page")
         return results, header | {"seconds": progress.seconds, "load": results.measured.busy}
@@ -134,40 +135,48 @@ def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None
 def print_summary(results: Results, page: str) -> None:
     """What each accuracy costs, pooled, the noise floor, and where the page is."""
     console = Console()
-    title = (
-        "µs per simulated second for so small an error, of a radius; median of"
-        f" {len(results.scenes)} scenes"
-    )
-    title += (
-        "\n(k of n: so accurate in k scenes only; never: at no dt, or failed, in half of them or"
-        " more)"
-    )
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
-    table.add_column("engine", no_wrap=True)
-    for accuracy in ACCURACIES:
-        table.add_column(accuracy, justify="right", no_wrap=True)
-    for (engine, profile), group in results.pooled_reached.groupby(
-        ["engine", "profile"], sort=False
-    ):
-        cells = (
-            (
-                style.number(row["cost"])
-                if isfinite(row["cost"])
-                else "never"
-                if row["lost"]
-                else f"{row['got']} of {row['of']}"
-            )
-            for row in group.to_dict("records")
+    scenes = len(results.scenes)
+    rows = [
+        [f"{engine}:{profile}", *map(cost_of, group.to_dict("records"))]
+        for (engine, profile), group in results.pooled_reached.groupby(
+            ["engine", "profile"], sort=False
         )
-        table.add_row(f"{engine}:{profile}", *cells)
-    console.print(table)
-    console.print(said_of_pool(results.pooled), highlight=False)
+    ]
+    title = "What an error, in radii, costs: µs per simulated second"
+    title += f", median of {scenes} scenes" if scenes > 1 else ""
+    print_table(console, ["engine", *ACCURACIES], rows, title)
+    console.print()
+    print_texts(console, marks_in(rows, scenes))
+    said = [said_of_pool(results.pooled)]
     if len(results.explained):
-        console.print(f"Error budget: {sentence(results.explained)}.", highlight=False)
-    console.print(said_of_noise(results), highlight=False)
-    for what, why in results.left_out:
-        console.print(f"left out: {what}: {why}", highlight=False)
+        said.append(f"Error budget: {sentence(results.explained)}.")
+    said.append(said_of_noise(results))
+    said += [f"Left out: {what}: {why}." for what, why in results.left_out]
+    print_list(console, said)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
+
+
+def cost_of(row: Mapping[Hashable, Any]) -> str:
+    """What an accuracy costs an engine, or in how many scenes it is reached."""
+    if isfinite(row["cost"]):
+        return style.number(row["cost"])
+    if row["lost"]:
+        return NEVER
+    return f"{row['got']} of {row['of']}" if row["of"] > 1 else NOT_REACHED
+
+
+def marks_in(rows: Sequence[Sequence[str]], scenes: int) -> dict[str, str]:
+    """What stands in the table instead of a cost -> what it means."""
+    most = f", in half of the {scenes} scenes or more" if scenes > 1 else ""
+    meanings = {
+        NEVER: f"at no step size, or the engine failed{most}",
+        NOT_REACHED: "not at the step sizes that were tried",
+    }
+    cells = {cell for row in rows for cell in row[1:]}
+    found = {mark: meaning for mark, meaning in meanings.items() if mark in cells}
+    if any(" of " in cell for cell in cells):
+        found[f"k of {scenes}"] = f"in k of the {scenes} scenes, too few for a median"
+    return found
 
 
 def said_of_noise(results: Results) -> str:
@@ -176,12 +185,13 @@ def said_of_noise(results: Results) -> str:
     if not noise["pairs"]:
         return "No engine was timed against itself, so the noise floor is not known."
     said = (
-        f"Noise floor: an engine against itself reads {noise['median']:.3f}, half of"
-        f" {noise['pairs']} pairs from {noise['low']:.3f} to {noise['high']:.3f}."
+        f"Noise floor: the time of an engine over its own time again is {noise['median']:.3f}; for"
+        f" half of {noise['pairs']} pairs it is from {noise['low']:.3f} to"
+        f" {noise['high']:.3f}."
     )
     if noise["quiet"]:
         return said
     return (
-        f"{said} That is too loud: it must stay within 0.95 and 1.05. Measure alone on the machine"
-        " to quote a time."
+        f"{said} It must stay between 0.95 and 1.05: measure again while nothing else runs before"
+        " you quote a time."
     )

@@ -12,6 +12,7 @@ from reports.run.scenes import open_scene
 from reports.speed.effort import Effort
 from reports.speed.plan import SCENE, Measurement, Reach, SpeedPlan
 from reports.speed.timing import FEWEST_ROUNDS, LEAST, WARM_UP
+from reports.terminal.counts import counted
 from scenarios.model import Scenario
 
 # s, means over the measurements: of a step, of each disk in it, of applying forces in Python, of
@@ -37,8 +38,8 @@ def estimate(plan: SpeedPlan, measurements: Sequence[Measurement], reach: Reach)
     whole = STARTING + playing + timing + PAGE
     length = f"{ceil(whole / 60)} minutes" if whole > 90 else f"{ceil(whole / 10) * 10} s"
     return (
-        f"{len(measurements)} ladders of steps to play and {len(timed)} to time: about {length}"
-        " where nothing else runs"
+        f"{counted(len(measurements), 'run')} to play at several step sizes, {len(timed)} of them"
+        f" to time: about {length} while nothing else runs."
     )
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from reports.speed.budget import LIMIT, RESIDUAL, TOTAL, WHOSE
+from reports.terminal.counts import counted
 
 LEAST = 1e-9  # radii: a smaller error is rounding, and nothing to explain
 TO = (0.01, 0.001)  # of an error: what may be left over
@@ -98,19 +99,21 @@ def sentence(table: pd.DataFrame) -> str:
     known, over = share(table), extent(table)
     engines = table[["engine", "profile"]].drop_duplicates().shape[0]
     said = (
-        f"of {known.errors} errors ({engines} engines in {over.scenes} scenes"
-        + (f"; {known.exact} more are below {LEAST:g} radii" if known.exact else "")
-        + (f"; {known.failed} were not played" if known.failed else "")
+        f"of {counted(known.errors, 'error')} ({counted(engines, 'engine')} in"
+        f" {counted(over.scenes, 'scene')}"
+        + (f"; {known.exact} more below {LEAST:g} radii" if known.exact else "")
+        + (f"; {known.failed} not played" if known.failed else "")
         + f") {known.within[0]} are explained to 1 %, {known.within[1]} to 0.1 %, "
         f"over {over.evaluated:.0f} of {over.horizon:.0f} simulated seconds"
     )
     if not over.cuts:
-        return f"{said}: every scene as far as its exact answer goes"
+        return f"{said}, up to the end of every exact answer"
     cuts = ", ".join(
         f"{cut.scenario} at {cut.until:.2g} of {cut.horizon:.2g} s" for cut in over.cuts
     )
+    are_cut = "1 scene is" if len(over.cuts) == 1 else f"{len(over.cuts)} scenes are"
     return (
-        f"{said}: {len(over.cuts)} scenes are cut where end-of-step detection alone puts a disk"
-        f" {LIMIT:g} radii off ({cuts}). Of the {known.whole} errors in scenes that are not cut,"
-        f" {known.whole_within} are explained to 1 %"
+        f"{said}: {are_cut} cut where end-of-step detection alone puts a disk"
+        f" {LIMIT:g} radii off ({cuts}). Of the {counted(known.whole, 'error')} in scenes that are"
+        f" not cut, {known.whole_within} are explained to 1 %"
     )

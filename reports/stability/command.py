@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import NoReturn
 
 import pandas as pd
-from rich.table import Table
 
 from adapters.engines import ENGINES, OWN
 from reports.page.style import number
@@ -40,12 +39,22 @@ from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, Unusable, broken_off, refuse, say
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
+from reports.terminal.tables import print_table, print_texts
 from scenarios.files.scene_file import SceneFileError, read_scene_file
 
 SEE = (
     "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for"
     " --vary see --help"
 )
+MARKS = {
+    "–": "does not fail as far as was tried",
+    "everywhere": "fails at every value",
+    "refused": "the engine does not take such a scene",
+    "≤": "fails at this value and below, works above",
+    "≥": "fails at this value and above, works below",
+    "*": "works again at some harsher value, or fails at the gentlest as well",
+}
+"""What stands in the table of limits -> what it means."""
 LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
 PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in ENGINES)
 STABILITY = Kind(
@@ -166,43 +175,46 @@ def varied_of(path: str, vary: Sequence[str]) -> tuple[list[str], list[str]]:
 
 def finish(results: StabilityResults, out: Path) -> NoReturn:
     """Print a table and where the page is; exit 1 if a task ended without a result."""
-    # a row that is cut off would be no use to anybody
-    console = Console(width=max(Console().width, 120))
-    limits = results.limits
-    rows = Table(title="Where they fail", title_justify="left", box=None, padding=(0, 1, 0, 0))
-    shown = list(dict.fromkeys(limit.case for limit in limits))
-    engines = [name for name in ENGINES if any(limit.engine == name for limit in limits)]
-    rows.add_column("case, parameter", overflow="fold")  # this one, so that no number is cut
-    for engine in engines:
-        rows.add_column(engine.replace(":", "\n"), justify="right", no_wrap=True)
-    found = {(limit.case, limit.engine): limit for limit in limits}
-    for name in shown:
-        cells = [
-            in_words(found[name, engine]) if (name, engine) in found else "" for engine in engines
-        ]
-        case, parameter = Path(name).name, case_named(name).parameter
-        rows.add_row(case + (", " if len(case + parameter) < 24 else ",\n") + parameter, *cells)
-    console.print(rows)
-    console.print(
-        "A number: the first failure from gentle to harsh. ≤, ≥: fails up to there, works beyond."
-        " –: does not"
-    )
-    console.print(
-        "fail so far. never: fails everywhere. *: works again beyond, or fails before. Brackets,"
-        " and how far apart"
-    )
-    console.print(
-        "values were scanned, are in limits.csv (works_at, fails_at, spacing) and on the page."
-    )
-    console.print(
-        f"\n{(out / 'stability.html').resolve()}", style="bold", highlight=False, soft_wrap=True
-    )
-    lost = [f"{one.case} on {one.engine}" for one in limits if one.status != "ok"]
+    print_limits(Console(), results.limits)
+    Console().print(f"\n{(out / PAGE).resolve()}", style="bold", highlight=False, soft_wrap=True)
+    lost = [f"{one.case} on {one.engine}" for one in results.limits if one.status != "ok"]
     lost += [f"{one.name} on {one.engine}" for one in results.maps if one.status != "ok"]
     lost += [f"{one.name} on {one.engine}" for one in results.laws if one.status != "ok"]
     if lost:
         say(f"no result: {', '.join(lost)}")
     sys.exit(FAILED if lost else DONE)
+
+
+def print_limits(console: Console, limits: Sequence[Limit]) -> None:
+    """A row a case, a column an engine, and what the marks in it mean."""
+    engines = [name for name in ENGINES if any(limit.engine == name for limit in limits)]
+    found = {(limit.case, limit.engine): limit for limit in limits}
+    rows = []
+    for name in dict.fromkeys(limit.case for limit in limits):
+        cells = [
+            in_words(found[name, engine]) if (name, engine) in found else "" for engine in engines
+        ]
+        rows.append([label_of(name), *cells])
+    if not rows:
+        return
+    headings = ["case: parameter", *(engine.replace(":", "\n") for engine in engines)]
+    print_table(console, headings, rows, "The first value, from gentle to harsh, that fails")
+    text = "".join(cell for row in rows for cell in row[1:])
+    console.print()
+    print_texts(console, {mark: meaning for mark, meaning in MARKS.items() if mark in text})
+    console.print(
+        "The bracket of each limit, and how far apart the values were scanned, are in limits.csv"
+        " (works_at, fails_at, spacing) and on the page.",
+        highlight=False,
+    )
+
+
+def label_of(name: str) -> str:
+    """The case and what is varied in it; of a scene file the file without its folder."""
+    case = case_named(name)
+    unit = "" if case.unit == "1" else f", {case.unit}"
+    shown = name if name in CASES else Path(name.rpartition(":")[0]).name
+    return f"{shown}: {case.parameter}{unit}"
 
 
 def in_words(limit: Limit) -> str:

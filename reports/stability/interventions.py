@@ -168,7 +168,7 @@ def intervention_of(search: Search, limit: Limit) -> str:
         return ""
     scenario, _ = seen
     for name, intervention in INTERVENTIONS.items():
-        if intervention.fits(search.engine, search.case.parameter):
+        if intervention.fits(search.engine, search.case.varies):
             changed = intervention.change(scenario)
             if not judge(
                 search.case.predicate,

@@ -107,6 +107,11 @@ class Case:
         """1 if larger values are harsher, -1 if smaller ones are."""
         return 1 if self.values[-1] > self.values[0] else -1
 
+    @property
+    def varies(self) -> str:
+        """What is varied in a word: of a scene file (FILE.toml:speed) as `--vary` calls it."""
+        return self.name.rpartition(":")[2] if ":" in self.name else self.parameter
+
     def scan(self, form: Form) -> tuple[float, ...]:
         """The values to scan; in the full form those half way between them as well, so that the
         quick ones are some.
@@ -218,7 +223,7 @@ class Limit:
             return (
                 "refused"
                 if self.failing is not None and self.failing.broken == "refused"
-                else "never"
+                else "everywhere"
             )
         return "–" if self.verdict == NEVER_FAILS else ""
 

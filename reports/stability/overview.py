@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 from math import isnan
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from reports.page.style import number
 from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Limit
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import AT_ONCE, PAIRS, AtGap
+from reports.terminal.counts import counted
 
 
 class LimitCell(NamedTuple):
@@ -79,10 +81,17 @@ def bracket(limit: Limit) -> tuple[str, str]:
     return works, fails
 
 
-def pattern(limit: Limit) -> str:
-    """Every value tried, from gentle to harsh: how it works and fails where it does not do so once
-    and for all."""
-    return "" if limit.monotone else "".join("o" if trial.works else "x" for trial in limit.trials)
+def where_it_works(limit: Limit) -> str:
+    """From gentle to harsh, between which of the values tried it works and fails; "" where it does
+    so once and for all."""
+    if limit.monotone:
+        return ""
+    said = []
+    for works, group in groupby(limit.trials, key=lambda trial: trial.works):
+        first, *others = (number(trial.value, 4) for trial in group)
+        span = f"{first} to {others[-1]}" if others else first
+        said.append(f"{'works' if works else 'fails'} at {span}")
+    return "From gentle to harsh it " + ", ".join(said) + "."
 
 
 def findings(limits: Sequence[Limit]) -> list[str]:
@@ -91,36 +100,38 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     cases = list(dict.fromkeys(limit.case for limit in mine))
     failing = [limit for limit in mine if limit.verdict != NEVER_FAILS]
     found = [
-        f"{len(mine)} searches in {len(cases)} cases: {len(mine) - len(failing)} found no failure"
-        f" as far as they went, {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} a"
-        f" limit, and {sum(limit.verdict == NEVER_WORKS for limit in mine)} failed everywhere."
+        f"{counted(len(mine), 'search', 'searches')} in {counted(len(cases), 'case')}:"
+        f" {len(mine) - len(failing)} found no failure as far as was tried,"
+        f" {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} found a limit, and"
+        f" {sum(limit.verdict == NEVER_WORKS for limit in mine)} failed at every value."
     ]
     fails: dict[str, list[str]] = {}
     for limit in failing:
         fails.setdefault(limit.engine, []).append(limit.case)
-    if fails:
+    if fails and len(cases) > 1:
         # in reading order, which decides between equals
         engines = dict.fromkeys(limit.engine for limit in mine)
         order = sorted(engines, key=lambda engine: len(fails.get(engine, [])))
         found.append(
             f"Of these {len(cases)} cases {order[0]} fails in the fewest,"
             f" {len(fails.get(order[0], []))}, and {order[-1]} in the most,"
-            f" {len(fails[order[-1]])}. Each fails somewhere else."
+            f" {len(fails[order[-1]])}."
         )
-    tested = [limit for limit in failing if limit.tested]
-    found.append(
-        f"The reasons of {len(tested)} of the {len(failing)} limits were tested: the limit follows"
-        " from the reason, or an engine that differs in that one thing gets farther, or the"
-        " failing run works without it, or the reference with end-of-step detection and the fewest"
-        " mechanisms of the engine that suffice works and fails at the same values. The others are"
-        " called likely, or not known."
-    )
+    if failing:
+        tested = sum(bool(limit.tested) for limit in failing)
+        found.append(
+            f"The reason of {tested} of {counted(len(failing), 'limit')} was tested: the limit"
+            " follows from the reason, or an engine that differs in that one thing gets farther, or"
+            " the failing run works without it, or the reference with end-of-step detection and the"
+            " fewest mechanisms of the engine that suffice works and fails at the same values. The"
+            " other reasons are called likely, or not known."
+        )
     odd = [limit for limit in mine if not limit.monotone]
     if odd:
         names = ", ".join(dict.fromkeys(f"{limit.engine} in {limit.case}" for limit in odd[:3]))
         found.append(
-            f"{len(odd)} of the searches found more than one edge (marked *): an engine that works"
-            f" again beyond its first failure, as {names}. What stands in the table is the first"
+            f"In {counted(len(odd), 'search', 'searches')} (marked *) there is more than one edge:"
+            f" the engine works again beyond its first failure, as {names}. The table has the first"
             " failure."
         )
     return found

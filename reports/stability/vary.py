@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -136,23 +137,49 @@ def scaled_thrust(thrust: Thrust, force: float, torque: float) -> Thrust:
 
 
 FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3)
-VARIES: dict[str, tuple[str, tuple[float, ...], Callable[[Scenario, float], Scenario]]] = {
-    "dt": ("s", (), in_steps),
-    "speed": ("times as fast", (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS), at_speed),
-    "mass_ratio": ("times as heavy", (*FACTORS, 1e4, 1e5, 1e6), at_mass_ratio),
-    "restitution": (
+
+
+class Varied(NamedTuple):
+    """What is varied in a scene file: what a value of it is, its unit, the values to scan, and
+    how."""
+
+    parameter: str
+    unit: str
+    values: tuple[float, ...]
+    change: Callable[[Scenario, float], Scenario]
+
+
+VARIES = {
+    "dt": Varied("dt", "s", (), in_steps),
+    "speed": Varied(
+        "start velocities and spins / the file's",
+        "1",
+        (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS),
+        at_speed,
+    ),
+    "mass_ratio": Varied(
+        "mass of the first disk that moves / the file's",
+        "1",
+        (*FACTORS, 1e4, 1e5, 1e6),
+        at_mass_ratio,
+    ),
+    "restitution": Varied(
+        "restitution",
         "1",
         (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0),
         at_restitution,
     ),
-    "scale": (
-        "times as large",
+    "scale": Varied(
+        "all lengths / the file's",
+        "1",
         (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS),
         at_scale,
     ),
-    "offset": ("m", (*FACTORS, 1e4, 1e5, 1e6), at_offset),
+    "offset": Varied(
+        "displacement of the whole scene to the right", "m", (*FACTORS, 1e4, 1e5, 1e6), at_offset
+    ),
 }
-"""What is varied -> its unit, the values to scan, and how."""
+"""What `--vary` takes, and what it means."""
 
 
 def varied(path: str, what: str, x: float, _run: int) -> Scenario:
@@ -160,7 +187,7 @@ def varied(path: str, what: str, x: float, _run: int) -> Scenario:
     one = read_scene_file(Path(path))
     if what == "dt":
         return in_steps(one, x)
-    return replace(VARIES[what][2](one, x), substeps=one.substeps[-1:])
+    return replace(VARIES[what].change(one, x), substeps=one.substeps[-1:])
 
 
 def cannot_vary(one: Scenario, what: str) -> str:
@@ -179,14 +206,14 @@ def cannot_vary(one: Scenario, what: str) -> str:
 def case_of_file(path: str, what: str) -> Case:
     """The case: up to which value is the scene of this file usable?"""
     one = read_scene_file(Path(path))
-    unit, values, _ = VARIES[what]
+    meant = VARIES[what]
     return Case(
         f"{path}:{what}",
         FAMILY,
         f"{one.name}: {one.asks}",
-        what,
-        unit,
-        values or dense_ladder(one),
+        meant.parameter,
+        meant.unit,
+        meant.values or dense_ladder(one),
         partial(varied, path, what),
         USABLE,
     )

@@ -1,44 +1,96 @@
-"""Progress in the terminal: a bar while something runs, a line now and then in a log."""
+"""Progress: one line that changes while something runs on a terminal, a line now and then in a
+log."""
 
 from __future__ import annotations
 
+from datetime import timedelta
 from time import perf_counter
 from types import TracebackType
 
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.progress import Progress as Bar
+from rich.progress import ProgressColumn, Task
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
 
 from reports.terminal.console import Console
 from reports.terminal.foreign_text import legible
 
 QUIET = 30.0  # s between two lines where there is no terminal that a bar could be drawn on
+BAR, GAP = 10, 2  # columns
+LEAST = 24  # columns for what is being done, before anything else is left out
+
+
+class OneLine(ProgressColumn):
+    """What is being done, how much of it is done, and how long it takes, in one line of any width.
+
+    What does not fit is left out as a whole, least important first: never a part of a number.
+    """
+
+    def __init__(self, console: Console) -> None:
+        super().__init__()
+        self.console = console
+
+    def render(self, task: Task) -> Table:
+        """The line of a task."""
+        parts, width = parts_of(task), self.console.width
+        # the bar first, then from the last number on; the first two are always there
+        while room_beside(parts, width) < LEAST and len(parts) > 2:
+            parts.pop(0 if isinstance(parts[0], ProgressBar) else -1)
+        what = legible(task.description).replace("\n", " ")
+        line = Table.grid(padding=(0, GAP, 0, 0))
+        line.add_row(Text(fitted(what, room_beside(parts, width))), *parts)
+        return line
+
+
+def parts_of(task: Task) -> list[ProgressBar | Text]:
+    """The bar, how many are done, the time left, the time each takes, the time so far."""
+    elapsed = Text(clock(task.elapsed), "progress.elapsed")
+    if not task.total or task.finished:
+        return [elapsed]
+    return [
+        ProgressBar(total=task.total, completed=task.completed, width=BAR),
+        Text(f"{task.completed:.0f}/{task.total:.0f}", "progress.download"),
+        Text(f"{clock(task.time_remaining)} left", "progress.remaining"),
+        Text(task.fields["each"]),
+        elapsed,
+    ]
+
+
+def room_beside(parts: list[ProgressBar | Text], width: int) -> int:
+    """How many of `width` columns are left beside them."""
+    widths = (BAR if isinstance(part, ProgressBar) else part.cell_len for part in parts)
+    return width - sum(each + GAP for each in widths)
+
+
+def clock(seconds: float | None) -> str:
+    """As 0:01:05; of a time that is not known yet -:--:--."""
+    return "-:--:--" if seconds is None else str(timedelta(seconds=int(seconds)))
+
+
+def fitted(what: str, room: int) -> str:
+    """The words of `what`, as many as fit; of a first one that does not fit the beginning."""
+    if len(what) <= room:
+        return what
+    kept = what[: room + 1]
+    words = kept if kept.endswith(" ") else kept.rpartition(" ")[0]
+    return words.rstrip() or what[: max(room - 1, 0)] + "…"
 
 
 class Progress:
-    """A bar that says what runs, how long one takes and how long all will; in a log, a line now and
-    then."""
+    """Says what runs, how long one takes and how long all will; on a terminal in a line that is
+    gone at the end, in a log now and then."""
 
     def __init__(self) -> None:
+        console = Console(stderr=True)
+        self.live = console.is_interactive
         self.bar = Bar(
-            TextColumn("{task.description:<44.44}", markup=False),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            TextColumn("{task.fields[each]}"),
-            console=Console(stderr=True),
+            OneLine(console), console=console, transient=True, expand=True, disable=not self.live
         )
 
     def __enter__(self) -> Progress:
         self.began = perf_counter()
-        self.task = self.bar.add_task("starting", total=None, each="")
+        self.begin("starting")
         self.bar.start()
         return self
 
@@ -47,9 +99,17 @@ class Progress:
     ) -> None:
         self.bar.stop()
 
+    def begin(self, what: str, total: int | None = None, completed: int = 0) -> None:
+        """Put a line in place of what was there before, its clocks at 0."""
+        for task in self.bar.task_ids:
+            self.bar.remove_task(task)
+        self.task = self.bar.add_task(what, total=total, completed=completed, each="")
+
     def say(self, what: str) -> None:
         """Say what is being done."""
-        self.bar.update(self.task, description=legible(what))
+        if self.bar.finished:
+            self.begin(what)
+        self.bar.update(self.task, description=what)
 
     def note(self, sentence: str) -> None:
         """A line that stays."""
@@ -60,7 +120,7 @@ class Progress:
         self.counted, self.since = 0, perf_counter()
         self.reported, self.missing = self.since, missing
         what = what or "starting workers (the first run compiles: some 20 s more)"
-        self.bar.reset(self.task, total=total, completed=total - missing, description=what, each="")
+        self.begin(what, total, total - missing)
 
     def done(self, what: str, status: str = "ok", reason: str = "") -> None:
         """One more is done."""
@@ -70,7 +130,7 @@ class Progress:
         self.counted += 1
         now = perf_counter()
         each = (now - self.since) / self.counted
-        if not self.bar.console.is_terminal and now - self.reported > QUIET:
+        if not self.live and now - self.reported > QUIET:
             self.reported = now
             self.note(f"{what}: {self.counted} of {self.missing}, {each:.2g} s each")
         self.bar.update(self.task, description=what, advance=1, each=f"{each:.2g} s each")

@@ -9,7 +9,6 @@ from tempfile import TemporaryFile
 from typing import NoReturn
 
 import pandas as pd
-from rich.table import Table
 
 from reports.run.arguments import opening, unknown
 from reports.run.folders import made_anew, place_of
@@ -18,6 +17,7 @@ from reports.terminal.console import Console
 from reports.terminal.exits import DONE, broken_off, refuse
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
+from reports.terminal.tables import print_table
 from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, TUNED, Search
 
 NAME = "matched.csv"
@@ -43,12 +43,15 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
     tables: list[pd.DataFrame] = []
     with (
         broken_off(
-            out, lambda: f"What had ended is in {out / NAME}." if tables else "No search had ended."
+            out,
+            lambda: (
+                f"The finished searches are in {out / NAME}." if tables else "No search finished."
+            ),
         ),
         Progress() as bar,
     ):
         for engine in dict.fromkeys(engines or TUNED):
-            bar.say(f"{engine}: the exact answers, and what is matched now")
+            bar.say(f"{engine}: the exact answers, and the present settings")
             search = Search(engine, say=bar.note)
             bar.say(f"{engine}: setting by setting")
             found = pd.concat([*tables, search.run()])
@@ -62,15 +65,13 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
 
 def show(table: pd.DataFrame) -> None:
     """Print what is chosen, and why not the others."""
-    rows = Table(
-        title="Error over the chosen settings' error, at equal cost", title_justify="left", box=None
-    )
-    for column in ("engine", "setting", "value", "error", "on other seeds", "cost", "verdict"):
-        rows.add_column(column, overflow="fold")
+    rows = []
     for _, row in table[table.verdict.isin([CHOSEN, BETTER, NO_BETTER, BREAKS])].iterrows():
         numbers = [
             "" if pd.isna(row[name]) else f"{row[name]:.3g}"
             for name in ("equal_cost", "again", "cost")
         ]
-        rows.add_row(row.engine, row.setting, row.value, *numbers, row.verdict)
-    Console().print(rows)
+        rows.append([f"{row.engine}, {row.setting}: {row.value}", *numbers, row.verdict])
+    headings = ["setting", "error", "on other\nseeds", "cost\nof a step", "verdict"]
+    title = "Errors at equal cost, and costs, as factors of those of the chosen settings"
+    print_table(Console(), headings, rows, title, left=headings[-1:])

@@ -174,7 +174,7 @@ RUN: dict[str, tuple[str, tuple[int, ...], str]] = {
         (0,),
         "All 4 cells",
     ),
-    "a disk that leaves at once": (scene("0 0 1e9 0; 3 0 0 0"), (0, 1), "cells have ended"),
+    "a disk that leaves at once": (scene("0 0 1e9 0; 3 0 0 0"), (0, 1), "ended: "),
     "an answer that takes too long": (
         scene("0 0 -2.1938 2.0846 0.3", SQUARE, "restitution = 1.0\nsubsteps = [1]", 1e5, 1.0),
         (1,),

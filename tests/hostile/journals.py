@@ -218,7 +218,7 @@ SPOILT = [
         (REPORT, (1,), "1 error"),
         (DIFF, (1,), "is not what was written"),
         (REPLAY, (0, 1, 2), ""),
-        (RESUME, (0,), "All 2 cells have ended: 2 ok"),
+        (RESUME, (0,), "2 cells ended: 2 ok"),
     )
 ]
 

@@ -329,7 +329,7 @@ BESIDE = (
         TRAPS | {"two.toml": TWO},
         codes=(0,),
         writes=WRITES,
-        says="All 1 cells have ended: 1 ok",
+        says="1 cell ended: 1 ok",
     ),
     Input(
         "truth: beside modules of Python's names",
@@ -367,7 +367,7 @@ NAMES = (
         {"two.toml": TWO, "UPPER.PY": PY},
         codes=(0,),
         writes=WRITES,
-        says="All 1 cells have ended: 1 ok",
+        says="1 cell ended: 1 ok",
     ),
     Input(
         "run: a name with a colon",

@@ -70,7 +70,7 @@ def test_a_student_with_a_long_name_and_one_with_an_empty_folder_have_a_row(tmp_
         ["with", "nothing", "-"]
     ]
     assert "  with nothing: holds no .js and no .py file" in done.stdout
-    assert "1 of 1 files without a fault; 2 not checked." in done.stdout
+    assert "1 of 1 file without a fault; 2 not checked." in done.stdout
     assert (done.returncode, ".git" in done.stdout) == (1, False)
 
 

@@ -75,9 +75,9 @@ def test_a_crash_is_replayed_from_its_last_good_state(folder: Path, replayed):
     code, said, printed = replayed(key_of(folder, "aborts:control")[:8])
 
     assert code == 1
-    assert f"from:   step {FATAL - 1}, 1.65 s, the last good state" in said
-    assert "now:    crashed: worker died: SIGABRT in misbehave" in said
-    assert f"as far: step {2 * (FATAL - 1)} of 240" in said
+    assert f"from:    step {FATAL - 1}, 1.65 s, the last good state" in said
+    assert "now:     crashed: worker died: SIGABRT in misbehave" in said
+    assert f"reached: step {2 * (FATAL - 1)} of 240" in said
     assert "assertion failed: mass > 0" in printed  # what an engine prints is shown
 
 
@@ -86,7 +86,7 @@ def test_a_good_cell_is_replayed_from_the_start_to_the_same_bits(folder: Path, r
     code, said, _ = replayed(key_of(folder, "good:control"))
 
     assert code == 0
-    assert "bits:   as recorded" in said
+    assert "bits:    as recorded" in said
 
 
 def test_a_cell_that_is_not_there_is_bad_input_with_what_is_near(folder: Path, replayed):

@@ -41,7 +41,7 @@ def test_an_interrupted_run_can_be_reported_and_says_it_is_not_finished(
     done = crosscheck("report", "out", cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
-    assert "Not finished: 11 cells have ended so far" in done.stdout
+    assert "Not finished: 11 cells ended so far" in done.stdout
     assert len(pd.read_csv(part / "runs.csv")) == 11
 
 
@@ -53,7 +53,7 @@ def test_an_engine_that_was_asked_but_has_not_played_yet_does_not_spoil_the_page
     done = crosscheck("report", "out", cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
-    assert "Not finished: 1 cells have ended so far" in done.stdout
+    assert "Not finished: 1 cell ended so far" in done.stdout
     assert (tmp_path / "out.part" / "report.html").exists()
 
 
@@ -92,7 +92,7 @@ def test_a_new_run_does_not_bury_an_interrupted_one(small: Path, tmp_path: Path)
     done = crosscheck(*SMALL, "--out", "out", cwd=tmp_path)
 
     assert done.returncode == 2
-    assert "in which 11 cells have ended" in done.stderr
+    assert "an interrupted run with 11 finished cells" in done.stderr
     assert f"crosscheck run --resume {tmp_path / 'out'}" in done.stderr
     assert (part / "journal.jsonl").read_bytes()[: before.rfind(b"\n") + 1] == before[
         : before.rfind(b"\n") + 1

@@ -142,7 +142,7 @@ def test_from_another_folder_the_same_files_are_played(home: Path, tmp_path: Pat
 
     assert done.returncode == 0, done.stderr
     assert last_of(home / "out")["footer"]["played"] == 0
-    assert "bits:   as recorded" in replayed.stdout
+    assert "bits:    as recorded" in replayed.stdout
     assert sorted(path.name for path in home.iterdir()) == ["in", "mine.py", "out"]
 
 

@@ -204,10 +204,10 @@ def test_a_replay_says_that_the_file_is_another(tmp_path: Path):
 
     assert "has changed since" not in same.stderr
     assert (
-        "plain.py or a version has changed since: what is played is what is there now"
+        "plain.py, or a version, has changed since the run; the present one is played"
         in other.stderr
     )
-    assert "bits:   other than recorded" in other.stdout
+    assert "bits:    not as recorded" in other.stdout
 
 
 def test_a_run_says_which_modules_beside_the_file_were_played(tmp_path: Path):

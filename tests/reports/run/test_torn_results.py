@@ -94,7 +94,7 @@ def test_replay_says_that_a_trajectory_is_torn_and_plays_from_the_start(torn: Pa
     done = crosscheck("replay", path.stem, "--out", torn, cwd=torn.parent)
 
     assert f"{path.name} is not what was written" in done.stderr
-    assert "from:   step 0" in done.stdout
+    assert "from:    step 0" in done.stdout
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from adapters.engines import ENGINES
 from adapters.play import play
 from reports.compare.delays import jumps_of
 from reports.compare.view import View
+from reports.run.scenes import open_scene
 from reports.speed import ladder
 from reports.speed.advice import (
     NEARER,
@@ -89,7 +90,7 @@ def test_every_purpose_sees_an_engine_that_is_wrong(purpose: str, control: type)
 def test_a_ladder_begins_at_the_steps_of_the_scene_and_halves_them():
     """Two step sizes at least, so that one finer can speak for a coarser."""
     for name in SCENARIOS:
-        scenario = ladder.open_scene(name, 0)
+        scenario = open_scene(name, 0)
         steps = ladder_of(scenario)
         assert steps[0] == scenario.substeps[0]
         assert len(steps) >= 2

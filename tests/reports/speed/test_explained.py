@@ -51,14 +51,12 @@ def test_the_sentence_says_what_is_cut_at_which_time_and_how_much_is_left():
     said, uncut = sentence(TABLE), sentence(TABLE[TABLE.scenario != "short"])
 
     assert said.startswith(
-        "of 3 errors (2 engines in 3 scenes; 2 more are below 1e-09 radii; 1 were not played) 2 are"
+        "of 3 errors (2 engines in 3 scenes; 2 more below 1e-09 radii; 1 not played) 2 are"
     )
-    assert "over 7 of 8 simulated seconds: 1 scenes are cut" in said
+    assert "over 7 of 8 simulated seconds: 1 scene is cut" in said
     assert "(short at 0.2 of 1 s)" in said
-    assert said.endswith("Of the 1 errors in scenes that are not cut, 1 are explained to 1 %")
-    assert uncut.endswith(
-        "over 7 of 7 simulated seconds: every scene as far as its exact answer goes"
-    )
+    assert said.endswith("Of the 1 error in scenes that are not cut, 1 are explained to 1 %")
+    assert uncut.endswith("over 7 of 7 simulated seconds, up to the end of every exact answer")
 
 
 def test_the_budget_itself_tells_how_far_it_goes():

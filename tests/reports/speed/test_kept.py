@@ -131,7 +131,8 @@ def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(
     assert unasked.returncode == 2
     assert "holds 2 results of an interrupted run" in unasked.stderr
     assert second.returncode == 0, second.stderr
-    assert "that had ended: 2" in second.stderr  # a ladder, and what its error is made of
+    # a ladder, and what its error is made of
+    assert "Kept from the interrupted run: 2 tasks." in second.stderr
     assert len(pd.read_csv(tmp_path / "out" / "speed_errors.csv")) == len(
         QUICK.ladder(scenario("free_fall"))
     )

@@ -289,8 +289,8 @@ def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
         assert "Scored to" in page  # the asteroids, whose exact answer ends before they do
     assert f"gas_of_100 at {gas.until:.2g} of {gas.horizon:.2g} s" in shorter
     assert 'id="cuts"' in shorter
-    assert "1 scenes are cut" in shorter
-    assert "every scene as far as its exact answer goes" in whole
+    assert "1 scene is cut" in shorter
+    assert "up to the end of every exact answer" in whole
     assert 'id="cuts"' not in whole
 
 

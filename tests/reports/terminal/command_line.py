@@ -2,13 +2,17 @@
 this one, sooner."""
 
 import contextlib
+import fcntl
 import os
+import struct
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Thread
 from typing import NamedTuple
 from unittest import mock
 
@@ -66,3 +70,34 @@ def wait_for(done: Callable[[], bool]) -> None:
             return
         time.sleep(0.05)
     pytest.fail("nothing happened within two minutes")
+
+
+def on_terminal(columns: int, *words: str | Path, cwd: Path) -> Done:
+    """The command in a fork on a pseudo-terminal so many columns wide; `stdout` is all it wrote
+    there."""
+    ours, theirs = os.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
+    # rich asks the terminal for its width only where COLUMNS is no number
+    environment = {"COLUMNS": "", "TERM": "xterm-256color"}
+    written: list[bytes] = []
+    with TemporaryDirectory() as folder:
+        for name in ("stdout", "stderr"):
+            (Path(folder) / name).symlink_to(os.ttyname(theirs))
+        process = start(crosscheck_in, [*map(os.fspath, words)], cwd, Path(folder), environment)
+        reading = Thread(target=read_all, args=(ours, written))
+        reading.start()
+        process.join(120.0)
+        os.close(theirs)
+        reading.join(5.0)
+        os.close(ours)
+    if process.exitcode is None:
+        process.kill()
+        pytest.fail(f"crosscheck {words} hangs")
+    return Done(process.exitcode, b"".join(written).decode(), "")
+
+
+def read_all(terminal: int, written: list[bytes]) -> None:
+    """What is written to a terminal, until nobody has it open for writing."""
+    with contextlib.suppress(OSError):  # how Linux says so
+        while some := os.read(terminal, 65536):
+            written.append(some)

@@ -18,6 +18,7 @@ import pytest
 from reports.commands.run import what_is_kept
 from reports.run.folders import RUN, begun, replace_folder
 from reports.run.made import Made, put_made
+from reports.terminal.counts import counted
 from reports.terminal.exits import STATUS, Stopped, broken_off, stoppable
 from tests.reports.run.sweeps import ended_in
 from tests.reports.run.test_kills import alive
@@ -126,9 +127,7 @@ def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: 
 
     assert_ended(ended, how)
     assert {signal.SIGTERM: "Terminated.", signal.SIGINT: "Interrupted."}[how] in ended.said
-    assert (
-        f"The {ended_in(place / 'out.part') or had} cells that were played are kept." in ended.said
-    )
+    assert f"Kept: {counted(ended_in(place / 'out.part') or had, 'finished cell')}." in ended.said
     assert resumed.returncode == 0, resumed.stderr
     assert (place / "out" / "deviations.csv").read_bytes() == (done / "deviations.csv").read_bytes()
 

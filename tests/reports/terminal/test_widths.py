@@ -1,0 +1,247 @@
+"""What commands print fits a terminal of 80 and of 40 columns, and a pipe: no line is wider, no
+number is cut, no table wraps."""
+
+import re
+from math import nan
+from pathlib import Path
+
+import pytest
+from rich.cells import cell_len
+from rich.table import Table
+
+from adapters.engines import ENGINES
+from reports.commands import diff
+from reports.run.diff import Change
+from reports.stability.cases import CASES
+from reports.stability.command import print_limits
+from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit, Trial
+from reports.terminal.console import Console
+from reports.terminal.counts import counted
+from reports.terminal.progress import OneLine, Progress, fitted
+from reports.terminal.tables import print_list, print_table, print_texts
+from tests.reports.terminal.command_line import Done, crosscheck, on_terminal
+
+DATA = Path(__file__).parents[3] / "tests" / "data"
+SOLVER = Path(__file__).parents[3] / "tests" / "solvers" / "correct" / "plain.js"
+WIDTHS = (80, 40)
+CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+COUNT = re.compile(r"\d+/\d+  [\d:-]+ left")
+RUN = ("run", "slow_collision", "near_miss", "--dt", str(1 / 60), "--out", "out")
+
+
+def lines_of(done: Done) -> list[str]:
+    """Every line a terminal was given, those of the progress that were written over included."""
+    return re.split(r"[\r\n]+", CONTROL.sub("", done.stdout))
+
+
+def faults(lines: list[str], columns: int) -> list[str]:
+    """The lines that are too wide, or end in a cut."""
+    return [line for line in lines if cell_len(line) > columns or "…" in line]
+
+
+def words_of(text: str) -> set[str]:
+    """What stands between spaces."""
+    return set(text.split())
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with two finished runs, `out` and `later`."""
+    cwd = tmp_path_factory.mktemp("runs")
+    for out in ("out", "later"):
+        done = crosscheck(*RUN[:-1], out, "--engine", "pymunk", "--engine", "box2d_v3", cwd=cwd)
+        assert done.returncode == 0, done.stderr
+    return cwd
+
+
+def assert_fits(columns: int, *words: str | Path, cwd: Path) -> None:
+    """The path of a page is whole, and wraps where it must; all other lines fit."""
+    done = on_terminal(columns, *words, cwd=cwd)
+    lines = [line for line in lines_of(done) if str(cwd) not in line]
+
+    assert done.returncode == 0, done.stdout
+    assert len(lines) > 5
+    assert faults(lines, columns) == []
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [(80, ("--help",)), (80, ("run", "--help")), (80, ("list",)), (40, ("list",))],
+)
+def test_what_is_printed_at_once_fits_its_terminal(words: tuple, columns: int, tmp_path: Path):
+    """On a pseudo-terminal."""
+    assert_fits(columns, *words, cwd=tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("columns", WIDTHS)
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("truth", "galperin_31"),
+        ("truth", DATA / "scenes" / "break.toml"),
+        ("report", "out"),
+        ("diff", "out", "later"),
+        ("check", SOLVER),
+        ("stability", "slow_collision", "--engine", "pymunk", "--out", "limits"),
+        ("speed", "free_fall", "--engine", "pymunk", "--out", "speed"),
+        ("lesson", "order", "--export", "order.html"),
+    ],
+    ids=lambda words: f"{words[0]}-{Path(words[1]).stem}",
+)
+def test_what_takes_its_time_fits_its_terminal(words: tuple, columns: int, runs: Path):
+    """On a pseudo-terminal, the progress that was written over included."""
+    assert_fits(columns, *words, cwd=runs)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_a_run_counts_on_a_terminal_in_whole_numbers(columns: int, tmp_path: Path):
+    """Whatever is shown of the count and the time left is shown whole, beside what is played."""
+    done = on_terminal(columns, *RUN, "--engine", "pymunk", cwd=tmp_path)
+    lines = lines_of(done)
+    counts = [line for line in lines if " left" in line]
+
+    assert done.returncode == 0, done.stdout
+    assert counts
+    assert all(COUNT.search(line) for line in counts)
+    assert faults([line for line in lines if str(tmp_path) not in line], columns) == []
+    assert "0/0" not in done.stdout
+
+
+def test_the_check_of_widths_finds_a_table_that_does_not_fit(capsys: pytest.CaptureFixture[str]):
+    """A table as rich divides it cuts its numbers at 40 columns; a console that is wider than the
+    terminal is found, too."""
+    table = Table("engine", *("position",) * 6, box=None)
+    table.add_row("event_driven:float64", *("6.29×10⁻¹⁵",) * 6)
+    Console(width=40).print(table)
+    cut = capsys.readouterr().out
+    Console(width=120).print(table)
+    wide = capsys.readouterr().out
+
+    assert faults(cut.splitlines(), 40)
+    assert faults(wide.splitlines(), 80)
+
+
+def test_a_pipe_gets_results_and_no_progress(tmp_path: Path):
+    """What a log keeps: the table and the sentences; nothing of a bar, and nothing that acts on a
+    terminal."""
+    done = crosscheck(*RUN, "--engine", "pymunk", cwd=tmp_path)
+
+    assert done.stderr == ""
+    assert "\x1b" not in done.stdout
+    for word in ("writing the page", "0/0", " left", "0:00:0"):
+        assert word not in done.stdout
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_no_number_of_a_table_is_lost_on_a_narrow_terminal(
+    columns: int, capsys: pytest.CaptureFixture[str]
+):
+    """Ten engines, six numbers: what stands on a wide terminal stands on a narrow one, each column
+    whole, beside the names."""
+    rows = [
+        [name, *(f"{10.0**-k:.3g}_{row}" for k in range(6))] for row, name in enumerate(ENGINES)
+    ]
+    headings = ["engine", "a", "b", "c", "d\ne", "a heading", "f"]
+    shown = {}
+    for width in (columns, 400):
+        print_table(Console(width=width), headings, rows, "title")
+        shown[width] = capsys.readouterr().out
+
+    assert words_of(shown[columns]) == words_of(shown[400])
+    assert faults(shown[columns].splitlines(), columns) == []
+    assert shown[400].count("pymunk:matched") == 1
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_the_limits_of_all_engines_fit(columns: int, capsys: pytest.CaptureFixture[str]):
+    """As many columns as engines, a row for each kind of case; a mark in it is explained below, and
+    no other."""
+    trial = Trial(0.00123456, 1, 1, 1.0)
+    kinds = {LIMIT: 0.00123456, NEVER_FAILS: nan, NEVER_WORKS: 0.1}
+    limits = [
+        Limit(case, engine, "quick", kind, nan, fails_at, (trial,))
+        for case, (kind, fails_at) in zip(list(CASES)[:3], kinds.items())
+        for engine in ENGINES
+    ]
+    print_limits(Console(width=columns), limits)
+    lines = capsys.readouterr().out.splitlines()
+
+    assert faults(lines, columns) == []
+    assert sum(line.count("0.00123") for line in lines) == len(ENGINES)
+    assert any(line.startswith("everywhere ") and "every value" in line for line in lines)
+    assert not any("refused" in line or "works again" in line for line in lines)
+
+
+@pytest.mark.parametrize("columns", [40, 60, 80, 120, 200])
+@pytest.mark.parametrize("total", [9, 1520, 123456])
+def test_the_progress_leaves_out_what_does_not_fit_and_cuts_no_number(
+    columns: int, total: int, capsys: pytest.CaptureFixture[str]
+):
+    """The count and the time left are always there; on 80 columns also the time each takes."""
+    console = Console(width=columns)
+    with Progress() as progress:
+        progress.start(total, total)
+        progress.done("simbenchmark_bouncing  event_driven:float64  dt 0.01667 s")
+        [task] = progress.bar.tasks
+        console.print(OneLine(console).render(task))
+        progress.say("writing the page")
+    [line] = capsys.readouterr().out.rstrip("\n").split("\n")
+
+    assert cell_len(line) <= columns
+    assert f"1/{total}  " in line
+    assert COUNT.search(line)
+    assert line.startswith("simbenchmark")
+    assert " s each" in line or columns < 80
+
+
+def test_what_is_not_counted_shows_no_count(capsys: pytest.CaptureFixture[str]):
+    """Neither 0/0 nor a time left: only what is being done, and since when."""
+    console = Console(width=80)
+    with Progress() as progress:
+        for prepare in (lambda: None, lambda: progress.start(0, 0), lambda: progress.start(0, 9)):
+            prepare()
+            progress.say("writing the page")
+            [task] = progress.bar.tasks
+            console.print(OneLine(console).render(task))
+
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert [re.sub(r"\d$", "0", line) for line in lines] == ["writing the page  0:00:00"] * 3
+
+
+def test_words_are_left_out_whole():
+    """A number at the end of what is being done is there, or it is not."""
+    said = "near_miss  pymunk:matched  dt 0.01667 s"
+
+    assert fitted(said, 40) == said
+    assert fitted(said, 36) == "near_miss  pymunk:matched  dt"
+    assert fitted(said, 25) == "near_miss  pymunk:matched"
+    assert fitted("a_name_that_is_too_long", 10) == "a_name_th…"
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_texts_and_lists_wrap_below_themselves(columns: int, capsys: pytest.CaptureFixture[str]):
+    """No word of them is lost."""
+    console, text = Console(width=columns), "one two three four " * 8
+    print_texts(console, {"a name": text, "another name of some length": text}, "title")
+    print_list(console, [text, text])
+    printed = capsys.readouterr().out
+
+    assert faults(printed.splitlines(), columns) == []
+    assert printed.count("three") == 32
+
+
+def test_things_are_counted_in_one_way():
+    """One of them, none, and a plural of its own."""
+    assert [counted(n, "scene") for n in (0, 1, 2)] == ["0 scenes", "1 scene", "2 scenes"]
+    assert [counted(n, "search", "searches") for n in (1, 2)] == ["1 search", "2 searches"]
+
+
+def test_a_change_between_two_runs_is_a_line():
+    """Verdict, engine, what, before and after."""
+    change = Change("pymunk:matched", "near_miss  dt 0.01 s  status", "ok", "crashed", "worse")
+
+    assert diff.in_words(change) == (
+        "worse: pymunk:matched, near_miss  dt 0.01 s  status: ok → crashed"
+    )
