@@ -199,9 +199,7 @@ FOREIGN: dict[str, dict[str, str]] = {
 @pytest.mark.parametrize(
     ("command", "what"),
     [
-        pytest.param(
-            command, what, marks=() if command == "run" or what == "a page" else THOROUGH
-        )
+        pytest.param(command, what, marks=() if command == "run" or what == "a page" else THOROUGH)
         for command in COMMANDS
         for what in FOREIGN
     ],
