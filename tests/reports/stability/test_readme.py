@@ -6,8 +6,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
-
 from reports.stability.cases import CASES
 from reports.stability.limits import FULL, QUICK
 from tests.reports.stability.kept_limits import IN_README, VARIANTS, in_words, kept
