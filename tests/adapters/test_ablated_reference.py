@@ -219,7 +219,7 @@ on = {"friction": 0.3, "correction_share": 0.1, "slop": 0.01, "push_speed": 3.0,
 for order in (EXERCISE, BOX2D, PYMUNK, BOX2D_V3):
     engine = AblatedReference(order, **on)
     engine.load(scene, 0.01)
-    engine.step(300)
+    engine.step(150)
     assert len(engine.collisions()) > 20
     sys.stdout.buffer.write(engine.read().position.tobytes() + engine.read().velocity.tobytes())
 """

@@ -97,6 +97,12 @@ def test_no_disk_is_a_fault_whether_left_out_or_empty(tmp_path: Path) -> None:
     assert faults_of(head + "disk = []", tmp_path) == [
         "disk = []: 0 items; must be 1 to 100000 [[disk]] tables"
     ]
+
+
+@pytest.mark.slow
+def test_more_disks_than_a_scene_may_have_are_one_fault(tmp_path: Path) -> None:
+    """One more than allowed, which takes two seconds to read."""
+    head = 'name = "many"\nduration = 1\nsample_interval = 1\nrestitution = 1\n'
     one = "{position = [0, 0], radius = 1, static = 1},"
     (fault,) = faults_of(head + f"disk = [{one * 100_001}]", tmp_path)
     assert fault.endswith("100001 items; must be 1 to 100000 [[disk]] tables")

@@ -155,10 +155,10 @@ def wrong(name: str, change: Change) -> list[str]:
 
 
 CAN = {change: [name for name in SCENES if (change, name) not in LEFT_OUT] for change in CHANGES}
-# Every change and every scene is in the third that is played here; the long test has the others.
+# Every change and every scene is in the quarter that is played here; the long test has the others.
 PAIRS = [
     pytest.param(
-        name, change, marks=[] if j % 3 == k % min(3, len(CAN[change])) else [pytest.mark.slow]
+        name, change, marks=[] if j % 4 == k % min(4, len(CAN[change])) else [pytest.mark.slow]
     )
     for k, change in enumerate(CHANGES)
     for j, name in enumerate(CAN[change])

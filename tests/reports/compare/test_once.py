@@ -1,0 +1,53 @@
+"""A law of `reports.compare.laws` is worked out once for the same objects, and forgotten with
+them."""
+
+import gc
+import weakref
+from dataclasses import replace
+
+import pytest
+
+from reports.compare.laws import once
+from scenarios.catalogue import scenario
+from scenarios.model import Scene
+
+
+@pytest.fixture
+def asked() -> list[tuple[Scene, Scene]]:
+    """What the law below was worked out for."""
+    return []
+
+
+def test_the_same_objects_are_asked_once_and_others_that_look_alike_again(asked: list):
+    """Scenes are equal only to themselves: a copy is another scene."""
+    law = once(lambda one, other: asked.append((one, other)) or one.position + other.position)
+    one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
+    again = replace(other)
+
+    found = law(one, other)
+    assert law(one, other) is found
+    assert law(one, again) is not found
+    assert asked == [(one, other), (one, again)]
+
+
+def test_what_was_found_cannot_be_edited():
+    """It is handed to everybody who asks."""
+    found = once(lambda scene: scene.position * 2)(scenario("near_miss").scene)
+
+    with pytest.raises(ValueError, match="read-only"):
+        found[0] = 0.0
+
+
+def test_what_was_found_is_forgotten_with_the_first_object():
+    """And lets go of the others it was found for."""
+    law = once(lambda one, other: one.position + other.position)
+    one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
+    law(one, other)
+    kept = weakref.ref(other)
+
+    del other
+    gc.collect()
+    assert kept() is not None
+    del one
+    gc.collect()
+    assert kept() is None
