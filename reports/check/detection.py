@@ -169,19 +169,28 @@ def touch(answer: Answer) -> CheckRow:
     """Exactly touching: free."""
     reacts = acts(QUESTIONS["touch"].balls, answer.last)
     asked = "Do spheres collide whose distance is exactly the sum of the sizes?"
-    note = f"compares with {'<=' if reacts else '<'}, which is free"
-    return CheckRow("touch", "2a", asked, "yes" if reacts else "no", "either", "note", note)
+    sign = "<=" if reacts else "<"
+    said = f"the comparison is the one with {sign}"
+    got = "yes" if reacts else "no"
+    return CheckRow("touch", "2a", asked, got, "yes or no", "free choice", said)
 
 
 def same_centre(answer: Answer) -> CheckRow:
-    """Two spheres at one place have no normal; nothing may become NaN for that."""
-    asked = "Are all numbers finite where two centres are at the same place?"
+    """Two spheres at one place have no normal, and the exercise does not say what becomes of
+    them."""
+    asked = "What becomes of two spheres whose centres are at the same place?"
     values = [] if answer.failed else [x for b in answer.last for x in (*b.x, *b.v, b.alpha, b.w)]
-    if values and np.isfinite(values).all():
-        return judged("same centre", "2a", asked, "yes", "yes", True)
-    cause = (
-        "divides by a distance of zero; the exercise does not say what to do, but the page loses"
-        " both spheres"
+    guarded = bool(values) and bool(np.isfinite(values).all())
+    said = (
+        "this case has a guard"
+        if guarded
+        else "there is no guard for this case; the direction between the two is 0 / 0"
     )
-    got = f"fails: {answer.failed}" if answer.failed else "no, NaN or infinite"
-    return CheckRow("same centre", "2a", asked, got, "yes, by a guard", "note", cause)
+    got = (
+        "they keep finite numbers"
+        if guarded
+        else f"the call fails: {answer.failed}"
+        if answer.failed
+        else "their numbers become NaN or infinite"
+    )
+    return CheckRow("same centre", "2a", asked, got, "anything", "free choice", said)

@@ -12,6 +12,7 @@ import numpy as np
 from adapters.own_solver.engine import spheres_of
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
+from reports.check.questions import fresh_world
 from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
@@ -57,10 +58,11 @@ def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> SceneAn
         "gravity": [0.0, 0.0],
         "wrap": None,
     }
-    requests = [("load", start, LIMIT), ("read", None, LIMIT)]
+    requests = [*fresh_world(process), ("load", start, LIMIT), ("read", None, LIMIT)]
     for _ in range(scenario.samples):
         requests += [("step", step, LIMIT), ("read", None, LIMIT)]
-    *answers, contacts = process.request([*requests, ("contacts", None, LIMIT)], SCENE_LIMIT)
+    requests.append(("contacts", None, LIMIT))
+    *answers, contacts = process.request(requests, SCENE_LIMIT)[len(fresh_world(process)) :]
     failed = next(
         (answer for answer in (*answers, contacts) if isinstance(answer, SolverFailed)), None
     )

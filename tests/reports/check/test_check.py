@@ -94,7 +94,7 @@ def test_another_restitution_is_a_note_and_is_judged_by_itself():
         for row in check_solver(next(path for path in CORRECT if path.name == "unusual_e.js"))
     }
 
-    assert rows["restitution"].verdict == "note"
+    assert rows["restitution"].verdict == "free choice"
     assert "e = 0.5 is written into the file" in rows["restitution"].cause
     assert rows["oblique"].verdict == "right"
 
@@ -108,7 +108,7 @@ def test_free_choices_are_notes():
 
     notes = [rows[name].cause for name in ("touch", "split", "separating", "same centre")]
     assert {rows[name].verdict for name in ("touch", "split", "separating", "same centre")} == {
-        "note"
+        "free choice"
     }
     assert "compares with <=" in notes[0]
     assert "A alone is moved" in notes[1]
