@@ -28,7 +28,7 @@ RULES: dict[str, Rule] = {
     "the squares of the sizes are added, not their sum squared": lambda x, y, a, b: (
         x * x + y * y < a * a + b * b
     ),
-    "the sizes are taken for diameters": lambda x, y, a, b: np.hypot(x, y) < (a + b) / 2,
+    "the sizes are used as diameters": lambda x, y, a, b: np.hypot(x, y) < (a + b) / 2,
     "the sizes are doubled": lambda x, y, a, b: np.hypot(x, y) < 2 * (a + b),
     "the larger size is used alone": lambda x, y, a, b: np.hypot(x, y) < max(a, b),
     "the smaller size is used alone": lambda x, y, a, b: np.hypot(x, y) < min(a, b),
@@ -39,10 +39,10 @@ RULES: dict[str, Rule] = {
     "x and y are compared one by one, as of boxes": lambda x, y, a, b: (
         abs(x) < a + b and abs(y) < a + b
     ),
-    "dx is taken for dy, too": lambda x, y, a, b: np.hypot(x, x) < a + b,
-    "dy is taken for dx, too": lambda x, y, a, b: np.hypot(y, y) < a + b,
-    "|dx| + |dy| is taken for the distance": lambda x, y, a, b: abs(x) + abs(y) < a + b,
-    "dx + dy is taken for the distance": lambda x, y, a, b: abs(x + y) < a + b,
+    "dx is used for dy, too": lambda x, y, a, b: np.hypot(x, x) < a + b,
+    "dy is used for dx, too": lambda x, y, a, b: np.hypot(y, y) < a + b,
+    "|dx| + |dy| is used as the distance": lambda x, y, a, b: abs(x) + abs(y) < a + b,
+    "dx + dy is used as the distance": lambda x, y, a, b: abs(x + y) < a + b,
     "only x is compared": lambda x, y, a, b: abs(x) < a + b,
     "only y is compared": lambda x, y, a, b: abs(y) < a + b,
     "the comparison is the wrong way round": lambda x, y, a, b: np.hypot(x, y) > a + b,
@@ -73,7 +73,7 @@ def compared(square: Callable[[float, float], float], reach: Callable[[float], f
     return lambda x, y, a, b: bool(square(x, y) < reach(a + b))
 
 
-BITS = "^ is no power but acts on bits (XOR)"
+BITS = "^ is not a power but XOR, which acts on bits"
 # Only asked of a file that has a ^: some give the pattern of a file that compares nothing.
 XOR = {
     f"{BITS}: the root of {left}": rooted(square) for left, square in SQUARES.items() if "^" in left
@@ -125,7 +125,7 @@ def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
     )
     wrong = [(q, was) for q, was in seen if was != RULES[""](*q)]
     if no_number(answers):
-        cause = "the distance is no number (a field that does not exist, a division by zero?)"
+        cause = "the distance is not a number (a field that does not exist, a division by zero?)"
     if cause is None and mixed_up(answers):
         cause = "the distance is not the one between the centres: positions are added or mixed up"
     if not wrong:

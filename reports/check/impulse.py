@@ -190,7 +190,7 @@ def momentum(seen: Seen) -> CheckRow:
 def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
     """The one row on velocities that are no numbers: nothing else can be read from them."""
     if not finite(answers, "x"):
-        why = "the positions become no numbers before it"
+        why = "the positions become NaN or infinite before it"
         return [not_asked("impulse", "2c", why), not_asked("velocity of A", "2d", why)]
     lost = {
         name: [not np.isfinite(ball.v).all() for ball in answers[name].last] for name in COLLISIONS
@@ -214,15 +214,15 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
                 f"{shown(collision.ma * came[0])} N s",
                 f"{shown(P)} N s",
                 False,
-                f"the impulse is no number {why}",
+                f"the impulse is not a number {why}",
             ),
-            not_asked("velocity of A", "2d", "the impulse is no number"),
+            not_asked("velocity of A", "2d", "the impulse is not a number"),
         ]
     who, right = (
         ("A", collision.va + P / collision.ma) if a else ("B", collision.vb - P / collision.mb)
     )
     return [
-        not_asked("impulse", "2c", f"the velocity of {who} becomes no number"),
+        not_asked("impulse", "2c", f"the velocity of {who} becomes NaN or infinite"),
         judged(
             f"velocity of {who}",
             "2d",
@@ -230,7 +230,7 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
             f"{shown(after[int(b)].v)} m/s",
             f"{shown(right)} m/s",
             False,
-            f"the velocity of {who} becomes no number {why}",
+            f"the velocity of {who} becomes NaN or infinite {why}",
         ),
     ]
 

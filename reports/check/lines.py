@@ -168,7 +168,7 @@ class Source:
         if named:
             numbers = [int(named[1] or named[2])]
         elif row.task == "loop":
-            numbers = self.calls(CALLED.get(row.name, ""))
+            numbers = self.calls(row.name)
         elif "does not come back" in row.cause:
             seen = self.integrating if row.task == "1" else self.colliding
             numbers = [seen[-1].line] if seen else []
@@ -203,17 +203,20 @@ class Source:
             return [line for line in used if line not in {*velocities, *displacing}] or velocities
         return []
 
-    def calls(self, function: str) -> list[int]:
-        """The lines of performSimStep that call a function; that of projectObjects without one."""
-        code = code_of(self.text).splitlines()
-        if not function:
-            return self.heads("projectObjects")
+    def calls(self, name: str) -> list[int]:
+        """The lines of performSimStep that a row of the step is about; of one about the edges that
+        of projectObjects."""
+        if name not in CALLED:
+            return self.heads("projectObjects" if name in ("edges", "ufo") else "performSimStep")
+        code, function = code_of(self.text).splitlines(), CALLED[name]
         begin = next(iter(self.heads("performSimStep")), 0)
         found = [
             k
             for k, line in enumerate(code[begin:], begin + 1)
             if re.search(rf"\b{function}\s*\(", line) and k not in self.heads(function)
         ]
+        if found and name == "itself":  # the loop over j stands last, its head before the call
+            return [found[-1] - 1, found[-1]]
         return found or self.heads("performSimStep")
 
     def heads(self, function: str) -> list[int]:

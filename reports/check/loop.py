@@ -40,7 +40,7 @@ def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
             judged("step", "loop", "Does performSimStep return?", "it fails", "yes", False, cause)
         ]
     rows = (
-        [not_asked("all spheres", "loop", "the functions that it calls have faults of their own")]
+        [not_asked("all spheres", "loop", "the functions that the step calls have faults")]
         if faulty
         else step_rows(asked, came)
     )
@@ -165,8 +165,9 @@ def against_itself(question: Question, came: dict[str, Answer]) -> CheckRow | No
     if not alone:
         return None
     who = name_of(alone[0])
-    asked = "Does a step give the collision function two different spheres in every call?"
-    got, expected = f"no: {who} and {who} ({len(alone)} such calls)", "yes"
+    asked = "Which spheres does a step give to the collision function?"
+    got = f"{who} and {who} again ({len(alone)} such calls)"
+    expected = "two different spheres"
     right = integrated(question, came).verdict == "right"
     cause = "performSimStep lets a sphere collide with itself: j begins at i, not at i + 1"
     if right:

@@ -46,7 +46,7 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "they are moved by their distance, not by the overlap": lambda s, a, b: s.distance,
     "the overlap is taken of squares": lambda s, a, b: s.sizes**2 - s.distance**2,
     "the overlap is size plus distance": lambda s, a, b: s.sizes + s.distance,
-    "the squared distance is taken for the distance": lambda s, a, b: (
+    "the squared distance is used as the distance": lambda s, a, b: (
         (s.sizes - s.distance**2) / s.distance
     ),
     "brackets are missing: each is moved by sizes - distance / 2": lambda s, a, b: (
@@ -122,7 +122,7 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
 
 def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
     """What a pair at relative rest says of the displacement; nothing if the impulse explains it or
-    is no number."""
+    is not a number."""
     still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
     kept = all(near(x.v, y.v) for x, y in zip(still, after))
     numbers = bool(np.isfinite([b.v for b in after]).all())
@@ -140,7 +140,7 @@ def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
                 "the displacement changes the velocity, too"
                 if numbers
                 else (
-                    "the velocities of a pair at relative rest become no numbers (a division by"
+                    "the velocities of a pair at relative rest become NaN or infinite (a division by"
                     " zero?)"
                 )
             ),
@@ -161,7 +161,7 @@ def total_cause(seen: Pairs) -> str:
 def no_numbers(seen: Pairs) -> str:
     """That positions are lost, before any other cause is looked for; "" if none is."""
     finite = np.isfinite([b.x for *_, after in seen for b in after]).all()
-    return "" if finite else "the positions become no numbers"
+    return "" if finite else "the positions become NaN or infinite"
 
 
 def half_of_one(seen: Pairs) -> str:
@@ -231,7 +231,8 @@ def way_of(seen: list[tuple[Ball, Ball, Ball]]) -> str | None:
         if near(crosses, 0.0, 0.01):
             return name
     return next(
-        (f"{which} is set, not changed (= for +=)" for which in SET if was_set(which, seen)), None
+        (f"{which} is set instead of changed (= for +=)" for which in SET if was_set(which, seen)),
+        None,
     )
 
 

@@ -32,7 +32,7 @@ class Restitution:
     Attributes:
         own: the value written into it, or the exercise's if none is found.
         named: whether it is written in, by a name or as a number.
-        absurd: whether what came is no number from 0 to 1, and a name such as e or restitution gets
+        absurd: whether what came is not a number from 0 to 1, and a name such as e or restitution gets
             it.
         came: separation over approach speed of two equal spheres that meet head-on at 2 m/s.
         slow, fast: the same at 2 mm/s and at 200 m/s.
@@ -83,7 +83,7 @@ class Restitution:
             return CheckRow(
                 "restitution", "2c", asked, shown(self.came), shown(EXERCISE), "free choice", note
             )
-        cause = mistake if np.isfinite(self.came) else "the velocities become no numbers"
+        cause = mistake if np.isfinite(self.came) else "the velocities become NaN or infinite"
         cause = cause or f"the file has e = {shown(self.own)}, but its collisions have another"
         return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
 

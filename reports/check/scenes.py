@@ -93,7 +93,7 @@ def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None
             found.append(scene_row(scenario, record, played, dt, FOLLOWS if blamed else ""))
             wrong = wrong or first_wrong(scenario, played.contacts, dt)
             if not np.isfinite(played.position).all():
-                break  # what is no number may also be slow, and says no more in the other scenes
+                break  # what is not a number may also be slow, and says no more in the other scenes
     except SolverFailed as failure:
         return [
             judged(
@@ -111,7 +111,7 @@ def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None
         judged(
             "first wrong collision",
             "scenes",
-            "Is every collision in these scenes right by itself?",
+            "Does every collision of these scenes follow the formula from the state before it?",
             wrong or "yes",
             "yes",
             not wrong,
@@ -231,7 +231,7 @@ def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
         return (
             ""
             if near(states[1], states[0])
-            else f"they react at a distance of {shown(d)} m, beyond {shown(reach)} m"
+            else f"they collide at a distance of {shown(d)} m, beyond {shown(reach)} m"
         )
     n, apart = r / d, float(np.hypot(*(a2[:2] - b2[:2])))
     vn = float((a[2:] - b[2:]) @ n)
@@ -297,7 +297,7 @@ def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
     many digits."""
     forced = Scenario(
         name="forced",
-        asks="Where is a sphere that a force forces and a torque turns for a second?",
+        asks="Where is a sphere after a second of a constant force and torque?",
         source="F = m a",
         scene=scene_of([[-1.0, 0.5, 0.6, -0.2]], [0.3], [1.4], e),
         duration=1.0,

@@ -79,12 +79,12 @@ class FileCheck:
 
 def sentence(row: CheckRow) -> str:
     """Where, what is likely wrong, and the numbers that say so."""
-    numbers = (
-        ""
-        if row.name in ("implemented", "loads", "answers")
-        else f" Came: {row.got}. Expected: {row.expected}."
-    )
-    return f"{task_title(row.task)}, {row.name}: {row.cause}.{numbers}"
+    numbers = "" if row.name in WITHOUT_NUMBERS else f" Came: {row.got}. Expected: {row.expected}."
+    name = "" if row.name in WITHOUT_NUMBERS else f", {row.name}"
+    return f"{task_title(row.task)}{name}: {row.cause}.{numbers}"
+
+
+WITHOUT_NUMBERS = ("implemented", "loads", "answers", "same answer again")
 
 
 def task_title(task: str) -> str:

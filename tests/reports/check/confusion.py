@@ -34,10 +34,9 @@ def judged(paths: Sequence[Path]) -> dict[Path, FileCheck]:
 
 
 def first(one: FileCheck) -> CheckRow | None:
-    """What is said first: a fault, or where there is none the note that a guard is missing."""
+    """What is said first: a fault, or where there is none that a guard is missing."""
     return next(iter(one.faults), None) or next(
-        (row for row in one.rows if row.verdict == "free choice" and row.name == "same centre"),
-        None,
+        (row for row in one.choices if "no guard" in row.cause), None
     )
 
 

@@ -199,7 +199,7 @@ CALLS = {
             "integrate",
             "sphere.position = new Proxy(sphere.position, { get() { return {}; } });",
         ),
-        "position: it is no number",
+        "position: it is not a number",
     ),
     "frozen.js": (
         within(JS, "integrate", "Object.freeze(sphere.velocity);"),
@@ -233,9 +233,12 @@ CALLS = {
     ),
     "strings.js": (
         JS.replace("x += sphere.force.x", "x += '' + sphere.force.x"),
-        "velocity: it is no number",
+        "velocity: it is not a number",
     ),
-    "array.js": (within(JS, "integrate", "sphere.position = [1, 2];"), "position: it is no number"),
+    "array.js": (
+        within(JS, "integrate", "sphere.position = [1, 2];"),
+        "position: it is not a number",
+    ),
     "clock.js": (
         within(JS, "integrate", "var t = Date.now();"),
         "run without page, network and clock",

@@ -184,7 +184,7 @@ def test_pytest_runs_the_rows_as_tests(folder: Path):
 
     assert (right.returncode, wrong.returncode, junk.returncode) == (0, 1, 4)
     assert "passed" in right.stdout
-    assert "likely:   it divides by (mA + mB) instead of (1/mA + 1/mB)" in wrong.stdout
+    assert "likely: it divides by (mA + mB) instead of (1/mA + 1/mB)" in wrong.stdout
     assert "is not text" in junk.stderr + junk.stdout
 
 
