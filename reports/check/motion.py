@@ -94,8 +94,8 @@ MOVED: dict[str, Law] = {
     "it is converted to radians, though it is in radians already": lambda x, _v, new, _a, dt: (
         x + np.radians(new * dt)
     ),
-    "a step of 0.001 s is written into the file and used instead of dt": lambda x, _v, new, _a, _dt: (
-        x + new * 0.001
+    "a step of 0.001 s is written into the file and used instead of dt": (
+        lambda x, _v, new, _a, _dt: x + new * 0.001
     ),
     "the old {velocity} is converted to degrees": lambda x, v, _n, _a, dt: x + np.degrees(v * dt),
 }

@@ -140,8 +140,8 @@ def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
                 "the displacement changes the velocity, too"
                 if numbers
                 else (
-                    "the velocities of a pair at relative rest become NaN or infinite (a division by"
-                    " zero?)"
+                    "the velocities of a pair at relative rest become NaN or infinite (a division"
+                    " by zero?)"
                 )
             ),
         )

@@ -32,8 +32,7 @@ class Restitution:
     Attributes:
         own: the value written into it, or the exercise's if none is found.
         named: whether it is written in, by a name or as a number.
-        absurd: whether what came is not a number from 0 to 1, and a name such as e or restitution gets
-            it.
+        absurd: whether what came is not from 0 to 1, and a name such as e or restitution gets it.
         came: separation over approach speed of two equal spheres that meet head-on at 2 m/s.
         slow, fast: the same at 2 mm/s and at 200 m/s.
     """
