@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 
 from reports.check.questions import QUESTIONS, Answer, Ball
-from reports.check.rows import CheckRow, judged, near
+from reports.check.rows import SAME_AGAIN, CheckRow, judged, near
 
 FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
 MAY_FAIL = ("same centre",)  # is judged by a row of its own
@@ -64,7 +64,7 @@ def same_again(
     where = f" in the global {kept[0]}" if len(kept) == 1 else ""
     return [
         judged(
-            "same answer again",
+            SAME_AGAIN,
             "1" if function == "integrate" else changed_part(answers, mine),
             f"Does {function} do the same to the same spheres, whatever it was called with before?",
             f"{len(mine)} of {len(answers)} answers depend on what was asked before",
@@ -74,6 +74,11 @@ def same_again(
             " asked in a fresh world",
         )
     ]
+
+
+def keeps_state(rows: Iterable[CheckRow]) -> bool:
+    """Whether a file was found to remember what it was called with."""
+    return any(row.name == SAME_AGAIN and row.verdict == "fault" for row in rows)
 
 
 def changed_part(answers: dict[str, Answer], others: dict[str, Answer]) -> str:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from adapters.own_solver.process import SolverProcess
 from reports.check.questions import QUESTIONS, Question, fresh_world
 from reports.check.restitution import code_of
-from reports.check.rows import CheckRow
+from reports.check.rows import SAME_AGAIN, CheckRow
 
 LIMIT = 0.5  # s a traced call may take: one that never comes back is known from its first accesses
 MOST = 3  # lines of a row
@@ -172,7 +172,7 @@ class Source:
         elif "does not come back" in row.cause:
             seen = self.integrating if row.task == "1" else self.colliding
             numbers = [seen[-1].line] if seen else []
-        elif row.name == "same answer again":
+        elif row.name == SAME_AGAIN:
             numbers = self.assigning(re.findall(r"global (\w+)", row.cause))
         else:
             numbers = self.accessing(row)

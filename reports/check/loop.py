@@ -7,7 +7,7 @@ import numpy as np
 
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
-from reports.check.questions import LIMIT, Answer, Ball, Question, ask, fresh_world
+from reports.check.questions import LIMIT, Answer, Ball, Question, ask_in_two_orders, fresh_world
 from reports.check.rows import FOLLOWS, CheckRow, judged, near, not_asked, shown
 
 DT = 1e-3  # s, the exercise's
@@ -33,7 +33,7 @@ def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
     if no_scene:
         return [no_scene]
     asked = worlds(len(start), has["wrap"])
-    came = ask(process, asked, afresh=True)
+    came, _ = ask_in_two_orders(process, asked)
     if failed := next((answer.failed for answer in came.values() if answer.failed), None):
         cause = FOLLOWS if faulty else f"performSimStep: {failed}"
         return [

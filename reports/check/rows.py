@@ -14,6 +14,7 @@ Verdict = Literal["right", "fault", "free choice", "not asked"]
 # than that.
 TOLERANCE = 1e-6
 FOLLOWS = "it follows from the faults above"
+SAME_AGAIN = "same answer again"  # the row on state that a file keeps between calls
 UNKNOWN = "unknown: none of the known mistakes gives these numbers"
 TASKS = {
     "file": "the file",
@@ -55,7 +56,7 @@ FORMULAS = {
     "edges": "a centre beyond an edge is set onto the opposite edge",
     "ufo": "a ufo that leaves the box is set back to its start",
 }
-WITHOUT_FORMULA = ("implemented", "input only", "same answer again", "rest kept", "sphere kept")
+WITHOUT_FORMULA = ("implemented", "input only", SAME_AGAIN, "rest kept", "sphere kept")
 
 
 @dataclass(frozen=True)

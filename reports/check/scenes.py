@@ -12,6 +12,7 @@ import numpy as np
 from adapters.own_solver.engine import spheres_of
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
+from reports.check.functions import keeps_state
 from reports.check.questions import fresh_world
 from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
@@ -44,9 +45,13 @@ def step_of(process: SolverProcess) -> float:
     return DT if process.surface == "exercise" else 5 * DT
 
 
-def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> SceneAnswer:
-    """Play it by the file's own functions; its forces last as long as it does. Raises
-    `SolverFailed`."""
+def play_scene(
+    process: SolverProcess, scenario: Scenario, dt: float, afresh: bool = False
+) -> SceneAnswer:
+    """Play it by the file's own functions; its forces last as long as it does.
+
+    afresh: load the file anew before it, as one that keeps state needs. Raises `SolverFailed`.
+    """
     scene, count = scenario.scene, round(scenario.sample_interval / dt)
     forces = np.zeros((scene.n, 3))
     for thrust in scenario.thrusts:
@@ -58,11 +63,12 @@ def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> SceneAn
         "gravity": [0.0, 0.0],
         "wrap": None,
     }
-    requests = [*fresh_world(process), ("load", start, LIMIT), ("read", None, LIMIT)]
+    before = fresh_world(process) if afresh else []
+    requests = [*before, ("load", start, LIMIT), ("read", None, LIMIT)]
     for _ in range(scenario.samples):
         requests += [("step", step, LIMIT), ("read", None, LIMIT)]
     requests.append(("contacts", None, LIMIT))
-    *answers, contacts = process.request(requests, SCENE_LIMIT)[len(fresh_world(process)) :]
+    *answers, contacts = process.request(requests, SCENE_LIMIT)[len(before) :]
     failed = next(
         (answer for answer in (*answers, contacts) if isinstance(answer, SolverFailed)), None
     )
@@ -89,7 +95,7 @@ def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None
     found, wrong, dt = [], "", step_of(process)
     try:
         for scenario, record in scenes(round(e, 9)):
-            played = play_scene(process, scenario, dt)
+            played = play_scene(process, scenario, dt, keeps_state(rows))
             found.append(scene_row(scenario, record, played, dt, FOLLOWS if blamed else ""))
             wrong = wrong or first_wrong(scenario, played.contacts, dt)
             if not np.isfinite(played.position).all():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.own_solver.file import NotASolver, SolverText, read_solver
-from reports.check.rows import FOLLOWS, TASKS, CheckRow, Verdict, worst
+from reports.check.rows import FOLLOWS, SAME_AGAIN, TASKS, CheckRow, Verdict, worst
 from reports.check.solver import examine
 
 MOST = 3  # sentences
@@ -84,7 +84,7 @@ def sentence(row: CheckRow) -> str:
     return f"{task_title(row.task)}{name}: {row.cause}.{numbers}"
 
 
-WITHOUT_NUMBERS = ("implemented", "loads", "answers", "same answer again")
+WITHOUT_NUMBERS = ("implemented", "loads", "answers", SAME_AGAIN)
 
 
 def task_title(task: str) -> str:
