@@ -13,6 +13,8 @@ from reports.check.restitution import code_of
 from reports.check.rows import SAME_AGAIN, CheckRow
 
 LIMIT = 0.5  # s a traced call may take: one that never comes back is known from its first accesses
+# task -> the question that shows which lines do what
+SHOWN = {"1": "force", "2": "collision/light on heavy"}
 MOST = 3  # lines of a row
 LONGEST = 160  # characters of a line; a minified file is a single one
 
@@ -152,15 +154,27 @@ def cut(line: str) -> str:
 
 
 class Source:
-    """The text of a file and what its two functions read and write."""
+    """The text of a file, and what its two functions read and write, traced when it is asked for.
+
+    Its methods raise `SolverFailed` if the process is lost.
+    """
 
     def __init__(self, process: SolverProcess, text: str) -> None:
-        self.text, self.lines = text, text.splitlines()
-        has = process.functions
-        self.integrating = accesses_of(process, QUESTIONS["force"]) if has["integrate"] else []
-        self.colliding = (
-            accesses_of(process, QUESTIONS["collision/light on heavy"]) if has["collide"] else []
-        )
+        self.process, self.text, self.lines = process, text, text.splitlines()
+        self.traced: dict[str, list[Access]] = {}
+
+    def accesses(self, question: str) -> list[Access]:
+        """What a question makes the file read and write; nothing where it lacks the function."""
+        needed = QUESTIONS[question].calls[0][0]
+        if question not in self.traced:
+            has = self.process.functions[needed]
+            found = accesses_of(self.process, QUESTIONS[question]) if has else []
+            self.traced[question] = found
+        return self.traced[question]
+
+    def part_of(self, question: str, failed_at: int) -> str:
+        """The part of task 2 in which the call of a question failed, at this line."""
+        return part_of(self.accesses(question), failed_at, self.text)
 
     def of(self, row: CheckRow) -> list[tuple[int, str]]:
         """The lines that a row is about, at most `MOST`, each with its number from 1."""
@@ -170,7 +184,7 @@ class Source:
         elif row.task == "loop":
             numbers = self.calls(row.name)
         elif "does not come back" in row.cause:
-            seen = self.integrating if row.task == "1" else self.colliding
+            seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
             numbers = [seen[-1].line] if seen else []
         elif row.name == SAME_AGAIN:
             numbers = self.assigning(re.findall(r"global (\w+)", row.cause))
@@ -181,7 +195,7 @@ class Source:
 
     def accessing(self, row: CheckRow) -> list[int]:
         """The lines that read or write what a row of the two tasks is about."""
-        seen = self.integrating if row.task == "1" else self.colliding
+        seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
         if row.name in WRITTEN:
             who = {"velocity of A": {0}, "velocity of B": {1}}.get(row.name, {0, 1})
             return [

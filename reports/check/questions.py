@@ -16,7 +16,8 @@ from reports.check.rows import TOLERANCE
 from scenarios.model import Array
 
 LIMIT = 1.0  # s a question may take: it needs a few microseconds
-TOGETHER = 50  # questions of a request: what it may take is limited, too
+TOGETHER = 50  # fresh worlds of a request: what it may take is limited, too
+BEGINNING = 2.0  # s that initScene may take
 LOADING = 3.0  # s that the file may take to be loaded anew
 
 
@@ -204,7 +205,8 @@ def ask(
     is there. Raises `SolverFailed` if the process is lost."""
     before = fresh_world(process) if afresh else []
     answers: dict[str, Answer] = {}
-    for names in batched(asked, TOGETHER):
+    # One request for all, where the worker puts no call again that did not come back.
+    for names in batched(asked, TOGETHER if afresh else len(asked)):
         requests: list[Request] = []
         for name in names:
             requests += [*before, ("ask", asked[name].request, LIMIT)]
@@ -222,7 +224,7 @@ def batched(names: Iterable[str], size: int) -> Iterator[list[str]]:
 
 def fresh_world(process: SolverProcess) -> list[Request]:
     """Requests that load the file anew, and let it make its scene."""
-    begin: list[Request] = [("begin", None, LIMIT)] if process.functions["begin"] else []
+    begin: list[Request] = [("begin", None, BEGINNING)] if process.functions["begin"] else []
     return [("renew", None, LOADING), *begin]
 
 

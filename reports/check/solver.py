@@ -14,7 +14,7 @@ from reports.check.detection import detection_rows
 from reports.check.functions import implemented, same_again
 from reports.check.impacts import APPROACH, BACKWARDS, explain
 from reports.check.impulse import impulse_rows
-from reports.check.lines import Source, accesses_of, part_of
+from reports.check.lines import SHOWN, Source
 from reports.check.loop import loop_rows
 from reports.check.motion import motion_rows
 from reports.check.projection import moved_together, projection_rows
@@ -67,8 +67,9 @@ def rows_of(process: SolverProcess, text: str) -> tuple[list[CheckRow], float | 
         if process.functions["integrate" if k in MOTION else "collide"]
     }
     answers, others = ask_in_two_orders(process, asked)
+    source = Source(process, text)
     rows = [loads(process), *task_1(process, answers, others, text)]
-    contact, restitution = task_2(process, answers, others, text)
+    contact, restitution = task_2(process, answers, others, source)
     rows += contact
     faulty = any(row.verdict == "fault" for row in rows)
     if stuck(answers):
@@ -78,18 +79,17 @@ def rows_of(process: SolverProcess, text: str) -> tuple[list[CheckRow], float | 
     e = restitution.played if restitution is not None else None
     rows += scene_rows(process, rows, e)
     rows = hinted(rows, text) if process.kind == "javascript" else rows
-    return with_lines(rows, process, text), e
+    return with_lines(rows, source), e
 
 
-def with_lines(rows: list[CheckRow], process: SolverProcess, text: str) -> list[CheckRow]:
+def with_lines(rows: list[CheckRow], source: Source) -> list[CheckRow]:
     """The rows, each fault with the lines of the file that it is about."""
-    if not any(row.verdict == "fault" for row in rows):
-        return rows
     try:
-        source = Source(process, text)
-    except SolverFailed:  # the rows say how it fails
+        return [
+            replace(row, lines=source.of(row)) if row.verdict == "fault" else row for row in rows
+        ]
+    except SolverFailed:  # the process is lost; the rows say how the file fails
         return rows
-    return [replace(row, lines=source.of(row)) if row.verdict == "fault" else row for row in rows]
 
 
 def hinted(rows: list[CheckRow], text: str) -> list[CheckRow]:
@@ -142,15 +142,15 @@ def task_1(
 
 
 def task_2(
-    process: SolverProcess, answers: dict[str, Answer], others: dict[str, Answer], text: str
+    process: SolverProcess, answers: dict[str, Answer], others: dict[str, Answer], source: Source
 ) -> tuple[list[CheckRow], Restitution | None]:
     """The rows of the collision function, and its restitution where it has one."""
-    mine = {name: answer for name, answer in answers.items() if name not in MOTION}
+    mine, text = {k: answer for k, answer in answers.items() if k not in MOTION}, source.text
 
     def part(name: str) -> str:
-        failed = mine[name].failed
-        line = failed.line if failed else 0
-        return part_of(accesses_of(process, QUESTIONS[name]), line, text)
+        question = SHOWN["2"] if mine[SHOWN["2"]].failed else name
+        failed = mine[question].failed
+        return source.part_of(question, failed.line if failed else 0)
 
     rows, usable = implemented("2a", process.functions["collide"], mine, text, part)
     if not usable:
