@@ -3,7 +3,8 @@
 // It keeps the built-ins it needs, because a solver may replace them, and answers in JSON that it writes itself.
 Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   const { parse, stringify } = JSON;
-  const { keys, is, setPrototypeOf, getOwnPropertyDescriptor } = Object;
+  const { keys, is, setPrototypeOf, getOwnPropertyDescriptor, defineProperty } = Object;
+  const { captureStackTrace } = Error;
   const { apply, ownKeys } = Reflect;
   const { slice } = String.prototype;
   const { sqrt } = Math;
@@ -29,6 +30,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
 
   let file;  // the solver's functions and globals, once it is loaded
   let world;  // the scene being played
+  let accesses = "";  // what the last traced call read and wrote
 
   function snapshot() {
     const found = setPrototypeOf({}, null), names = keys(BUILT_IN);
@@ -129,6 +131,31 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     return found;
   }
 
+  // The file's own globals that are numbers and what they are, as text: those that a call leaves changed are its state.
+  function numbers() {
+    const found = setPrototypeOf({}, null), names = keys(globe);
+    for (let k = 0; k < names.length; k++) if (typeof globe[names[k]] === "number") found[names[k]] = "" + globe[names[k]];
+    return found;
+  }
+
+  function changed(before) {
+    const now = numbers(), names = keys(now), found = empty();
+    for (let k = 0; k < names.length; k++) if (before[names[k]] !== now[names[k]]) found[found.length] = names[k];
+    return found;
+  }
+
+  // Put functions that write down each call in the place of the file's own; a `const` one stays, and is not seen.
+  function watch(spheres, calls) {
+    const place = (s) => { for (let k = 0; k < spheres.length; k++) if (spheres[k] === s) return k; return -1; };
+    const { integrate, collide, wrap } = file;
+    const noted = (called, line) => (...given) => {
+      calls[calls.length] = line(given[0], given[1]);
+      return apply(called, undefined, given);
+    };
+    file.watch(noted(integrate, (s, dt) => `["integrate",${place(s)},${text(dt)}]`),
+      noted(collide, (a, b) => `["collide",${place(a)},${place(b)}]`), noted(wrap, () => '["wrap"]'));
+  }
+
   function call(what, spheres) {
     if (what[0] === "integrate") return file.integrate(spheres[what[1]], what[2]);
     if (what[0] === "collide") return file.collide(spheres[what[1]], spheres[what[2]]);
@@ -138,10 +165,14 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   // One question: spheres, calls -> the spheres after each call, whether anything was returned, what went wrong.
   function ask(question) {
     let states = "", returned = false, spheres = empty(), known = "", problem = "null";
+    const calls = empty();
+    seed = 1;
+    const before = numbers();
     try {
       if (question.world) {
         spheres = everybody();
         for (let i = 0; i < spheres.length; i++) place(spheres[i], question.spheres[i]);
+        if (question.watch) watch(spheres, calls);
       } else {
         for (let i = 0; i < question.spheres.length; i++) spheres[i] = sphere(question.spheres[i]);
         known = witness();
@@ -155,8 +186,51 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     } catch (error) { problem = described(error); }
     const strayed = !question.world && witness() !== known;
     return `{"states":[${states}],"returned":${returned},"strayed":${strayed},"strange":[${list(strange(spheres))}],`
-      + `"error":${problem}}`;
+      + `"kept":[${list(changed(before))}],"calls":${reported(calls)},"error":${problem}}`;
   }
+
+  // A sphere that writes down who reads or writes which of its numbers, and from where in the file.
+  function traced(r, i) {
+    const from = sphere(r), fields = FIELDS, seen = {};
+    for (let f = 0; f < fields.length; f++) {
+      const name = fields[f];
+      if (f < 3) from[name] = accessors({}, from[name], ["x", "y"], i, name);
+    }
+    return accessors(seen, from, fields, i, "");
+  }
+
+  function accessors(target, values, names, i, within) {
+    for (let k = 0; k < names.length; k++) {
+      const name = names[k], field = within || name, noted = within || typeof values[name] === "number";
+      defineProperty(target, name, {
+        enumerable: true, configurable: true,
+        get() { if (noted) access("r", i, field); return values[name]; },
+        set(value) { access("w", i, field); values[name] = value; },
+      });
+    }
+    return target;
+  }
+
+  let count = 0, latest = "";
+  function access(kind, i, field) {
+    const at = {};
+    captureStackTrace(at, access);
+    latest = `["${kind}",${i},"${field}",${stringify(apply(slice, "" + at.stack, [0, 2000]))}]`;
+    if (count++ < 400) accesses += (accesses ? "," : "") + latest;
+  }
+
+  // The calls of a question on such spheres; `accesses` then reports what they did, even if they never came back.
+  function trace(question) {
+    const spheres = empty();
+    accesses = latest = "";
+    count = 0;
+    seed = 1;
+    for (let i = 0; i < question.spheres.length; i++) spheres[i] = traced(question.spheres[i], i);
+    for (let k = 0; k < question.calls.length; k++) call(question.calls[k], spheres);
+    return "null";
+  }
+
+  const traceOf = () => "[" + accesses + (count > 400 ? "," + latest : "") + "]";
 
   function described(error) {
     let what = "", stack = "";
@@ -227,7 +301,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   }
 
   const commands = {
-    ask, load, step, read: () => rows(world.spheres), collisions: () => reported(world.collisions), contacts: () => reported(world.log),
+    ask, trace, accesses: traceOf, load, step, read: () => rows(world.spheres), collisions: () => reported(world.collisions), contacts: () => reported(world.log),
     begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
   };
 

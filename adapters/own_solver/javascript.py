@@ -34,6 +34,13 @@ BIND = """__crosscheck("bind", {
   wrap: typeof projectObjects === "undefined" ? null : projectObjects,
   begin: typeof initScene === "undefined" ? null : initScene,
   ufo: () => ufo, asteroids: () => asteroids,
+  watch: (i, c, w) => {
+    try { if (typeof integrate === "function") integrate = i; } catch (_) {}
+    try {
+      if (typeof sphereSphereCollisionHandling === "function") sphereSphereCollisionHandling = c;
+    } catch (_) {}
+    try { if (typeof projectObjects === "function") projectObjects = w; } catch (_) {}
+  },
 })"""
 
 
@@ -43,7 +50,12 @@ class JavaScriptSolver:
     surface = "exercise"
 
     def __init__(self, solver: SolverText) -> None:
-        self.engine = MiniRacer()
+        self.solver = solver
+        self.renew()
+
+    def renew(self) -> None:
+        """Load the file into a V8 of its own, with nothing in it of what was called before."""
+        solver, self.engine = self.solver, MiniRacer()
         self.engine.set_hard_memory_limit(HEAP)
         self.engine.eval(DRIVER)
         for name, text in solver.beside:
@@ -69,6 +81,9 @@ class JavaScriptSolver:
     def run(self, command: str, argument: Any, limit: float) -> Any:
         """What the driver answers to a command; raises `SolverFailed` after `limit` s, or if the
         file threw."""
+        if command == "renew":
+            self.engine.close()
+            return self.renew()
         code = f'__crosscheck("{command}", {json.dumps(json.dumps(argument))})'
         try:
             answer = json.loads(str(self.evaluated(code, limit, may_repeat=command == "ask")))
@@ -76,6 +91,8 @@ class JavaScriptSolver:
             raise self.failure(error, limit, "in one call") from None
         if "error" in answer:
             raise thrown(answer["error"])
+        if command == "accesses":
+            return [[*access[:3], lines_of(access[3])] for access in answer["done"]]
         if isinstance(answer["done"], dict) and answer["done"].get("error"):
             answer["done"]["error"] = vars(thrown(answer["done"]["error"]))
         return answer["done"]
@@ -116,6 +133,11 @@ class JavaScriptSolver:
         if stack and not isinstance(error, JSParseException):
             line, column = int(stack[1]), int(stack[2])
         return SolverFailed("error", plainly(place[2]), line, column)
+
+
+def lines_of(stack: str) -> list[int]:
+    """The lines of the solver's file in a stack, the innermost call first."""
+    return [int(line) for line in re.findall(rf"{NAME}:(\d+):\d+", stack)]
 
 
 def thrown(error: dict[str, str]) -> SolverFailed:

@@ -15,10 +15,11 @@ from typing import Any
 
 from adapters.own_solver.beside import Neighbours
 from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
-from adapters.own_solver.spheres import NAMES, Fields, sphere_of
+from adapters.own_solver.spheres import NAMES, Fields, Traced, sphere_of
 
 LOAD_LIMIT = 3.0  # s; importing numba takes one
 LOGGED = 400  # contacts that are kept for the judge
+TRACED = 400  # accesses that are kept of a traced call
 
 
 def row_of(s: Any) -> list[float]:
@@ -42,6 +43,13 @@ def number(x: Any) -> float:
         return float("nan")
 
 
+def seed() -> None:
+    """The same random numbers for every question."""
+    random.seed(1)
+    if "numpy" in sys.modules:
+        sys.modules["numpy"].random.seed(1)
+
+
 class PythonSolver:
     """The file as a module of this process. Raises `SolverFailed` if it cannot be loaded."""
 
@@ -49,9 +57,19 @@ class PythonSolver:
         """`copies`: where the texts lie as they were read, for numba: it keeps what it compiled by
         file and content."""
         here = solver.path.resolve()
-        self.name = str(solver.path if copies is None else copies / here.name)
-        sys.meta_path.insert(0, Neighbours(here.parent, dict(solver.beside), copies or here.parent))
-        random.seed(1)
+        self.solver, self.name = solver, str(solver.path if copies is None else copies / here.name)
+        self.neighbours = Neighbours(here.parent, dict(solver.beside), copies or here.parent)
+        sys.meta_path.insert(0, self.neighbours)
+        self.renew()
+
+    def renew(self, _argument: Any = None) -> None:
+        """Load the file and the modules beside it as new ones, with nothing in them of what was
+        called before."""
+        solver, here = self.solver, self.solver.path.resolve()
+        for name, loaded in list(sys.modules.items()):
+            if getattr(getattr(loaded, "__spec__", None), "loader", None) is self.neighbours:
+                del sys.modules[name]
+        seed()
         self.module = module = ModuleType("solver")
         module.__file__ = str(here)
         sys.modules["solver"] = module  # numba and dataclasses look a function's module up
@@ -77,6 +95,8 @@ class PythonSolver:
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
         """The answer to a command; raises `SolverFailed` after `limit` s, or if the file threw."""
+        if command == "renew":
+            return self.renew()
         with self.guarded(limit, "in one call"):
             return getattr(self.whole if command.startswith("whole") else self, command)(argument)
 
@@ -156,12 +176,14 @@ class PythonSolver:
         failed."""
         states: list[list[list[float]]] = []
         returned, error = False, None
+        seed()
+        before = self.numbers()
         spheres = self.placed(question)
+        calls = self.watched(spheres) if question.get("watch") else []
         known = None if question["world"] else self.globals()
         try:
             for name, *arguments in question["calls"]:
-                on = {"integrate": 1, "collide": 2}.get(name, 0)
-                result = self.file[name](*(spheres[i] for i in arguments[:on]), *arguments[on:])
+                result = self.call(name, arguments, spheres)
                 if hasattr(result, "send"):
                     raise TypeError(
                         f"a call of {name} runs nothing: it is an async def, or has a yield"
@@ -186,8 +208,80 @@ class PythonSolver:
             "returned": returned,
             "strayed": strayed,
             "strange": strange,
+            "kept": [name for name, value in self.numbers().items() if before.get(name) != value],
+            "calls": calls,
             "error": error,
         }
+
+    def call(self, name: str, arguments: list[Any], spheres: list[Any]) -> Any:
+        """Call a function of the file on some of the spheres; what it returns."""
+        on = {"integrate": 1, "collide": 2}.get(name, 0)
+        return self.file[name](*(spheres[i] for i in arguments[:on]), *arguments[on:])
+
+    def numbers(self) -> dict[str, str]:
+        """The file's global numbers as text: those that a call leaves changed are its state."""
+        return {
+            name: repr(value)
+            for name, value in vars(self.module).items()
+            if isinstance(value, (int, float, complex))
+        }
+
+    def watched(self, spheres: list[Any]) -> list[list[Any]]:
+        """A list that gets a row for every call the file makes of its own functions."""
+        calls: list[list[Any]] = []
+        place = {id(s): k for k, s in enumerate(spheres)}
+
+        def noted(name: str, called: Callable[..., Any], on: int) -> Callable:
+            def note(*given: Any, **named: Any) -> Any:
+                rest = [number(x) for x in given[on:]]
+                calls.append([name, *(place.get(id(s), -1) for s in given[:on]), *rest])
+                return called(*given, **named)
+
+            return note
+
+        names = {"integrate": 1, "sphereSphereCollisionHandling": 2, "projectObjects": 0}
+        for (function, on), name in zip(names.items(), ("integrate", "collide", "wrap")):
+            if name in self.file and function in vars(self.module):
+                vars(self.module)[function] = noted(name, self.file[name], on)
+        return calls
+
+    def trace(self, question: dict[str, Any]) -> None:
+        """Make the calls of a question on spheres that write down who reads or writes which of
+        their numbers; `accesses` then reports it, even if a call never came back."""
+        self.trail: list[tuple[str, int, str, list[int]]] = []
+        seed()
+        spheres = [self.traced(r, k) for k, r in enumerate(question["spheres"])]
+        for name, *arguments in question["calls"]:
+            self.call(name, arguments, spheres)
+
+    def accesses(self, _argument: Any = None) -> list[tuple[str, int, str, list[int]]]:
+        """("r" or "w", sphere, field, lines of the file from the innermost call on) of the last
+        `trace`."""
+        return self.trail
+
+    def traced(self, numbers: list[float], k: int) -> Any:
+        """Sphere `k`, which reports its accesses."""
+
+        def access(kind: str, field: str) -> None:
+            last = len(self.trail) > TRACED  # of a loop without end only the latest is kept
+            self.trail[TRACED if last else len(self.trail) :] = [
+                (kind, k, field, self.lines_of(sys._getframe(2)))
+            ]
+
+        made = sphere_of(numbers)
+        for name, value in vars(made).items():
+            if isinstance(value, Fields):
+                vars(made)[name] = Traced(access, vars(value), name)
+        return Traced(access, vars(made))
+
+    def lines_of(self, frame: FrameType | None) -> list[int]:
+        """The lines of the file in the calls that led to `frame`, the innermost first."""
+        lines = []
+        while frame is not None:
+            if frame.f_code.co_filename == self.name:
+                lines.append(frame.f_lineno)
+            frame = frame.f_back
+        return lines
 
     def placed(self, question: dict[str, Any]) -> list[Any]:
         """The question's spheres, new ones or the file's own."""

@@ -3,6 +3,7 @@ item."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 
@@ -36,6 +37,30 @@ def sphere_of(r: list[float]) -> Fields:
         MoI=r[10],
         size=r[11],
     )
+
+
+class Traced(Fields):
+    """The same, reporting every access to a number as ("r" or "w", the sphere's field)."""
+
+    def __init__(
+        self, access: Callable[[str, str], None], values: dict[str, Any], within: str = ""
+    ) -> None:
+        self.__dict__.update(_access=access, _values=dict(values), _within=within)
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self._values:
+            return super().__getattr__(name)
+        value = self._values[name]
+        if not isinstance(value, Fields):
+            self._access("r", self._within or name)
+        return value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self._access("w", self._within or name)
+        self._values[name] = value
+
+    __getitem__ = __getattr__
+    __setitem__ = __setattr__
 
 
 NAMES = frozenset(vars(sphere_of([0.0] * 12)))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from adapters.own_solver.file import KINDS, SolverFailed, SolverText, dangling
 from adapters.own_solver.gl_matrix import HANDED_OUT
 from adapters.own_solver.process import SolverProcess
+from reports.check.functions import keeps_state
 from reports.check.machine import as_json, as_junit
 from reports.check.terminal import print_class, print_file
 from reports.check.verdict import NONE, FileCheck, check_file
@@ -147,7 +148,9 @@ def make_page(path: Path, one: FileCheck) -> None:
 
     smallest: Smallest | None = None
     if one.faults and one.restitution is not None and one.solver is not None:
-        task: dict[Hashable, Any] = {path: partial(smallest_here, one.solver, one.restitution)}
+        task: dict[Hashable, Any] = {
+            path: partial(smallest_here, one.solver, one.restitution, keeps_state(one.rows))
+        }
         with closing(run_all(task, 1, CHECKING)) as results:
             [(_, found)] = results
         smallest = None if isinstance(found, Failure) else found  # the rows say how it failed
@@ -159,14 +162,14 @@ def make_page(path: Path, one: FileCheck) -> None:
     say(f"{path.resolve()}")
 
 
-def smallest_here(solver: SolverText, restitution: float) -> Smallest | None:
+def smallest_here(solver: SolverText, restitution: float, afresh: bool) -> Smallest | None:
     """In a worker: the smallest scene that shows a fault of a solver; None if none is found, or the
     solver fails."""
     from reports.check.smallest import smallest_scene
 
     try:
         with SolverProcess(solver) as process:
-            return smallest_scene(process, restitution)
+            return smallest_scene(process, restitution, afresh)
     except SolverFailed:
         return None
 

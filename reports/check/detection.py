@@ -28,7 +28,7 @@ RULES: dict[str, Rule] = {
     "the squares of the sizes are added, not their sum squared": lambda x, y, a, b: (
         x * x + y * y < a * a + b * b
     ),
-    "the sizes are taken for diameters": lambda x, y, a, b: np.hypot(x, y) < (a + b) / 2,
+    "the sizes are used as diameters": lambda x, y, a, b: np.hypot(x, y) < (a + b) / 2,
     "the sizes are doubled": lambda x, y, a, b: np.hypot(x, y) < 2 * (a + b),
     "the larger size is used alone": lambda x, y, a, b: np.hypot(x, y) < max(a, b),
     "the smaller size is used alone": lambda x, y, a, b: np.hypot(x, y) < min(a, b),
@@ -39,10 +39,10 @@ RULES: dict[str, Rule] = {
     "x and y are compared one by one, as of boxes": lambda x, y, a, b: (
         abs(x) < a + b and abs(y) < a + b
     ),
-    "dx is taken for dy, too": lambda x, y, a, b: np.hypot(x, x) < a + b,
-    "dy is taken for dx, too": lambda x, y, a, b: np.hypot(y, y) < a + b,
-    "|dx| + |dy| is taken for the distance": lambda x, y, a, b: abs(x) + abs(y) < a + b,
-    "dx + dy is taken for the distance": lambda x, y, a, b: abs(x + y) < a + b,
+    "dx is used for dy, too": lambda x, y, a, b: np.hypot(x, x) < a + b,
+    "dy is used for dx, too": lambda x, y, a, b: np.hypot(y, y) < a + b,
+    "|dx| + |dy| is used as the distance": lambda x, y, a, b: abs(x) + abs(y) < a + b,
+    "dx + dy is used as the distance": lambda x, y, a, b: abs(x + y) < a + b,
     "only x is compared": lambda x, y, a, b: abs(x) < a + b,
     "only y is compared": lambda x, y, a, b: abs(y) < a + b,
     "the comparison is the wrong way round": lambda x, y, a, b: np.hypot(x, y) > a + b,
@@ -73,7 +73,7 @@ def compared(square: Callable[[float, float], float], reach: Callable[[float], f
     return lambda x, y, a, b: bool(square(x, y) < reach(a + b))
 
 
-BITS = "^ is no power but acts on bits (XOR)"
+BITS = "^ is not a power but XOR, which acts on bits"
 # Only asked of a file that has a ^: some give the pattern of a file that compares nothing.
 XOR = {
     f"{BITS}: the root of {left}": rooted(square) for left, square in SQUARES.items() if "^" in left
@@ -125,7 +125,7 @@ def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
     )
     wrong = [(q, was) for q, was in seen if was != RULES[""](*q)]
     if no_number(answers):
-        cause = "the distance is no number (a field that does not exist, a division by zero?)"
+        cause = "the distance is not a number (a field that does not exist, a division by zero?)"
     if cause is None and mixed_up(answers):
         cause = "the distance is not the one between the centres: positions are added or mixed up"
     if not wrong:
@@ -169,19 +169,28 @@ def touch(answer: Answer) -> CheckRow:
     """Exactly touching: free."""
     reacts = acts(QUESTIONS["touch"].balls, answer.last)
     asked = "Do spheres collide whose distance is exactly the sum of the sizes?"
-    note = f"compares with {'<=' if reacts else '<'}, which is free"
-    return CheckRow("touch", "2a", asked, "yes" if reacts else "no", "either", "note", note)
+    sign = "<=" if reacts else "<"
+    said = f"the comparison is the one with {sign}"
+    got = "yes" if reacts else "no"
+    return CheckRow("touch", "2a", asked, got, "yes or no", "free choice", said)
 
 
 def same_centre(answer: Answer) -> CheckRow:
-    """Two spheres at one place have no normal; nothing may become NaN for that."""
-    asked = "Are all numbers finite where two centres are at the same place?"
+    """Two spheres at one place have no normal, and the exercise does not say what becomes of
+    them."""
+    asked = "What becomes of two spheres whose centres are at the same place?"
     values = [] if answer.failed else [x for b in answer.last for x in (*b.x, *b.v, b.alpha, b.w)]
-    if values and np.isfinite(values).all():
-        return judged("same centre", "2a", asked, "yes", "yes", True)
-    cause = (
-        "divides by a distance of zero; the exercise does not say what to do, but the page loses"
-        " both spheres"
+    guarded = bool(values) and bool(np.isfinite(values).all())
+    said = (
+        "this case has a guard"
+        if guarded
+        else "there is no guard for this case; the direction between the two is 0 / 0"
     )
-    got = f"fails: {answer.failed}" if answer.failed else "no, NaN or infinite"
-    return CheckRow("same centre", "2a", asked, got, "yes, by a guard", "note", cause)
+    got = (
+        "they keep finite numbers"
+        if guarded
+        else f"the call fails: {answer.failed}"
+        if answer.failed
+        else "their numbers become NaN or infinite"
+    )
+    return CheckRow("same centre", "2a", asked, got, "anything", "free choice", said)

@@ -4,26 +4,32 @@ nothing else?"""
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 
 from reports.check.questions import QUESTIONS, Answer, Ball
-from reports.check.rows import CheckRow, judged, near
+from reports.check.rows import SAME_AGAIN, CheckRow, judged, near
 
 FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
 MAY_FAIL = ("same centre",)  # is judged by a row of its own
 
 
 def implemented(
-    task: str, there: bool, answers: dict[str, Answer], text: str
+    task: str,
+    there: bool,
+    answers: dict[str, Answer],
+    text: str,
+    part: Callable[[str], str],
 ) -> tuple[list[CheckRow], bool]:
-    """The rows on the function of a task and its arguments, and whether it can be judged
-    further."""
+    """The rows on the function of a task and its arguments, and whether it can be judged further.
+
+    part: of the task, in which the call of a question failed.
+    """
     function = FUNCTIONS[task]
     asked = f"Does {function} do something with the spheres it is given?"
 
-    def fault(got: str, cause: str) -> tuple[list[CheckRow], bool]:
-        return [judged("implemented", task, asked, got, "it changes them", False, cause)], False
+    def fault(got: str, cause: str, where: str = task) -> tuple[list[CheckRow], bool]:
+        return [judged("implemented", where, asked, got, "it changes them", False, cause)], False
 
     if not there:
         return fault(
@@ -34,10 +40,9 @@ def implemented(
         name: answer for name, answer in answers.items() if answer.failed and name not in MAY_FAIL
     }
     if failed:
-        answer = next(iter(failed.values()))
-        return fault(
-            f"it fails in {len(failed)} of {len(answers)} calls", f"{function}: {answer.failed}"
-        )
+        name, answer = next(iter(failed.items()))
+        got = f"it fails in {len(failed)} of {len(answers)} calls"
+        return fault(got, f"{function}: {answer.failed}", part(name))
     if not any(
         changed(QUESTIONS[name].balls, answer.last)
         for name, answer in answers.items()
@@ -45,6 +50,50 @@ def implemented(
     ):
         return fault("nothing is changed", nothing(function, answers.values()))
     return [arguments(task, function, answers.values())], True
+
+
+def same_again(
+    function: str, answers: dict[str, Answer], others: dict[str, Answer]
+) -> list[CheckRow]:
+    """A fault where answers depend on what was asked before, in the part that it changes; else
+    nothing. `others`: the answers that came otherwise."""
+    mine = {name: other for name, other in others.items() if name in answers}
+    if not mine:
+        return []
+    kept = sorted({name for answer in mine.values() for name in answer.kept})
+    where = f" in the global {kept[0]}" if len(kept) == 1 else ""
+    return [
+        judged(
+            SAME_AGAIN,
+            "1" if function == "integrate" else changed_part(answers, mine),
+            f"Does {function} do the same to the same spheres, whatever it was called with before?",
+            f"{len(mine)} of {len(answers)} answers depend on what was asked before",
+            "none does",
+            False,
+            f"{function} keeps a value{where} from one call to the next. Below, each question was"
+            " asked in a fresh world",
+        )
+    ]
+
+
+def keeps_state(rows: Iterable[CheckRow]) -> bool:
+    """Whether a file was found to remember what it was called with."""
+    return any(row.name == SAME_AGAIN and row.verdict == "fault" for row in rows)
+
+
+def changed_part(answers: dict[str, Answer], others: dict[str, Answer]) -> str:
+    """The part of task 2 whose outcome depends on earlier calls."""
+
+    def differs(read: Callable[[Answer], object]) -> bool:
+        return any(
+            not near(read(answers[name]), read(other))
+            for name, other in others.items()
+            if answers[name].balls and other.balls
+        )
+
+    if differs(lambda answer: [b.x for b in answer.last]):
+        return "2b"
+    return "2c" if differs(lambda answer: [b.v for b in answer.last]) else "2d"
 
 
 def instead(function: str, text: str) -> str:

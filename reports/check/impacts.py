@@ -44,9 +44,9 @@ def tangent(h: PairCollision) -> Array:
 
 
 ONES: Array = np.ones(2)
-NEVER = "the velocities are never changed: not implemented, or it returns before"
+NEVER = "the velocities never change: not implemented, or the function returns before"
 BACKWARDS = (
-    "the normal is the wrong way round for the signs it is used with: here it points from B to A"
+    "the normal has the wrong direction: with the signs of this file it must point from B to A"
 )
 APPROACH = "the test for approach has the wrong sign: only pairs that part get an impulse"
 # What a solver may take for J n, N s
@@ -89,7 +89,6 @@ IMPULSES: dict[str, Impulse] = {
     "the mass of A is used for both": scaled(lambda h, e: h.ma / 2 / h.mu),
     "the mass of B is used for both": scaled(lambda h, e: h.mb / 2 / h.mu),
     "the mean of the masses is used": scaled(lambda h, e: (h.ma + h.mb) / 2 / h.mu),
-    "half the reduced mass is used: right only for J of each": scaled(lambda h, e: 1 / 2),
     "the normal is not normalised": scaled(lambda h, e: h.d * h.d),
     "the normal is not normalised (taken after the displacement)": scaled(lambda h, e: h.s * h.s),
     "the normal is not normalised in one of its two places": scaled(lambda h, e: h.d),
@@ -114,10 +113,10 @@ IMPULSES: dict[str, Impulse] = {
     "the velocities are added, not subtracted": lambda h, e: (
         -(1 + e) * ((h.va + h.vb) @ h.n) * h.mu * h.n
     ),
-    "the whole relative velocity is taken, with its tangential part": lambda h, e: (
+    "the whole relative velocity is used, with its tangential part": lambda h, e: (
         -(1 + e) * h.u * h.mu
     ),
-    "the relative speed is taken for its normal part": lambda h, e: (
+    "the relative speed is used instead of its normal part": lambda h, e: (
         (1 + e) * np.hypot(*h.u) * h.mu * h.n
     ),
     "x and y are exchanged in the scalar product": lambda h, e: (
@@ -128,18 +127,18 @@ IMPULSES: dict[str, Impulse] = {
     "one part of the normal has the wrong sign": along(lambda h: h.n * [1, -1]),
     "the normal has its x part twice": along(lambda h: h.n[0] * ONES),
     "the normal has its y part twice": along(lambda h: h.n[1] * ONES),
-    "dx is taken for dy, too": along(lambda h: unit(h.n[0] * ONES)),
-    "dy is taken for dx, too": along(lambda h: unit(h.n[1] * ONES)),
+    "dx is used for dy, too": along(lambda h: unit(h.n[0] * ONES)),
+    "dy is used for dx, too": along(lambda h: unit(h.n[1] * ONES)),
     "x and y of the normal are exchanged": along(lambda h: h.n[::-1]),
-    "the direction of A's velocity is taken for the normal": along(lambda h: unit(h.va)),
+    "the direction of A's velocity is used as the normal": along(lambda h: unit(h.va)),
     "it acts along the tangent": lambda h, e: -(1 + e) * h.vn * h.mu * tangent(h),
-    "the tangential part is thrown back, not the normal one": lambda h, e: (
+    "the tangential part is reversed, not the normal one": lambda h, e: (
         -(1 + e) * (h.u @ tangent(h)) * h.mu * tangent(h)
     ),
-    "the tangential part is lost, too": lambda h, e: (
+    "the tangential part is set to zero, too": lambda h, e: (
         h.mu * (-(1 + e) * h.vn * h.n - (h.u - h.vn * h.n))
     ),
-    "the tangential part is thrown back, too, without e": lambda h, e: (
+    "the tangential part is reversed, too, without e": lambda h, e: (
         h.mu * (-(1 + e) * h.vn * h.n - 2 * (h.u - h.vn * h.n))
     ),
 }
@@ -162,11 +161,13 @@ UPDATES: dict[str, Update] = {
     "B gets the sign and the mass of A": Update(lambda h, P, e: (P / h.ma, P / h.ma)),
     "B is not changed": Update(lambda h, P, e: (P / h.ma, 0 * P)),
     "A is not changed": Update(lambda h, P, e: (0 * P, -P / h.mb)),
-    "they are not divided by the masses": Update(lambda h, P, e: (P, -P)),
+    "the impulse is not divided by the masses": Update(lambda h, P, e: (P, -P)),
     "A is not divided by its mass": Update(lambda h, P, e: (P, -P / h.mb)),
     "B is not divided by its mass": Update(lambda h, P, e: (P / h.ma, -P)),
-    "they are multiplied by the masses": Update(lambda h, P, e: (P * h.ma, -P * h.mb)),
-    "they are set to J n / m, not changed by it": Update(
+    "the impulse is multiplied by the masses, not divided by them": Update(
+        lambda h, P, e: (P * h.ma, -P * h.mb)
+    ),
+    "the velocities are set to J n / m, which must be added to them": Update(
         lambda h, P, e: (P / h.ma - h.va, -P / h.mb - h.vb)
     ),
     "B is computed from the new velocity of A": Update(
@@ -184,10 +185,10 @@ UPDATES: dict[str, Update] = {
     "each bounces off the other as off a wall": Update(
         lambda h, P, e: (-(1 + e) * (h.va @ h.n) * h.n, -(1 + e) * (h.vb @ h.n) * h.n)
     ),
-    "each velocity is turned round and multiplied by e": Update(
+    "each velocity is reversed and multiplied by e": Update(
         lambda h, P, e: (-(1 + e) * h.va, -(1 + e) * h.vb)
     ),
-    "each velocity is turned round": Update(lambda h, P, e: (-2 * h.va, -2 * h.vb)),
+    "each velocity is reversed": Update(lambda h, P, e: (-2 * h.va, -2 * h.vb)),
     "the new velocities are multiplied by e": Update(
         lambda h, P, e: (e * P / h.ma - (1 - e) * h.va, -e * P / h.mb - (1 - e) * h.vb)
     ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,102 +14,184 @@ from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
 
 
+@dataclass(frozen=True)
+class Seen:
+    """A collision of a file, and what is known of its mistakes.
+
+    Attributes:
+        pair: before the collision; of several that were asked about one that shows what is wrong.
+        after: velocities of A and B after it, (2, 2) m/s.
+        found: the impulse and the update that give all collisions, None if none do.
+        e: the restitution that it is judged by.
+        impulse, update: the mistake in (c) and the one in (d), "" where none is known.
+    """
+
+    pair: PairCollision
+    after: Array
+    found: Finding | None
+    e: float
+    impulse: str
+    update: str
+
+    @property
+    def mistake(self) -> str:
+        """The one to begin with."""
+        return self.impulse or self.update or (self.found.mistake if self.found else "")
+
+    @property
+    def right_impulse(self) -> Array:
+        """J n by the exercise's formula, N s."""
+        return IMPULSES[""](self.pair, self.e)
+
+    @property
+    def computed_impulse(self) -> Array:
+        """J n as the file computes it, right or wrong, so that (d) is judged by itself, N s."""
+        return self.found.law(self.pair, self.found.e) if self.found else self.right_impulse
+
+    @property
+    def change(self) -> Array:
+        """What was added to both velocities, (2, 2) m/s."""
+        return self.after - [self.pair.va, self.pair.vb]
+
+    @property
+    def received(self) -> Array:
+        """What A got from B, N s."""
+        return np.asarray(self.pair.ma * self.change[0])
+
+    @property
+    def right_c(self) -> bool:
+        """Whether the impulse is known to be right."""
+        return self.found is not None and not self.found.impulse
+
+    @property
+    def right_d(self) -> bool:
+        """Whether the update is known to be right."""
+        return self.found is not None and (not self.found.update or self.found.task != "2d")
+
+
 def impulse_rows(
     answers: dict[str, Answer], restitution: Restitution, found: Finding | None
 ) -> list[CheckRow]:
     """The rows of (c) and (d)."""
     if not finite(answers, "v"):
         return [*no_number(answers, restitution.own), bystanders(answers)]
-    e = found.e if found else restitution.own
-    name = next(
-        iter(COLLISIONS if found else wrong_collisions(answers, e) or COLLISIONS)
-    )  # numbers that show what is wrong
-    balls, after = QUESTIONS[name].balls, answers[name].last
-    collision, came = collision_of(balls, after), changes(balls, after)
-    P = IMPULSES[""](collision, e)
-    acts = acting(collision, found, P)
-    fine_c = found is not None and not found.impulse
-    impulse = restitution.mistake or (found.impulse if found else partly(answers, e))
-    update = found.update if found and found.task == "2d" else ""
-    mistake = impulse or (found.mistake if found else "")
-    spoilt = "2d" if fine_c else "2c"  # the part in which lies what spoils energy and restitution
-    got, lost = collision.ma * came[0], energy(collision, came)
-    across, gained = (
-        float(got @ tangent(collision)),
-        collision.ma * came[0] + collision.mb * came[1],
-    )
-    rows = [
-        judged(
-            "impulse",
-            "2c",
-            f"What impulse has A from B, for {shown(collision.ma)} and {shown(collision.mb)} kg?",
-            f"{shown(got @ collision.n)} N s along the normal",
-            f"{shown(P @ collision.n)} N s",
-            fine_c,
-            impulse,
-        ),
-        judged(
-            "tangential part",
-            "2c",
-            "What impulse is there across the normal?",
-            f"{shown(across)} N s",
-            "0 N s",
-            near(across, 0.0) or fine_c,
-            impulse,
-        ),
-        judged(
-            "energy",
-            spoilt,
-            "How much kinetic energy does the collision add?",
-            f"{shown(lost)} J",
-            f"{shown(-(1 - e * e) / 2 * collision.mu * collision.vn**2)} J",
-            bool(lost <= 1e-9),
-            mistake,
-        ),
-        replace(restitution.row(mistake), task=spoilt if not near(restitution.came, e) else "2c"),
-        restitution.speeds(mistake),
-        separating(answers, found, e),
-        judged(
-            "velocity of A",
-            "2d",
-            "What velocity has A after the collision, by the impulse that acts?",
-            f"{shown(after[0].v)} m/s",
-            f"{shown(collision.va + acts / collision.ma)} m/s",
-            right_update(found) or near(came[0], acts / collision.ma),
-            update or impulse,
-        ),
-        judged(
-            "velocity of B",
-            "2d",
-            "What velocity has B after the collision, by the impulse that acts?",
-            f"{shown(after[1].v)} m/s",
-            f"{shown(collision.vb - acts / collision.mb)} m/s",
-            right_update(found) or near(came[1], -acts / collision.mb),
-            update or impulse,
-        ),
-        judged(
-            "momentum",
-            "2d",
-            "How much momentum does the collision add?",
-            f"{shown(gained)} kg m/s",
-            "(0, 0) kg m/s",
-            near(gained, 0.0),
-            update or impulse,
-        ),
-        symmetry(answers, mistake),
+    seen = seen_in(answers, restitution, found)
+    spoilt = "2d" if seen.right_c else "2c"  # the part whose mistake spoils energy and restitution
+    return [
+        normal_impulse(seen),
+        tangential_impulse(seen),
+        *([] if spoilt == "2d" else spoilt_rows(seen, restitution, spoilt)),
+        restitution.speeds(seen.mistake),
+        separating(answers, found, seen.e),
+        new_velocity(seen, 0),
+        new_velocity(seen, 1),
+        momentum(seen),
+        # The velocities say more of a mistake in (d) than the energy that it spoils.
+        *(spoilt_rows(seen, restitution, spoilt) if spoilt == "2d" else []),
+        symmetry(answers, seen.mistake),
         bystanders(answers),
     ]
-    # The velocities say more of a mistake in (d) than the energy and the restitution that it
-    # spoils.
-    return sorted(
-        rows, key=lambda row: (row.task, row.task == "2d" and row.name in ("energy", "restitution"))
+
+
+def seen_in(answers: dict[str, Answer], restitution: Restitution, found: Finding | None) -> Seen:
+    """The collision to show, and the mistakes in it."""
+    e = found.e if found else restitution.own
+    wrong = [] if found else wrong_collisions(answers, e)
+    name = next(iter(wrong or COLLISIONS))
+    balls, after = QUESTIONS[name].balls, answers[name].last
+    return Seen(
+        collision_of(balls, after),
+        np.array([b.v for b in after]),
+        found,
+        e,
+        restitution.mistake or (found.impulse if found else partly(answers, e)),
+        found.update if found and found.task == "2d" else "",
+    )
+
+
+def normal_impulse(seen: Seen) -> CheckRow:
+    """J."""
+    masses = f"{shown(seen.pair.ma)} and {shown(seen.pair.mb)} kg"
+    return judged(
+        "impulse",
+        "2c",
+        f"What impulse does A get from B, for masses of {masses}?",
+        f"{shown(seen.received @ seen.pair.n)} N s along the normal",
+        f"{shown(seen.right_impulse @ seen.pair.n)} N s",
+        seen.right_c,
+        seen.impulse,
+    )
+
+
+def tangential_impulse(seen: Seen) -> CheckRow:
+    """None, as there is no friction."""
+    across = float(seen.received @ tangent(seen.pair))
+    return judged(
+        "tangential part",
+        "2c",
+        "What impulse does A get across the normal?",
+        f"{shown(across)} N s",
+        "0 N s",
+        near(across, 0.0) or seen.right_c,
+        seen.impulse,
+    )
+
+
+def spoilt_rows(seen: Seen, restitution: Restitution, task: str) -> list[CheckRow]:
+    """Energy and restitution, in the task whose mistake they show."""
+    added, pair = energy(seen.pair, seen.change), seen.pair
+    expected = -(1 - seen.e**2) / 2 * pair.mu * pair.vn**2
+    return [
+        judged(
+            "energy",
+            task,
+            "How much kinetic energy does the collision add?",
+            f"{shown(added)} J",
+            f"{shown(expected)} J",
+            bool(added <= 1e-9),  # J; any loss is explained by the rows on the impulse
+            seen.mistake,
+        ),
+        replace(
+            restitution.row(seen.mistake),
+            task="2c" if near(restitution.came, seen.e) else task,
+        ),
+    ]
+
+
+def new_velocity(seen: Seen, k: int) -> CheckRow:
+    """The velocity of A (k = 0) or B (k = 1), by the impulse that the file computes."""
+    before, mass = ((seen.pair.va, seen.pair.ma), (seen.pair.vb, seen.pair.mb))[k]
+    change = (1 - 2 * k) * seen.computed_impulse / mass
+    return judged(
+        f"velocity of {'AB'[k]}",
+        "2d",
+        f"What velocity has {'AB'[k]} after the collision, by the impulse that the file computes?",
+        f"{shown(seen.after[k])} m/s",
+        f"{shown(before + change)} m/s",
+        seen.right_d or near(seen.change[k], change),
+        seen.update or seen.impulse,
+    )
+
+
+def momentum(seen: Seen) -> CheckRow:
+    """Of both together, which no collision changes."""
+    added = seen.pair.ma * seen.change[0] + seen.pair.mb * seen.change[1]
+    return judged(
+        "momentum",
+        "2d",
+        "How much momentum does the collision add?",
+        f"{shown(added)} kg m/s",
+        "(0, 0) kg m/s",
+        near(added, 0.0),
+        seen.update or seen.impulse,
     )
 
 
 def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
     """The one row on velocities that are no numbers: nothing else can be read from them."""
     if not finite(answers, "x"):
-        return impulse_not_asked("the positions become no numbers before it")
+        why = "the positions become NaN or infinite before it"
+        return [not_asked("impulse", "2c", why), not_asked("velocity of A", "2d", why)]
     lost = {
         name: [not np.isfinite(ball.v).all() for ball in answers[name].last] for name in COLLISIONS
     }
@@ -121,7 +203,8 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
     why = "(a field that does not exist, a division by zero?)"
     if a and b:
         asked = (
-            f"What impulse has A from B, for {shown(collision.ma)} and {shown(collision.mb)} kg?"
+            f"What impulse does A get from B, for masses of {shown(collision.ma)} and"
+            f" {shown(collision.mb)} kg?"
         )
         return [
             judged(
@@ -131,15 +214,15 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
                 f"{shown(collision.ma * came[0])} N s",
                 f"{shown(P)} N s",
                 False,
-                f"the impulse is no number {why}",
+                f"the impulse is not a number {why}",
             ),
-            not_asked("velocity of A", "2d", "the impulse is no number"),
+            not_asked("velocity of A", "2d", "the impulse is not a number"),
         ]
     who, right = (
         ("A", collision.va + P / collision.ma) if a else ("B", collision.vb - P / collision.mb)
     )
     return [
-        not_asked("impulse", "2c", f"the velocity of {who} becomes no number"),
+        not_asked("impulse", "2c", f"the velocity of {who} becomes NaN or infinite"),
         judged(
             f"velocity of {who}",
             "2d",
@@ -147,14 +230,9 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
             f"{shown(after[int(b)].v)} m/s",
             f"{shown(right)} m/s",
             False,
-            f"the velocity of {who} becomes no number {why}",
+            f"the velocity of {who} becomes NaN or infinite {why}",
         ),
     ]
-
-
-def right_update(found: Finding | None) -> bool:
-    """Whether (d) is known to be right."""
-    return found is not None and (not found.update or found.task != "2d")
 
 
 def partly(answers: dict[str, Answer], e: float) -> str:
@@ -182,11 +260,6 @@ def wrong_collisions(answers: dict[str, Answer], e: float) -> list[str]:
     return wrong
 
 
-def acting(collision: PairCollision, found: Finding | None, right: Array) -> Array:
-    """The impulse the file computes, right or wrong, so that (d) is judged by itself."""
-    return found.law(collision, found.e) if found else right
-
-
 def energy(collision: PairCollision, came: Array) -> float:
     """J, what a collision adds to the kinetic energy."""
     before = collision.ma * collision.va @ collision.va + collision.mb * collision.vb @ collision.vb
@@ -195,9 +268,9 @@ def energy(collision: PairCollision, came: Array) -> float:
 
 
 def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> CheckRow:
-    """On pairs that part: nothing, or the printed formula; both are free."""
-    asked = "What happens to a pair that overlaps and moves apart?"
-    either = "no impulse, or that of the formula"
+    """On pairs that move apart: nothing, or the printed formula; both are free."""
+    asked = "What impulse gets a pair that overlaps and moves apart?"
+    expected = "none, or that of the formula"
     seen = [
         (
             collision_of(QUESTIONS[n].balls, answers[n].last),
@@ -205,27 +278,22 @@ def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> C
         )
         for n in SEPARATING
     ]
+
+    def chosen(got: str, said: str) -> CheckRow:
+        return CheckRow("separating", "2c", asked, got, expected, "free choice", said)
+
     if all(near(came, 0.0) for _, came in seen):
-        return CheckRow(
-            "separating",
-            "2c",
-            asked,
-            "no impulse",
-            either,
-            "note",
-            "only pairs that approach get an impulse",
-        )
+        return chosen("none", "only pairs that approach get an impulse")
     law, change = (found.law, found.change) if found else (IMPULSES[""], UPDATES[""].change)
     if all(near(change(h, law(h, e), e), came, 0.1) for h, came in seen):
-        note = "pairs that part get an impulse too, as the formula is printed; it turns them back"
-        return CheckRow(
-            "separating", "2c", asked, "an impulse, by the same formula", either, "note", note
-        )
+        said = "as the formula is printed, pairs that move apart get an impulse, too"
+        return chosen("that of the formula", said)
     got = f"A is changed by {shown(seen[0][1][0])} m/s"
-    return judged("separating", "2c", asked, got, either, False, found.mistake if found else "")
+    cause = found.mistake if found else ""
+    return judged("separating", "2c", asked, got, expected, False, cause)
 
 
-UNALIKE = "A and B are not treated alike: it matters which is called first"
+UNALIKE = "the result depends on which sphere is A: the two are not treated alike"
 
 
 def symmetry(answers: dict[str, Answer], mistake: str) -> CheckRow:
@@ -239,7 +307,7 @@ def symmetry(answers: dict[str, Answer], mistake: str) -> CheckRow:
     return judged(
         "order",
         "2d",
-        "Are the velocities the same if A and B change places in the call?",
+        "Are the velocities the same if A and B are exchanged in the call?",
         shown(swapped[0][0]) + " m/s",
         shown(came[0][0]) + " m/s",
         same,
@@ -275,8 +343,3 @@ def bystanders(answers: dict[str, Answer]) -> CheckRow:
         not what,
         f"it writes {what}",
     )
-
-
-def impulse_not_asked(why: str) -> list[CheckRow]:
-    """The rows of (c) and (d) where there is no collision to look at."""
-    return [not_asked("impulse", "2c", why), not_asked("velocity of A", "2d", why)]

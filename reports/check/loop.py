@@ -3,11 +3,13 @@ functions."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
-from reports.check.questions import Answer, Ball, Question, ask
+from reports.check.questions import LIMIT, Answer, Ball, Question, ask_in_two_orders, fresh_world
 from reports.check.rows import FOLLOWS, CheckRow, judged, near, not_asked, shown
 
 DT = 1e-3  # s, the exercise's
@@ -16,65 +18,66 @@ EDGES = {"right": (5.2, 0.1), "left": (-5.2, -0.1), "top": (0.1, 3.2), "bottom":
 ONTO = {"right": (-5.0, 0.1), "left": (5.0, -0.1), "top": (0.1, -3.0), "bottom": (-0.1, 3.0)}
 # a pair that collides
 A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)
+# a pair that overlaps by half a millimetre after a step, and not if only one of the two moves
+LEFT, RIGHT = Ball((-0.3, 0.0), (1.0, 0.0), r=0.3), Ball((0.3015, 0.0), (-1.0, 0.0), r=0.3)
 
 
-def loop_rows(process: SolverProcess, faulty: bool, begun: object) -> list[CheckRow]:
+def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
     """The rows of the step; where the file has none, a row that says so.
 
-    `faulty`: the functions it calls are; `begun`: what came of its first initScene.
+    `faulty`: the functions it calls are.
     """
     has = process.functions
     if not (has["begin"] and has["step"]):
         missing = "initScene" if not has["begin"] else "performSimStep"
         return [not_asked("step", "loop", f"the file has no function {missing}")]
-    try:
-        if isinstance(begun, SolverFailed):
-            raise begun
-        process.do("begin", limit=2.0)
-    except SolverFailed as failure:
-        cause = f"initScene: {failure}"
-        return [
-            judged(
-                "step", "loop", "Does initScene make a scene?", "it fails", "a scene", False, cause
-            )
-        ]
-    start = process.do("globals")
-    if not start or len(start) < 3:
-        got = f"{len(start)} spheres" if start else "no ufo or no asteroids"
-        return [
-            judged(
-                "step",
-                "loop",
-                "Does initScene make a ufo and asteroids?",
-                got,
-                "a ufo and 20 asteroids",
-                False,
-                "initScene leaves the globals ufo and asteroids without spheres",
-            )
-        ]
+    start, no_scene = scene_of(process)
+    if no_scene:
+        return [no_scene]
     asked = worlds(len(start), has["wrap"])
-    came = ask(process, asked)
-    failed = next((answer.failed for answer in came.values() if answer.failed), None)
-    if failed:
+    came, _ = ask_in_two_orders(process, asked)
+    if failed := next((answer.failed for answer in came.values() if answer.failed), None):
         cause = FOLLOWS if faulty else f"performSimStep: {failed}"
         return [
-            judged(
-                "step", "loop", "Does performSimStep come back?", "it fails", "yes", False, cause
-            )
+            judged("step", "loop", "Does performSimStep return?", "it fails", "yes", False, cause)
         ]
-    if faulty:
-        rows = [
-            not_asked("all spheres", "loop", "the functions that it calls have faults of their own")
-        ]
-    else:
-        rows = [integrated(asked["free"], came["free"], came["alone"]), pairs(asked, came)]
-        rows += (
-            [wrapping(asked["edges in a step"], came["edges in a step"], came["edges"])]
-            if has["wrap"]
-            else []
-        )
+    rows = (
+        [not_asked("all spheres", "loop", "the functions that the step calls have faults")]
+        if faulty
+        else step_rows(asked, came)
+    )
     if has["wrap"]:
         rows += edges(asked["edges"], came["edges"], start, process.surface == "exercise")
+    return rows
+
+
+def scene_of(process: SolverProcess) -> tuple[list[list[float]], CheckRow | None]:
+    """The numbers of the spheres that initScene makes in a fresh world; or a fault if it makes
+    none."""
+    *_, begun, start = process.request([*fresh_world(process), ("globals", None, LIMIT)])
+    if isinstance(begun, SolverFailed):
+        asked, got, expected = "Does initScene make a scene?", "it fails", "a scene"
+        return [], judged("step", "loop", asked, got, expected, False, f"initScene: {begun}")
+    if isinstance(start, SolverFailed) or not start or len(start) < 3:
+        found = start if isinstance(start, list) else []
+        asked = "Does initScene make a ufo and asteroids?"
+        got = f"{len(found)} spheres" if found else "no ufo or no asteroids"
+        cause = "initScene leaves the globals ufo and asteroids without spheres"
+        return [], judged("step", "loop", asked, got, "a ufo and 20 asteroids", False, cause)
+    return start, None
+
+
+def step_rows(asked: dict[str, Question], came: dict[str, Answer]) -> list[CheckRow]:
+    """The rows of a step whose functions are right."""
+    itself = against_itself(asked["free"], came)
+    if itself and itself.verdict == "fault":
+        return [itself, not_asked("all spheres", "loop", "a sphere collides with itself")]
+    met = pairs(asked, came)
+    rows = [integrated(asked["free"], came), met, *([itself] if itself else [])]
+    if met.verdict == "right":
+        rows.append(integration_first(asked, came))
+    if "edges in a step" in came:
+        rows.append(wrapping(asked["edges in a step"], came["edges in a step"], came["edges"]))
     return rows
 
 
@@ -87,6 +90,7 @@ def worlds(n: int, wraps: bool) -> dict[str, Question]:
     )
     found = {
         "free": Question(forced, step, world=True),
+        "watched": Question(forced, step, world=True, watch=True),
         "alone": Question((forced[0],), (("integrate", 0, DT),)),
     }
     middle = n // 2
@@ -94,9 +98,9 @@ def worlds(n: int, wraps: bool) -> dict[str, Question]:
         {(0, 1), (0, middle), (0, n - 1), (1, 2), (1, n - 1), (n - 2, n - 1), (middle - 1, middle)}
     ):
         if 0 <= i < j < n:
-            spheres = list(plain)
-            spheres[i], spheres[j] = A, B
-            found[f"pair {i} {j}"] = Question(tuple(spheres), step, world=True)
+            found[f"pair {i} {j}"] = Question(put(plain, i, A, j, B), step, world=True)
+    for i, j in ((0, 1), (1, 2)):
+        found[f"about to meet {i} {j}"] = Question(put(plain, i, LEFT, j, RIGHT), step, world=True)
     if wraps:
         spheres = list(plain)
         for k, place in enumerate(list(EDGES.values())[: n - 1]):
@@ -106,6 +110,11 @@ def worlds(n: int, wraps: bool) -> dict[str, Question]:
         resting = tuple(b._replace(v=(0.0, 0.0)) for b in spheres)
         found["edges in a step"] = Question(resting, step, world=True)
     return found
+
+
+def put(spheres: tuple[Ball, ...], i: int, a: Ball, j: int, b: Ball) -> tuple[Ball, ...]:
+    """The spheres with a and b in the places i and j."""
+    return tuple({i: a, j: b}.get(k, sphere) for k, sphere in enumerate(spheres))
 
 
 def parked(n: int) -> tuple[Ball, ...]:
@@ -118,27 +127,60 @@ def parked(n: int) -> tuple[Ball, ...]:
     )
 
 
-def integrated(question: Question, came: Answer, alone: Answer) -> CheckRow:
+def integrated(question: Question, came: dict[str, Answer]) -> CheckRow:
     """Every sphere moves as one alone does by the file's own integrate."""
     asked = "Does a step integrate every sphere once?"
-    start, end = question.balls[0], alone.last[0]
-    moved = np.subtract(end.x, start.x)
+    after, end = came["free"].last, came["alone"].last[0]
+    moved = np.subtract(end.x, question.balls[0].x)
     wrong = [
         k
-        for k, (b, a) in enumerate(zip(question.balls, came.last))
+        for k, (b, a) in enumerate(zip(question.balls, after))
         if not (near(a.x, np.add(b.x, moved)) and near(a.v, end.v) and near(a.w, end.w))
     ]
     if not wrong:
         return judged("all spheres", "loop", asked, "yes", "yes", True)
-    first = came.last[wrong[0]]
-    who = name_of(wrong[0])
-    cause = (
-        "a loop of performSimStep leaves spheres out"
-        if near(first.v, question.balls[0].v)
-        else ("performSimStep integrates more than once, or not by dt")
-    )
-    got = f"{who} moves at {shown(first.v)} m/s ({len(wrong)} of {len(came.last)} wrong)"
+    first = wrong[0]
+    got = f"{name_of(first)} moves at {shown(after[first].v)} m/s"
+    got += f" ({len(wrong)} of {len(after)} spheres are wrong)"
+    cause = integration_cause(first, question.balls[first], after[first], came["watched"])
     return judged("all spheres", "loop", asked, got, f"{shown(end.v)} m/s", False, cause)
+
+
+def integration_cause(k: int, before: Ball, after: Ball, watched: Answer) -> str:
+    """What a step does to sphere `k` instead of integrating it once."""
+    steps = [call[2] for call in watched.calls if call[:2] == ("integrate", k)]
+    if near(after.v, before.v):
+        return "a loop of performSimStep leaves spheres out"
+    if len(steps) > 1:
+        return f"performSimStep integrates {name_of(k)} {len(steps)} times"
+    if steps and not near(steps[0], DT):
+        return f"performSimStep gives integrate a dt of {shown(steps[0])} s, not its own dt"
+    return "performSimStep integrates more than once, or not by dt"
+
+
+def against_itself(question: Question, came: dict[str, Answer]) -> CheckRow | None:
+    """What comes of a sphere that is given to the collision function twice; None if none is.
+
+    Nobody is near anybody else, so that whatever is struck was struck by itself.
+    """
+    alone = [call[1] for call in came["watched"].calls if is_with_itself(call)]
+    if not alone:
+        return None
+    who = name_of(alone[0])
+    asked = "Which spheres does a step give to the collision function?"
+    got = f"{who} and {who} again ({len(alone)} such calls)"
+    expected = "two different spheres"
+    right = integrated(question, came).verdict == "right"
+    cause = "performSimStep lets a sphere collide with itself: j begins at i, not at i + 1"
+    if right:
+        cause = f"{who} is also tested against itself, which changes nothing"
+        return CheckRow("itself", "loop", asked, got, "any", "free choice", cause)
+    return judged("itself", "loop", asked, got, expected, False, cause)
+
+
+def is_with_itself(call: tuple[Any, ...]) -> bool:
+    """Whether it gives the collision function one of the file's spheres twice."""
+    return bool(call[0] == "collide" and call[1] == call[2] >= 0)
 
 
 def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
@@ -148,13 +190,11 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
         if not name.startswith("pair"):
             continue
         i, j = map(int, name.split()[1:])
-        kicked = [
-            k for k, (b, a) in enumerate(zip(question.balls, came[name].last)) if not near(a.v, b.v)
-        ]
-        if not {i, j} <= set(kicked):
+        struck = struck_in(question, came[name])
+        if not {i, j} <= struck:
             silent.append(name_of(i, j))
-        elif set(kicked) != {i, j}:
-            others.append(name_of(min(set(kicked) - {i, j})))
+        elif struck != {i, j}:
+            others.append(name_of(min(struck - {i, j})))
     got = (
         f"no collision of {', '.join(silent)}"
         if silent
@@ -165,7 +205,7 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
     cause = (
         "a loop of performSimStep leaves pairs out"
         if silent
-        else "performSimStep lets spheres react that are apart"
+        else "performSimStep lets spheres collide that are apart"
     )
     return judged(
         "pairs",
@@ -175,6 +215,29 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
         "yes",
         not silent and not others,
         cause,
+    )
+
+
+def struck_in(question: Question, came: Answer) -> set[int]:
+    """The spheres whose velocities a step without forces has changed."""
+    return {k for k, (b, a) in enumerate(zip(question.balls, came.last)) if not near(a.v, b.v)}
+
+
+def integration_first(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
+    """A pair that touches only at the end of the step collides in it, if all were integrated."""
+    missed = [
+        name_of(*map(int, name.split()[-2:]))
+        for name, question in asked.items()
+        if name.startswith("about to meet") and not struck_in(question, came[name])
+    ]
+    return judged(
+        "integration first",
+        "loop",
+        "Does a pair collide in the step in which it begins to overlap?",
+        f"not {' and not '.join(missed)}" if missed else "yes",
+        "yes",
+        not missed,
+        "the step handles collisions before all spheres are integrated: it finds them a step late",
     )
 
 

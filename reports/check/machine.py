@@ -33,7 +33,7 @@ def as_json(checks: Sequence[FileCheck]) -> dict[str, Any]:
     }
 
 
-def row_as_json(row: CheckRow) -> dict[str, str]:
+def row_as_json(row: CheckRow) -> dict[str, Any]:
     """A row, its fields in reading order."""
     return {
         "name": row.name,
@@ -43,6 +43,8 @@ def row_as_json(row: CheckRow) -> dict[str, str]:
         "expected": row.expected,
         "verdict": row.verdict,
         "cause": row.cause,
+        "formula": row.formula,
+        "lines": [{"line": line, "text": text} for line, text in row.lines],
         "read": row.read,
     }
 
@@ -76,13 +78,19 @@ def as_junit(checks: Sequence[FileCheck]) -> str:
             )
             if row.verdict == "fault":
                 failure = ElementTree.SubElement(case, "failure", message=plain(row.cause))
-                failure.text = plain(
-                    f"{row.asked}\ncame: {row.got}\nexpected: {row.expected}\nread: {row.read}"
-                )
+                failure.text = plain("\n".join([row.asked, *evidence(row)]))
             elif row.verdict == "not asked":
                 ElementTree.SubElement(case, "skipped", message=plain(row.cause))
     ElementTree.indent(suites)
     return ElementTree.tostring(suites, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def evidence(row: CheckRow) -> list[str]:
+    """What speaks for a fault, a line each: the numbers, the file's lines, the formula."""
+    lines = [f"came: {row.got}", f"expected: {row.expected}"]
+    lines += [f"line {line}: {text}" for line, text in row.lines]
+    lines += [f"exercise: {row.formula}"] * bool(row.formula)
+    return [*lines, f"read: {row.read}"]
 
 
 def plain(text: str) -> str:

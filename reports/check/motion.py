@@ -41,22 +41,24 @@ UNDER_FORCE: dict[str, Law] = {
     "dt is counted twice": lambda v, f, m, _o, dt: v + 2 * f / m * dt,
     "it divides by dt": lambda v, f, m, _o, dt: v + f / m / dt,
     "the sign is wrong": lambda v, f, m, _o, dt: v - f / m * dt,
-    "it is set to F/m dt, not changed by it": lambda v, f, m, _o, dt: f / m * dt + 0 * v,
-    "the force is taken for a velocity": lambda v, f, _m, _o, _dt: f + 0 * v,
-    "gravity is added, which the exercise has not": lambda v, f, m, _o, dt: (
+    "it is set to F/m dt, which must be added": lambda v, f, m, _o, dt: f / m * dt + 0 * v,
+    "the force is used as the velocity": lambda v, f, _m, _o, _dt: f + 0 * v,
+    "gravity is added, which the exercise does not have": lambda v, f, m, _o, dt: (
         v + (f / m + G[: np.size(v)]) * dt
     ),
     "x and y of the force are exchanged": lambda v, f, m, _o, dt: v + np.flip(f) / m * dt,
-    "y takes the force along x": lambda v, f, m, _o, dt: v + taken(f, 0) / m * dt,
-    "x takes the force along y": lambda v, f, m, _o, dt: v + taken(f, 1) / m * dt,
+    "y uses the force along x": lambda v, f, m, _o, dt: v + taken(f, 0) / m * dt,
+    "x uses the force along y": lambda v, f, m, _o, dt: v + taken(f, 1) / m * dt,
     "the quotient is rounded down (// or floor)": lambda v, f, m, _o, dt: v + np.floor(f / m) * dt,
     "only x is changed": lambda v, f, m, _o, dt: v + f / m * dt * X[: np.size(v)],
     "only y is changed": lambda v, f, m, _o, dt: v + f / m * dt * Y[: np.size(v)],
-    "it is in degrees": lambda v, f, m, _o, dt: v + np.degrees(f / m * dt),
-    "it is turned to radians, which it has already": lambda v, f, m, _o, dt: (
+    "it is converted to degrees": lambda v, f, m, _o, dt: v + np.degrees(f / m * dt),
+    "it is converted to radians, though it is in radians already": lambda v, f, m, _o, dt: (
         v + np.radians(f / m * dt)
     ),
-    "the step is written into the file as 0.001 s": lambda v, f, m, _o, _dt: v + f / m * 0.001,
+    "a step of 0.001 s is written into the file and used instead of dt": lambda v, f, m, _o, _dt: (
+        v + f / m * 0.001
+    ),
 }
 # (x or alpha, v or w before, the same after, acceleration by the right formula, dt) -> x' or alpha'
 MOVED: dict[str, Law] = {
@@ -79,23 +81,25 @@ MOVED: dict[str, Law] = {
         x + new * dt + a * dt * dt / 2
     ),
     "it is moved by the acceleration, not by the {velocity}": lambda x, _v, _n, a, dt: x + a * dt,
-    "y takes the velocity along x": lambda x, _v, new, _a, dt: x + taken(new, 0) * dt,
-    "x takes the velocity along y": lambda x, _v, new, _a, dt: x + taken(new, 1) * dt,
+    "y uses the velocity along x": lambda x, _v, new, _a, dt: x + taken(new, 0) * dt,
+    "x uses the velocity along y": lambda x, _v, new, _a, dt: x + taken(new, 1) * dt,
     "x is moved by both parts of the velocity, y by none": lambda x, _v, new, _a, dt: (
         x + X[: np.size(x)] * new.sum() * dt
     ),
     "it is moved by a dt2 / 2 alone": lambda x, _v, _n, a, dt: x + a * dt * dt / 2,
-    "it is set to {velocity} times dt, not changed by it": lambda x, _v, new, _a, dt: (
+    "it is set to {velocity} times dt, which must be added": lambda x, _v, new, _a, dt: (
         new * dt + 0 * x
     ),
     "only x is moved": lambda x, _v, new, _a, dt: x + new * dt * X[: np.size(x)],
     "only y is moved": lambda x, _v, new, _a, dt: x + new * dt * Y[: np.size(x)],
-    "it is in degrees": lambda x, _v, new, _a, dt: x + np.degrees(new * dt),
-    "it is turned to radians, which it has already": lambda x, _v, new, _a, dt: (
+    "it is converted to degrees": lambda x, _v, new, _a, dt: x + np.degrees(new * dt),
+    "it is converted to radians, though it is in radians already": lambda x, _v, new, _a, dt: (
         x + np.radians(new * dt)
     ),
-    "the step is written into the file as 0.001 s": lambda x, _v, new, _a, _dt: x + new * 0.001,
-    "the old {velocity} is kept in degrees": lambda x, v, _n, _a, dt: x + np.degrees(v * dt),
+    "a step of 0.001 s is written into the file and used instead of dt": (
+        lambda x, _v, new, _a, _dt: x + new * 0.001
+    ),
+    "the old {velocity} is converted to degrees": lambda x, v, _n, _a, dt: x + np.degrees(v * dt),
 }
 
 
@@ -181,7 +185,7 @@ def law_row(
     if name == "spin":
         cause = cause.replace("the force", "the torque").replace("F/m", "torque/MoI")
     if not np.isfinite(np.asarray(came[0], float)).all():
-        cause = "it is no number (a field that does not exist, text, a division by zero?)"
+        cause = "it is not a number (a field that does not exist, text, a division by zero?)"
     return judged(
         name, "1", asked, f"{shown(came[0])} {unit}", f"{shown(right)} {unit}", found == "", cause
     )

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from adapters.run import Run
-from reports.check.rows import TASKS, shown
+from reports.check.rows import TASKS, Verdict, shown
 from reports.check.smallest import DT, Smallest
 from reports.check.verdict import FileCheck
 from reports.page import style
@@ -20,6 +20,20 @@ from scenarios.model import Scenario, Trajectory
 GENERATOR = "crosscheck check"
 # apart from the truth in any light, by style.py
 YOURS = style.Look("#a3123a", "#ff7a93", (), "diamond", True)
+# Faults stand first; what a group is, is said in words.
+GROUPS: dict[Verdict, tuple[str, str]] = {
+    "fault": (
+        "Faults",
+        "A cause is named where its formula gives the same numbers to six digits. The lines are"
+        " those of your file that read or write what is wrong.",
+    ),
+    "free choice": (
+        "Free choices",
+        "The exercise leaves these open. Whatever you chose is right; this only says what it is.",
+    ),
+    "right": ("Right", "Asked, and as expected."),
+    "not asked": ("Not asked", "These could not be asked; each row says why."),
+}
 SCRIPTS = (*ENGINE, "check/check.js")
 
 
@@ -37,6 +51,7 @@ def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
         name=check.path.name,
         check=check,
         tasks=TASKS,
+        groups=GROUPS,
         smallest=smallest,
         layers=names,
         scene=[] if smallest is None else scene_lines(smallest.scenario),

@@ -18,9 +18,9 @@ Change = Callable[[PairCollision, Array, float], tuple[Array, Array]]
 PRODUCTS: dict[str, Callable[[float, float, float, float, float], float]] = {
     "is left out": lambda v, across, other, n, m: 0.0,
     "has the wrong sign": lambda v, across, other, n, m: -v * n,
-    "takes the other part of n": lambda v, across, other, n, m: v * m,
-    "takes the velocity along the other axis": lambda v, across, other, n, m: across * n,
-    "takes the velocity of the other sphere": lambda v, across, other, n, m: other * n,
+    "uses the other component of n": lambda v, across, other, n, m: v * m,
+    "uses the velocity along the other axis": lambda v, across, other, n, m: across * n,
+    "uses the velocity of the other sphere": lambda v, across, other, n, m: other * n,
     "is not multiplied by n": lambda v, across, other, n, m: v,
 }
 PLACES = {  # (0: A, 1: B; 0: x, 1: y)
@@ -62,10 +62,14 @@ COMPONENTS: dict[str, Callable[..., float]] = {
     "": lambda p, q, whole, m, other, v, e: p / m,
     "is never changed": lambda p, q, whole, m, other, v, e: 0.0,
     "has the wrong sign": lambda p, q, whole, m, other, v, e: -p / m,
-    "takes the other part of n": lambda p, q, whole, m, other, v, e: q / m,
-    "takes the other part of n, with the wrong sign": lambda p, q, whole, m, other, v, e: -q / m,
-    "is set, not changed (= for +=)": lambda p, q, whole, m, other, v, e: p / m - v,
-    "is set, not changed, with the wrong sign": lambda p, q, whole, m, other, v, e: -p / m - v,
+    "uses the other component of n": lambda p, q, whole, m, other, v, e: q / m,
+    "uses the other component of n, with the wrong sign": lambda p, q, whole, m, other, v, e: (
+        -q / m
+    ),
+    "is set instead of changed (= for +=)": lambda p, q, whole, m, other, v, e: p / m - v,
+    "is set instead of changed, with the wrong sign": lambda p, q, whole, m, other, v, e: (
+        -p / m - v
+    ),
     "is divided by the mass of the other": lambda p, q, whole, m, other, v, e: p / other,
     "is not divided by its mass": lambda p, q, whole, m, other, v, e: p,
     "is multiplied by its mass": lambda p, q, whole, m, other, v, e: p * m,

@@ -46,7 +46,7 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "they are moved by their distance, not by the overlap": lambda s, a, b: s.distance,
     "the overlap is taken of squares": lambda s, a, b: s.sizes**2 - s.distance**2,
     "the overlap is size plus distance": lambda s, a, b: s.sizes + s.distance,
-    "the squared distance is taken for the distance": lambda s, a, b: (
+    "the squared distance is used as the distance": lambda s, a, b: (
         (s.sizes - s.distance**2) / s.distance
     ),
     "brackets are missing: each is moved by sizes - distance / 2": lambda s, a, b: (
@@ -86,9 +86,9 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
         (q.balls, shift_of(q.balls, answers[name].last), answers[name].last)
         for name, q in COLLISIONS.items()
     ]
-    balls, shift, after = seen[0]
+    met = [near(s.a + s.b, s.overlap, 0.1) and near(s.across, 0.0, 0.1) for _, s, _ in seen]
+    balls, shift, after = seen[met.index(False) if False in met else 0]
     distance = float(np.hypot(*np.subtract(after[0].x, after[1].x)))
-    right = all(near(s.a + s.b, s.overlap, 0.1) for _, s, _ in seen)
     along = all(near(s.across, 0.0, 0.1) for _, s, _ in seen)
     backwards = found is not None and found.impulse == BACKWARDS
     explained = found is not None and bool(found.mistake) and found.task != "2b"
@@ -99,8 +99,8 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
             "How far apart are the centres of a pair after it?",
             f"{shown(distance)} m",
             f"{shown(shift.sizes)} m: they meet in one point",
-            right and along,
-            "" if right and along else BACKWARDS if backwards else total_cause(seen),
+            all(met),
+            "" if all(met) else BACKWARDS if backwards else total_cause(seen),
         ),
         judged(
             "normal",
@@ -109,11 +109,11 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
             f"{shown(shift.across)} m across it",
             "0 m across it",
             along,
-            across_cause(seen),
+            no_numbers(seen) or across_cause(seen),
         ),
         (
             split(balls, shift)
-            if right and along
+            if all(met)
             else not_asked("split", "2b", "they do not meet in one point")
         ),
     ]
@@ -122,7 +122,7 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
 
 def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
     """What a pair at relative rest says of the displacement; nothing if the impulse explains it or
-    is no number."""
+    is not a number."""
     still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
     kept = all(near(x.v, y.v) for x, y in zip(still, after))
     numbers = bool(np.isfinite([b.v for b in after]).all())
@@ -140,41 +140,55 @@ def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
                 "the displacement changes the velocity, too"
                 if numbers
                 else (
-                    "the velocities of a pair at relative rest become no numbers (a division by"
-                    " zero?)"
+                    "the velocities of a pair at relative rest become NaN or infinite (a division"
+                    " by zero?)"
                 )
             ),
         )
     ]
 
 
-def total_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
+Pairs = list[tuple[tuple[Ball, ...], Shift, list[Ball]]]
+"""Of every pair that collides: before the call, how it was displaced, after the call."""
+
+
+def total_cause(seen: Pairs) -> str:
     """The mistake that gives the displacement of all pairs; "" if none does."""
-    if lost := no_numbers(seen):
-        return lost
-    moved = [(abs(s.a) > 1e-9, abs(s.b) > 1e-9) for _, s, _ in seen]
-    if all(a and not b for a, b in moved) or all(b and not a for a, b in moved):
-        who = "A" if moved[0][0] else "B"
-        if all(near(s.a + s.b, s.overlap / 2, 0.1) for _, s, _ in seen):
+    mistakes = (no_numbers, half_of_one, b_as_a, across_cause, wrong_total)
+    return next((cause for mistake in mistakes if (cause := mistake(seen))), "")
+
+
+def no_numbers(seen: Pairs) -> str:
+    """That positions are lost, before any other cause is looked for; "" if none is."""
+    finite = np.isfinite([b.x for *_, after in seen for b in after]).all()
+    return "" if finite else "the positions become NaN or infinite"
+
+
+def half_of_one(seen: Pairs) -> str:
+    """That one sphere stays where it is and the other does only its half."""
+    halved = all(near(s.a + s.b, s.overlap / 2, 0.1) for _, s, _ in seen)
+    for who, still in (("A", "b"), ("B", "a")):
+        if halved and all(abs(getattr(s, still)) <= 1e-9 for _, s, _ in seen):
             return f"only {who} is moved, by half of the overlap"
-    if all(near(abs(s.a) + abs(s.b), s.overlap, 0.1) and s.a * s.b < 0 for _, s, _ in seen):
-        return "B is moved the same way as A: its sign is wrong"
+    return ""
+
+
+def b_as_a(seen: Pairs) -> str:
+    """That both go the same way, together by as much as the overlap."""
+    alike = (near(abs(s.a) + abs(s.b), s.overlap, 0.1) and s.a * s.b < 0 for _, s, _ in seen)
+    return "B is moved the same way as A: its sign is wrong" if all(alike) else ""
+
+
+def wrong_total(seen: Pairs) -> str:
+    """The formula of `TOTALS` that gives the way of both together, of pairs moved along their
+    normals."""
     if not all(near(s.across, 0.0, 0.1) for _, s, _ in seen):
-        return across_cause(seen)
+        return ""
     with np.errstate(all="ignore"):
         for name, law in TOTALS.items():
             if all(near(s.a + s.b, law(s, *balls), 0.1) for balls, s, _ in seen):
                 return name
     return ""
-
-
-def no_numbers(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
-    """That positions are lost, before any other cause is looked for; "" if none is."""
-    return (
-        ""
-        if np.isfinite([b.x for *_, after in seen for b in after]).all()
-        else "the positions become no numbers"
-    )
 
 
 # (n, A or B before, the other) -> the direction in which a mistake would move it
@@ -192,10 +206,8 @@ WAYS: dict[str, Callable[[Array, Ball, Ball], Array]] = {
 }
 
 
-def across_cause(seen: list[tuple[tuple[Ball, ...], Shift, list[Ball]]]) -> str:
+def across_cause(seen: Pairs) -> str:
     """Along what else they are moved, or one of them is; "" if along nothing that is known."""
-    if lost := no_numbers(seen):
-        return lost
     moved = [way_of([(b[who], b[1 - who], after[who]) for b, _, after in seen]) for who in (0, 1)]
     if moved[0] == moved[1]:
         return f"they are moved {moved[0]}" if moved[0] else ""
@@ -219,7 +231,8 @@ def way_of(seen: list[tuple[Ball, Ball, Ball]]) -> str | None:
         if near(crosses, 0.0, 0.01):
             return name
     return next(
-        (f"{which} is set, not changed (= for +=)" for which in SET if was_set(which, seen)), None
+        (f"{which} is set instead of changed (= for +=)" for which in SET if was_set(which, seen)),
+        None,
     )
 
 
@@ -243,22 +256,29 @@ def split(balls: tuple[Ball, ...], shift: Shift) -> CheckRow:
     a, b = balls
     share = shift.a / shift.overlap
     known = {
-        "shared equally": 0.5,
-        "shared by inverse mass": b.m / (a.m + b.m),
-        "A alone is moved": 1.0,
-        "shared by mass, so that the heavier moves farther": a.m / (a.m + b.m),
-        "B alone is moved": 0.0,
+        "both are moved by half of it": 0.5,
+        "it is shared by inverse mass": b.m / (a.m + b.m),
+        ONE.format("A", "B"): 1.0,
+        "it is shared by mass, so that the heavier is moved farther": a.m / (a.m + b.m),
+        ONE.format("B", "A"): 0.0,
     }
     how = next(
         (name for name, wanted in known.items() if near(share, wanted)),
-        f"A is moved by {share:.3g} of it",
+        f"A is moved by {share:.3g} of it, B by the rest",
     )
     centre = (a.m * shift.a - b.m * shift.b) / (a.m + b.m)
-    aside = "stays" if abs(centre) < 1e-9 else f"is moved by {shown(abs(centre))} m"
+    aside = "stays" if abs(centre) < 1e-9 else f"moves by {shown(abs(centre))} m"
     asked = f"How is the overlap shared, for masses of {shown(a.m)} and {shown(b.m)} kg?"
+    got = f"A {shown(shift.a)} m, B {shown(shift.b)} m"
     return CheckRow(
-        "split", "2b", asked, how, "any", "note", f"{how}; their centre of mass {aside}"
+        "split", "2b", asked, got, "any shares", "free choice", f"{how}; the centre of mass {aside}"
     )
+
+
+ONE = (
+    "only {0} is moved. The task asks to displace the two until they meet in one point and does not"
+    " say by how much each: all for {0} and nothing for {1} is read as one way to share it"
+)
 
 
 def separation(answer: Answer) -> CheckRow:
@@ -266,14 +286,16 @@ def separation(answer: Answer) -> CheckRow:
     shift = shift_of(QUESTIONS["separate"].balls, answer.last)
     moved = abs(shift.a) + abs(shift.b) > 1e-9
     said = (
-        "displaced as any other" if moved else "left as it is: an early return for pairs that part"
+        "it is displaced like any other pair"
+        if moved
+        else "it is left as it is: the function returns early where spheres move apart"
     )
     return CheckRow(
         "separating pair",
         "2b",
         "Is a pair displaced that overlaps and moves apart?",
         "yes" if moved else "no",
-        "yes, or no if it returns early",
-        "note",
+        "yes or no",
+        "free choice",
         said,
     )

@@ -75,9 +75,10 @@ class RowItem(pytest.Item):
         """The row in words, without a stack that is not the solver's."""
         if not isinstance(excinfo.value, Fault):
             return str(super().repr_failure(excinfo, *given, **named))
-        row = self.row
-        lines = {"came": row.got, "expected": row.expected, "likely": row.cause, "read": row.read}
-        return "\n".join([row.asked, *(f"  {name + ':':10}{text}" for name, text in lines.items())])
+        from reports.check.machine import evidence
+
+        likely = f"likely: {self.row.cause}"
+        return "\n  ".join([self.row.asked, likely, *evidence(self.row)])
 
     def reportinfo(self) -> tuple[Path, None, str]:
         """Where the test is said to be."""

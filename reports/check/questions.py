@@ -1,19 +1,24 @@
-"""The tiny states a solver is asked about, and its answers: one request for all of them."""
+"""The tiny states a solver is asked about, and its answers, which must not depend on each other."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
+from adapters.own_solver.process import Request, SolverProcess
+from reports.check.rows import TOLERANCE
 from scenarios.model import Array
 
 LIMIT = 1.0  # s a question may take: it needs a few microseconds
+TOGETHER = 50  # fresh worlds of a request: what it may take is limited, too
+BEGINNING = 2.0  # s that initScene may take
+LOADING = 3.0  # s that the file may take to be loaded anew
 
 
 class Ball(NamedTuple):
@@ -52,11 +57,24 @@ def ball(numbers: ArrayLike) -> Ball:
 
 
 class Question(NamedTuple):
-    """Spheres and what is called on them; `world`: they are the file's own ufo and asteroids."""
+    """Spheres and what is called on them; `world`: they are the file's own ufo and asteroids;
+    `watch`: the answer has the calls that the file makes of its own functions."""
 
     balls: tuple[Ball, ...]
     calls: tuple[tuple[Any, ...], ...]
     world: bool = False
+    watch: bool = False
+
+    @property
+    def request(self) -> dict[str, object]:
+        """As the worker takes it."""
+        spheres = [b.numbers() for b in self.balls]
+        return {
+            "spheres": spheres,
+            "calls": self.calls,
+            "world": self.world,
+            "watch": self.watch,
+        }
 
 
 @dataclass(frozen=True)
@@ -68,6 +86,9 @@ class Answer:
         returned: whether a function gave back an object.
         strayed: whether the file's own ufo or asteroids changed, though they had no part in it.
         strange: fields that the spheres did not have before.
+        kept: global numbers of the file that the calls have changed.
+        calls: what the file called, of a question that is watched: ("integrate", sphere, dt),
+            ("collide", sphere, sphere), ("wrap",).
         failed: how it failed, or None.
     """
 
@@ -75,6 +96,8 @@ class Answer:
     returned: bool = False
     strayed: bool = False
     strange: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()
+    calls: tuple[tuple[Any, ...], ...] = ()
     failed: SolverFailed | None = None
 
     @property
@@ -175,17 +198,83 @@ def questions() -> dict[str, Question]:
 QUESTIONS = questions()
 
 
-def ask(process: SolverProcess, asked: dict[str, Question]) -> dict[str, Answer]:
-    """The answers by name; raises `SolverFailed` if the process is lost."""
-    requests = [
-        (
-            "ask",
-            {"spheres": [b.numbers() for b in q.balls], "calls": q.calls, "world": q.world},
-            LIMIT,
-        )
-        for q in asked.values()
-    ]
-    return {name: answered(reply) for name, reply in zip(asked, process.request(requests))}
+def ask(
+    process: SolverProcess, asked: dict[str, Question], afresh: bool = False
+) -> dict[str, Answer]:
+    """The answers by name; `afresh`: each question in a world of its own, else all in the one that
+    is there. Raises `SolverFailed` if the process is lost."""
+    before = fresh_world(process) if afresh else []
+    answers: dict[str, Answer] = {}
+    # One request for all, where the worker puts no call again that did not come back.
+    for names in batched(asked, TOGETHER if afresh else len(asked)):
+        requests: list[Request] = []
+        for name in names:
+            requests += [*before, ("ask", asked[name].request, LIMIT)]
+        replies = process.request(requests)[len(before) :: len(before) + 1]
+        answers |= {name: answered(reply) for name, reply in zip(names, replies)}
+    return answers
+
+
+def batched(names: Iterable[str], size: int) -> Iterator[list[str]]:
+    """The names in lists of at most `size`."""
+    left = iter(names)
+    while batch := list(islice(left, size)):
+        yield batch
+
+
+def fresh_world(process: SolverProcess) -> list[Request]:
+    """Requests that load the file anew, and let it make its scene."""
+    begin: list[Request] = [("begin", None, BEGINNING)] if process.functions["begin"] else []
+    return [("renew", None, LOADING), *begin]
+
+
+def ask_in_two_orders(
+    process: SolverProcess, asked: dict[str, Question]
+) -> tuple[dict[str, Answer], dict[str, Answer]]:
+    """The answers of a fresh world to each question, and those that came otherwise where more was
+    asked before.
+
+    A fresh world takes V8 10 ms. So all are asked in one world and then, in the other order, in a
+    second one: where both answer the same, what was asked before does not matter. Where they do
+    not, each question gets a world of its own.
+    """
+    process.request(fresh_world(process))
+    answers = ask(process, asked)
+    if stuck(answers):
+        return answers, {}
+    process.request(fresh_world(process))
+    again = ask(process, dict(reversed(asked.items())))
+    if all(name in BY_CHANCE or alike(answers[name], again[name]) for name in asked):
+        return answers, {}
+    alone = ask(process, asked, afresh=True)
+    others = {
+        name: other
+        for name in asked
+        if name not in BY_CHANCE
+        for other in (answers[name], again[name])
+        if not alike(alone[name], other)
+    }
+    return alone, others
+
+
+BY_CHANCE = ("same centre",)  # who has no direction may draw one
+
+
+def alike(one: Answer, other: Answer) -> bool:
+    """Whether two answers say the same of the spheres."""
+    if bool(one.failed) != bool(other.failed) or len(one.balls) != len(other.balls):
+        return False
+    first, second = (
+        np.array([b.numbers() for balls in answer.balls for b in balls]) for answer in (one, other)
+    )
+    return np.allclose(first, second, rtol=TOLERANCE, atol=TOLERANCE, equal_nan=True)
+
+
+def stuck(answers: dict[str, Answer]) -> bool:
+    """Whether a call had to be stopped: whatever makes it again would have to be stopped, too."""
+    return any(
+        answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values()
+    )
 
 
 def answered(reply: dict[str, Any] | SolverFailed) -> Answer:
@@ -194,7 +283,15 @@ def answered(reply: dict[str, Any] | SolverFailed) -> Answer:
         return Answer([], failed=reply)
     failed = None if reply["error"] is None else SolverFailed(**reply["error"])
     balls = [[ball(numbers) for numbers in state] for state in reply["states"]]
-    return Answer(balls, reply["returned"], reply["strayed"], tuple(reply["strange"]), failed)
+    return Answer(
+        balls,
+        reply["returned"],
+        reply["strayed"],
+        tuple(reply["strange"]),
+        tuple(reply["kept"]),
+        tuple(map(tuple, reply["calls"])),
+        failed,
+    )
 
 
 def direction(a: Ball, b: Ball) -> tuple[Array, float]:

@@ -32,8 +32,7 @@ class Restitution:
     Attributes:
         own: the value written into it, or the exercise's if none is found.
         named: whether it is written in, by a name or as a number.
-        absurd: whether what came is no number from 0 to 1, and a name such as e or restitution gets
-            it.
+        absurd: whether what came is not from 0 to 1, and a name such as e or restitution gets it.
         came: separation over approach speed of two equal spheres that meet head-on at 2 m/s.
         slow, fast: the same at 2 mm/s and at 200 m/s.
     """
@@ -67,27 +66,24 @@ class Restitution:
         )
 
     def row(self, mistake: str) -> CheckRow:
-        """0.9 is right, another number is a note if the file says so, and a fault if it says
+        """0.9 is right; another number is a free choice if the file says so, a fault if it says
         something else.
 
         `mistake`: what is known to be wrong with the collisions, if anything.
         """
-        asked = "What part of its closing speed has a pair when it parts?"
+        asked = "What is the restitution e, the speed of separation over that of approach?"
         if near(self.came, EXERCISE):
             return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
         if near(self.came, self.own) or len(self.candidates) > 1:
             note = (
-                f"e = {shown(self.came)} is written into the file; the exercise has 0.9. It is"
-                " judged by its own"
+                f"the file has e = {shown(self.came)}, the exercise 0.9; all is judged with the"
+                " file's"
             )
             return CheckRow(
-                "restitution", "2c", asked, shown(self.came), shown(EXERCISE), "note", note
+                "restitution", "2c", asked, shown(self.came), shown(EXERCISE), "free choice", note
             )
-        cause = mistake if np.isfinite(self.came) else "the velocities become no numbers"
-        cause = (
-            cause
-            or f"e = {shown(self.own)} is written into the file, but its collisions have another"
-        )
+        cause = mistake if np.isfinite(self.came) else "the velocities become NaN or infinite"
+        cause = cause or f"the file has e = {shown(self.own)}, but its collisions have another"
         return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
 
     def speeds(self, mistake: str) -> CheckRow:

@@ -9,12 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-Verdict = Literal["right", "fault", "note", "not asked"]
+Verdict = Literal["right", "fault", "free choice", "not asked"]
 # Single precision is allowed: a dozen operations of 6e-8 each. What is wrong is wrong by far more
 # than that.
 TOLERANCE = 1e-6
 FOLLOWS = "it follows from the faults above"
-UNKNOWN = "unknown: no common mistake gives these numbers"
+SAME_AGAIN = "same answer again"  # the row on state that a file keeps between calls
+UNKNOWN = "unknown: none of the known mistakes gives these numbers"
 TASKS = {
     "file": "the file",
     "1": "1 integrate",
@@ -22,11 +23,11 @@ TASKS = {
     "2b": "2b project",
     "2c": "2c impulse",
     "2d": "2d velocities",
-    "loop": "the step around them",
+    "loop": "the step, performSimStep",
     "scenes": "whole scenes",
 }
 READ = {
-    "file": "the exercise's text: only the two tasks are to be filled in",
+    "file": "the exercise's text: only the two tasks are to be written",
     "1": "the exercise, task 1; reference_impl/exercise.py, integrate",
     "2a": "the exercise, task 2 (a); reference_impl/exercise.py, collide (a)",
     "2b": "the exercise, task 2 (b); reference_impl/exercise.py, collide (b)",
@@ -35,6 +36,27 @@ READ = {
     "loop": "performSimStep and projectObjects as the exercise hands them out",
     "scenes": "scenarios/truth/closed_forms.py, scenarios/truth/exact.py",
 }
+# The formula of the exercise, by the row's name where it has one of its own, else by its task; a
+# prime marks the value after the step or the collision.
+FORMULAS = {
+    "velocity": "v' = v + F / mass dt",
+    "position": "x' = x + v' dt, with the new velocity v'",
+    "spin": "w' = w + torque / MoI dt",
+    "angle": "alpha' = alpha + w' dt, with the new angular velocity w'",
+    "coasting": "v' = v + F / mass dt, w' = w + torque / MoI dt, here with F = 0 and torque = 0",
+    "2a": "the spheres collide if |xA - xB| < sizeA + sizeB",
+    "2b": "|xA' - xB'| = sizeA + sizeB; both are moved along n = (xA - xB) / |xA - xB|",
+    "2c": "J = -(1 + e) (vA - vB).n / (n.n (1/mA + 1/mB)), e = 0.9",
+    "2d": "vA' = vA + J n / mA, vB' = vB - J n / mB",
+    "all spheres": "integrate the ufo and every asteroid, once",
+    "integration first": "integrate every sphere, then handle the collisions, then projectObjects",
+    "pairs": "every asteroid with the ufo; for i < j the pair of asteroids i and j",
+    "itself": "for i < j the pair of asteroids i and j: j begins at i + 1",
+    "edges in a step": "projectObjects ends the step",
+    "edges": "a centre beyond an edge is set onto the opposite edge",
+    "ufo": "a ufo that leaves the box is set back to its start",
+}
+WITHOUT_FORMULA = ("implemented", "input only", SAME_AGAIN, "rest kept", "sphere kept")
 
 
 @dataclass(frozen=True)
@@ -46,9 +68,10 @@ class CheckRow:
         task: the key in `TASKS` of the part of the exercise it belongs to.
         asked: the question, one sentence.
         got, expected: the answer and the right one, with units.
-        verdict: "right"; "fault"; "note": as the author chose where the exercise leaves the choice;
-            "not asked": it could not be asked, and `cause` says why.
-        cause: of a fault its likely cause; of a note what the choice is.
+        verdict: "right"; "fault"; "free choice": the exercise leaves it to the author, so that no
+            answer is wrong; "not asked": it could not be asked, and `cause` says why.
+        cause: of a fault its likely cause; of a free choice what was chosen.
+        lines: of a fault the lines of the file that it is about: number from 1, text.
     """
 
     name: str
@@ -58,11 +81,19 @@ class CheckRow:
     expected: str
     verdict: Verdict
     cause: str = ""
+    lines: Sequence[tuple[int, str]] = ()
 
     @property
     def read(self) -> str:
         """Where to read how it is meant."""
         return READ[self.task]
+
+    @property
+    def formula(self) -> str:
+        """The exercise's formula for it; "" if it has none."""
+        if self.name in WITHOUT_FORMULA:
+            return ""
+        return FORMULAS.get(self.name, FORMULAS.get(self.task, ""))
 
 
 def judged(
@@ -121,5 +152,5 @@ def shown(value: object) -> str:
 def worst(rows: Iterable[CheckRow]) -> Verdict:
     """The verdict of a group of rows: its worst."""
     found = {row.verdict for row in rows}
-    order: tuple[Verdict, ...] = ("fault", "not asked", "right", "note")
+    order: tuple[Verdict, ...] = ("fault", "not asked", "right", "free choice")
     return next((verdict for verdict in order if verdict in found), "not asked")

@@ -12,6 +12,8 @@ import numpy as np
 from adapters.own_solver.engine import spheres_of
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
+from reports.check.functions import keeps_state
+from reports.check.questions import fresh_world
 from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
@@ -44,9 +46,13 @@ def step_of(process: SolverProcess) -> float:
     return DT if process.surface == "exercise" else 5 * DT
 
 
-def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> SceneAnswer:
-    """Play it by the file's own functions; its forces last as long as it does. Raises
-    `SolverFailed`."""
+def play_scene(
+    process: SolverProcess, scenario: Scenario, dt: float, afresh: bool = False
+) -> SceneAnswer:
+    """Play it by the file's own functions; its forces last as long as it does.
+
+    afresh: load the file anew before it, as one that keeps state needs. Raises `SolverFailed`.
+    """
     scene, count = scenario.scene, round(scenario.sample_interval / dt)
     forces = np.zeros((scene.n, 3))
     for thrust in scenario.thrusts:
@@ -58,10 +64,12 @@ def play_scene(process: SolverProcess, scenario: Scenario, dt: float) -> SceneAn
         "gravity": [0.0, 0.0],
         "wrap": None,
     }
-    requests = [("load", start, LIMIT), ("read", None, LIMIT)]
+    before = fresh_world(process) if afresh else []
+    requests = [*before, ("load", start, LIMIT), ("read", None, LIMIT)]
     for _ in range(scenario.samples):
         requests += [("step", step, LIMIT), ("read", None, LIMIT)]
-    *answers, contacts = process.request([*requests, ("contacts", None, LIMIT)], SCENE_LIMIT)
+    requests.append(("contacts", None, LIMIT))
+    *answers, contacts = process.request(requests, SCENE_LIMIT)[len(before) :]
     failed = next(
         (answer for answer in (*answers, contacts) if isinstance(answer, SolverFailed)), None
     )
@@ -88,11 +96,11 @@ def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None
     found, wrong, dt = [], "", step_of(process)
     try:
         for scenario, record in scenes(round(e, 9)):
-            played = play_scene(process, scenario, dt)
+            played = play_scene(process, scenario, dt, keeps_state(rows))
             found.append(scene_row(scenario, record, played, dt, FOLLOWS if blamed else ""))
             wrong = wrong or first_wrong(scenario, played.contacts, dt)
             if not np.isfinite(played.position).all():
-                break  # what is no number may also be slow, and says no more in the other scenes
+                break  # what is not a number may also be slow, and says no more in the other scenes
     except SolverFailed as failure:
         return [
             judged(
@@ -110,7 +118,7 @@ def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None
         judged(
             "first wrong collision",
             "scenes",
-            "Is every collision in these scenes right by itself?",
+            "Does every collision of these scenes follow the formula from the state before it?",
             wrong or "yes",
             "yes",
             not wrong,
@@ -232,7 +240,7 @@ def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
         return (
             ""
             if near(states[1], states[0])
-            else f"they react at a distance of {shown(d)} m, beyond {shown(reach)} m"
+            else f"they collide at a distance of {shown(d)} m, beyond {shown(reach)} m"
         )
     n, apart = r / d, float(np.hypot(*(a2[:2] - b2[:2])))
     vn = float((a[2:] - b[2:]) @ n)
@@ -298,7 +306,7 @@ def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
     many digits."""
     forced = Scenario(
         name="forced",
-        asks="Where is a sphere that a force forces and a torque turns for a second?",
+        asks="Where is a sphere after a second of a constant force and torque?",
         source="F = m a",
         scene=scene_of([[-1.0, 0.5, 0.6, -0.2]], [0.3], [1.4], e),
         duration=1.0,

@@ -3,9 +3,10 @@ forms alone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from tempfile import TemporaryDirectory
 from time import monotonic
 
@@ -37,6 +38,8 @@ Sphere = tuple[int, int, int, int, int, int]
 """x, y in half metres, vx, vy in m/s, radius in quarters of a metre, mass in kg."""
 Example = tuple[list[Sphere], tuple[int, int, int]]
 """The spheres, and the thrust of one that is alone: force x, y in N, torque in tenths of a N m."""
+Play = Callable[[Scenario], SceneAnswer]
+"""A scene by the solver's file, in steps of `DT`."""
 # Tried before any is sampled: on a busy machine the time may be up before a pair that collides is.
 FIRST: list[Example] = [
     ([(0, 0, 1, 1, 1, 2)], (1, 2, 1)),
@@ -56,14 +59,18 @@ class Smallest:
     truth: Trajectory | None
 
 
-def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
-    """The smallest that is found within `SECONDS`; None if none shows a fault."""
-    best = next((example for example in FIRST if fault_of(process, *example, e)), None)
+def smallest_scene(process: SolverProcess, e: float, afresh: bool = False) -> Smallest | None:
+    """The smallest that is found within `SECONDS`; None if none shows a fault.
+
+    afresh: each scene is played by the file loaded anew, as one that keeps state needs.
+    """
+    play = partial(play_scene, process, dt=DT, afresh=afresh)
+    best = next((example for example in FIRST if fault_of(play, *example, e)), None)
     deadline = monotonic() + SECONDS
 
     def faulty(example: Example) -> bool:
         nonlocal best
-        if monotonic() > deadline or not fault_of(process, *example, e):
+        if monotonic() > deadline or not fault_of(play, *example, e):
             return False
         best = example if best is None else min(best, example, key=size)
         return True
@@ -83,7 +90,7 @@ def smallest_scene(process: SolverProcess, e: float) -> Smallest | None:
     # nothing found, or the time was up while it shrank
     with homeless(), suppress(NoSuchExample, Flaky):
         find(scene, faulty, settings=rules)
-    return shown_by(process, *without_idlers(process, *best, e), e) if best else None
+    return shown_by(play, *without_idlers(play, *best, e), e) if best else None
 
 
 def size(example: Example) -> tuple[int, int]:
@@ -107,14 +114,14 @@ def homeless() -> Iterator[None]:
 
 
 def without_idlers(
-    process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float
+    play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float
 ) -> tuple[list[Sphere], tuple[int, int, int]]:
     """The scene without the spheres that the fault does not need: the time may be up before
     hypothesis sees to it."""
     for k in range(len(spheres)):
         fewer = spheres[:k] + spheres[k + 1 :]
-        if fewer and fault_of(process, fewer, thrust, e):
-            return without_idlers(process, fewer, thrust, e)
+        if fewer and fault_of(play, fewer, thrust, e):
+            return without_idlers(play, fewer, thrust, e)
     return spheres, thrust
 
 
@@ -153,15 +160,13 @@ def scenario_of(
     )
 
 
-def fault_of(
-    process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float
-) -> str:
+def fault_of(play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float) -> str:
     """What is wrong with the file's motion in a scene; "" if nothing is, or it is no scene."""
     scenario = scenario_of(spheres, thrust, e, DURATION)
     if scenario is None:
         return ""
     try:
-        played = play_scene(process, scenario, DT)
+        played = play(scenario)
     except SolverFailed as failure:
         return str(failure) if failure.kind == "error" else ""
     return first_wrong(scenario, played.contacts, DT) or flight_fault(scenario, played)
@@ -191,14 +196,12 @@ def flight_fault(scenario: Scenario, played: SceneAnswer) -> str:
     return ""
 
 
-def shown_by(
-    process: SolverProcess, spheres: list[Sphere], thrust: tuple[int, int, int], e: float
-) -> Smallest:
+def shown_by(play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float) -> Smallest:
     """The scene with the file's motion and the exact one."""
     scenario = scenario_of(spheres, thrust, e, INTERVAL)
     assert scenario is not None
-    fault = fault_of(process, spheres, thrust, e)
-    played = play_scene(process, scenario, DT)
+    fault = fault_of(play, spheres, thrust, e)
+    played = play(scenario)
     kicked = [row for row in played.contacts if not near(row[[5, 6, 9, 10]], row[[13, 14, 17, 18]])]
     collisions = Collisions.of(
         [((row[0] + 1) * DT, int(row[1]), int(row[2]), float("nan")) for row in kicked]

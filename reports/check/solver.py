@@ -11,13 +11,14 @@ import numpy as np
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.detection import detection_rows
-from reports.check.functions import implemented
+from reports.check.functions import implemented, same_again
 from reports.check.impacts import APPROACH, BACKWARDS, explain
-from reports.check.impulse import impulse_not_asked, impulse_rows
+from reports.check.impulse import impulse_rows
+from reports.check.lines import SHOWN, Source
 from reports.check.loop import loop_rows
 from reports.check.motion import motion_rows
 from reports.check.projection import moved_together, projection_rows
-from reports.check.questions import COLLISIONS, QUESTIONS, Answer, ask
+from reports.check.questions import COLLISIONS, QUESTIONS, Answer, ask_in_two_orders, stuck
 from reports.check.restitution import Restitution, code_of, restitution_of
 from reports.check.rows import CheckRow, judged, not_asked
 from reports.check.scenes import scene_rows
@@ -60,25 +61,35 @@ LOADS = "Can the file be loaded, and does it leave the language as it is?"
 def rows_of(process: SolverProcess, text: str) -> tuple[list[CheckRow], float | None]:
     """The rows of a file that is loaded, and its restitution; raises `SolverFailed` if its process
     is lost."""
-    # Makes the globals that must not change; judged with the step.
-    begun = process.request([("begin", None, 2.0)])[0] if process.functions["begin"] else None
     asked = {
         k: q
         for k, q in QUESTIONS.items()
         if process.functions["integrate" if k in MOTION else "collide"]
     }
-    answers = ask(process, asked)
-    rows = [loads(process), *task_1(process, answers, text)]
-    contact, restitution = task_2(process, answers, text)
+    answers, others = ask_in_two_orders(process, asked)
+    source = Source(process, text)
+    rows = [loads(process), *task_1(process, answers, others, text)]
+    contact, restitution = task_2(process, answers, others, source)
     rows += contact
     faulty = any(row.verdict == "fault" for row in rows)
     if stuck(answers):
-        rows.append(not_asked("step", "loop", "a call did not come back"))
+        rows.append(not_asked("step", "loop", "a call did not return"))
     else:
-        rows += loop_rows(process, faulty, begun)
+        rows += loop_rows(process, faulty)
     e = restitution.played if restitution is not None else None
     rows += scene_rows(process, rows, e)
-    return hinted(rows, text) if process.kind == "javascript" else rows, e
+    rows = hinted(rows, text) if process.kind == "javascript" else rows
+    return with_lines(rows, source), e
+
+
+def with_lines(rows: list[CheckRow], source: Source) -> list[CheckRow]:
+    """The rows, each fault with the lines of the file that it is about."""
+    try:
+        return [
+            replace(row, lines=source.of(row)) if row.verdict == "fault" else row for row in rows
+        ]
+    except SolverFailed:  # the process is lost; the rows say how the file fails
+        return rows
 
 
 def hinted(rows: list[CheckRow], text: str) -> list[CheckRow]:
@@ -104,13 +115,6 @@ SET_IN_CONDITION = re.compile(r"\b(if|while)\s*\(\s*[\w.]+\s*=(?![=>])")
 MOTION = ("force", "force, other numbers", "coast", "force twice")
 
 
-def stuck(answers: dict[str, Answer]) -> bool:
-    """Whether a call had to be stopped: whatever makes it again would have to be stopped, too."""
-    return any(
-        answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values()
-    )
-
-
 def loads(process: SolverProcess) -> CheckRow:
     """Loaded, and which built-ins it has replaced for everybody."""
     replaced = process.functions["replaced"]
@@ -126,36 +130,50 @@ def loads(process: SolverProcess) -> CheckRow:
     )
 
 
-def task_1(process: SolverProcess, answers: dict[str, Answer], text: str) -> list[CheckRow]:
-    """The rows of integrate."""
+def task_1(
+    process: SolverProcess, answers: dict[str, Answer], others: dict[str, Answer], text: str
+) -> list[CheckRow]:
+    """The rows of integrate; `others`: the answers that came otherwise after other questions."""
     mine = {name: answer for name, answer in answers.items() if name in MOTION}
-    rows, usable = implemented("1", process.functions["integrate"], mine, text)
-    return rows + (
-        motion_rows(mine)
-        if usable
-        else [not_asked("velocity", "1", "integrate cannot be judged further")]
-    )
+    rows, usable = implemented("1", process.functions["integrate"], mine, text, lambda name: "1")
+    if not usable:
+        return [*rows, not_asked("velocity", "1", "integrate cannot be judged further")]
+    return [*rows, *same_again("integrate", mine, others), *motion_rows(mine)]
 
 
 def task_2(
-    process: SolverProcess, answers: dict[str, Answer], text: str
+    process: SolverProcess, answers: dict[str, Answer], others: dict[str, Answer], source: Source
 ) -> tuple[list[CheckRow], Restitution | None]:
     """The rows of the collision function, and its restitution where it has one."""
-    mine = {name: answer for name, answer in answers.items() if name not in MOTION}
-    rows, usable = implemented("2a", process.functions["collide"], mine, text)
+    mine, text = {k: answer for k, answer in answers.items() if k not in MOTION}, source.text
+
+    def part(name: str) -> str:
+        question = SHOWN["2"] if mine[SHOWN["2"]].failed else name
+        failed = mine[question].failed
+        return source.part_of(question, failed.line if failed else 0)
+
+    rows, usable = implemented("2a", process.functions["collide"], mine, text, part)
     if not usable:
         why = "the collision function cannot be judged further"
-        return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None
+        return rows + not_judged(rows[0].task, why), None
     rows += detection_rows(mine, text)
     if not reacts(mine):
         why = "the overlapping pairs of these questions are taken to be apart"
-        return rows + [not_asked("one point", "2b", why), *impulse_not_asked(why)], None
+        return rows + not_judged("2a", why), None
     restitution = restitution_of(text, mine)
     found = explain(mine, restitution)
     if found is not None and found.impulse == APPROACH and moved_together(mine):
         found = replace(found, impulse=BACKWARDS)
+    rows += same_again("sphereSphereCollisionHandling", mine, others)
     rows += projection_rows(mine, found)
-    return rows + impulse_rows(mine, restitution, found), restitution
+    rows += impulse_rows(mine, restitution, found)
+    return sorted(rows, key=lambda row: row.task), restitution
+
+
+def not_judged(but: str, why: str) -> list[CheckRow]:
+    """A row for each part of task 2 that could not be asked, without the part that says why."""
+    first = {"2a": "reach", "2b": "one point", "2c": "impulse", "2d": "velocity of A"}
+    return [not_asked(name, task, why) for task, name in first.items() if task != but]
 
 
 def reacts(answers: dict[str, Answer]) -> bool:

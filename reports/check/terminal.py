@@ -10,22 +10,26 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters.own_solver.file import printable
-from reports.check.rows import TASKS
+from reports.check.rows import FOLLOWS, TASKS, CheckRow
 from reports.check.verdict import FileCheck
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import legible
 from reports.terminal.tables import print_table
 
-STYLE = {"right": "green", "fault": "bold red", "note": "yellow", "not asked": "dim"}
-SHORT = {"right": "ok", "note": "ok", "fault": "FAULT", "not asked": "-"}
+STYLE = {"right": "green", "fault": "bold red", "free choice": "yellow", "not asked": "dim"}
+SHORT = {"right": "ok", "free choice": "ok", "fault": "FAULT", "not asked": "-"}
 
 
 def print_file(one: FileCheck) -> None:
-    """The sentences, the verdict of every task, then the faults and the free choices."""
+    """The sentences with the lines they are about, the verdict of every task, all faults, and the
+    free choices under a title that says what they are."""
     console = Console()
-    for k, sentence in enumerate(one.sentences):
-        console.print(sentence if one.passed else f"{k + 1}. {sentence}", highlight=False)
+    if one.passed:
+        console.print(one.sentences[0], highlight=False)
+    for k, (sentence, row) in enumerate(zip(one.sentences, one.findings), 1):
+        console.print(f"{k}. {sentence}", highlight=False)
+        print_source(console, row)
     console.print()
     table = Table("task", "verdict", "questions", "faults", box=None, padding=(0, 2, 0, 0))
     for task, title in TASKS.items():
@@ -35,17 +39,37 @@ def print_file(one: FileCheck) -> None:
             faults = sum(row.verdict == "fault" for row in rows)
             table.add_row(title, Text(word, STYLE[word]), str(asked), str(faults or ""))
     console.print(table)
-    details = Table(
-        "task", "row", "came", "expected", "cause or choice", box=None, padding=(0, 2, 0, 0)
-    )
-    shown = [row for row in one.rows if row.verdict in ("fault", "note")]
-    for row in shown:
-        details.add_row(
-            row.task, Text(row.name, STYLE[row.verdict]), row.got, row.expected, row.cause
+    if one.faults:
+        print_rows(console, "All faults:", [row for row in one.faults if row.cause != FOLLOWS])
+        follow = [row.name for row in one.faults if row.cause == FOLLOWS]
+        if follow:
+            console.print(f"  These follow from the faults above: {', '.join(follow)}.")
+    if one.choices:
+        print_rows(
+            console, "Free choices. The exercise leaves them open; none is a fault:", one.choices
         )
-    if shown:
-        console.print()
-        console.print(details)
+
+
+def print_source(console: Console, row: CheckRow) -> None:
+    """The lines of the file that a fault is about, and the formula of the exercise."""
+    given = [(f"line {line}", text) for line, text in row.lines]
+    given += [("exercise", row.formula)] * bool(row.formula)
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    for name, text in given:
+        grid.add_row(Text(name, "dim"), text)
+    if given:
+        console.print(Padding(grid, (0, 0, 0, 3)))
+
+
+def print_rows(console: Console, title: str, rows: Sequence[CheckRow]) -> None:
+    """A title, and a row a paragraph: its verdict in a word, where it belongs, what is said."""
+    console.print(f"\n{title}", highlight=False)
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    for row in rows:
+        numbers = f" (came: {row.got}; expected: {row.expected})" if row.verdict == "fault" else ""
+        said = Text.assemble((row.name, "bold"), f": {legible(row.cause + numbers)}")
+        grid.add_row(Text(row.verdict, STYLE[row.verdict]), row.task, said)
+    console.print(Padding(grid, (0, 0, 0, 2)))
 
 
 def name_in(folder: Path, one: FileCheck) -> str:

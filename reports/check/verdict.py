@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.own_solver.file import NotASolver, SolverText, read_solver
-from reports.check.rows import FOLLOWS, TASKS, CheckRow, Verdict, worst
+from reports.check.rows import FOLLOWS, SAME_AGAIN, TASKS, CheckRow, Verdict, worst
 from reports.check.solver import examine
 
 MOST = 3  # sentences
@@ -34,6 +34,16 @@ class FileCheck:
         return [row for row in self.rows if row.verdict == "fault"]
 
     @property
+    def choices(self) -> list[CheckRow]:
+        """The rows on what the exercise leaves free."""
+        return [row for row in self.rows if row.verdict == "free choice"]
+
+    @property
+    def asked(self) -> list[CheckRow]:
+        """The rows that could be asked."""
+        return [row for row in self.rows if row.verdict != "not asked"]
+
+    @property
     def passed(self) -> bool:
         """Whether no fault was found."""
         return not self.refused and not self.faults
@@ -54,28 +64,32 @@ class FileCheck:
         if self.refused:
             return [self.refused]
         if not self.faults:
-            asked = [row for row in self.rows if row.verdict in ("right", "note")]
             return [
-                f"No fault found: {len(asked)} questions,"
-                f" {sum(row.verdict == 'note' for row in asked)} free choices."
+                f"No fault found: {len(self.asked)} questions, {len(self.choices)} of them about"
+                " free choices."
             ]
+        return [sentence(row) for row in self.findings]
+
+    @property
+    def findings(self) -> list[CheckRow]:
+        """The faults that the sentences are about, in their order."""
         first = {row.cause: row for row in reversed(self.faults) if row.cause != FOLLOWS}
-        rows = sorted(first.values(), key=self.faults.index) or self.faults[:1]
-        return [sentence(row) for row in rows[:MOST]]
+        return (sorted(first.values(), key=self.faults.index) or self.faults[:1])[:MOST]
 
 
 def sentence(row: CheckRow) -> str:
     """Where, what is likely wrong, and the numbers that say so."""
-    numbers = (
-        ""
-        if row.name in ("implemented", "loads", "answers")
-        else f" Came: {row.got}. Expected: {row.expected}."
-    )
-    return (
-        f"Task {TASKS[row.task]}, {row.name}: {row.cause}.{numbers}"
-        if row.task[0] in "12"
-        else (f"{TASKS[row.task].capitalize()}, {row.name}: {row.cause}.{numbers}")
-    )
+    numbers = "" if row.name in WITHOUT_NUMBERS else f" Came: {row.got}. Expected: {row.expected}."
+    name = "" if row.name in WITHOUT_NUMBERS else f", {row.name}"
+    return f"{task_title(row.task)}{name}: {row.cause}.{numbers}"
+
+
+WITHOUT_NUMBERS = ("implemented", "loads", "answers", SAME_AGAIN)
+
+
+def task_title(task: str) -> str:
+    """The name of a task at the beginning of a sentence."""
+    return f"Task {TASKS[task]}" if task[0] in "12" else TASKS[task][0].upper() + TASKS[task][1:]
 
 
 def check_file(path: Path) -> FileCheck:

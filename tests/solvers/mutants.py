@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +19,11 @@ CORRECT = sorted(
 
 class Mutant(NamedTuple):
     """A patch: in the correct file `base`, `old` becomes `new`; task and a piece of the cause that
-    must come first."""
+    must come first.
+
+    also: further changes, each an old and a new text.
+    second: of a file with two faults the task of the other and a piece of its cause.
+    """
 
     name: str
     base: str
@@ -26,13 +31,17 @@ class Mutant(NamedTuple):
     cause: str
     old: str
     new: str
+    also: Sequence[tuple[str, str]] = ()
+    second: tuple[str, str] | None = None
 
     def write(self, folder: Path) -> Path:
         """The faulty file in `folder`."""
         text = (HERE / "correct" / self.base).read_text()
-        assert self.old in text, f"{self.name}: the patch does not fit {self.base}"
+        for old, new in [(self.old, self.new), *self.also]:
+            assert old in text, f"{self.name}: the patch does not fit {self.base}"
+            text = text.replace(old, new)
         path = folder / self.name
-        path.write_text(text.replace(self.old, self.new))
+        path.write_text(text)
         shutil.copy(GL_MATRIX, folder)
         return path
 

@@ -22,6 +22,8 @@ COLUMNS = (
     "reported first in",
     "first cause",
     "first cause is right",
+    "second fault is in",
+    "second is found",
 )
 
 
@@ -32,9 +34,9 @@ def judged(paths: Sequence[Path]) -> dict[Path, FileCheck]:
 
 
 def first(one: FileCheck) -> CheckRow | None:
-    """What is said first: a fault, or where there is none the note that a guard is missing."""
+    """What is said first: a fault, or where there is none that a guard is missing."""
     return next(iter(one.faults), None) or next(
-        (row for row in one.rows if row.verdict == "note" and row.name == "same centre"), None
+        (row for row in one.choices if "no guard" in row.cause), None
     )
 
 
@@ -42,6 +44,13 @@ def said_first(mutant: Mutant, one: FileCheck) -> bool:
     """Whether the first thing said is this mutant's fault, in its task."""
     row = first(one)
     return row is not None and row.task == mutant.task and mutant.cause in row.cause
+
+
+def said_too(mutant: Mutant, one: FileCheck) -> bool:
+    """Whether the second fault of a file with two has a row with its cause."""
+    assert mutant.second is not None
+    task, cause = mutant.second
+    return any(row.task == task and cause in row.cause for row in one.faults)
 
 
 def main() -> None:
@@ -56,9 +65,12 @@ def main() -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerows([COLUMNS, *rows])
     found, right = (sum(row[k] == "yes" for row in rows[: len(MUTANTS)]) for k in (2, 5))
+    both = sum(row[7] == "yes" for row in rows)
+    pairs = sum(mutant.second is not None for mutant in MUTANTS)
     faulted = sum(row[2] == "yes" for row in rows[len(MUTANTS) :])
     print(
         f"{found} of {len(MUTANTS)} mutants found, {right} with the right cause first; "
+        f"of {pairs} with two faults the second is found in {both}; "
         f"{faulted} of {len(CORRECT)} correct solvers faulted"
     )
 
@@ -68,7 +80,10 @@ def row_of(name: str, mutant: Mutant | None, one: FileCheck) -> tuple[str, ...]:
     row = first(one) if mutant else next(iter(one.faults), None)
     reported = (row.task, row.cause) if row else ("", "")
     right = "" if mutant is None else "yes" if said_first(mutant, one) else "no"
-    return (name, mutant.task if mutant else "", "yes" if row else "no", *reported, right)
+    second = ("", "")
+    if mutant is not None and mutant.second is not None:
+        second = (mutant.second[0], "yes" if said_too(mutant, one) else "no")
+    return (name, mutant.task if mutant else "", "yes" if row else "no", *reported, right, *second)
 
 
 if __name__ == "__main__":

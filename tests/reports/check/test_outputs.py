@@ -22,7 +22,7 @@ from reports.check import command
 from reports.check.machine import SCHEMA
 from reports.check.smallest import Smallest, smallest_scene
 from reports.check.verdict import check_file
-from tests.reports.page.browsing import opened
+from tests.reports.page.browsing import opened, overhang
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, process
 from tests.solvers.mutants import CORRECT, MUTANTS
 
@@ -63,6 +63,27 @@ def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(
         "1. Task 2c impulse, impulse: it divides by (mA + mB)"
     )
     assert [path.name for path in tmp_path.iterdir()] == ["check.html"]
+
+
+def test_the_terminal_tells_faults_from_free_choices_by_a_word_and_shows_the_line(
+    folder: Path, tmp_path: Path
+):
+    """Without any colour: faults before free choices, each row with its verdict; the line and the
+    formula below the sentence. Where there is no fault, nothing is said to be expected."""
+    right, wrong = (
+        crosscheck("check", folder / who / "Exercise.js", cwd=tmp_path).stdout
+        for who in ("anna", "ben")
+    )
+    said = " ".join(wrong.split())
+
+    assert "line 63 var J = -(1 + restitution) * vn / (sphereA.mass + sphereB.mass);" in said
+    assert "exercise J = -(1 + e) (vA - vB).n / (n.n (1/mA + 1/mB)), e = 0.9" in said
+    assert wrong.index("All faults:") < wrong.index("Free choices. The exercise leaves them open")
+    assert "  fault  2c  impulse: it divides by (mA + mB)" in wrong
+    assert "These follow from the faults above: head_on" in said
+    assert "  free choice  2a  touch: the comparison is the one with <" in right
+    assert "expected" not in right
+    assert max(map(len, wrong.splitlines())) <= 80
 
 
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
@@ -184,7 +205,7 @@ def test_pytest_runs_the_rows_as_tests(folder: Path):
 
     assert (right.returncode, wrong.returncode, junk.returncode) == (0, 1, 4)
     assert "passed" in right.stdout
-    assert "likely:   it divides by (mA + mB) instead of (1/mA + 1/mB)" in wrong.stdout
+    assert "likely: it divides by (mA + mB) instead of (1/mA + 1/mB)" in wrong.stdout
     assert "is not text" in junk.stderr + junk.stdout
 
 
@@ -235,11 +256,18 @@ def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
     page.wait_for_function("players.smallest")
     at_end = "name => { players.smallest.seek(1); return players.smallest.positions(name); }"
     shown = {name: page.evaluate(at_end, name) for name in ("Exercise.js:own", "truth")}
-    fits = page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    cut = overhang(page)
     title = page.locator("h1").inner_text()
+    groups = page.locator("h2").all_inner_texts()
+    evidence = page.locator(".findings .source").first.inner_text().replace("\n", " ")
 
     assert heard == []
-    assert fits
+    assert cut <= 0
+    assert groups[1:] == ["Faults", "Free choices", "Right", "Not asked"]
+    assert set(page.locator(".fault-row .verdict").all_inner_texts()) == {"fault"}
+    assert set(page.locator(".free-choice-row .verdict").all_inner_texts()) == {"free choice"}
+    assert "var J = -(1 + restitution) * vn / (sphereA.mass + sphereB.mass);" in evidence
+    assert "exercise J = -(1 + e) (vA - vB).n / (n.n (1/mA + 1/mB))" in evidence
     assert title == "Exercise.js: what is wrong, and where"
     assert shown["truth"] is not None
     assert max(abs(x - y) for x, y in zip(shown["Exercise.js:own"][0], shown["truth"][0])) > 0.004

@@ -1,0 +1,245 @@
+"""Which lines of a solver's file a row is about, found by spheres that report from which line each
+of their numbers is read or written."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from adapters.own_solver.process import SolverProcess
+from reports.check.questions import QUESTIONS, Question, fresh_world
+from reports.check.restitution import code_of
+from reports.check.rows import SAME_AGAIN, CheckRow
+
+LIMIT = 0.5  # s a traced call may take: one that never comes back is known from its first accesses
+# task -> the question that shows which lines do what
+SHOWN = {"1": "force", "2": "collision/light on heavy"}
+MOST = 3  # lines of a row
+LONGEST = 160  # characters of a line; a minified file is a single one
+
+
+class Access(NamedTuple):
+    """A read or a write of a number of a sphere.
+
+    Attributes:
+        kind: "r" or "w".
+        sphere: its place in the question.
+        field: of the sphere; "position" for its x and its y.
+        lines: of the file in the calls that led to it, from the innermost on.
+    """
+
+    kind: str
+    sphere: int
+    field: str
+    lines: Sequence[int]
+
+    @property
+    def line(self) -> int:
+        """Where it stands; 0 if nobody can tell."""
+        return self.lines[0] if self.lines else 0
+
+
+def accesses_of(process: SolverProcess, question: Question) -> list[Access]:
+    """What the calls of a question read and write, in order, in a fresh world; until they fail, if
+    they do. Raises `SolverFailed` if the process is lost."""
+    if process.surface == "advance":
+        return []  # its spheres are arrays, which report nothing
+    *_, seen = process.request(
+        [
+            *fresh_world(process),
+            ("trace", question.request, LIMIT),
+            ("accesses", None, LIMIT),
+        ]
+    )
+    return outside_helpers([Access(*row) for row in seen]) if isinstance(seen, list) else []
+
+
+def outside_helpers(seen: list[Access]) -> list[Access]:
+    """The accesses, those of a line that writes positions and velocities alike moved to the line
+    that called it: such a helper sets whatever vector it is given."""
+    written: dict[int, set[str]] = {}
+    for access in seen:
+        if access.kind == "w":
+            written.setdefault(access.line, set()).add(access.field)
+    helpers = {line for line, fields in written.items() if fields >= {"position", "velocity"}}
+    if not helpers:
+        return seen
+    return outside_helpers(
+        [
+            access._replace(lines=access.lines[1:])
+            if access.line in helpers and len(access.lines) > 1
+            else access._replace(lines=())
+            if access.line in helpers
+            else access
+            for access in seen
+        ]
+    )
+
+
+def part_of(seen: Sequence[Access], failed_at: int, text: str) -> str:
+    """The part of task 2 in which a call failed, by what it had read and written until then.
+
+    failed_at: the line that threw; 0 for a call that never came back.
+    """
+    statement = text.splitlines()[failed_at - 1] if failed_at else ""
+    if WRITES_VELOCITY.search(statement) or any_write(seen, "velocity"):
+        return "2d"
+    if WRITES_POSITION.search(statement):
+        return "2b"
+    if not failed_at and repeated(seen) == "position":
+        return "2b"
+    displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
+    before = [a for a in seen[displaced + 1 :] if not failed_at or a.line != failed_at]
+    if all((who, field) in {(a.sphere, a.field) for a in before} for who, field in FOR_IMPULSE):
+        return "2d"  # all that the impulse needs has been read
+    if displaced >= 0 or any(a.field == "velocity" for a in seen):
+        return "2c"
+    return "2b" if {(a.sphere, a.field) for a in before} >= FOR_DISTANCE else "2a"
+
+
+# sphere.velocity.x = ..., sphere["velocity"]["x"] += ..., [a.velocity.x, a.velocity.y] = ...
+ASSIGNED = r"""["']?\]?(?:\.[xy]|\[["']?[xy01]["']?\])?\s*\]?\s*[-+*/]?=(?!=)"""
+WRITES_VELOCITY = re.compile(rf"\bvelocity{ASSIGNED}")
+WRITES_POSITION = re.compile(rf"\bposition{ASSIGNED}")
+FOR_IMPULSE = {(who, field) for who in (0, 1) for field in ("velocity", "mass")}
+FOR_DISTANCE = {(who, field) for who in (0, 1) for field in ("position", "size")}
+
+
+def repeated(seen: Sequence[Access]) -> str:
+    """The field that a call without end reads or writes again and again; "" if it does not."""
+    again = seen[-1:] and sum(access.line == seen[-1].line for access in seen) > LOOPS
+    return seen[-1].field if again else ""
+
+
+LOOPS = 40  # accesses from one line; a call that is right needs a dozen
+
+
+def is_write(access: Access, field: str) -> bool:
+    """Whether it writes this field."""
+    return (access.kind, access.field) == ("w", field)
+
+
+def any_write(seen: Iterable[Access], field: str) -> bool:
+    """Whether one of them writes this field."""
+    return any(is_write(access, field) for access in seen)
+
+
+# row of task 1 -> the fields that it is about
+WRITTEN = {
+    "velocity": ("velocity",),
+    "position": ("position",),
+    "spin": ("angularVelocity",),
+    "angle": ("alpha",),
+    "coasting": ("velocity", "angularVelocity"),
+    "force kept": ("force", "torque"),
+    "sphere kept": ("mass", "MoI", "size"),
+    "rest kept": ("force", "alpha", "angularVelocity", "torque", "mass", "MoI", "size"),
+    "velocity of A": ("velocity",),
+    "velocity of B": ("velocity",),
+}
+# row of the step -> what performSimStep calls where it is about that
+CALLED = {
+    "all spheres": "integrate",
+    "pairs": "sphereSphereCollisionHandling",
+    "itself": "sphereSphereCollisionHandling",
+    "integration first": "sphereSphereCollisionHandling",
+    "edges in a step": "projectObjects",
+}
+
+
+def cut(line: str) -> str:
+    """A line of at most `LONGEST` characters."""
+    return line if len(line) <= LONGEST else f"{line[: LONGEST - 4]} ..."
+
+
+class Source:
+    """The text of a file, and what its two functions read and write, traced when it is asked for.
+
+    Its methods raise `SolverFailed` if the process is lost.
+    """
+
+    def __init__(self, process: SolverProcess, text: str) -> None:
+        self.process, self.text, self.lines = process, text, text.splitlines()
+        self.traced: dict[str, list[Access]] = {}
+
+    def accesses(self, question: str) -> list[Access]:
+        """What a question makes the file read and write; nothing where it lacks the function."""
+        needed = QUESTIONS[question].calls[0][0]
+        if question not in self.traced:
+            has = self.process.functions[needed]
+            found = accesses_of(self.process, QUESTIONS[question]) if has else []
+            self.traced[question] = found
+        return self.traced[question]
+
+    def part_of(self, question: str, failed_at: int) -> str:
+        """The part of task 2 in which the call of a question failed, at this line."""
+        return part_of(self.accesses(question), failed_at, self.text)
+
+    def of(self, row: CheckRow) -> list[tuple[int, str]]:
+        """The lines that a row is about, at most `MOST`, each with its number from 1."""
+        named = re.search(r"\(line (\d+)\b|\bline (\d+) has\b", row.cause)
+        if named:
+            numbers = [int(named[1] or named[2])]
+        elif row.task == "loop":
+            numbers = self.calls(row.name)
+        elif "does not come back" in row.cause:
+            seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
+            numbers = [seen[-1].line] if seen else []
+        elif row.name == SAME_AGAIN:
+            numbers = self.assigning(re.findall(r"global (\w+)", row.cause))
+        else:
+            numbers = self.accessing(row)
+        shown = sorted(set(numbers) - {0})[:MOST]
+        return [(k, cut(self.lines[k - 1].strip())) for k in shown if k <= len(self.lines)]
+
+    def accessing(self, row: CheckRow) -> list[int]:
+        """The lines that read or write what a row of the two tasks is about."""
+        seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
+        if row.name in WRITTEN:
+            who = {"velocity of A": {0}, "velocity of B": {1}}.get(row.name, {0, 1})
+            return [
+                a.line
+                for a in seen
+                if a.kind == "w" and a.field in WRITTEN[row.name] and a.sphere in who
+            ]
+        first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
+        if row.task == "2a":
+            return [a.line for a in seen[:first_write] if a.field == "size"]
+        if row.task == "2b":
+            return [a.line for a in seen if is_write(a, "position")]
+        velocities = [a.line for a in seen if is_write(a, "velocity")]
+        if row.task == "2d":
+            return velocities
+        if row.task == "2c":
+            used = [a.line for a in seen if a.kind == "r" and a.field in ("velocity", "mass")]
+            displacing = {a.line for a in seen if is_write(a, "position")}
+            return [line for line in used if line not in {*velocities, *displacing}] or velocities
+        return []
+
+    def calls(self, name: str) -> list[int]:
+        """The lines of performSimStep that a row of the step is about; of one about the edges that
+        of projectObjects."""
+        if name not in CALLED:
+            return self.heads("projectObjects" if name in ("edges", "ufo") else "performSimStep")
+        code, function = code_of(self.text).splitlines(), CALLED[name]
+        begin = next(iter(self.heads("performSimStep")), 0)
+        found = [
+            k
+            for k, line in enumerate(code[begin:], begin + 1)
+            if re.search(rf"\b{function}\s*\(", line) and k not in self.heads(function)
+        ]
+        if found and name == "itself":  # the loop over j stands last, its head before the call
+            return [found[-1] - 1, found[-1]]
+        return found or self.heads("performSimStep")
+
+    def heads(self, function: str) -> list[int]:
+        """The lines where a function is defined."""
+        head = re.compile(rf"\b(?:function|def|const|let|var)\s+{function}\b")
+        return [k for k, line in enumerate(self.lines, 1) if head.search(line)]
+
+    def assigning(self, names: Sequence[str]) -> list[int]:
+        """The lines that change one of these variables."""
+        change = re.compile(rf"\b(?:{'|'.join(names)})\s*(?:[-+*/]?=(?!=)|\+\+|--)")
+        code = code_of(self.text).splitlines()
+        return [k for k, line in enumerate(code, 1) if names and change.search(line)]

@@ -1,0 +1,217 @@
+"""What a fault comes with: the part it is filed under, the lines of the file, the formula;
+and that no answer depends on the question before it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from adapters.own_solver.file import read_solver
+from adapters.own_solver.process import SolverProcess
+from reports.check.lines import Access, accesses_of, part_of
+from reports.check.machine import SCHEMA, as_json
+from reports.check.questions import QUESTIONS, ask, ask_in_two_orders
+from reports.check.rows import CheckRow
+from reports.check.verdict import FileCheck
+from tests.reports.check.confusion import judged
+from tests.solvers.mutants import CORRECT, HERE, MUTANTS
+
+CORRECT_FILES = HERE / "correct"
+FAULTY = (
+    "collisions_first.js",
+    "against_itself.js",
+    "typo_in_d.js",
+    "state_in_impulse.py",
+    "two_overlap_and_b_sign.js",
+)
+COUNTS = {  # keeps a count of its calls, which it also writes into the sphere
+    "count.js": "let n = 0;\nfunction integrate(s, dt) { s.alpha = ++n; }\n",
+    "count.py": "n = 0\ndef integrate(s, dt):\n    global n\n    n += 1\n    s.alpha = n\n",
+}
+
+
+@pytest.fixture(scope="module")
+def checks(tmp_path_factory: pytest.TempPathFactory) -> dict[str, FileCheck]:
+    """The checks of some faulty files, and of a right one whose loop tests a sphere against
+    itself."""
+    folder = tmp_path_factory.mktemp("evidence")
+    paths = [mutant.write(folder) for mutant in MUTANTS if mutant.name in FAULTY]
+    return {p.name: one for p, one in judged([*paths, CORRECT_FILES / "every_order.js"]).items()}
+
+
+def begin_with(one: FileCheck) -> CheckRow:
+    """The fault that is named first."""
+    return one.findings[0]
+
+
+def test_collisions_before_integration_are_a_fault_of_the_step(checks: dict[str, FileCheck]):
+    """The template integrates first; with it the same pair collides in that step."""
+    row = begin_with(checks["collisions_first.js"])
+
+    assert (row.task, row.name, row.got) == (
+        "loop",
+        "integration first",
+        "not the ufo and asteroid 0 and not asteroid 0 and asteroid 1",
+    )
+    assert "before all spheres are integrated" in row.cause
+    assert [row.verdict for row in checks["every_order.js"].rows if row.name == "integration first"]
+
+
+def test_a_sphere_against_itself_is_the_only_fault_that_is_named(checks: dict[str, FileCheck]):
+    """`j = i`: with its line; what the function does to it is no other fault."""
+    one = checks["against_itself.js"]
+
+    assert [row.name for row in one.faults] == ["itself"]
+    assert "lets a sphere collide with itself" in one.sentences[0]
+    assert any("var j = i;" in text for _, text in begin_with(one).lines)
+
+
+def test_a_sphere_against_itself_is_free_where_it_changes_nothing(checks: dict[str, FileCheck]):
+    """A function that returns for it is right."""
+    one = checks["every_order.js"]
+    (row,) = (row for row in one.rows if row.name == "itself")
+
+    assert one.passed
+    assert row.verdict == "free choice"
+
+
+def test_an_error_in_the_code_of_2d_is_filed_under_2d(checks: dict[str, FileCheck]):
+    """Not under 2a, where the function begins; with the line that failed."""
+    row = begin_with(checks["typo_in_d.js"])
+
+    assert row.task == "2d"
+    assert row.lines == [(64, "sphereA.velocity.x += j / sphereA.mass * nx;")]
+    assert checks["typo_in_d.js"].tasks["2a"] == "not asked"
+
+
+@pytest.mark.parametrize(
+    ("seen", "failed_at", "text", "part"),
+    [
+        ([], 1, "let d = hypot(x);", "2a"),
+        ([("r", 0, "position"), ("r", 1, "position"), ("r", 0, "size")], 30, "d = 1", "2a"),
+        ("distance", 30, "let o = oops;", "2b"),
+        ("distance", 30, "a.position.x += oops;", "2b"),
+        ("displaced", 30, "let J = oops;", "2c"),
+        ("impulse", 30, "let x = oops;", "2d"),
+        ("displaced", 30, "a['velocity']['x'] += oops", "2d"),
+        ("displaced", 30, "if (a.velocity.x >= oops) return;", "2c"),
+        ("impulse", 0, "", "2d"),
+        ("kicked", 0, "", "2d"),
+    ],
+)
+def test_where_a_call_fails_is_read_from_what_it_had_done(
+    seen: str | list, failed_at: int, text: str, part: str
+):
+    """By the numbers it had read and written; the line that failed decides if it assigns one."""
+    distance = [("r", who, field) for who in (0, 1) for field in ("position", "size")]
+    displaced = [*distance, ("w", 0, "position"), ("w", 1, "position")]
+    impulse = [*displaced, *(("r", who, f) for who in (0, 1) for f in ("velocity", "mass"))]
+    known = {"distance": distance, "displaced": displaced, "impulse": impulse}
+    known["kicked"] = [*displaced, ("w", 0, "velocity")]
+    steps = known[seen] if isinstance(seen, str) else seen
+    accesses = [Access(*step, [k + 1]) for k, step in enumerate(steps)]
+
+    assert part_of(accesses, failed_at, "\n" * (failed_at - 1) + text) == part
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["endless_in_d.js", "endless_in_d.py", "endless_in_b.js"])
+def test_an_endless_loop_is_filed_under_the_part_it_stands_in(name: str, tmp_path: Path):
+    """It is stopped; what it had written until then says where it is."""
+    (mutant,) = (mutant for mutant in MUTANTS if mutant.name == name)
+    (one,) = judged([mutant.write(tmp_path)]).values()
+
+    assert one.faults[0].task == mutant.task
+    assert "does not come back" in one.sentences[0]
+
+
+def test_a_fault_shows_the_lines_of_the_file_and_the_formula(checks: dict[str, FileCheck]):
+    """Of each of two faults: the lines that write what is wrong, and how the exercise has it; in
+    JSON, too."""
+    one = checks["two_overlap_and_b_sign.js"]
+    text = one.solver.text.splitlines() if one.solver else []
+    overlap, sign = one.findings
+    reported = as_json([one])
+    rows = {row["name"]: row for row in reported["files"][0]["rows"]}
+
+    jsonschema.validate(reported, json.loads(SCHEMA.read_text()))
+    assert "counted twice" in overlap.cause
+    assert all("position" in line and text[k - 1].strip() == line for k, line in overlap.lines)
+    assert overlap.formula.startswith("|xA' - xB'| = sizeA + sizeB")
+    assert [line for _, line in sign.lines] == [
+        "sphereB.velocity.x += J / sphereB.mass * nx;",
+        "sphereB.velocity.y += J / sphereB.mass * ny;",
+    ]
+    assert rows["velocity of B"]["formula"] == "vA' = vA + J n / mA, vB' = vB - J n / mB"
+    assert rows["velocity of B"]["lines"][0]["line"] == sign.lines[0][0]
+    assert rows["velocity"]["lines"] == []
+
+
+@pytest.mark.parametrize("name", ["complex_numbers.py", "plain.js"])
+def test_the_lines_that_are_shown_are_those_of_the_task_and_not_of_a_helper(name: str):
+    """`put(a.velocity, ...)` is where a velocity is written, not the body of put."""
+    solver = read_solver(CORRECT_FILES / name)
+    with SolverProcess(solver) as process:
+        seen = accesses_of(process, QUESTIONS["collision/light on heavy"])
+    lines = solver.text.splitlines()
+    wrote = {field: {a.line for a in seen if (a.kind, a.field) == ("w", field)} for field in FIELDS}
+
+    assert wrote["position"]
+    assert not wrote["position"] & wrote["velocity"]
+    for field, numbers in wrote.items():
+        assert all(field in lines[k - 1] for k in numbers)
+
+
+FIELDS = ("position", "velocity")
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_a_question_in_a_fresh_world_is_the_first_that_was_asked(name: str, tmp_path: Path):
+    """Any number of them: the file counts to one each time. In one world it counts on."""
+    (tmp_path / name).write_text(COUNTS[name])
+    asked = {k: QUESTIONS["force"] for k in "abc"}
+    with SolverProcess(read_solver(tmp_path / name)) as process:
+        alone = ask(process, asked, afresh=True)
+        together = ask(process, asked)
+        answers, others = ask_in_two_orders(process, asked)
+
+    assert [answer.last[0].alpha for answer in alone.values()] == [1, 1, 1]
+    assert [answer.last[0].alpha for answer in together.values()] == [2, 3, 4]
+    assert [answer.last[0].alpha for answer in answers.values()] == [1, 1, 1]
+    assert set(others) == {"a", "b", "c"}
+
+
+def test_a_module_beside_a_solver_is_new_in_a_fresh_world_too(tmp_path: Path):
+    """It may keep state as well as the file itself."""
+    (tmp_path / "counter.py").write_text("n = 0\n")
+    text = "import counter\ndef integrate(s, dt):\n    counter.n += 1\n    s.alpha = counter.n\n"
+    (tmp_path / "solver.py").write_text(text)
+    with SolverProcess(read_solver(tmp_path / "solver.py")) as process:
+        alone = ask(process, {k: QUESTIONS["force"] for k in "ab"}, afresh=True)
+
+    assert [answer.last[0].alpha for answer in alone.values()] == [1, 1]
+
+
+def test_who_keeps_a_value_is_told_so_and_nothing_else_is_blamed(checks: dict[str, FileCheck]):
+    """J += for J =: the global by its name, and its line; the step around it is not accused."""
+    one = checks["state_in_impulse.py"]
+    row = begin_with(one)
+
+    assert (row.task, row.name) == ("2c", "same answer again")
+    assert "keeps a value in the global J from one call to the next" in row.cause
+    assert any("J += -(1" in text for _, text in row.lines)
+    assert one.tasks["loop"] == "not asked"
+    assert {row.name for row in one.faults if row.task != "scenes"} == {"same answer again"}
+
+
+def test_who_remembers_what_changes_nothing_is_right():
+    """The negative control: a memo of unit vectors in a global."""
+    path = next(path for path in CORRECT if path.name == "reflection_matrix.js")
+    with SolverProcess(read_solver(path)) as process:
+        asked = {name: q for name, q in QUESTIONS.items() if not name.startswith("reach/")}
+        _, others = ask_in_two_orders(process, asked)
+
+    assert others == {}
