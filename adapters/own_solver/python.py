@@ -246,6 +246,13 @@ class PythonSolver:
         if (before != after or x * x + y * y < reach * reach) and len(self.log) < LOGGED:
             self.log.append([self.steps, i, j, *map(number, before), *map(number, after)])
 
+    def play(self, argument: dict[str, Any]) -> dict[str, Any]:
+        """Some calls of `step`, then where everything is and the collisions from number `heard` on:
+        one request for all."""
+        for step in argument["steps"]:
+            self.step(step)
+        return {"rows": self.read(), "collisions": self.collision_rows[argument["heard"] :]}
+
     def read(self, _argument: Any = None) -> list[list[float]]:
         """The scene's spheres as they are."""
         return [row_of(s) for s in self.spheres]

@@ -45,7 +45,7 @@ def own_rows(names: Sequence[str]) -> dict[str, EngineRow]:
     rows, faults = {}, []
     for name in names:
         path = Path(name.removesuffix(OWN))
-        rows[name] = engine_file(path, PATIENCE)
+        rows[name] = engine_file(path, PATIENCE, collected=True)
         if reason := grounded(rows[name]):
             faults.append(f"{path}: {reason.removeprefix(f'{path.name} ')}")
     if faults:
