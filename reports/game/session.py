@@ -122,16 +122,17 @@ class Session:
         """One engine's disks, its measures, and where it diverged or why it left."""
         diverged = None
         if flyer.divergence is not None:
-            collision = flyer.divergence.collision
-            diverged = collision._asdict() | {
-                "t": (collision.frame + 1) * self.flight.scenario.sample_interval,
-                "shared": flyer.divergence.shared,
-                "solid_only": flyer.divergence.solid_only,
+            at, shared, solid_only = flyer.divergence
+            diverged = at._asdict() | {
+                "t": (at.frame + 1) * self.flight.scenario.sample_interval,
+                "shared": shared,
+                "solid_only": solid_only,
             }
         return self.flight.measures(flyer) | {
             "x": rounded(flyer.state.position.ravel()),
             "angle": rounded(flyer.state.angle),
             "left": flyer.left,
+            "left_at": flyer.left_at,
             "diverged": diverged,
             "set_backs": flyer.set_backs,
         }
