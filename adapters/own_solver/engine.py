@@ -13,7 +13,7 @@ import numpy as np
 from adapters.engine import FLOAT64, ContactImpulse, EngineRow, Unsupported
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import restitution_of
+from adapters.own_solver.restitution import EXERCISE, restitution_of
 from scenarios.model import Array, Scene, State
 
 NEEDED = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling"}
@@ -64,6 +64,14 @@ class Student:
                 make_globals(self.started)
                 self.restitution = restitution_of(self.solver, self.started)
         return self.started
+
+    @property
+    def own_restitution(self) -> float:
+        """What the file is written for; the exercise's where its text tells nothing, or it takes
+        any. Raises `Unsupported` if the file cannot be loaded."""
+        if self.process.surface == "advance" or self.restitution.own is None:
+            return EXERCISE
+        return self.restitution.own
 
     def load(self, scene: Scene, dt: float) -> None:
         """Make the scene's spheres; raises `Unsupported` for what the exercise has not."""

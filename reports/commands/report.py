@@ -11,6 +11,7 @@ from rich.table import Table
 
 from adapters.play import STATUSES
 from adapters.thrust_grid import off_grid_note
+from reports.commands.own_solvers import lines
 from reports.lessons.catalogue import LESSONS
 from reports.page import overview
 from reports.page.report import Report, make_report
@@ -18,6 +19,7 @@ from reports.run.arguments import refusing
 from reports.run.folders import found
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, say
+from reports.terminal.foreign_text import legible
 from reports.terminal.progress import Progress
 
 
@@ -64,6 +66,8 @@ def print_summary(report: Report, page: str) -> None:
     console.print(table)
     for sentence in report.findings:
         console.print(sentence, highlight=False)
+    for line in lines(report.said):
+        console.print(legible(line), highlight=False)
     for comparison in report.comparisons:
         if note := off_grid_note(comparison.scenario):
             console.print(f"{comparison.scenario.name}: {note}.", highlight=False)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from adapters.engines import row_of
+from reports.commands.own_solvers import checks_of
 from reports.commands.report import finish
 from reports.lessons.catalogue import LESSONS
 from reports.page.report import make_report
@@ -54,9 +55,11 @@ def run_plan(
     130 or 143."""
     with opening(out):
         out, folder = place_of(out), os.getcwd()
+    rows = {name: row_of(name) for name in checked_engines(engines)}
     plan = RunPlan(
         scenes=checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
-        engines={name: row_of(name) for name in checked_engines(engines)},
+        engines=rows,
+        checks=checks_of(list(rows)),
         seed=seed,
         dts=dts,
         full=full,
@@ -134,7 +137,11 @@ def plan_of(folder: Path, part: Path) -> RunPlan:
     }
     names = ("seed", "dts", "full", "timings", "command", "folder")
     return RunPlan(
-        scenes=scenes, engines=engines, files=moved, **{name: header[name] for name in names}
+        scenes=scenes,
+        engines=engines,
+        files=moved,
+        checks=checks_of(list(engines)),
+        **{name: header[name] for name in names},
     )
 
 

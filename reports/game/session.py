@@ -25,9 +25,11 @@ class Session:
         given_up: nobody waits for its answer any more, and it may still be at it.
     """
 
-    def __init__(self, engines: Sequence[str], file: Scenario | None = None) -> None:
+    def __init__(
+        self, engines: Sequence[str], file: Scenario | None = None, restitution: float = 0.9
+    ) -> None:
         self.file, self.given_up = file, False
-        self.flight = self.begun(Fly(do="fly", engines=list(engines)))
+        self.flight = self.begun(Fly(do="fly", engines=list(engines), restitution=restitution))
 
     def begun(self, wish: Fly) -> Flight:
         """A new flight as wished; a file's own field and step are kept."""

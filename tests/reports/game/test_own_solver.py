@@ -45,7 +45,7 @@ def solver(folder: Path, more: str = "") -> Path:
 def page_of(browser: Browser, path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Page]:
     """The game, paused at its first frame, with this solver solid and the reference as its
     ghost."""
-    rows = own_rows([f"{path}:own"])
+    rows, _ = own_rows([f"{path}:own"])
     for name, row in rows.items():
         monkeypatch.setitem(ENGINES, name, row)
     with served(application(Game([*rows, "reference:exercise"]))) as url:
@@ -100,9 +100,9 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
 
     assert frame == 30
     assert solid == "reference:exercise"
-    assert row.startswith("left: ")
+    assert row.startswith("left at 0.")
     assert reason in row
-    assert banner.startswith("Exercise.js left: ")
+    assert banner.startswith("Exercise.js left at 0.")
     assert reason in banner
     assert took < 10 * PATIENCE
 
@@ -120,7 +120,7 @@ def test_the_page_says_that_it_waits(
         page.wait_for_function("() => !game.waiting", timeout=10_000 * PATIENCE)
         banner = page.locator("#banner").inner_text()
 
-    assert banner.startswith("Exercise.js left: ")
+    assert banner.startswith("Exercise.js left at 0.")
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,7 @@ def test_a_solver_that_hangs_keeps_no_other_tab_waiting(
 ):
     """The engines of each tab work in a thread of their own."""
     path = solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
-    for name, row in own_rows([f"{path}:own"]).items():
+    for name, row in own_rows([f"{path}:own"])[0].items():
         monkeypatch.setitem(ENGINES, name, row)
     with served(application(Game(["reference:exercise"]))) as url:
         address = url.replace("http", "ws") + "/fly"
