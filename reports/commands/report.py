@@ -19,7 +19,6 @@ from reports.run.arguments import refusing
 from reports.run.folders import found
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, say
-from reports.terminal.foreign_text import legible
 from reports.terminal.progress import Progress
 
 
@@ -67,7 +66,7 @@ def print_summary(report: Report, page: str) -> None:
     for sentence in report.findings:
         console.print(sentence, highlight=False)
     for line in lines(report.said):
-        console.print(legible(line), highlight=False)
+        console.print(line, highlight=False)
     for comparison in report.comparisons:
         if note := off_grid_note(comparison.scenario):
             console.print(f"{comparison.scenario.name}: {note}.", highlight=False)

@@ -198,6 +198,7 @@ def test_a_solver_that_hangs_keeps_no_other_tab_waiting(
     assert "does not come back" in answer
 
 
+@pytest.mark.slow  # its check hangs, too, and is waited for
 def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
     """As soon as the patience with it is at its end: exit 0, and nothing but where it was and that
     it has stopped."""
@@ -219,7 +220,8 @@ def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
             took = monotonic() - began
 
     assert (started.returncode, out) == (0, "Stopped.\n")
-    assert [line for line in complaints.splitlines() if "is taken" not in line] == []
+    told = ("is taken", "by crosscheck check", "It was not checked within", "does not come back")
+    assert [line for line in complaints.splitlines() if not any(t in line for t in told)] == []
     assert took < 10 * PATIENCE
 
 
