@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
+from playwright.sync_api import Browser
 
 from reports.commands.serve import application
 from reports.game.command import game_of
@@ -38,12 +39,12 @@ MEANINGS = {
 
 
 def measure(
-    seconds: float, engines: Sequence[str]
+    browser: Browser, seconds: float, engines: Sequence[str]
 ) -> tuple[dict[str, np.ndarray], float, list[str]]:
     """ms of each kind over so many seconds of a flight under thrust, the flight's time over the
     clock's, and who flew; no engine: those that the game begins with."""
     game = game_of(None, engines)
-    with served(application(game)) as url, chromium() as browser:
+    with served(application(game)) as url:
         page, heard = opened(browser, url, viewport={"width": 1280, "height": 900})
         # compiled by then
         page.wait_for_function("() => game.field && game.now.frame > 64", timeout=120_000)
@@ -62,7 +63,8 @@ def measure(
 
 def main(seconds: float, engines: Sequence[str]) -> None:
     """Print them."""
-    rows, pace, flown = measure(seconds, engines)
+    with chromium() as browser:
+        rows, pace, flown = measure(browser, seconds, engines)
     print(f"{len(flown)} engines, 21 disks, {seconds:g} s: {', '.join(flown)}")
     print(f"{'ms':24}{'mean':>8}{'95 %':>8}{'most':>8}")
     for name, ms in rows.items():

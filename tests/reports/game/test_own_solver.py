@@ -13,7 +13,6 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
-import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 from websockets.sync.client import connect
@@ -369,17 +368,18 @@ def test_a_frame_under_thrust_is_one_exchange_with_the_file(
 
 
 @pytest.mark.slow
-def test_two_files_and_two_engines_keep_the_clock(tmp_path: Path):
-    """In Chromium, under thrust: what engines and picture take fits into a frame. The pace itself
-    is that of the machine, whatever else it does: `python -m tests.bench.game` prints it."""
+def test_two_files_and_two_engines_keep_the_clock(browser: Browser, tmp_path: Path):
+    """In Chromium, under thrust: what engines and picture take fits into a frame, by the least of
+    many, as everything else on the machine adds to it. `python -m tests.bench.game` prints the
+    pace."""
     (tmp_path / "anna").mkdir()
     files = [str(solver(tmp_path)), str(solver(tmp_path / "anna"))]
     before = dict(ENGINES)
     try:
-        times, _, _ = measure(6.0, [*files, "reference:exercise", "pymunk:shipped"])
+        times, _, _ = measure(browser, 6.0, [*files, "reference:exercise", "pymunk:shipped"])
     finally:
         ENGINES.clear()
         ENGINES.update(before)
-    engines, picture = (np.median(times[k]) for k in ("engines, for a frame", "to draw a picture"))
+    engines, picture = (min(times[k]) for k in ("engines, for a frame", "to draw a picture"))
 
     assert engines + picture < 1e3 * FRAME
