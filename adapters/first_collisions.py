@@ -33,7 +33,8 @@ def first_collisions(
 
     An impulse in the step after another of the same pair continues it if it is no larger than
     `weight` N s, or if the engine does not report how large it is: else it is a collision of its
-    own. Impulses of less than a millionth of the pair's strongest are rounding, and left out.
+    own. Impulses of less than a millionth of the pair's strongest are rounding, and left out; their
+    size counts, as a faulty solver may pull where it should push.
     """
     if not collisions:
         return NO_COLLISIONS
@@ -44,11 +45,13 @@ def first_collisions(
     order = np.lexsort((step, other, disk))
     rows = step[order], disk[order], other[order], impulse[order]
     starts = first_of_pair(rows[1], rows[2])
-    strongest = np.maximum.reduceat(np.nan_to_num(rows[3]), np.flatnonzero(starts))[
+    size = np.abs(rows[3])
+    strongest = np.maximum.reduceat(np.nan_to_num(size), np.flatnonzero(starts))[
         np.cumsum(starts) - 1
     ]
-    step, disk, other, impulse = (row[~(rows[3] < 1e-6 * strongest)] for row in rows)
-    begins = first_of_pair(disk, other) | (np.diff(step, prepend=step[0]) > 1) | (impulse > weight)
+    step, disk, other, impulse = (row[~(size < 1e-6 * strongest)] for row in rows)
+    begins = first_of_pair(disk, other) | (np.diff(step, prepend=step[0]) > 1)
+    begins |= np.abs(impulse) > weight
     order = np.flatnonzero(begins)[np.lexsort((other[begins], disk[begins], step[begins]))]
     return Collisions(
         t=frozen((step[order] + 1) * dt),

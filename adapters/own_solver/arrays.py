@@ -56,6 +56,13 @@ class Whole:
         walls = np.reshape(argument["scene"]["walls"], (-1, 2, 2))
         self.engine.load(Scene(**argument["scene"] | {"walls": walls}), argument["dt"])
 
+    def whole_play(self, argument: dict[str, Any]) -> dict[str, Any]:
+        """Some calls of `whole_step`, then where everything is and the collisions from number
+        `heard` on."""
+        for step in argument["steps"]:
+            self.whole_step(step)
+        return {"rows": self.rows(), "collisions": self.collisions(argument["heard"])}
+
     def whole_step(self, argument: dict[str, Any]) -> None:
         """`count` steps; forces act in the first."""
         for disk, (x, y, torque) in enumerate(argument["forces"] or ()):
@@ -63,7 +70,7 @@ class Whole:
                 self.engine.apply_force(disk, np.array([x, y]), torque)
         self.engine.step(argument["count"])
 
-    def whole_read(self, _argument: Any) -> list[list[float]]:
+    def rows(self) -> list[list[float]]:
         """Position, velocity, angle and angular velocity of every disk."""
         state = self.engine.read()
         rows: list[list[float]] = np.column_stack(
@@ -71,11 +78,11 @@ class Whole:
         ).tolist()
         return rows
 
-    def whole_collisions(self, _argument: Any) -> list[list[float]]:
-        """(step, i, j, impulse), as `advance` reported them."""
+    def collisions(self, heard: int) -> list[list[float]]:
+        """(step, i, j, impulse), as `advance` reported them, from number `heard` on."""
         return [
             [int(step), int(i), int(j), float(impulse)]
-            for step, i, j, impulse in self.engine.collisions()
+            for step, i, j, impulse in self.engine.collisions()[heard:]
         ]
 
 

@@ -3,6 +3,7 @@ its own process."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,12 @@ from adapters.engine import ContactImpulse, Unsupported
 from adapters.engine_row import FLOAT64, EngineRow
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
+from adapters.own_solver.restitution import EXERCISE, restitution_of
 from scenarios.model import Array, Scene, State
 
 NEEDED = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling"}
 STEP_LIMIT = 30.0  # s that one call for some steps may take
-# largest difference between the file's restitution and the scene's: that of a constant written 0.9
-REST = 1e-3
+BEGIN_LIMIT = 2.0  # s that initScene may take
 
 
 class Student:
@@ -26,22 +27,28 @@ class Student:
 
     One with `advance` is played by it and plays what the reference solver plays. Of any other the
     functions `integrate` and `sphereSphereCollisionHandling` are called: all spheres, every pair i
-    < j, then the wrap. Its restitution is written into it, so a scene that needs another is
-    refused, as are walls and disks that cannot move, which the exercise does not have.
+    < j, then the wrap; whatever they do is played. Its restitution is written into it, so a scene
+    that needs another than the file is written for is refused, as are walls and disks that cannot
+    move, which the exercise does not have, and what calls a function that the file lacks.
 
     patience: s that a call for some steps may take after the first, in which a file may still be
         compiled.
+    collected: steps are asked for when somebody reads what came of them, all in one request: a
+        frame under thrust is one exchange with the process instead of one a step.
     """
 
     listening, wrapping = True, 0.0
 
-    def __init__(self, solver: SolverText, patience: float = STEP_LIMIT) -> None:
+    def __init__(
+        self, solver: SolverText, patience: float = STEP_LIMIT, collected: bool = False
+    ) -> None:
         self.solver, self.path, self.patience, self.limit = (
             solver,
             solver.path,
             patience,
             STEP_LIMIT,
         )
+        self.collected = collected
         self.started: SolverProcess | None = None
 
     @property
@@ -53,45 +60,56 @@ class Student:
                 self.started = SolverProcess(self.solver, compiled=True)
             except SolverFailed as failure:
                 raise Unsupported(f"{self.path.name} {failure}") from None
+            self.whole = self.started.surface == "advance"
+            if not self.whole:
+                make_globals(self.started)
+                self.restitution = restitution_of(self.solver, self.started)
         return self.started
+
+    @property
+    def own_restitution(self) -> float:
+        """What the file is written for; the exercise's where its text tells nothing, or it takes
+        any. Raises `Unsupported` if the file cannot be loaded."""
+        if self.process.surface == "advance" or self.restitution.own is None:
+            return EXERCISE
+        return self.restitution.own
 
     def load(self, scene: Scene, dt: float) -> None:
         """Make the scene's spheres; raises `Unsupported` for what the exercise has not."""
-        self.whole = self.process.surface == "advance"
+        process = self.process
         self.forces = np.zeros((scene.n, 3))
+        self.asked: list[dict[str, Any]] = []
+        self.log: list[ContactImpulse] = []
+        self.rows: Array | None = None
         if self.whole:
             fields = {
                 name: None if value is None else np.asarray(value).tolist()
                 for name, value in vars(scene).items()
             }
-            self.process.do("whole_load", {"scene": fields, "dt": dt}, STEP_LIMIT)
+            process.do("whole_load", {"scene": fields, "dt": dt}, STEP_LIMIT)
             return
-        self.restitution = read_restitution(self.process)
         self.refuse(scene)
         wrap = None if scene.wrap is None else scene.wrap.ravel().tolist()
         spheres = spheres_of(scene)
-        self.process.do(
+        process.do(
             "load", {"spheres": spheres, "dt": dt, "gravity": scene.gravity.tolist(), "wrap": wrap}
         )
 
     def refuse(self, scene: Scene) -> None:
         """Raise `Unsupported` for a missing function, walls, disks that cannot move, another
         restitution."""
-        missing = [name for key, name in NEEDED.items() if not self.process.functions[key]]
+        needed = NEEDED if scene.n > 1 else {"integrate": NEEDED["integrate"]}
+        missing = [name for key, name in needed.items() if not self.process.functions[key]]
         if missing:
             raise Unsupported(f"{self.path.name} has no function {' and no '.join(missing)}")
         if len(scene.walls):
             raise Unsupported("the exercise has no walls")
         if scene.static.any():
             raise Unsupported("the exercise has no disks that cannot move")
-        if scene.n > 1 and self.restitution == -1:
+        if scene.n > 1 and not self.restitution.fits(scene.restitution):
             raise Unsupported(
-                f"{self.path.name} lets spheres that meet go on as they were: its collisions do"
-                " nothing"
-            )
-        if scene.n > 1 and not abs(self.restitution - scene.restitution) <= REST:
-            raise Unsupported(
-                f"the file has e = {self.restitution:.3g}, the scene needs {scene.restitution:g}"
+                f"the file has e = {self.restitution.own:.3g}, the scene needs"
+                f" {scene.restitution:g}"
             )
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
@@ -99,34 +117,49 @@ class Student:
         self.forces[disk] += [*force, torque]
 
     def step(self, count: int = 1) -> None:
-        """One request for all the steps."""
+        """One request for all the steps, now or, if they are collected, with the next `read`."""
         forces = self.forces.tolist() if self.forces.any() else None
-        self.process.do(
-            "whole_step" if self.whole else "step", {"count": count, "forces": forces}, self.limit
-        )
-        self.limit = self.patience
+        self.asked.append({"count": count, "forces": forces})
         self.forces[:] = 0.0
+        self.rows = None
+        if not self.collected:
+            for steps in self.take():
+                self.process.do("whole_step" if self.whole else "step", steps, self.limit)
+            self.limit = self.patience
+
+    def take(self) -> list[dict[str, Any]]:
+        """The steps that were not asked for yet, which are taken for asked for from now on."""
+        asked, self.asked = self.asked, []
+        return asked
+
+    def look(self) -> Array:
+        """(n, 12) or (n, 6) numbers of the spheres or the arrays; collisions are noted, too."""
+        if self.rows is None:
+            what = {"steps": self.take(), "heard": len(self.log)}
+            answer = self.process.do("whole_play" if self.whole else "play", what, self.limit)
+            self.limit = self.patience
+            self.rows = np.array(answer["rows"], float)
+            self.log += [
+                ContactImpulse(int(step), int(i), int(j), impulse)
+                for step, i, j, impulse in answer["collisions"]
+            ]
+        return self.rows
 
     def read(self) -> State:
         """From the arrays, or from the spheres' fields."""
-        rows = np.array(self.process.do("whole_read" if self.whole else "read"), float)
+        rows = self.look()
         angle, spin = (4, 5) if self.whole else (6, 7)
-        return State(
-            *(
-                np.ascontiguousarray(rows[:, part])
-                for part in (slice(0, 2), slice(2, 4), angle, spin)
-            )
-        )
+        return State(*(rows[:, part].copy() for part in (slice(0, 2), slice(2, 4), angle, spin)))
 
     def collisions(self) -> list[ContactImpulse]:
         """What `advance` reported, or every call of the collision function that changed a
         velocity."""
-        rows = self.process.do("whole_collisions" if self.whole else "collisions")
-        return [ContactImpulse(int(step), int(i), int(j), impulse) for step, i, j, impulse in rows]
+        self.look()
+        return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """What the file decides."""
-        own = "the scene's" if self.whole else f"{self.restitution:.6g}, written into the file"
+        own = "the scene's" if self.whole else str(self.restitution)
         order = "the file's own advance" if self.whole else "integrate all, every pair i < j, wrap"
         beside = ", ".join(file for file, _ in self.solver.beside)
         return {
@@ -150,6 +183,14 @@ class Student:
             self.started = None
 
 
+def make_globals(process: SolverProcess) -> None:
+    """Let the file make its own scene, as the exercise's page does before the first step: its
+    functions may speak of `ufo` or `asteroids`."""
+    if process.functions["begin"]:
+        with suppress(SolverFailed):  # what needs them says so itself
+            process.do("begin", None, BEGIN_LIMIT)
+
+
 def spheres_of(scene: Scene) -> list[list[float]]:
     """The 12 numbers of every disk: position, velocity, force, alpha, angularVelocity, torque,
     mass, MoI, size."""
@@ -170,31 +211,12 @@ def spheres_of(scene: Scene) -> list[list[float]]:
     return rows
 
 
-def read_restitution(process: SolverProcess) -> float:
-    """The e of a file, from two equal spheres that meet head-on at 2 m/s; NaN where no collision
-    comes out of it."""
-    pair = [
-        [-0.45, 0.0, 1.0, *[0.0] * 6, 1.0, 1.0, 0.5],
-        [0.45, 0.0, -1.0, *[0.0] * 6, 1.0, 1.0, 0.5],
-    ]
-    try:
-        answer = process.do(
-            "ask", {"spheres": pair, "calls": [["collide", 0, 1]], "world": False}, 1.0
-        )
-    except SolverFailed:
-        return float("nan")
-    if answer["error"] or not answer["states"]:
-        return float("nan")
-    a, b = answer["states"][-1]
-    return float(b[2] - a[2]) / 2.0
-
-
-def engine_file(path: Path, patience: float = STEP_LIMIT) -> EngineRow:
+def engine_file(path: Path, patience: float = STEP_LIMIT, collected: bool = False) -> EngineRow:
     """The row of `ENGINES` that a solver's file, as it is now, stands for; raises `NotASolver` if
     the path is none."""
     solver = read_solver(path)
     return EngineRow(
-        partial(Student, solver, patience),
+        partial(Student, solver, patience, collected),
         f"your own solver, {path}",
         1.0,
         FLOAT64,

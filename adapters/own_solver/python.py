@@ -231,7 +231,7 @@ class PythonSolver:
         calls: list[list[Any]] = []
         place = {id(s): k for k, s in enumerate(spheres)}
 
-        def noted(name: str, called: Callable[..., Any], on: int) -> Callable:
+        def noted(name: str, called: Callable[..., Any], on: int) -> Callable[..., Any]:
             def note(*given: Any, **named: Any) -> Any:
                 rest = [number(x) for x in given[on:]]
                 calls.append([name, *(place.get(id(s), -1) for s in given[:on]), *rest])
@@ -315,6 +315,7 @@ class PythonSolver:
                 px, py, turn = forces[i] if forces and (held or k == 0) else (0.0, 0.0, 0.0)
                 s.force.x, s.force.y, s.torque = s.mass * gx + px, s.mass * gy + py, turn
                 self.file["integrate"](s, self.scene["dt"])
+            self.motions = [motion(s) for s in self.spheres]
             for i in range(len(self.spheres)):
                 for j in range(i + 1, len(self.spheres)):
                     self.pair(i, j)
@@ -326,19 +327,27 @@ class PythonSolver:
     def pair(self, i: int, j: int) -> None:
         """Collide two, and log them if they overlapped or anything changed."""
         a, b = self.spheres[i], self.spheres[j]
-        x, y = a.position.x - b.position.x, a.position.y - b.position.y
-        before = (*motion(a), *motion(b))
+        was_a, was_b = self.motions[i], self.motions[j]
         self.file["collide"](a, b)
-        after = (*motion(a), *motion(b))
-        reach = a.size + b.size
-        if before[2:4] != after[2:4] or before[6:] != after[6:]:
-            du, dv = after[2] - before[2], after[3] - before[3]
+        is_a, is_b = self.motions[i], self.motions[j] = motion(a), motion(b)
+        x, y, reach = was_a[0] - was_b[0], was_a[1] - was_b[1], a.size + b.size
+        changed = was_a != is_a or was_b != is_b
+        if changed and (was_a[2:] != is_a[2:] or was_b[2:] != is_b[2:]):
+            du, dv = is_a[2] - was_a[2], is_a[3] - was_a[3]
             sign = -1.0 if du * x + dv * y < 0 else 1.0
             self.collision_rows.append(
                 [self.steps, i, j, number(sign * a.mass * (du * du + dv * dv) ** 0.5)]
             )
-        if (before != after or x * x + y * y < reach * reach) and len(self.log) < LOGGED:
-            self.log.append([self.steps, i, j, *map(number, before), *map(number, after)])
+        if (changed or x * x + y * y < reach * reach) and len(self.log) < LOGGED:
+            numbers = map(number, (*was_a, *was_b, *is_a, *is_b))
+            self.log.append([self.steps, i, j, *numbers])
+
+    def play(self, argument: dict[str, Any]) -> dict[str, Any]:
+        """Some calls of `step`, then where everything is and the collisions from number `heard` on:
+        one request for all."""
+        for step in argument["steps"]:
+            self.step(step)
+        return {"rows": self.read(), "collisions": self.collision_rows[argument["heard"] :]}
 
     def read(self, _argument: Any = None) -> list[list[float]]:
         """The scene's spheres as they are."""

@@ -9,6 +9,7 @@ from typing import NoReturn
 
 from adapters.run import STATUSES
 from adapters.thrust_grid import off_grid_note
+from reports.commands.own_solvers import lines
 from reports.lessons.catalogue import LESSONS
 from reports.page import overview
 from reports.page.report import Report, make_report
@@ -57,7 +58,9 @@ def print_summary(report: Report, page: str) -> None:
     rows = [[name, *(cell.text for cell in cells)] for name, cells in found.items()]
     print_table(console, headings, rows, title_of(len(report.comparisons)))
     console.print()
-    print_list(console, [*report.findings, *off_grid(report), statuses(report)])
+    print_list(
+        console, [*report.findings, *lines(report.said), *off_grid(report), statuses(report)]
+    )
     if failed := failures(report, Path(page).parent):
         console.print(failed, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)

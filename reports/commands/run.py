@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from adapters.engines import row_of
+from reports.commands.own_solvers import checks_of
 from reports.commands.report import finish
 from reports.lessons.catalogue import LESSONS
 from reports.page.report import make_report
@@ -60,9 +61,11 @@ def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
     with opening(request.out):
         out, folder = place_of(request.out), os.getcwd()
     scenes = request.scenes or list(SCENARIOS)
+    rows = {name: row_of(name) for name in checked_engines(request.engines)}
     plan = RunPlan(
         scenes=checked_scenes(scenes, request.dts, request.full, request.seed),
-        engines={name: row_of(name) for name in checked_engines(request.engines)},
+        engines=rows,
+        checks=checks_of(list(rows)),
         seed=request.seed,
         dts=request.dts,
         full=request.full,
@@ -140,7 +143,11 @@ def plan_of(folder: Path, part: Path) -> RunPlan:
     }
     names = ("seed", "dts", "full", "timings", "command", "folder")
     return RunPlan(
-        scenes=scenes, engines=engines, files=moved, **{name: header[name] for name in names}
+        scenes=scenes,
+        engines=engines,
+        files=moved,
+        checks=checks_of(list(engines)),
+        **{name: header[name] for name in names},
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from starlette.applications import Starlette
 
+from reports.commands.own_solvers import said_of
 from reports.game.command import FIRST, game_of
 from reports.game.server import Game, routes
 from reports.lessons.command import checked_lesson
@@ -22,7 +23,9 @@ def application(game: Game) -> Starlette:
 
 def play(flight: Path | None, engines: Sequence[str], port: int, opens: bool) -> None:
     """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is none."""
-    server.serve(application(game_of(flight, engines)), port, "/", opens)
+    game = game_of(flight, engines)
+    game.said = said_of(game.engines)
+    server.serve(application(game), port, "/", opens)
 
 
 def lesson(name: str, port: int, opens: bool) -> None:

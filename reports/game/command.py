@@ -7,11 +7,14 @@ from collections.abc import Sequence
 from contextlib import closing
 from math import inf
 from pathlib import Path
+from typing import cast
 
+from adapters.engine import Engine
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, OWN
-from adapters.own_solver.engine import engine_file
+from adapters.own_solver.engine import Student, engine_file
 from adapters.own_solver.file import KINDS
+from adapters.own_solver.restitution import EXERCISE
 from adapters.runaway import fault_of
 from reports.game.flight import FRAME, field_scenario
 from reports.game.messages import MOST_ENGINES
@@ -23,45 +26,55 @@ from scenarios.model import Scenario
 
 MOST_DISKS = 200  # of a scene file: more are no longer drawn sixty times a second
 PATIENCE = 2.0  # s that a solver's file may take for a frame, while the others wait for it
+# beside a solver's file if nothing else is named: a right solver of the exercise, and the exact
+# answer in float64
+BESIDE = ("reference:exercise", "event_driven:float64")
 FIRST = ("reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:float64")
 
 
 def game_of(flight: Path | None, engines: Sequence[str]) -> Game:
-    """The game, or a saved flight, through these engines; exits 2 if the file or an engine is
-    none."""
+    """The game, or a saved flight, through these engines, of which a solver's file is the solid
+    one; exits 2 if the file or an engine is none."""
     chosen = checked_engines(engines) if engines else list(FIRST)
+    own = [name for name in chosen if name.endswith(OWN)]
+    others = [name for name in chosen if name not in own]
     if len(chosen) > MOST_ENGINES:
         refuse([f"--engine: {len(chosen)} engines; at most {MOST_ENGINES} fly at once: name fewer"])
     file = read_flight(flight) if flight else None
     # A solver's file is a row like any other while it flies; one that cannot fly at all is reported
     # before.
-    ENGINES.update(own_rows([name for name in chosen if name.endswith(OWN)]))
-    return Game(chosen, file)
+    rows, restitution = own_rows(own)
+    ENGINES.update(rows)
+    beside = others or BESIDE[: MOST_ENGINES - len(own)]
+    return Game([*own, *beside], file, restitution)
 
 
-def own_rows(names: Sequence[str]) -> dict[str, EngineRow]:
-    """The rows of solvers' files, `PATH:own`, each tried on a lone ship; exits 2 with a line for
-    each that fails."""
-    rows, faults = {}, []
+def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
+    """The rows of solvers' files, `PATH:own`, each tried on a ship and an asteroid, and the
+    restitution that the first of them is written for; exits 2 with a line for each that fails."""
+    rows, faults, restitutions = {}, [], []
     for name in names:
         path = Path(name.removesuffix(OWN))
-        rows[name] = engine_file(path, PATIENCE)
-        if reason := grounded(rows[name]):
-            faults.append(f"{path}: {reason.removeprefix(f'{path.name} ')}")
+        rows[name] = engine_file(path, PATIENCE, collected=True)
+        with closing(cast(Student, rows[name].make())) as engine:
+            try:
+                restitutions.append(engine.own_restitution)
+                try_out(engine, restitutions[-1])
+            except Exception as error:  # somebody's solver may raise anything
+                reason = str(error) or type(error).__name__
+                faults.append(f"{path}: {reason.removeprefix(f'{path.name} ')}")
     if faults:
         refuse(faults)
-    return rows
+    return rows, next(iter(restitutions), EXERCISE)
 
 
-def grounded(row: EngineRow) -> str:
-    """Why an engine cannot take a lone ship through a step; "" if it can."""
-    with closing(row.make()) as engine:
-        try:
-            engine.load(field_scenario(asteroids=0).scene, FRAME)
-            engine.step()
-            return fault_of(engine.read(), inf)
-        except Exception as error:  # somebody's solver may raise anything
-            return str(error) or type(error).__name__
+def try_out(engine: Engine, restitution: float) -> None:
+    """Take a ship and an asteroid through a step; raises what the engine raises, `ValueError` if
+    what it gives cannot be gone on from."""
+    engine.load(field_scenario(asteroids=1, restitution=restitution).scene, FRAME)
+    engine.step()
+    if fault := fault_of(engine.read(), inf):
+        raise ValueError(fault)
 
 
 def read_flight(path: Path) -> Scenario:

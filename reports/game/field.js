@@ -119,7 +119,7 @@ class Field {
     return { outline, craters, colour: `rgb(${grey + 10} ${grey} ${grey - 10})`, dark: `rgb(${grey - 34} ${grey - 42} ${grey - 50})` };
   }
 
-  // `flyers`: [{name, at: [[x, y, angle], ...], gone}], the solid one first named by `solid`; `mark`: where one diverged.
+  // `flyers`: [{name, label, at: [[x, y, angle], ...], gone}], of which number `solid` is the solid one; `marks`: where one diverged.
   draw(flyers, solid, force, marks) {
     this.last = [flyers, solid, force, marks];
     const pen = this.canvas.getContext("2d");
@@ -130,7 +130,9 @@ class Field {
     leader.at.forEach(([x, y, angle], disk) => disk !== SHIP && this.drawRock(pen, disk, x, y, angle));
     this.drawShip(pen, ...leader.at[SHIP], force);
     flyers.forEach((flyer, k) => k !== solid && !flyer.gone && this.drawGhost(pen, flyer, leader));
-    marks.forEach((mark) => this.drawMark(pen, mark));
+    const taken = [this.drawName(pen, leader)];
+    marks.forEach((mark, k) => this.drawRing(pen, mark, marks.slice(0, k)));
+    marks.forEach((mark) => taken.push(this.drawLabel(pen, mark, taken)));
   }
 
   within(pen, x, y, angle, paint) {
@@ -209,24 +211,58 @@ class Field {
     pen.setLineDash([]);
   }
 
-  drawMark(pen, { x, y, name, text }) {
+  get large() { return this.size[0] > 500; }
+
+  // Rings at one place lie in each other.
+  drawRing(pen, { x, y, name }, earlier) {
     const [px, py] = this.pixel(x, y);
-    const colour = looks[name].dark;
-    pen.strokeStyle = pen.fillStyle = colour;
-    const r = this.size[0] > 600 ? 13 : 8;
-    pen.lineWidth = r / 7;
+    const inside = earlier.filter((mark) => Math.hypot(...this.pixel(mark.x, mark.y).map((at, k) => at - [px, py][k])) < 12).length;
+    const r = (this.large ? 13 : 8) + 4 * inside;
+    pen.strokeStyle = looks[name].dark;
+    pen.lineWidth = this.large ? 2 : 1.2;
     pen.beginPath(); pen.arc(px, py, r, 0, 2 * Math.PI); pen.stroke();
     for (const turn of [0, 1, 2, 3]) {
       this.withinPixels(pen, px, py, (turn * Math.PI) / 2, () => { pen.beginPath(); pen.moveTo(r, 0); pen.lineTo(1.6 * r, 0); pen.stroke(); });
     }
-    pen.font = `${r > 10 ? 12 : 10}px system-ui, sans-serif`;
-    const right = px > this.size[0] - 15 * r;
-    pen.textAlign = right ? "right" : "left";
+  }
+
+  // Beside its ring, below the labels that are there already; returns the box it takes: left, top, right, bottom in pixels.
+  drawLabel(pen, { x, y, name, text }, taken) {
+    const [px, py] = this.pixel(x, y);
+    const line = this.font(pen), width = pen.measureText(text).width, away = this.large ? 24 : 15;
+    const left = px + away + width > this.size[0] ? Math.max(2, px - away - width) : px + away;
+    const box = (top) => [left, top, left + width, top + line];
+    const meets = (one) => taken.some((other) => one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3]);
+    const lowest = this.size[1] - line - 2, first = Math.min(lowest, Math.max(2, py - 1.2 * line));
+    const tops = Array.from({ length: 2 * Math.ceil(this.size[1] / line) }, (_, k) => first + (k % 2 ? -1 : 1) * Math.ceil(k / 2) * line);
+    const free = box(tops.find((top) => top >= 2 && top <= lowest && !meets(box(top))) ?? first);
+    this.write(pen, text, free, looks[name].dark);
+    return free;
+  }
+
+  // The solid one's name below its ship; returns the box it takes.
+  drawName(pen, { label, at }) {
+    const [px, py] = this.pixel(...at[SHIP]), r = this.field.radius[SHIP] * this.scale;
+    const line = this.font(pen), width = pen.measureText(label).width;
+    const left = Math.min(Math.max(2, px - width / 2), this.size[0] - width - 2);
+    const top = py + r + 3 + line > this.size[1] ? py - r - 3 - line : py + r + 3;
+    this.write(pen, label, [left, top], "#f2f4f8");
+    return [left, top, left + width, top + line];
+  }
+
+  // Height of a line of the field's letters in pixels.
+  font(pen) {
+    pen.font = `${this.large ? 12 : 10}px system-ui, sans-serif`;
+    return this.large ? 15 : 12;
+  }
+
+  write(pen, text, [left, top], colour) {
+    pen.textBaseline = "top";
     pen.lineWidth = 3;
     pen.strokeStyle = "rgb(8 12 26 / .85)";
-    const at = [px + (right ? -1.7 : 1.7) * r, Math.max(14, py - 0.6 * r)];
-    pen.strokeText(text, ...at);
-    pen.fillText(text, ...at);
+    pen.strokeText(text, left, top + 1);
+    pen.fillStyle = colour;
+    pen.fillText(text, left, top + 1);
   }
 
   withinPixels(pen, x, y, turn, paint) {

@@ -3,8 +3,9 @@ server in here."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,13 @@ import numpy as np
 from adapters.advance import advance
 from adapters.engine import Engine
 from adapters.engines import ENGINES
-from adapters.first_collisions import first_collisions, weight_impulse
+from adapters.first_collisions import weight_impulse
 from adapters.runaway import RUNAWAY, fault_of, reach
-from reports.game.divergence import Divergence, Touches, divergence
+from reports.game.divergence import WAIT, Divergence, Edge, Touches, divergence
 from reports.game.pilot import SHIP, Pilot
 from scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
 from scenarios.model import Array, Scenario, State
+from scenarios.no_truth import NoTruth
 
 # s; a power of two, so that every instant of a saved flight is a whole number of steps without
 # rounding
@@ -53,12 +55,13 @@ class Flyer:
     Attributes:
         name: `engine:profile`.
         state: at the end of the last frame.
+        touches: the latest collision of every disk, and how many there were.
         left: why it flies no more, or "".
-        touches: the latest collision of every disk.
-        set_backs: how often its ship was set back to the start.
+        left_at: s on the flight's clock, the end of the frame in which it left.
+        since: s on the flight's clock when its own began: at the start, or when its ship was set
+            back.
+        edges: where and when its ship left the field, each time.
         seen: how many of its collisions since then are in `touches`.
-        earlier: how many collisions there were before.
-        collisions: how many there were since.
         divergence: where it diverged from the solid one.
     """
 
@@ -67,11 +70,34 @@ class Flyer:
     state: State
     touches: Touches
     left: str = ""
-    set_backs: int = 0
+    left_at: float = 0.0
+    since: float = 0.0
+    edges: list[Edge] = field(default_factory=list)
     seen: int = 0
-    earlier: int = 0
-    collisions: int = 0
     divergence: Divergence | None = None
+
+    @property
+    def set_backs(self) -> int:
+        """How often its ship was set back to the start."""
+        return len(self.edges)
+
+    def leave(self, reason: Exception | str, at: float) -> None:
+        """Fly no more, from `at` s of the flight on."""
+        if isinstance(reason, Exception):
+            reason = on_the_clock(reason, self.since)
+        self.left, self.left_at = reason, at
+
+
+SECONDS = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?) s\b")
+
+
+def on_the_clock(error: Exception, since: float) -> str:
+    """What an engine says when it fails. An event engine says when: its clock runs from `since` s
+    of the flight on, and its times are given as the flight's."""
+    said = str(error) or type(error).__name__
+    if not isinstance(error.__cause__, NoTruth):
+        return said
+    return SECONDS.sub(lambda time: f"{since + float(time[1]):.4g} s", said)
 
 
 class Flight:
@@ -97,13 +123,14 @@ class Flight:
     def boarded(self, name: str) -> Flyer:
         """An engine with the scene in it; one that cannot be made or refuses says why in `left`."""
         scene = self.scenario.scene
-        flyer = Flyer(name, None, scene.state, Touches(scene))  # type: ignore[arg-type]
+        touches = Touches(scene, weight_impulse(scene, self.dt))
+        flyer = Flyer(name, None, scene.state, touches)  # type: ignore[arg-type]
         try:
             flyer.engine = ENGINES[name].make()
             flyer.engine.load(scene, self.dt)
             flyer.state = flyer.engine.read()
         except Exception as error:  # a missing library, a refusal, or whatever an engine raises
-            flyer.left = str(error) or type(error).__name__
+            flyer.leave(error, 0.0)
         return flyer
 
     @property
@@ -145,14 +172,17 @@ class Flight:
                 self.fly_on(flyer, steered, step, stride)
 
     def may_leave(self, state: State) -> bool:
-        """Whether the ship is so near an edge that a frame may carry it beyond."""
+        """Whether the ship is so near an edge that a frame may carry it beyond: by its own
+        velocity, or by that of whatever strikes it.
+
+        One that is displaced further, as out of a deep overlap, is set back at the end of the frame
+        instead of the step.
+        """
         if not self.is_game:
             return False
         low, high = np.array([LOW, HIGH])
-        room = (
-            self.scenario.scene.radius[SHIP]
-            + 2 * np.abs(state.velocity[SHIP]) * self.scenario.sample_interval
-        )
+        fastest = np.abs(state.velocity).max(axis=0)
+        room = 2 * (np.abs(state.velocity[SHIP]) + fastest) * self.scenario.sample_interval
         return bool(
             ((state.position[SHIP] < low + room) | (state.position[SHIP] > high - room)).any()
         )
@@ -160,33 +190,31 @@ class Flight:
     def fly_on(self, flyer: Flyer, steered: Scenario, step: int, count: int) -> None:
         """`count` steps of one engine from step number `step` on; what it raises or does wrong
         makes it leave."""
-        before = flyer.state
+        before, ends = flyer.state, (self.frame + 1) * self.scenario.sample_interval
         try:
             advance(flyer.engine, steered, step, count, self.dt)
             flyer.state = flyer.engine.read()
             collisions = flyer.engine.collisions()
         except Exception as error:  # a refusal, or whatever an engine raises
-            flyer.left = str(error) or type(error).__name__
+            flyer.leave(error, ends)
             return
         if fault := fault_of(flyer.state, self.farthest):
-            flyer.state, flyer.left = before, fault
+            flyer.state = before
+            flyer.leave(fault, ends)
             return
         if len(collisions) > flyer.seen:
             flyer.touches.note(collisions[flyer.seen :], self.frame, flyer.state)
             flyer.seen = len(collisions)
-            flyer.collisions = len(
-                first_collisions(collisions, self.dt, weight_impulse(self.scenario.scene, self.dt))
-            )
         if self.ship_left(before, flyer.state):
-            self.set_back(flyer)
+            self.set_back(flyer, before, (step + count) * self.dt)
 
     def ship_left(self, before: State, after: State) -> bool:
         """Whether the ship was set onto the opposite edge of the game's field."""
         jump = np.abs(after.position[SHIP] - before.position[SHIP])
         return self.is_game and bool((jump > (np.array(HIGH) - LOW) / 2).any())
 
-    def set_back(self, flyer: Flyer) -> None:
-        """The ship to its start, all else as it is."""
+    def set_back(self, flyer: Flyer, before: State, now: float) -> None:
+        """The ship to its start, all else as it is, at `now` s; it was last seen in `before`."""
         if flyer is self.solid and self.left_at < 0:
             self.left_at = self.frame
         arrays: dict[str, Any] = {
@@ -194,31 +222,41 @@ class Flight:
         }
         for name, array in arrays.items():
             array[SHIP] = getattr(self.scenario.scene, name)[SHIP]
-        flyer.earlier, flyer.collisions, flyer.seen = flyer.earlier + flyer.collisions, 0, 0
-        flyer.set_backs += 1
+        flyer.edges.append(Edge(self.frame, *before.position[SHIP].tolist()))
+        flyer.touches.begin_again(SHIP)
+        flyer.seen, flyer.since = 0, now
         try:
             flyer.engine.load(replace(self.scenario.scene, **arrays), self.dt)
             flyer.state = flyer.engine.read()
         except Exception as error:  # say, an event engine, where the start is taken by an asteroid
-            flyer.left = f"the ship cannot be set back: {error}"
+            flyer.leave(f"the ship cannot be set back: {on_the_clock(error, now)}", now)
 
     def compare(self) -> None:
         """Note who diverges from the solid one at the end of this frame, and whether the game is
         won."""
         solid = self.solid
         for ghost in self.flyers:
-            watched = not (
-                ghost is solid
-                or ghost.left
-                or ghost.divergence
-                or solid.set_backs
-                or ghost.set_backs
-            )
-            if watched:
-                velocities = solid.state.velocity, ghost.state.velocity
-                ghost.divergence = divergence(solid.touches, ghost.touches, *velocities, self.frame)
+            if not (ghost is solid or ghost.left or ghost.divergence):
+                ghost.divergence = self.divergence_of(ghost)
         if self.won and self.won_at < 0:
             self.won_at = self.frame
+
+    def divergence_of(self, ghost: Flyer) -> Divergence | None:
+        """Where a ghost has diverged from the solid one by now.
+
+        Ships are set back one by one, so that a ship is not compared while it was set back in one
+        of the two only; one that stays the only one has diverged at the edge.
+        """
+        solid = self.solid
+        velocity, other = solid.state.velocity, ghost.state.velocity
+        if solid.set_backs != ghost.set_backs:
+            more = max(solid, ghost, key=lambda flyer: flyer.set_backs)
+            edge = more.edges[min(solid.set_backs, ghost.set_backs)]
+            if self.frame - edge.frame >= WAIT:
+                return Divergence(edge, False, more is solid)
+            velocity = velocity.copy()
+            velocity[SHIP] = other[SHIP]
+        return divergence(solid.touches, ghost.touches, velocity, other, self.frame)
 
     @property
     def won(self) -> bool:
@@ -242,7 +280,7 @@ class Flight:
             "energy": float(mass @ speed2 + inertia @ state.angular_velocity[moving] ** 2) / 2,
             "ship_deviation": float(deviation[SHIP]),
             "deviation": float(deviation.max()),
-            "collisions": flyer.earlier + flyer.collisions,
+            "collisions": flyer.touches.count,
         }
 
     def distances(self, here: Array, there: Array) -> Array:

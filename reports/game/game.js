@@ -69,7 +69,7 @@ class Game {
   nameThoseWhoLeave(frame) {
     const left = this.field.engines.filter((name, k) => frame.flyers[k].left && !this.gone.has(name));
     left.forEach((name) => this.gone.add(name));
-    if (left.length) this.announce(`${left.map(shortName).join(", ")} left: ${frame.flyers[this.field.engines.indexOf(left[0])].left}`);
+    if (left.length) this.announce(left.map((name) => `${shortName(name)} ${farewell(frame.flyers[this.field.engines.indexOf(name)])}`).join("; "));
   }
 
   tick(now) {
@@ -100,7 +100,7 @@ class Game {
     const share = this.span ? Math.min(1, (now - this.arrived) / this.span) : 1;
     const [before, after] = this.frames;
     const flyers = after.flyers.map((flyer, k) => ({
-      name: this.field.engines[k], gone: flyer.left,
+      name: this.field.engines[k], label: shortName(this.field.engines[k]), gone: flyer.left,
       at: this.field.radius.map((_, disk) => this.between(before.flyers[k], flyer, disk, this.paused ? 1 : share)),
     }));
     const marks = after.flyers.flatMap((flyer, k) => flyer.diverged ? [this.mark(flyer.diverged, this.field.engines[k])] : []);
@@ -152,12 +152,12 @@ class Game {
   }
 
   story(flyer, name) {
-    if (flyer.left) return `left: ${flyer.left}`;
+    if (flyer.left) return farewell(flyer);
     if (!flyer.diverged) return "";
     const { t, i, j, shared, solid_only: mine } = flyer.diverged;
-    const solid = this.field.engines[this.now.solid];
-    const whose = shared ? "both collide, and diverge" : `only ${shortName(mine ? solid : name)} collisions`;
-    return `${t.toFixed(2)} s, ${pairOf(i, j)}: ${whose}`;
+    const only = shortName(mine ? this.field.engines[this.now.solid] : name);
+    if (i === undefined) return `${t.toFixed(2)} s: the ship leaves the field in ${only} only`;
+    return `${t.toFixed(2)} s, ${pairOf(i, j)}: ${shared ? "both collide, and diverge" : `a collision in ${only} only`}`;
   }
 
   // Over the last second; the flight is slowed where the engines, the way to the server or the screen are too slow.
@@ -264,11 +264,13 @@ class Game {
 }
 
 const keyOf = (event) => KEYS[event.key] ?? KEYS[event.key.toLowerCase()];
-const pairOf = (i, j) => `${i === SHIP ? "ship" : i} × ${j < 0 ? `wall ${-1 - j}` : j === SHIP ? "ship" : j}`;
+const farewell = ({ left, left_at: at }) => at ? `left at ${at.toFixed(2)} s: ${left}` : `does not fly: ${left}`;
+const pairOf = (i, j) => i === undefined ? "leaves the field" : `${i === SHIP ? "ship" : i} × ${j < 0 ? `wall ${-1 - j}` : j === SHIP ? "ship" : j}`;
 const raised = (digits) => [...digits].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("");
 const short = (metres) => metres === 0 ? "0" : metres >= 1e-3 ? metres.toFixed(3)
   : metres.toExponential(0).replace(/e-(\d+)/, (_, digits) => `×10⁻${raised(digits)}`);
-const shortName = (name) => name.endsWith(":own") ? name.slice(0, -4).split("/").pop() : name;
+const labels = Object.fromEntries([...document.querySelectorAll("tr[data-engine]")].map(({ dataset }) => [dataset.engine, dataset.label]));
+const shortName = (name) => labels[name];
 const mean = (rows) => rows.reduce((sum, row) => sum + row[1], 0) / rows.length;
 
 // Keeps the rows of the last second; the first number of a row is its time in ms.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from asyncio import CancelledError
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from secrets import token_hex
@@ -47,16 +47,27 @@ class Allowance:
 @dataclass
 class Game:
     """What every tab begins with, how many are open, and by what a page knows its own server from a
-    later one."""
+    later one.
+
+    Attributes:
+        engines: that fly, the solid one first.
+        file: the flight that is shown again; None: keys steer.
+        restitution: of the first field.
+        said: engine -> what `check` says of its file.
+    """
 
     engines: Sequence[str]
     file: Scenario | None = None
+    restitution: float = 0.9
+    said: Mapping[str, Sequence[str]] = field(default_factory=dict)
     tabs: int = 0
     mark: str = field(default_factory=lambda: token_hex(8))
 
     async def page(self, _: Request) -> HTMLResponse:
         """The page."""
-        return HTMLResponse(game_page(self.engines, self.file, self.mark))
+        return HTMLResponse(
+            game_page(self.engines, self.file, self.mark, self.restitution, self.said)
+        )
 
     async def fly(self, socket: WebSocket) -> None:
         """A tab, as long as it keeps the rules."""
@@ -70,7 +81,7 @@ class Game:
         self.tabs += 1
         session = None
         try:
-            session = await in_thread(Session, self.engines, self.file)
+            session = await in_thread(Session, self.engines, self.file, self.restitution)
             with suppress(WebSocketDisconnect):
                 await socket.send_text(as_json(session.field() | {"server": self.mark}))
                 await converse(socket, session)

@@ -25,9 +25,11 @@ class Session:
         given_up: nobody waits for its answer any more, and it may still be at it.
     """
 
-    def __init__(self, engines: Sequence[str], file: Scenario | None = None) -> None:
+    def __init__(
+        self, engines: Sequence[str], file: Scenario | None = None, restitution: float = 0.9
+    ) -> None:
         self.file, self.given_up = file, False
-        self.flight = self.begun(Fly(do="fly", engines=list(engines)))
+        self.flight = self.begun(Fly(do="fly", engines=list(engines), restitution=restitution))
 
     def begun(self, wish: Fly) -> Flight:
         """A new flight as wished; a file's own field and step are kept."""
@@ -122,16 +124,17 @@ class Session:
         """One engine's disks, its measures, and where it diverged or why it left."""
         diverged = None
         if flyer.divergence is not None:
-            collision = flyer.divergence.collision
-            diverged = collision._asdict() | {
-                "t": (collision.frame + 1) * self.flight.scenario.sample_interval,
-                "shared": flyer.divergence.shared,
-                "solid_only": flyer.divergence.solid_only,
+            at, shared, solid_only = flyer.divergence
+            diverged = at._asdict() | {
+                "t": (at.frame + 1) * self.flight.scenario.sample_interval,
+                "shared": shared,
+                "solid_only": solid_only,
             }
         return self.flight.measures(flyer) | {
             "x": rounded(flyer.state.position.ravel()),
             "angle": rounded(flyer.state.angle),
             "left": flyer.left,
+            "left_at": flyer.left_at,
             "diverged": diverged,
             "set_backs": flyer.set_backs,
         }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -58,12 +59,14 @@ def write_page(
     known_answers: pd.DataFrame,
     about: Mapping[str, Any],
     lessons: Mapping[str, Any],
+    said: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> None:
     """Write the page of `comparisons`, in reading order, to `path`.
 
     `findings` are the sentences on top; who is in `untrusted` is not scored; `conformance` and
     `known_answers` are the tables below them; `about` holds command, seed, machine, versions,
-    started and seconds; `lessons` name -> what has its number, title and question.
+    started and seconds; `lessons` name -> what has its number, title and question; `said` a
+    solver's file -> what `crosscheck check` says of it.
     """
     names = overview.names_of(comparisons)
     common = overview.common_settings(comparisons)
@@ -94,6 +97,7 @@ def write_page(
         heat_bounds=style.HEAT_BOUNDS,
         metrics=METRICS,
         lessons=lessons,
+        said=said,
         truth_of=truth_of,
         off_grid_note=off_grid_note,
         common=by_name(common),

@@ -32,6 +32,7 @@ class Report:
             concluded from them.
         unjudged: name of a scene -> why it is not held to its answer, or not compared at all,
             though it should be.
+        said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
     """
 
     archive: Archive
@@ -40,6 +41,7 @@ class Report:
     findings: list[str]
     untrusted: set[str]
     unjudged: Mapping[str, str]
+    said: Mapping[str, list[str]]
 
 
 def make_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, Any]) -> Report:
@@ -79,6 +81,11 @@ def made_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, 
         if row["verdict"] == "breaks"
     }
     sentences = findings(comparisons, untrusted)
+    said = {
+        name: archive.checked[name]["checked"]["says"]
+        for name in header["engines"]
+        if name in archive.checked
+    }
     write_page(
         folder / PAGE,
         comparisons,
@@ -88,5 +95,6 @@ def made_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, 
         known_answers=pd.DataFrame(known),
         about=header | {"seconds": archive.seconds},
         lessons=lessons,
+        said=said,
     )
-    return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged)
+    return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged, said)

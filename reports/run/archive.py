@@ -53,6 +53,7 @@ class Archive:
         records: the lines of the cells that ended, `as_found`.
         conformance: `engine:profile` -> its line.
         known_answers: the lines of the known answers that were made again.
+        checked: solver's file, `PATH:own` -> its line, what `crosscheck check` says of it.
         timings: key of a cell -> s, its timings, each taken alone.
         seconds: that the run took, up to now; NaN if it is not complete.
         complete: whether everything that was asked for has ended.
@@ -63,6 +64,7 @@ class Archive:
     records: list[dict[str, Any]]
     conformance: dict[str, dict[str, Any]]
     known_answers: list[dict[str, Any]]
+    checked: dict[str, dict[str, Any]]
     timings: dict[str, list[float]]
     seconds: float
     complete: bool
@@ -72,7 +74,9 @@ class Archive:
         """Read the journal of a folder, once; raises `ValueError`, naming the line, if it cannot be
         used."""
         header: dict[str, Any] = {}
-        last: dict[str, Numbered] = {"cell": {}, "conformance": {}, "known_answer": {}}
+        last: dict[str, Numbered] = {
+            kind: {} for kind in ("cell", "conformance", "known_answer", "checked")
+        }
         timings: dict[str, list[float]] = {}
         seconds, complete = 0.0, False
         for number, kind, line in checked_lines(folder, KINDS):
@@ -90,7 +94,9 @@ class Archive:
         for number, record in last["cell"].values():
             if fault := stranger(record, header):
                 raise ValueError(no_use(folder, number, fault, KINDS.missed))
-        records, conformance, known = ([line for _, line in last[kind].values()] for kind in last)
+        records, conformance, known, checked = (
+            [line for _, line in last[kind].values()] for kind in last
+        )
         records = [as_found(folder, record) for record in records]
         by_engine = {line["of"]: line for line in conformance}
         return Archive(
@@ -99,6 +105,7 @@ class Archive:
             records,
             by_engine,
             known,
+            {line["of"]: line for line in checked},
             timings,
             seconds if complete else float("nan"),
             complete,

@@ -120,6 +120,22 @@ class KnownAnswerLine(Line):
     key: Literal[""] | Digest
 
 
+class Checked(Line):
+    """What `crosscheck check` says of a solver's file: whether it found no fault, and its
+    sentences."""
+
+    passed: bool
+    says: list[Words]
+
+
+class CheckedLine(Line):
+    """The check of a solver's file that plays."""
+
+    checked: Checked
+    of: EngineProfile
+    key: Literal[""] | Digest
+
+
 class TimingLine(Line):
     """A timing of a cell."""
 
@@ -154,6 +170,7 @@ KINDS = Kinds(
         "cell": CellLine,
         "conformance": ConformanceLine,
         "known_answer": KnownAnswerLine,
+        "checked": CheckedLine,
         "timing": TimingLine,
         "footer": FooterLine,
     },

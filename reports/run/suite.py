@@ -11,7 +11,7 @@ from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from adapters.conformance.conform import no_answer
 from adapters.engine_row import EngineRow
@@ -34,6 +34,26 @@ from scenarios.files.scene_file import scene_text
 from scenarios.model import Scenario
 
 
+class Check(NamedTuple):
+    """What `crosscheck check` says of a solver's file.
+
+    Attributes:
+        passed: whether it found no fault.
+        says: its sentences, the one to begin with first.
+        source: of the text that was checked, as `EngineRow.source`; "" if there is none.
+    """
+
+    passed: bool
+    says: list[str]
+    source: str
+
+
+class Checking(NamedTuple):
+    """The task to check the file of an engine."""
+
+    engine: str
+
+
 @dataclass(frozen=True)
 class RunPlan:
     """What is asked for: all that decides which numbers come out.
@@ -48,6 +68,7 @@ class RunPlan:
         command: how to ask for the same again.
         folder: where it was asked for, from where paths that are not absolute are meant.
         files: what is read instead of a scene's path, such as the copy of a file that is gone.
+        checks: a solver's file of `engines` -> a picklable task that gives its `Check`.
     """
 
     scenes: Sequence[str]
@@ -59,6 +80,7 @@ class RunPlan:
     command: str
     folder: str = field(default_factory=os.getcwd)
     files: Mapping[str, Path] = field(default_factory=dict)
+    checks: Mapping[str, Callable[[], Check]] = field(default_factory=dict)
 
     def scenario(self, scene: str) -> Scenario:
         """The scenario behind one of `scenes`, with the steps asked for."""
@@ -104,13 +126,15 @@ def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress)
     archive = Archive.read(folder)
     done = had(archive, plan, means, scenarios)
     missing = {task: work for task, work in tasks.items() if task not in done}
+    # where the file is
+    checks = {task: missing.pop(task) for task in list(missing) if isinstance(task, Checking)}
     cells = [task for task in missing if isinstance(task, Cell)]
     alone = {cell for cell in cells if plan.engines[cell.engine].leaves_state}
     gathering = Gathering(archive, cells, means.timeout, progress.note)
-    comparing: deque[Any] = deque(gathering.whole())
-    progress.start(len(missing), len(tasks))
+    comparing: deque[Any] = deque([*checks.items(), *gathering.whole()])
+    progress.start(len(missing) + len(checks), len(tasks))
     limits = means.timeout, means.memory
-    if gathering.asked and not missing:
+    if gathering.asked and not missing and not checks:
         progress.say(waiting_for(gathering.asked))
     with closing(
         run_all(missing, means.workers, *limits, means.scheduler, alone, comparing)
@@ -124,6 +148,8 @@ def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress)
                 comparing.extend(gathering.ended(line))
             elif isinstance(task, Path):
                 comparing.extend(gathering.came(task, result))
+            elif isinstance(task, Checking):
+                progress.done(*keep_check(journal, plan, task.engine, result))
             else:
                 progress.done(*keep_answer(journal, plan, task, result))
             if gathering.asked and not gathering.playing:
@@ -132,7 +158,13 @@ def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress)
     take_timings(archive, plan, means, journal, scenarios, progress)
     sweep(archive)
     journal.append(
-        {"footer": {"tasks": len(tasks), "played": len(missing), "seconds": progress.seconds}}
+        {
+            "footer": {
+                "tasks": len(tasks),
+                "played": len(missing) + len(checks),
+                "seconds": progress.seconds,
+            }
+        }
     )
 
 
@@ -165,11 +197,12 @@ def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], ta
 
 
 def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
-    """What is to be done, by what it is: an engine's name (its probes), a `KnownAnswer`, or a
-    `Cell`."""
+    """What is to be done, by what it is: an engine's name (its probes), `Checking`, `KnownAnswer`
+    or `Cell`."""
     tasks: dict[Any, Callable[[], Any]] = {
         name: partial(conform_here, name, row) for name, row in plan.engines.items()
     }
+    tasks |= {Checking(name): check for name, check in plan.checks.items()}
     if KNOWN_SCENE in plan.scenes:
         tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
     for scene, scenario in scenarios.items():
@@ -193,6 +226,11 @@ def had(
     }
     asked: tuple[KnownAnswer | str, ...] = (*plan.engines, *KNOWN_ANSWERS)
     done: set[Any] = {task for task in asked if keys.get(name_of(task)) == answer_key(plan, task)}
+    done |= {
+        Checking(name)
+        for name, line in archive.checked.items()
+        if name in plan.engines and line["key"] == answer_key(plan, name)
+    }
     hashes = {scene: scene_hash(scenario) for scene, scenario in scenarios.items()}
     for record in archive.records:
         cell = Cell(
@@ -240,6 +278,23 @@ def keep_answer(
     # A key that is nobody's: what failed for a reason outside the engine is asked again.
     key = "" if failure and failure.outside else answer_key(plan, task)
     journal.append(line | {"of": name_of(task), "key": key})
+    return said, status, reason
+
+
+def keep_check(
+    journal: Journal, plan: RunPlan, engine: str, result: Check | Failure
+) -> tuple[str, str, str]:
+    """Write what `crosscheck check` says of an engine's file; returns what to say of it, its
+    status, and why."""
+    said, status, reason = f"check of {engine}", "ok", ""
+    passed, says, key = False, ["It was saved while the run began: check it by itself."], ""
+    if isinstance(result, Failure):
+        says = [f"It could not be checked: {result.reason}"]
+        status, reason = result.status, result.reason
+    elif result.source == plan.engines[engine].source:
+        passed, says, key = result.passed, result.says, answer_key(plan, engine)
+    # without a key it is asked again when the run is resumed
+    journal.append({"checked": {"passed": passed, "says": says}, "of": engine, "key": key})
     return said, status, reason
 
 

@@ -6,13 +6,16 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from adapters.own_solver.engine import engine_file
+from adapters.own_solver.restitution import OwnRestitution, written
 from adapters.play import play
 from scenarios.catalogue import scenario
+from scenarios.families.exercise import asteroid_field
 from tests.reports.terminal.command_line import crosscheck
-from tests.solvers.mutants import CORRECT
+from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
 
@@ -82,7 +85,7 @@ UNCLOSED = {"projectObjects();\n}": "projectObjects();"}
             "error",
             "ReferenceError: nothing is not defined (line 43, column 3)",
         ),
-        (IDLE, "head_on_equal_e09", "unsupported", "lets spheres that meet go on as they were"),
+        (IDLE, "head_on_equal_e09", "ok", ""),
         (UNCLOSED, "head_on_equal_e09", "unsupported", "SyntaxError: Unexpected end of input"),
     ],
 )
@@ -102,6 +105,116 @@ def test_what_a_file_does_is_the_status_of_its_cell(
     engine.close()
 
     assert (played.status, reason in played.reason) == (status, True), played.reason
+
+
+WATCHED = (  # a mutant, and what its collisions would be taken for if they told the file's e
+    "collide_empty.js",  # -1
+    "normal_long.js",  # 0.539
+    "no_restitution.js",  # 0
+    "touches_ufo.js",  # a global that only initScene makes
+)
+# what they lack cannot be played; all else is
+LACKING = {"integrate_missing.js", "integrate_missing.py"}
+
+
+@pytest.mark.parametrize(
+    "mutant",
+    [
+        pytest.param(one, id=one.name, marks=[] if one.name in WATCHED else pytest.mark.slow)
+        for one in MUTANTS
+    ],
+)
+def test_a_faulty_file_is_played(tmp_path: Path, mutant: Mutant):
+    """Every mutant of the catalogue: refused only for a function that it lacks, and then that is
+    the reason; where it ends in no numbers or throws, what came before can be watched."""
+    engine = engine_file(mutant.write(tmp_path), patience=2.0).make()
+    question = scenario("head_on_equal_e09")
+    played = play(engine, "x:own", question, question.dt(question.substeps[0]))
+    engine.close()
+
+    if mutant.name in LACKING:
+        assert (played.status, played.reason) == (
+            "unsupported",
+            f"{mutant.name} has no function integrate",
+        )
+    else:
+        assert played.status in ("ok", "diverged", "error"), played.reason
+        assert played.trajectory is not None
+        assert len(played.trajectory) > 0
+
+
+def test_a_file_without_collisions_plays_a_lone_disk(tmp_path: Path):
+    """Nothing of it is missing there; where two meet, the function is."""
+    text = RIGHT.read_text().replace("function sphereSphere", "function laterSphereSphere")
+    (tmp_path / "Exercise.js").write_text(text)
+    row = engine_file(tmp_path / "Exercise.js")
+    statuses = {}
+    for name in ("ship_thrust", "head_on_equal_e09"):
+        engine, question = row.make(), scenario(name)
+        played = play(engine, "x:own", question, question.dt(question.substeps[0]))
+        engine.close()
+        statuses[name] = (played.status, played.reason)
+
+    assert statuses == {
+        "ship_thrust": ("ok", ""),
+        "head_on_equal_e09": (
+            "unsupported",
+            "Exercise.js has no function sphereSphereCollisionHandling",
+        ),
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "came", "wanted", "fits"),
+    [
+        ("var e = 0.5;", 0.5, 0.9, False),  # written for another, and it has it
+        ("var e = 0.5;", 0.5, 0.5, True),
+        ("var e = 0.9;", 0.0, 0.9, True),  # a fault that makes 0 of it
+        ("var e = 0.9;", 0.0, 1.0, False),
+        ("J = -1.9 * v / m;", -0.05, 0.9, True),  # 1 + e as a number
+        ("J = -1.5 * v / m;", 0.5, 0.9, False),
+        ("J = -2 * v / m;", 1.0, 0.9, False),
+        ("J = -k * v / m;", 0.5, 0.9, True),  # the text tells nothing: it is played
+        ("var e = 1.5;", 1.5, 0.9, True),  # no restitution: a fault
+        ("// e = 0.5\nvar e = 0.9;", 0.9, 0.9, True),
+        ("J = -v / m;", float("nan"), 0.9, True),
+    ],
+)
+def test_a_file_is_refused_only_for_a_restitution_that_is_written_into_it(
+    text: str, came: float, wanted: float, fits: bool
+):
+    """What its collisions have may be a fault's doing."""
+    assert OwnRestitution(tuple(written(text, came)), came).fits(wanted) is fits
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "plain.js",
+        pytest.param("plain.py", marks=pytest.mark.slow),
+        pytest.param("arrays.py", marks=pytest.mark.slow),
+    ],
+)
+def test_collected_steps_give_the_same_bits(name: str):
+    """The game asks for a frame at once; state and collisions are those of step by step."""
+    flight = asteroid_field(1, 6, 0.9)
+    states, collisions = [], []
+    for collected in (False, True):
+        engine = engine_file(RIGHT.parent / name, collected=collected).make()
+        engine.load(flight, 1 / 128)
+        for k in range(300):
+            engine.apply_force(0, np.array([1.0, 0.5 * k]), 0.1)
+            engine.step()
+            if k % 16 == 0:
+                engine.read()
+        engine.step(64)
+        states.append(np.column_stack(list(vars(engine.read()).values())))
+        collisions.append(engine.collisions())
+        engine.close()
+
+    assert states[0].tobytes() == states[1].tobytes()
+    assert collisions[0] == collisions[1]
+    assert len(collisions[0]) > 3
 
 
 def test_a_file_that_ends_its_process_is_a_crash(tmp_path: Path):

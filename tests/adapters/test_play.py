@@ -135,3 +135,12 @@ def test_collisions_are_the_beginnings_of_runs_of_impulses(impulses):
     begins = {(step + 1.0, *pair) for step, pair in impulses if (step - 1, pair) not in impulses}
     assert set(zip(found.t.tolist(), found.i.tolist(), found.j.tolist())) == begins
     assert (np.diff(found.t) >= 0).all()
+
+
+def test_a_negative_impulse_is_a_collision_too():
+    """A faulty solver that pulls: its collisions are counted; only what is small is rounding."""
+    pulls = [ContactImpulse(3, 0, 1, -2.0), ContactImpulse(9, 0, 1, -1.0)]
+    found = first_collisions([*pulls, ContactImpulse(20, 0, 1, -1e-9)], 0.5)
+
+    assert found.t.tolist() == [2.0, 5.0]
+    assert found.impulse.tolist() == [-2.0, -1.0]

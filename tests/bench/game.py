@@ -1,16 +1,17 @@
-"""How smoothly the game flies four engines and 21 disks in Chromium: `uv run python -m
-tests.bench.game [SECONDS]`."""
+"""How smoothly the game flies engines and 21 disks in Chromium: `uv run python -m tests.bench.game
+[SECONDS [ENGINE|FILE ...]]`."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 import numpy as np
+from playwright.sync_api import Browser
 
 from reports.commands.serve import application
-from reports.game.command import FIRST
+from reports.game.command import game_of
 from reports.game.flight import FRAME
-from reports.game.server import Game
 from tests.reports.page.browsing import chromium, opened, served
 
 # What the page itself does, timed: a picture every animation frame, an answer for every question.
@@ -37,10 +38,13 @@ MEANINGS = {
 }
 
 
-def measure(seconds: float) -> tuple[dict[str, np.ndarray], float]:
-    """ms of each kind over so many seconds of a flight under thrust, and the flight's time over the
-    clock's."""
-    with served(application(Game(FIRST))) as url, chromium() as browser:
+def measure(
+    browser: Browser, seconds: float, engines: Sequence[str]
+) -> tuple[dict[str, np.ndarray], float, list[str]]:
+    """ms of each kind over so many seconds of a flight under thrust, the flight's time over the
+    clock's, and who flew; no engine: those that the game begins with."""
+    game = game_of(None, engines)
+    with served(application(game)) as url:
         page, heard = opened(browser, url, viewport={"width": 1280, "height": 900})
         # compiled by then
         page.wait_for_function("() => game.field && game.now.frame > 64", timeout=120_000)
@@ -53,13 +57,15 @@ def measure(seconds: float) -> tuple[dict[str, np.ndarray], float]:
         page.context.close()
     assert heard == [], heard
     rows = np.diff(found["drawn"]), found["drawing"], found["engines"], found["answer"]
-    return dict(zip(MEANINGS, rows)), 1e3 * (after[0] - before[0]) / (after[1] - before[1])
+    pace = 1e3 * (after[0] - before[0]) / (after[1] - before[1])
+    return dict(zip(MEANINGS, rows)), pace, list(game.engines)
 
 
-def main(seconds: float) -> None:
+def main(seconds: float, engines: Sequence[str]) -> None:
     """Print them."""
-    rows, pace = measure(seconds)
-    print(f"{len(FIRST)} engines, 21 disks, {seconds:g} s: {', '.join(FIRST)}")
+    with chromium() as browser:
+        rows, pace, flown = measure(browser, seconds, engines)
+    print(f"{len(flown)} engines, 21 disks, {seconds:g} s: {', '.join(flown)}")
     print(f"{'ms':24}{'mean':>8}{'95 %':>8}{'most':>8}")
     for name, ms in rows.items():
         print(
@@ -71,4 +77,4 @@ def main(seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 20.0)
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 20.0, sys.argv[2:])

@@ -4,19 +4,25 @@ bits, a saved flight too."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from math import pi, sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from adapters.engine import ContactImpulse, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES
+from adapters.first_collisions import first_collisions
 from adapters.play import play
+from reports.game.divergence import Edge, Touches
 from reports.game.flight import EARTH, FRAME, Flight, field_scenario
 from reports.game.pilot import SHIP
 from scenarios.families.exercise import SHIP as START
 from scenarios.files.scene_file import read_scene_file, scene_text
+from scenarios.model import Scene
+from scenarios.no_truth import NoTruth
 from scenarios.truth.closed_forms import world_thrusts
 
 EVENTS = [  # frame, key, down: a turn, a thrust across it, a renewed thrust, both keys of a pair
@@ -262,13 +268,10 @@ def test_the_marker_names_the_first_collision():
     t, i, j = truth.collisions.t[0], truth.collisions.i[0], truth.collisions.j[0]
 
     assert ghost.divergence is not None
-    assert (ghost.divergence.collision.i, ghost.divergence.collision.j) in ((i, j), (j, i))
-    assert ghost.divergence.collision.frame == int(t / FRAME)
+    assert (ghost.divergence.at.i, ghost.divergence.at.j) in ((i, j), (j, i))
+    assert ghost.divergence.at.frame == int(t / FRAME)
     assert ghost.divergence.shared
-    assert (
-        matched.divergence is None
-        or matched.divergence.collision.frame > ghost.divergence.collision.frame
-    )
+    assert matched.divergence is None or matched.divergence.at.frame > ghost.divergence.at.frame
 
 
 def read_truth(scenario):  # type: ignore[no-untyped-def]
@@ -320,3 +323,91 @@ def test_spin_is_part_of_the_energy():
     assert reported["energy"] == pytest.approx(sum(each), rel=1e-14)
     assert reported["momentum"] == pytest.approx((scene.mass @ scene.velocity).tolist(), rel=1e-13)
     assert 0 < pi / 4 * 0.3**4 * scene.angular_velocity[1] ** 2 < reported["energy"]
+
+
+def test_an_engine_leaves_by_the_flights_clock(monkeypatch: pytest.MonkeyPatch):
+    """What it says counts from when its ship was set back; the flight says when that was for who
+    looks on."""
+    row = ENGINES["event_driven:float64"]
+    monkeypatch.setitem(
+        ENGINES, "event_driven:float64", replace(row, make=lambda: Accumulating(row))
+    )
+    names = ["reference:exercise", "event_driven:float64"]
+    flight = flown(names, 240, [(0, "s", True)], asteroids=0)
+    left = flight.flyers[1]
+    frame = round(left.left_at / FRAME)
+
+    assert left.set_backs == 1
+    assert 222 < frame < 240
+    assert left.left == f"they accumulate at {left.since + Accumulating.AT:.4g} s"
+    assert left.left_at - FRAME <= left.since + Accumulating.AT <= left.left_at + FRAME
+
+
+class Accumulating(Failing):
+    """An event engine that stops some time after it was loaded for the second time, and says when
+    by its own clock."""
+
+    AT = 0.125
+
+    def load(self, scene: Scene, dt: float) -> None:
+        self.loads = getattr(self, "loads", 0) + 1
+        self.inner.load(scene, dt)
+
+    def step(self, count: int = 1) -> None:
+        self.inner.step(count)
+        if self.loads == 2 and self.inner.steps * self.inner.dt >= self.AT:
+            raise Unsupported("they accumulate at 0.125 s") from NoTruth("", self.AT)
+
+
+def test_ghosts_are_compared_after_the_ship_was_set_back():
+    """One that has stayed with the solid one so far diverges at a collision later on; the way back
+    itself is no divergence."""
+    names = ["reference:exercise", "pymunk:matched", "box2d:matched"]
+    flight = flown(names, 300, [(0, "s", True), (260, "s", False)], asteroids=0)
+    together = [(flyer.set_backs, flyer.divergence) for flyer in flight.flyers]
+    struck = flight.flyers[1]
+    state = struck.engine.read()
+    state.velocity[SHIP] += 0.5
+    struck.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    struck.touches.note([ContactImpulse(0, SHIP, -1, 1.0)], flight.frame, state)
+    flight.advance(20)
+
+    assert together == [(1, None)] * 3
+    assert struck.divergence is not None
+    assert struck.divergence.at.frame == 300
+    assert flight.flyers[2].divergence is None  # negative control: nothing struck that one
+
+
+def test_a_ship_that_leaves_in_one_engine_only_diverges_at_the_edge():
+    """Not at a collision of long ago, and not while the other is about to follow."""
+    flight = flown(["reference:exercise", "pymunk:matched"], 200, [(0, "s", True)], asteroids=0)
+    slow = flight.flyers[1]
+    state = slow.engine.read()
+    state.velocity[SHIP] = 0.0
+    slow.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    while flight.left_at < 0:
+        flight.advance()
+    soon = slow.divergence
+    flight.advance(8)
+
+    assert soon is None
+    assert slow.divergence is not None
+    assert isinstance(slow.divergence.at, Edge)
+    assert slow.divergence.at.frame == flight.left_at
+    assert slow.divergence.at.x == pytest.approx(-5.0, abs=0.01)
+    assert slow.divergence.solid_only
+
+
+def test_collisions_are_counted_as_a_run_counts_them():
+    """One by one, where a run looks at all of them: of the flight's own engines, and of a solver
+    whose pair collides in every step."""
+    flight = flown(["reference:exercise", "pymunk:matched", "event_driven:float64"], 380)
+    every = [ContactImpulse(k, 1, 2, 1e-3) for k in range(100)]
+    counted = Touches(flight.scenario.scene, 2e-3)
+    for one in every:
+        counted.note([one], 0, flight.solid.state)
+
+    for flyer in flight.flyers:
+        whole = first_collisions(flyer.engine.collisions(), flight.dt)
+        assert flyer.touches.count == len(whole) > 5
+    assert counted.count == len(first_collisions(every, flight.dt, 2e-3)) == 1

@@ -288,6 +288,53 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
     assert heard == []
 
 
+def test_the_table_is_on_the_first_screen(page: Page):
+    """All ten engines at 1280 x 900."""
+    bottom = page.evaluate("document.querySelector('.engines').getBoundingClientRect().bottom")
+
+    assert page.locator("tr[data-engine]").count() == len(ENGINES)
+    assert bottom <= 900
+
+
+BOXES = """() => {
+  const pen = game.sky.canvas.getContext("2d"), { left, bottom, right, top } = game.sky.view;
+  const names = game.field.engines.slice(0, 3);
+  return [[-3.5, 0.3], [left, top], [right, bottom], [right, 0]].map(([x, y]) => {
+    const taken = [game.sky.drawName(pen, game.sky.last[0][0])];
+    for (const name of names) {
+      taken.push(game.sky.drawLabel(pen, { x, y, name, text: `${name} 1 × 2` }, taken));
+    }
+    return taken;
+  });
+}"""
+RADII = """() => {
+  const arcs = [], name = game.field.engines[0], arc = CanvasRenderingContext2D.prototype.arc;
+  CanvasRenderingContext2D.prototype.arc = (x, y, r) => arcs.push(r);
+  const pen = game.sky.canvas.getContext("2d"), one = { x: 0, y: 0, name };
+  game.sky.drawRing(pen, one, []);
+  game.sky.drawRing(pen, one, [one]);
+  game.sky.drawRing(pen, { x: 2, y: 0, name }, [one, one]);
+  CanvasRenderingContext2D.prototype.arc = arc;
+  return arcs;
+}"""
+
+
+def test_labels_of_rings_at_one_place_do_not_lie_on_each_other(page: Page):
+    """Nor on the ship's name, nor outside of the field, wherever the place is; their rings have
+    different radii."""
+    width, height, _ = page.evaluate("game.sky.size")
+    first, second, elsewhere = page.evaluate(RADII)
+
+    for taken in page.evaluate(BOXES):
+        for k, (left, top, right, bottom) in enumerate(taken):
+            assert min(left, top, width - right, height - bottom) > -1
+            for other in taken[:k]:
+                beside = right <= other[0] or other[2] <= left
+                assert beside or bottom <= other[1] or other[3] <= top
+    assert first < second
+    assert elsewhere == first
+
+
 def test_with_reduced_motion_nothing_moves_by_itself(page: Page):
     """The flight waits for the engine."""
     page.wait_for_timeout(200)

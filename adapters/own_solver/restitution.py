@@ -1,0 +1,108 @@
+"""The restitution of somebody's file: the number that is written into it, beside the one that its
+collisions have."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import nan
+
+from adapters.own_solver.file import SolverFailed, SolverText
+from adapters.own_solver.process import SolverProcess
+
+# largest difference between two restitutions that are the same: that of a constant written 0.9
+SAME = 1e-3
+EXERCISE = 0.9
+COMMENTS = re.compile(r"/\*.*?\*/|//[^\n]*|#[^\n]*", re.DOTALL)
+NAMED = re.compile(
+    r"\b(?:e|eps|epsilon|cor|restitution|elasticity|bounciness|bounce|coeff\w*|c_?r)\b"
+    r"\s*(?::\s*\w+\s*)?[:=]\s*(-?\d*\.?\d+)",
+    re.IGNORECASE,
+)
+NUMBER = re.compile(r"(?<![\w.])\d*\.?\d+(?![\w.])")
+
+
+@dataclass(frozen=True)
+class OwnRestitution:
+    """Of a file with the exercise's functions, which take none.
+
+    Attributes:
+        written: the numbers from 0 to 1 in its text that may be it, the likeliest first.
+        came: separation over approach speed of two equal spheres that meet head-on; NaN where no
+            collision came of it.
+    """
+
+    written: tuple[float, ...]
+    came: float
+
+    @property
+    def own(self) -> float | None:
+        """The number that the file is written for; None if its text holds none."""
+        return next((e for e in self.written if same(e, self.came)), next(iter(self.written), None))
+
+    def fits(self, wanted: float) -> bool:
+        """Whether the file can be played where a scene wants this restitution.
+
+        It cannot if it is written for another one. A file whose text says nothing is played, and so
+        is one whose collisions have what is wanted, or ought to have it: a fault makes any number
+        of them.
+        """
+        fitting = any(same(e, wanted) for e in (*self.written, self.came))
+        return fitting or self.own is None
+
+    def __str__(self) -> str:
+        """What a table of settings says."""
+        has = f"its collisions have {self.came:.6g}" if self.came == self.came else "none came"
+        if self.own is None:
+            return f"none is found in the file; {has}"
+        written = f"{self.own:g}, written into the file"
+        return written if same(self.own, self.came) else f"{written}; {has}"
+
+
+def restitution_of(solver: SolverText, process: SolverProcess) -> OwnRestitution:
+    """What the text of a file says, and what its collisions give."""
+    text = "\n".join([solver.text, *(module for file, module in solver.beside if is_own(file))])
+    came = probed(process)
+    return OwnRestitution(tuple(written(text, came)), came)
+
+
+def is_own(file: str) -> bool:
+    """Whether what lies beside a solver is its author's: the other thing that is read is
+    gl-matrix."""
+    return file.endswith(".py")
+
+
+def written(text: str, came: float) -> list[float]:
+    """What may be the e of a file: numbers that a name such as e or restitution gets, then 0.9 if
+    that or 1.9 occurs; else what came, if it or 1 more than it does."""
+    code = COMMENTS.sub(" ", text)
+    numbers = [float(number) for number in NUMBER.findall(code)]
+    found = [e for e in map(float, NAMED.findall(code)) if 0 <= e <= 1]
+    found += [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
+    if found or not 0 <= came <= 1:
+        return found
+    return [came] * any(same(number, came) or same(number, 1 + came) for number in numbers)
+
+
+def probed(process: SolverProcess) -> float:
+    """Separation over approach speed of two equal spheres that meet head-on at 2 m/s; NaN where no
+    collision comes out of it."""
+    pair = [
+        [-0.45, 0.0, 1.0, *[0.0] * 6, 1.0, 1.0, 0.5],
+        [0.45, 0.0, -1.0, *[0.0] * 6, 1.0, 1.0, 0.5],
+    ]
+    try:
+        answer = process.do(
+            "ask", {"spheres": pair, "calls": [["collide", 0, 1]], "world": False}, 1.0
+        )
+    except SolverFailed:
+        return nan
+    if answer["error"] or not answer["states"]:
+        return nan
+    a, b = answer["states"][-1]
+    return float(b[2] - a[2]) / 2.0
+
+
+def same(one: float, other: float) -> bool:
+    """Whether two restitutions agree; NaN agrees with nothing."""
+    return abs(one - other) <= SAME

@@ -1,0 +1,69 @@
+"""What `crosscheck check` says of the solvers' files that play in a run or fly in the game."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from adapters.engines import OWN
+from reports.check.verdict import check_file
+from reports.run.runner import run_all
+from reports.run.suite import Check
+from reports.run.worker_process import Failure
+from reports.terminal.exits import say
+
+CHECKING = 10.0  # s that the game waits for the check of a file, which takes one or two
+
+
+def checks_of(engines: Sequence[str]) -> dict[str, Callable[[], Check]]:
+    """A task for each solver's file among these engines; its path is taken from here."""
+    return {
+        name: partial(checked, Path(name.removesuffix(OWN)).absolute())
+        for name in engines
+        if name.endswith(OWN)
+    }
+
+
+def checked(path: Path) -> Check:
+    """The check of one file, in few sentences."""
+    one = check_file(path)
+    return Check(one.passed, one.sentences, one.solver.source if one.solver else "")
+
+
+def said_of(engines: Sequence[str]) -> dict[str, list[str]]:
+    """What `check` says of each solver's file among these engines, said on standard error, too: the
+    game plays them with their faults."""
+    tasks: dict[Hashable, Any] = {name: check for name, check in checks_of(engines).items()}
+    found: dict[str, list[str]] = {}
+    if not tasks:
+        return found
+    with closing(run_all(tasks, min(os.cpu_count() or 1, len(tasks)), CHECKING)) as results:
+        for name, check in results:
+            found[name] = (
+                [f"It was not checked within {CHECKING:g} s."]
+                if isinstance(check, Failure)
+                else check.says
+            )
+    found = {name: found[name] for name in engines if name in found}
+    for line in lines(found):
+        say(line)
+    return found
+
+
+def lines(found: Mapping[str, list[str]]) -> list[str]:
+    """For people in a terminal: the file, then its sentences."""
+    return [
+        line
+        for name, says in found.items()
+        for line in (
+            f"{name.removesuffix(OWN)}, by crosscheck check:",
+            *(
+                f"  {k}. {sentence}" if len(says) > 1 else f"  {sentence}"
+                for k, sentence in enumerate(says, 1)
+            ),
+        )
+    ]

@@ -1,0 +1,86 @@
+"""A solver's file that plays is checked, too: page, terminal and journal say what `check` says."""
+
+from __future__ import annotations
+
+import csv
+import html
+import json
+from pathlib import Path
+from typing import cast
+
+import pytest
+
+from adapters.own_solver.engine import engine_file
+from reports.check.verdict import check_file
+from reports.commands.own_solvers import checked, checks_of, lines
+from reports.run.journal import JOURNAL, Journal
+from reports.run.run_lines import KINDS
+from reports.run.suite import Check, RunPlan, keep_check
+from reports.run.worker_process import Failure
+from tests.reports.terminal.command_line import crosscheck
+from tests.solvers.mutants import MUTANTS
+
+[FAULTY] = [mutant for mutant in MUTANTS if mutant.name == "normal_long.js"]
+
+
+def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
+    """Kept with its key; that of another text, or none at all, is said to be so, and has no key."""
+    path = FAULTY.write(tmp_path)
+    name = f"{path}:own"
+    plan = cast(RunPlan, type("Plan", (), {"engines": {name: engine_file(path)}}))
+    right = checked(path)
+    later = Check(True, ["No fault found."], "another text")
+    with Journal(tmp_path) as journal:
+        for result in (right, later, Failure("timeout", "was stopped")):
+            keep_check(journal, plan, name, result)
+    kept = [json.loads(line) for line in (tmp_path / JOURNAL).read_text().splitlines()]
+
+    assert FAULTY.cause in right.says[0]
+    assert kept[0]["checked"] == {"passed": False, "says": right.says}
+    assert [bool(line["key"]) for line in kept] == [True, False, False]
+    assert [line["checked"]["passed"] for line in kept] == [False] * 3
+    assert "was saved" in kept[1]["checked"]["says"][0]
+    assert "was stopped" in kept[2]["checked"]["says"][0]
+    for line in kept:
+        KINDS.models["checked"].model_validate(line)
+
+
+def test_only_solvers_files_are_checked():
+    """Engines of the table have no file."""
+    assert list(checks_of(["pymunk:matched", "a/Exercise.js:own"])) == ["a/Exercise.js:own"]
+
+
+def test_sentences_are_numbered_where_there_are_some():
+    """As `check` prints them."""
+    found = {"a.js:own": ["First.", "Second."], "b.js:own": ["No fault found."]}
+
+    assert lines(found) == [
+        "a.js, by crosscheck check:",
+        "  1. First.",
+        "  2. Second.",
+        "b.js, by crosscheck check:",
+        "  No fault found.",
+    ]
+
+
+@pytest.mark.slow
+def test_a_run_says_what_check_says(tmp_path: Path):
+    """The second command of the README, of a faulty file: played at every step, with the same cause
+    first on the page and in the terminal; a resumed run does not check again what it has."""
+    path = FAULTY.write(tmp_path)
+    words = ["head_on_equal_e09", "--engine", path.name, "--engine", "pymunk", "--out", "beside"]
+    first = check_file(path).sentences[0]
+    done = crosscheck("run", *words, cwd=tmp_path)
+    page = (tmp_path / "beside" / "report.html").read_text()
+    rows = list(csv.DictReader((tmp_path / "beside" / "runs.csv").read_text().splitlines()))
+    again = crosscheck("run", "--resume", "beside", cwd=tmp_path)
+    journal = (tmp_path / "beside" / JOURNAL).read_text()
+
+    assert done.returncode == 0, done.stderr
+    assert FAULTY.cause in first
+    assert first in " ".join(done.stdout.split())
+    assert html.escape(first) in page.replace("&#39;", "'")
+    assert {row["status"] for row in rows if row["engine"] == path.name} == {"ok"}
+    assert again.returncode == 0, again.stderr
+    assert journal.count('"checked"') == 1
+    assert json.loads(journal.splitlines()[-1])["footer"]["played"] == 0
