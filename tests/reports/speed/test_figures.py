@@ -178,11 +178,12 @@ def test_who_costs_less_than_our_own_solver_is_named():
     other = speed_figures.costs(against({"box2d:matched": "1 of 2: free_fall"}, thrust))
     assert "| free_fall | box2d:matched |" in other
     assert (
-        "Without what an idle step costs, some engine costs less in 1 scenes: ship_thrust." in other
+        "If the cost of an idle step is subtracted, some engine costs less in 1 scene: ship_thrust."
+        in other
     )
     changed = speed_figures.costs(against({}, {}, "1 of 1: free_fall"))
     assert changed.endswith(
-        "With one setting changed: pymunk:matched with sleeping cost less in free_fall.\n"
+        "With one setting changed, these cost less in free_fall: pymunk:matched with sleeping.\n"
     )
 
 
