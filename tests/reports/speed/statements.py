@@ -53,9 +53,9 @@ def caption(kept: pd.DataFrame) -> str:
         f"Half the step multiplies their time by {span(grows)}, and divides their error {by}"
         f"{' (below 1: the error grows)' if falls.min(axis=None) < 1 else ''}. They come within a"
         f" millionth of a radius of the exact answer in {min(reached)} to {max(reached)} of"
-        f" {of(rows.note.iloc[0])[1]} scenes. Two engines take each collision at its own time, and"
-        f" do so in more: `reference:ordered` in {got['reference:ordered']}, the event-driven engine"
-        f" in {got['event_driven:float64']} (it fails in {lost})."
+        f" {of(rows.note.iloc[0])[1]} scenes. The two engines that take each collision at its own"
+        f" time do so in {got['reference:ordered']} (`reference:ordered`) and"
+        f" {got['event_driven:float64']} (event-driven; it fails in {lost})."
     )
 
 
