@@ -55,14 +55,14 @@ class JavaScriptSolver:
 
     def renew(self) -> None:
         """Load the file into a V8 of its own, with nothing in it of what was called before."""
-        solver, self.engine = self.solver, MiniRacer()
-        self.engine.set_hard_memory_limit(HEAP)
-        self.engine.eval(DRIVER)
+        solver, self.v8 = self.solver, MiniRacer()
+        self.v8.set_hard_memory_limit(HEAP)
+        self.v8.eval(DRIVER)
         for name, text in solver.beside:
             self.load_library(name, text)
         try:
-            self.engine.eval(f"{solver.text}\n//# sourceURL={NAME}", timeout_sec=LOAD_LIMIT)
-            self.functions = json.loads(str(self.engine.eval(BIND, timeout_sec=LOAD_LIMIT)))
+            self.v8.eval(f"{solver.text}\n//# sourceURL={NAME}", timeout_sec=LOAD_LIMIT)
+            self.functions = json.loads(str(self.v8.eval(BIND, timeout_sec=LOAD_LIMIT)))
         except JSEvalException as error:
             raise self.failure(error, LOAD_LIMIT, "while it is loaded") from None
 
@@ -70,8 +70,8 @@ class JavaScriptSolver:
         """The gl-matrix, as the exercise's page loads it before the file. Raises `SolverFailed` if
         it is none."""
         try:
-            self.engine.eval(f"{text}\n//# sourceURL={name}", timeout_sec=LOAD_LIMIT)
-            self.engine.eval(TAKE_OUT)
+            self.v8.eval(f"{text}\n//# sourceURL={name}", timeout_sec=LOAD_LIMIT)
+            self.v8.eval(TAKE_OUT)
         except JSEvalException as error:
             said = str(error).partition("\n")[0]
             raise SolverFailed(
@@ -82,7 +82,7 @@ class JavaScriptSolver:
         """What the driver answers to a command; raises `SolverFailed` after `limit` s, or if the
         file threw."""
         if command == "renew":
-            self.engine.close()
+            self.v8.close()
             return self.renew()
         code = f'__crosscheck("{command}", {json.dumps(json.dumps(argument))})'
         try:
@@ -105,15 +105,15 @@ class JavaScriptSolver:
         """
         began = process_time()
         try:
-            return self.engine.eval(code, timeout_sec=limit)
+            return self.v8.eval(code, timeout_sec=limit)
         except JSTimeoutException:
             if not may_repeat or process_time() - began > limit / 2:
                 raise
-            return self.engine.eval(code, timeout_sec=(PATIENCE - 1) * limit)
+            return self.v8.eval(code, timeout_sec=(PATIENCE - 1) * limit)
 
     def versions(self) -> dict[str, str]:
         """What decides the numbers."""
-        return {"mini-racer": version("mini-racer"), "V8": self.engine.v8_version}
+        return {"mini-racer": version("mini-racer"), "V8": self.v8.v8_version}
 
     def failure(self, error: JSEvalException, limit: float, when: str) -> SolverFailed:
         """What V8 says, in a sentence, with line and column where it reports them."""

@@ -108,8 +108,8 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
     if not alone:
         refuse(
             [
-                "--resume goes on with a run as it was asked for: it takes no scenarios, --engine,"
-                " --dt, --full, --seed, --timings and --out"
+                "--resume goes on with a run as it was begun: it takes no scenarios, and none of"
+                " --engine, --dt, --full, --seed, --timings and --out"
             ]
         )
     with refusing(f"--resume {out}"):

@@ -125,7 +125,7 @@ def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> Non
 def faults_of_file(file: Path) -> list[str]:
     """Why a file cannot take part as an engine."""
     if ":" in str(file):
-        return [f"{file}: has a colon in its path, which parts engine and profile; rename it"]
+        return [f"{file}: has a colon in its path, which separates engine and profile; rename it"]
     try:
         read_row(f"{file}{OWN}")
     except NotASolver as refusal:

@@ -129,7 +129,8 @@ def ended_in(journal: Journal) -> int:
         if len(journal.path.read_bytes().splitlines()) <= 1:  # nothing, or a header
             return 0
         raise FolderTaken(
-            f"{part} holds what is no run that can be gone on with ({fault}); name another --out"
+            f"{part} holds something that cannot be continued as a run ({fault}); name another"
+            " --out"
         ) from None
 
 

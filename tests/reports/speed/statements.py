@@ -15,6 +15,7 @@ from reports.speed import explained, figures
 from reports.speed.figures import AGAINST, AGAINST_BARE
 from reports.speed.tables import no_nearer
 from reports.speed.versus import COMPARED, OWN
+from reports.terminal.counts import counted
 
 SHIPPED = tuple(name for name in ENGINES if name.endswith(":shipped"))
 MATCHED = tuple(name for name in ENGINES if name.endswith(":matched"))
@@ -47,14 +48,14 @@ def caption(kept: pd.DataFrame) -> str:
     reached = [got[name] for name in (OWN, *COMPARED)]
     falls, grows = halving(kept)
     spans = [span(falls.loc[list(names)]) for names in LATE_BY_KIND.values()]
-    by = ", ".join(f"of {kind} by {text}" for kind, text in zip(LATE_BY_KIND, spans))
+    by = ", ".join(f"by {text} for {kind}" for kind, text in zip(LATE_BY_KIND, spans))
     return (
-        "half the step divides the error"
-        f" {by}{' (below 1: it grows)' if falls.min(axis=None) < 1 else ''}, and multiplies the"
-        f" cost by {span(grows)}. They reach a millionth of a radius in {min(reached)} to"
-        f" {max(reached)} of {of(rows.note.iloc[0])[1]} scenes, `reference:ordered` in"
-        f" {got['reference:ordered']}, the event-driven engine in {got['event_driven:float64']} (it"
-        f" fails in {lost})."
+        f"Half the step multiplies their time by {span(grows)}, and divides their error {by}"
+        f"{' (below 1: the error grows)' if falls.min(axis=None) < 1 else ''}. They come within a"
+        f" millionth of a radius of the exact answer in {min(reached)} to {max(reached)} of"
+        f" {of(rows.note.iloc[0])[1]} scenes. The two engines that take each collision at its own"
+        f" time do so in {got['reference:ordered']} (`reference:ordered`) and"
+        f" {got['event_driven:float64']} (event-driven; it fails in {lost})."
     )
 
 
@@ -95,7 +96,8 @@ def costs(kept: pd.DataFrame) -> str:
     without = scenes_of(bare)
     if set(without) != set(less):
         said += (
-            f"\nWithout what an idle step costs, some engine costs less in {len(without)} scenes: "
+            "\nIf the cost of an idle step is subtracted, some engine costs less in"
+            f" {counted(len(without), 'scene')}: "
         )
         said += f"{', '.join(without) if without else 'none'}.\n"
     changed = named(kept[(kept.figure == AGAINST) & (kept["at"] != "")])
@@ -103,8 +105,8 @@ def costs(kept: pd.DataFrame) -> str:
     if cheaper:
         names = dict.fromkeys(name for names in cheaper.values() for name in names)
         return (
-            f"{said}\nWith one setting changed: {', '.join(names)} cost less in"
-            f" {', '.join(cheaper)}.\n"
+            f"{said}\nWith one setting changed, these cost less in {', '.join(cheaper)}:"
+            f" {', '.join(names)}.\n"
         )
     return (
         f"{said}\nNone of {len(changed)} changed settings of the matched engines costs less in any"
@@ -158,8 +160,8 @@ def nearer(orders: pd.DataFrame) -> str:
     rows = named(orders)
     none = rows[no_nearer(rows)].groupby("name").size()
     said = (
-        "From the coarsest to the finest step the error falls by less than a tenth in so many of "
-        f"{rows.scenario.nunique()} scenes, none of them right to a millionth of a radius:\n\n"
+        f"In how many of {rows.scenario.nunique()} scenes the error falls by less than a tenth from"
+        " the coarsest to the finest step, and is not yet below a millionth of a radius:\n\n"
         "| engine | scenes |\n|---|---|\n"
     )
     return said + "".join(

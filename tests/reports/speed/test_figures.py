@@ -105,8 +105,8 @@ def test_the_sentence_on_finer_steps_counts_each_engine():
     said = speed_figures.nearer(orders(box2d=1, box2d_v3=2)).splitlines()
 
     assert said[0].startswith(
-        "From the coarsest to the finest step the error falls by less than a tenth in so many of 2"
-        " scenes, "
+        "In how many of 2 scenes the error falls by less than a tenth from the coarsest to the"
+        " finest step, "
     )
     counts = dict(
         line.strip("| ").split(" | ")
@@ -179,11 +179,12 @@ def test_who_costs_less_than_our_own_solver_is_named():
     other = speed_figures.costs(against({"box2d:matched": "1 of 2: free_fall"}, thrust))
     assert "| free_fall | box2d:matched |" in other
     assert (
-        "Without what an idle step costs, some engine costs less in 1 scenes: ship_thrust." in other
+        "If the cost of an idle step is subtracted, some engine costs less in 1 scene: ship_thrust."
+        in other
     )
     changed = speed_figures.costs(against({}, {}, "1 of 1: free_fall"))
     assert changed.endswith(
-        "With one setting changed: pymunk:matched with sleeping cost less in free_fall.\n"
+        "With one setting changed, these cost less in free_fall: pymunk:matched with sleeping.\n"
     )
 
 
@@ -224,10 +225,12 @@ def test_the_caption_counts_scenes_and_failures():
     """Of the event-driven engine, too."""
     assert (
         speed_figures.caption(pooled())
-        == "half the step divides the error of `reference:exercise` and the matched engines by 2.0"
-        " to 2.0, of `reference:lesson` by 2.0 to 2.0, of the engines as shipped by 2.0 to 2.0,"
-        " and multiplies the cost by 2.0 to 2.0. They reach a millionth of a radius in 0 to 1 of"
-        " 2 scenes, `reference:ordered` in 1, the event-driven engine in 1 (it fails in 1)."
+        == "Half the step multiplies their time by 2.0 to 2.0, and divides their error by 2.0 to"
+        " 2.0 for `reference:exercise` and the matched engines, by 2.0 to 2.0 for"
+        " `reference:lesson`, by 2.0 to 2.0 for the engines as shipped. They come within a"
+        " millionth of a radius of the exact answer in 0 to 1 of 2 scenes. The two engines that"
+        " take each collision at its own time do so in 1 (`reference:ordered`) and 1"
+        " (event-driven; it fails in 1)."
     )
 
 
@@ -237,7 +240,7 @@ def test_the_readme_says_how_much_each_form_measures():
     text = " ".join((root / "reports" / "speed" / "README.md").read_text("utf-8").split())
 
     assert f"the cost of up to {QUICK.sizes[-1]} disks" in text
-    assert f"`--full` takes all scenes and {FULL.sizes[-1]:,} disks".replace(",", " ") in text
+    assert f"`--full` takes all scenes and up to {FULL.sizes[-1]:,} disks".replace(",", " ") in text
     assert set(FULL.scenes) == set(SCENARIOS)
     assert {len(scenario(name).substeps) for name in SCENARIOS} == {4}
     assert "at 4 step sizes" in (root / "README.md").read_text("utf-8")

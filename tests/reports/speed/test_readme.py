@@ -20,12 +20,12 @@ SPEED = (ROOT / "reports" / "speed" / "README.md").read_text("utf-8")
 def test_the_caption_of_the_picture_follows_from_the_kept_table():
     """Word for word but for line breaks: `python -m tests.reports.speed.statements` prints it."""
     assert speed_figures.caption(figures.read(figures.KEPT)) in " ".join(FRONT.split())
-    assert "the geometric mean of the middle half of the scenes" in " ".join(FRONT.split())
+    assert "the geometric mean of the middle half of all scenes" in " ".join(FRONT.split())
 
 
 def stated(text: str) -> list[tuple[float, float]]:
     """Each "a to b" of what half a step divides the errors by, in the order of `LATE_BY_KIND`."""
-    of_errors = " ".join(text.split()).split("divides the error ")[1].split(", and multiplies")[0]
+    of_errors = " ".join(text.split()).split("divides their error ")[1].split(". They come")[0]
     return [
         (float(low), float(high)) for low, high in re.findall(r"by ([\d.]+) to ([\d.]+)", of_errors)
     ]
@@ -55,7 +55,7 @@ def test_what_half_a_step_buys_is_true_of_every_engine_with_end_of_step_detectio
     assert sorted(spoken_of) == sorted(late)
     assert late == set(ENGINES) - {"reference:ordered", "event_driven:float64"}
     assert outside(kept, FRONT) == set()
-    assert ("below 1: it grows" in " ".join(FRONT.split())) == (
+    assert ("below 1: the error grows" in " ".join(FRONT.split())) == (
         speed_figures.halving(kept)[0] < 1
     ).any(axis=None)
 

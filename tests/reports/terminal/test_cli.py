@@ -207,7 +207,7 @@ def test_truth_tells_what_comes_to_rest_and_all_outcomes(tmp_path: Path):
     assert "comes to rest" in reported
     broken = crosscheck("truth", str(SCENES / "break.toml"), cwd=tmp_path).stdout
     for words in (
-        "2 outcomes; none is the truth",
+        "Outcome 2 of 2; none is the truth",
         "0: (-0.125, -0.216506)",
         "0: (-0.125, 0.216506)",
         "still known",
