@@ -1,0 +1,17 @@
+"use strict";
+// Boxes that scroll can be reached by keyboard, and have a name; those in which all is in sight are passed over.
+
+function reachable(box) {
+  const scrolls = box.scrollWidth > box.clientWidth + 1 || box.scrollHeight > box.clientHeight + 1;
+  if (!scrolls) {
+    ["tabindex", "role", "aria-label"].forEach((name) => box.removeAttribute(name));
+    return;
+  }
+  const heading = box.querySelector("caption") ?? box.closest("section, nav, footer")?.querySelector("h1, h2, h3");
+  box.tabIndex = 0;
+  box.setAttribute("role", "region");
+  box.setAttribute("aria-label", `${heading?.textContent.trim() || "Contents"}, scrolls`);
+}
+
+const boxes = new ResizeObserver((entries) => entries.forEach((entry) => reachable(entry.target)));
+document.querySelectorAll(".scroll, pre, #index .list").forEach((box) => boxes.observe(box));
