@@ -269,12 +269,12 @@ def figure_of(
     """A figure with a trace a line, each in its engine's look, `markers` marks on each, and `guide`
     behind them.
 
-    unit: of x, "" where hovering should not say it; height: px, if other than that of all.
+    unit: of x; mode: of plotly, of marks alone x is not said; height: px, if not that of all.
     """
     traces = list(guide)
     values = np.concatenate([line.y for line in lines])
     y_axis, floor = broken_axis(values, NOISE) if log else ({}, -np.inf)
-    at = f" at %{{x:.4g}} {unit}" if unit else ""
+    at = "" if mode == "markers" else f" at %{{x:.4g}} {unit}"
     for line in lines:
         look = style.look(line.run.engine, line.run.profile)
         clipped = log and bool((line.y < floor).any())
@@ -308,9 +308,9 @@ def sized(height: int | None) -> dict[str, Any]:
 
 
 def broken_axis(values: Array, bound: float) -> tuple[dict[str, Any], float]:
-    """A log axis for `values` >= 0, and where on it to draw what is smaller than its first decade.
+    """A log axis for `values` >= 0, and where on it to draw what is smaller than all of it.
 
-    Where some values are below `bound` and some are not, the axis is broken: it begins a decade
+    Where some values are below `bound` and some are not, the axis is broken: it begins a little
     below the smallest of the latter, and all that is below `bound` is drawn there, with a tick that
     says so. Else it goes down to `ZERO`.
     """
@@ -318,13 +318,14 @@ def broken_axis(values: Array, bound: float) -> tuple[dict[str, Any], float]:
     upper = real[real >= bound]
     if len(upper) in (0, len(real)):
         return decades(values), ZERO
-    axis = decades(upper)
-    floor = axis["range"][0] - 0.75
+    axis, start = decades(upper), float(np.log10(upper.min())) - 0.3
+    ticks = [(at, text) for at, text in zip(axis["tickvals"], axis["ticktext"]) if at > 10**start]
+    floor = start - 0.5
     text = f"< 10<sup>{np.log10(bound):.0f}</sup>".replace("-", "−")
     return axis | {
         "range": [floor - 0.4, axis["range"][1]],
-        "tickvals": [*axis["tickvals"], 10.0**floor],
-        "ticktext": [*axis["ticktext"], text],
+        "tickvals": [*(at for at, _ in ticks), 10.0**floor],
+        "ticktext": [*(label for _, label in ticks), text],
     }, float(10.0**floor)
 
 

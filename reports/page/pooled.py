@@ -1,4 +1,4 @@
-"""All scenes of a run at once: the score of every run, and two charts of their medians."""
+"""All scenes of a run at once: the score of every run, and the chart of medians by situation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from adapters.play import Run
 from reports.compare.comparison import Comparison
@@ -34,13 +33,13 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
         table, scenario = comparison.table, comparison.scenario
         judged = table[(table.versus == style.TRUTH) & table.metric.isin([ERROR, ANGLE])]
         judged = judged[~judged.note.astype(str).str.startswith(NOT_JUDGED)]
-        found = {
-            (f"{row.engine}:{row.profile}", row.dt_s, row.metric): row.value
-            for row in judged.itertuples()
-        }
+        keys = zip(judged.engine + ":" + judged.profile, judged.dt_s, judged.metric)
+        found = dict(zip(keys, judged.value.to_numpy(float)))
         steps = sorted({run.dt for run in comparison.runs}, reverse=True)
         for run in comparison.runs:
-            error, angle = (found.get((run.name, run.dt, each), np.inf) for each in (ERROR, ANGLE))
+            error, angle = (
+                float(found.get((run.name, run.dt, each), np.inf)) for each in (ERROR, ANGLE)
+            )
             cost = run.seconds / scenario.duration * 1e6 if np.isfinite(error) else np.nan
             middle = run.dt == comparison.middle_dt
             rows.append((scenario.name, run.name, error, angle, cost, steps.index(run.dt), middle))
@@ -50,11 +49,9 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
 def drawings(
     found: pd.DataFrame, answers: Sequence[situations.Answer], untrusted: Set[str]
 ) -> dict[str, Drawing]:
-    """Error by situation and error against engine time, from `scores`; {} if there are none."""
-    found = found[~found.name.isin(untrusted)]
-    if found.empty:
-        return {}
-    return {"situations": by_situation(found, answers), "cost": against_time(found)}
+    """The chart of `scores`, without who is `untrusted`; {} if there is nothing to draw."""
+    trusted = found[~found.name.isin(untrusted)]
+    return {"situations": by_situation(trusted, answers)} if answers else {}
 
 
 def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> Drawing:
@@ -68,7 +65,7 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
             float(mine[column_of(answer)].reindex(answer.scenes).fillna(np.inf).median())
             for answer in answers
         ]
-        y = np.where(np.isfinite(medians), medians, np.nan)
+        y = np.array([m if np.isfinite(m) else np.nan for m in medians])
         x = np.arange(len(answers)) + (k - (len(names) - 1) / 2) * 0.7 / max(len(names), 1)
         lines.append(ChartLine(named(name), x, y))
     axis = {
@@ -77,7 +74,7 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
         "ticktext": [answer.title.replace(" ", "<br>") for answer in answers],
         "range": [-0.5, len(answers) - 0.5],
     }
-    figure = figure_of(lines, axis, "error (radii)", unit="", mode="markers", height=340)
+    figure = figure_of(lines, axis, "error (radii)", mode="markers", height=340)
     return Drawing(
         "Error by situation",
         "A mark is an engine: the median over the scenes of its largest position error at the"
@@ -90,33 +87,6 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
 def column_of(answer: situations.Answer) -> str:
     """Which column of `SCORES` its errors are."""
     return "angle" if answer.unit == "rad" else "error"
-
-
-def against_time(found: pd.DataFrame) -> Drawing:
-    """A line an engine over the step sizes that all scenes have."""
-    steps = int(found.groupby("scenario").step_size.max().min())
-    pooled = found[found.step_size <= steps].groupby(["name", "step_size"], sort=False)
-    medians = pooled[["error", "cost"]].median().reset_index()
-    lines = []
-    for name in dict.fromkeys(found.name):
-        mine = medians[(medians.name == name) & np.isfinite(medians.error)]
-        mine = mine.sort_values("step_size")
-        if len(mine):
-            lines.append(
-                ChartLine(named(name), mine.cost.to_numpy(float), mine.error.to_numpy(float))
-            )
-    axis = {"title": "engine time (µs per simulated second)", "type": "log"}
-    figure: go.Figure | None = (
-        figure_of(lines, axis, "error (radii)", unit="µs", height=340) if lines else None
-    )
-    return Drawing(
-        "Error against engine time",
-        f"A point is one of {steps + 1} step sizes, each of its coordinates the median of"
-        f" {found.scenario.nunique()} scenes; smaller steps to the right. Down and left is better."
-        " Times are of this run, in which several processes shared the machine: they tell factors,"
-        " not percents. crosscheck speed measures them alone.",
-        figure,
-    )
 
 
 def named(name: str) -> Run:

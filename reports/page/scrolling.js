@@ -14,4 +14,4 @@ function reachable(box) {
 }
 
 const boxes = new ResizeObserver((entries) => entries.forEach((entry) => reachable(entry.target)));
-document.querySelectorAll(".scroll, pre, #index .list").forEach((box) => boxes.observe(box));
+document.querySelectorAll(".scroll, #index .list").forEach((box) => boxes.observe(box));

@@ -151,7 +151,7 @@ def answers(
         return []
     groups = grouped(dict.fromkeys(scores.name), scores)
     ranked = groups.get(ENGINE) or groups.get(OWN) or groups[EXACT]
-    rows = []
+    rows: list[Answer] = []
     for title, meaning in SITUATIONS.items():
         members = [s for s in dict.fromkeys(scores.scenario) if title in [*situations[s], ALL]]
         here = scores[scores.scenario.isin(members)]
@@ -203,6 +203,6 @@ def rank(name: str, mine: pd.DataFrame) -> Ranked:
         float(errors.median()),
         float(errors.iloc[0]),
         str(errors.index[0]),
-        errors[errors > FAR_OFF].to_dict(),
+        {str(scene): float(error) for scene, error in errors.items() if error > FAR_OFF},
         float(costs.median()) if len(costs) else np.nan,
     )
