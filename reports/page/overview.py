@@ -202,8 +202,9 @@ def pool(
     if not totals:
         return OverviewCell(number(np.nan), remark)
     value, worst_in = float(np.median(list(totals.values()))), max(totals, key=totals.__getitem__)
+    worst = totals[worst_in]
     return OverviewCell(
-        number(value), remark, value=value, worst=number(totals[worst_in]), worst_in=worst_in
+        number(value), remark, value=value, worst=number(worst) if worst else "", worst_in=worst_in
     )
 
 

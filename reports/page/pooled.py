@@ -12,6 +12,7 @@ from reports.compare.comparison import Comparison
 from reports.compare.view import NOT_JUDGED
 from reports.page import situations, style
 from reports.page.charts import ChartLine, Drawing, figure_of
+from scenarios.model import Array
 
 KEY = "pooled"  # of their figures in the page
 ERROR, ANGLE = "position_max_radii", "angle_max"
@@ -65,7 +66,7 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
             float(mine[column_of(answer)].reindex(answer.scenes).fillna(np.inf).median())
             for answer in answers
         ]
-        y = np.array([m if np.isfinite(m) else np.nan for m in medians])
+        y: Array = np.where(np.isfinite(medians), medians, np.nan)
         x = np.arange(len(answers)) + (k - (len(names) - 1) / 2) * 0.7 / max(len(names), 1)
         lines.append(ChartLine(named(name), x, y))
     axis = {
