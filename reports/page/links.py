@@ -17,22 +17,31 @@ class Neighbour(NamedTuple):
     href: str
 
 
-# key -> title, what it says, command, where its default folder is beside that of another page
+class Place(NamedTuple):
+    """A page by default: title, what it says, the command that makes it, and where that puts it,
+    from the folder of all results."""
+
+    title: str
+    says: str
+    command: str
+    place: str
+
+
 PAGES = {
-    "report": ("Report", "every scene, engine by engine", "crosscheck", "latest/report.html"),
-    "speed": (
+    "report": Place("Report", "every scene, engine by engine", "crosscheck", "latest/report.html"),
+    "speed": Place(
         "Speed",
         "what an accuracy costs, measured with care",
         "crosscheck speed",
         "speed/speed.html",
     ),
-    "stability": (
+    "stability": Place(
         "Limits",
         "how fast, how dense, how far until an engine fails",
         "crosscheck stability",
         "stability/stability.html",
     ),
-    "lessons": (
+    "lessons": Place(
         "Lessons",
         "why engines differ, with scenes that run",
         "crosscheck lesson",

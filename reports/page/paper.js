@@ -23,7 +23,7 @@ function drawPaper() {
     plot.after(sheet);
     const figure = onPaper(text, plot);
     const width = Number(plot.dataset.paper);
-    const size = { width, height: width > 400 ? 330 : 230, margin: { l: 52, r: 10, t: 8, b: 40 } };
+    const size = { width, height: width > 400 ? 330 : 210, margin: { l: 52, r: 10, t: 8, b: 40 } };
     Plotly.newPlot(sheet, figure.data, { ...figure.layout, ...size }, { staticPlot: true });
   }
 }

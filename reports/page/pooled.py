@@ -44,7 +44,7 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
             cost = run.seconds / scenario.duration * 1e6 if np.isfinite(error) else np.nan
             middle = run.dt == comparison.middle_dt
             rows.append((scenario.name, run.name, error, angle, cost, steps.index(run.dt), middle))
-    return pd.DataFrame(rows, columns=SCORES)
+    return pd.DataFrame(rows, columns=SCORES).astype({"middle": bool})
 
 
 def drawings(
@@ -67,7 +67,9 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
             for answer in answers
         ]
         y: Array = np.where(np.isfinite(medians), medians, np.nan)
-        x = np.arange(len(answers)) + (k - (len(names) - 1) / 2) * 0.7 / max(len(names), 1)
+        x = np.arange(len(answers), dtype=np.float64) + (k - (len(names) - 1) / 2) * 0.7 / max(
+            len(names), 1
+        )
         lines.append(ChartLine(named(name), x, y))
     axis = {
         "title": "",

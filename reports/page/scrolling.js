@@ -13,5 +13,6 @@ function reachable(box) {
   box.setAttribute("aria-label", `${heading?.textContent.trim() || "Contents"}, scrolls`);
 }
 
-const boxes = new ResizeObserver((entries) => entries.forEach((entry) => reachable(entry.target)));
-document.querySelectorAll(".scroll, #index .list").forEach((box) => boxes.observe(box));
+const BOXES = ".scroll, #index .list";
+const sizes = new ResizeObserver((entries) => entries.forEach((entry) => reachable(entry.target.closest(BOXES))));
+document.querySelectorAll(BOXES).forEach((box) => [box, ...box.children].forEach((each) => sizes.observe(each)));

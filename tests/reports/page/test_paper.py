@@ -27,7 +27,7 @@ UNPRINTED = "removeEventListener('beforeprint', drawPaper)"
 def sheet(browser: Browser, path: Path) -> Iterator[Page]:
     """The page as wide as paper, nothing of it scrolled to."""
     page, heard = opened(browser, path.as_uri(), viewport=A4)
-    page.wait_for_function("window.Plotly && printed.size === 3")
+    page.wait_for_function("() => window.Plotly && printed.size === 3")
     yield page
 
     assert heard == []
@@ -55,7 +55,7 @@ def test_charts_that_were_never_in_view_are_printed(browser: Browser, path: Path
     made = []
     for before in ("1", UNPRINTED):
         page, heard = opened(browser, path.as_uri())
-        page.wait_for_function("window.Plotly && printed.size === 3")
+        page.wait_for_function("() => window.Plotly && printed.size === 3")
         page.evaluate(before)
         made.append(page.pdf(format="A4", print_background=True))
         page.context.close()
@@ -126,7 +126,7 @@ def test_a_whole_run_is_twelve_pages_at_most(
     for on_paper in ((), [each.scenario.name for each in many]):
         write_small(tmp_path / "r.html", many, on_paper=on_paper)
         page, _ = opened(browser, (tmp_path / "r.html").as_uri())
-        page.wait_for_function("window.Plotly")
+        page.wait_for_function("() => window.Plotly")
         pages.append(pages_of(page.pdf(format="A4", print_background=True)))
         page.context.close()
 

@@ -246,7 +246,11 @@ def test_no_table_is_cut_at_1280(browser: Browser, path: Path):
 def test_a_box_that_scrolls_is_reached_by_keyboard_and_has_a_name(browser: Browser, path: Path):
     """At 400 px; what shows all of itself is passed over."""
     page, heard = opened(browser, path.as_uri(), viewport={"width": 400, "height": 900})
-    page.wait_for_function("document.querySelector('.scroll[tabindex]')")
+    page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
+    page.wait_for_function(
+        """() => [...document.querySelectorAll('details .scroll')]
+          .every(box => box.tabIndex === 0)"""
+    )
     boxes = page.evaluate(
         """() => [...document.querySelectorAll('.scroll')].filter(box => box.clientWidth).map(box =>
           [box.scrollWidth > box.clientWidth + 1, box.tabIndex, box.getAttribute('aria-label')])"""
