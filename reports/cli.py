@@ -155,6 +155,13 @@ def report(
     out: Annotated[
         Path, typer.Argument(metavar="OUT", help="The folder of a run, finished or not.")
     ],
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[SCENE]...", help="With --print: scenes to have on paper."),
+    ] = None,
+    printed: Annotated[
+        bool, typer.Option("--print", help="Give each SCENE half a page where the page is printed.")
+    ] = False,
 ) -> None:
     """Write the tables and the page of a run again.
 
@@ -162,7 +169,7 @@ def report(
     """
     from reports.commands.report import report_again
 
-    report_again(out)
+    report_again(out, scenes or [], printed)
 
 
 @app.command()

@@ -4,6 +4,7 @@ the exit status."""
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -13,11 +14,12 @@ from reports.commands.own_solvers import lines
 from reports.lessons.catalogue import LESSONS
 from reports.page import overview
 from reports.page.report import Report, make_report
+from reports.run.archive import Archive
 from reports.run.arguments import refusing
 from reports.run.folders import found
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
-from reports.terminal.exits import DONE, FAILED, say
+from reports.terminal.exits import DONE, FAILED, refuse, say
 from reports.terminal.progress import Progress
 from reports.terminal.tables import print_list, print_table
 
@@ -38,11 +40,23 @@ def finish(report: Report, out: Path) -> NoReturn:
     sys.exit(FAILED if lost or report.unjudged else DONE)
 
 
-def report_again(out: Path) -> NoReturn:
-    """Tables and page from the journal in `out`."""
+def report_again(out: Path, scenes: Sequence[str], printed: bool) -> NoReturn:
+    """Tables and page from the journal in `out`; `scenes` are on paper where it is printed."""
+    if scenes and not printed:
+        refuse([f"{' '.join(scenes)}: scenes are named after --print, to have them on paper"])
+    if printed and not scenes:
+        refuse(["--print: name the scenes that are to be on paper; the overview always is"])
     with refusing(str(out)), Progress() as progress:
         folder = found(out)
-        report = make_report(folder, progress.say, LESSONS)
+        played = sorted({record["scenario"] for record in Archive.read(folder).records})
+        if missing := [scene for scene in scenes if scene not in played]:
+            refuse(
+                [
+                    f"--print {scene}: not in {out}, which has {', '.join(played)}"
+                    for scene in missing
+                ]
+            )
+        report = make_report(folder, progress.say, LESSONS, tuple(dict.fromkeys(scenes)))
     finish(report, folder)
 
 

@@ -226,12 +226,14 @@ class Metric:
         against: what it is measured against: "itself" (laws of physics and the start), "truth",
             "engine".
         better: "lower", "higher", "zero" or "as stated" (the best value).
+        title: the name in words, as a table shows it; "" for the name itself.
     """
 
     of: Callable[[View], Value | None]
     unit: str
     against: tuple[str, ...]
     better: str = "lower"
+    title: str = ""
 
     @property
     def summary(self) -> str:
@@ -241,35 +243,79 @@ class Metric:
 
 TRUTH, ITSELF, ENGINE = "truth", "itself", "engine"
 METRICS: dict[str, Metric] = {
-    "position_max_radii": Metric(position_max_radii, "radii", (TRUTH, ENGINE)),
-    "position_rms_radii": Metric(position_rms_radii, "radii", (TRUTH, ENGINE)),
-    "position_max": Metric(position_max, "m", (TRUTH, ENGINE)),
-    "position_rms": Metric(position_rms, "m", (TRUTH, ENGINE)),
-    "velocity_max": Metric(velocity_max, "m/s", (TRUTH, ENGINE)),
-    "velocity_rms": Metric(velocity_rms, "m/s", (TRUTH, ENGINE)),
-    "angular_velocity_max": Metric(angular_velocity_max, "rad/s", (TRUTH, ENGINE)),
-    "angle_max": Metric(angle_max, "rad", (TRUTH, ENGINE)),
-    "angle_rms": Metric(angle_rms, "rad", (TRUTH, ENGINE)),
-    "time_to_1pct_s": Metric(time_to_1pct_s, "s", (TRUTH, ENGINE), "higher"),
-    "momentum_error": Metric(momentum_error, "1", (ITSELF,)),
-    "momentum_deviation": Metric(momentum_deviation, "1", (TRUTH, ENGINE)),
-    "angular_momentum_error": Metric(angular_momentum_error, "1", (ITSELF,)),
-    "energy_error": Metric(energy_error, "1", (ITSELF, TRUTH)),
-    "energy_deviation": Metric(energy_deviation, "1", (TRUTH, ENGINE)),
-    "energy_created": Metric(energy_created, "1", (ITSELF,)),
-    "energy_loss_error": Metric(energy_loss_error, "1", (TRUTH,), "zero"),
-    "restitution": Metric(collisions.restitution, "1", (ITSELF,), "as stated"),
-    "restitution_error": Metric(collisions.restitution_error, "1", (ITSELF,)),
-    "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,)),
-    "disks_through_walls": Metric(disks_through_walls, "disks", (ITSELF,)),
+    "position_max_radii": Metric(
+        position_max_radii, "radii", (TRUTH, ENGINE), title="Position, largest error"
+    ),
+    "position_rms_radii": Metric(
+        position_rms_radii, "radii", (TRUTH, ENGINE), title="Position, root mean square"
+    ),
+    "position_max": Metric(position_max, "m", (TRUTH, ENGINE), title="Position, largest error"),
+    "position_rms": Metric(position_rms, "m", (TRUTH, ENGINE), title="Position, root mean square"),
+    "velocity_max": Metric(velocity_max, "m/s", (TRUTH, ENGINE), title="Velocity, largest error"),
+    "velocity_rms": Metric(
+        velocity_rms, "m/s", (TRUTH, ENGINE), title="Velocity, root mean square"
+    ),
+    "angular_velocity_max": Metric(
+        angular_velocity_max, "rad/s", (TRUTH, ENGINE), title="Angular velocity, largest error"
+    ),
+    "angle_max": Metric(angle_max, "rad", (TRUTH, ENGINE), title="Angle, largest error"),
+    "angle_rms": Metric(angle_rms, "rad", (TRUTH, ENGINE), title="Angle, root mean square"),
+    "time_to_1pct_s": Metric(
+        time_to_1pct_s, "s", (TRUTH, ENGINE), "higher", title="Time until 1 % of a radius off"
+    ),
+    "momentum_error": Metric(momentum_error, "1", (ITSELF,), title="Momentum, largest error"),
+    "momentum_deviation": Metric(
+        momentum_deviation, "1", (TRUTH, ENGINE), title="Momentum, root mean square"
+    ),
+    "angular_momentum_error": Metric(
+        angular_momentum_error, "1", (ITSELF,), title="Angular momentum, largest error"
+    ),
+    "energy_error": Metric(energy_error, "1", (ITSELF, TRUTH), title="Energy, largest error"),
+    "energy_deviation": Metric(
+        energy_deviation, "1", (TRUTH, ENGINE), title="Energy, root mean square"
+    ),
+    "energy_created": Metric(energy_created, "1", (ITSELF,), title="Energy created"),
+    "energy_loss_error": Metric(
+        energy_loss_error, "1", (TRUTH,), "zero", title="Energy lost, less what should be"
+    ),
+    "restitution": Metric(
+        collisions.restitution, "1", (ITSELF,), "as stated", title="Restitution measured"
+    ),
+    "restitution_error": Metric(
+        collisions.restitution_error, "1", (ITSELF,), title="Restitution, largest error"
+    ),
+    "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,), title="Deepest overlap"),
+    "disks_through_walls": Metric(
+        disks_through_walls, "disks", (ITSELF,), title="Disks through walls"
+    ),
     "collision_count_error": Metric(
-        collisions.collision_count_error, "collisions", (TRUTH, ENGINE), "zero"
+        collisions.collision_count_error,
+        "collisions",
+        (TRUTH, ENGINE),
+        "zero",
+        title="Collisions, too many or too few",
     ),
-    "collisions_missed": Metric(collisions.collisions_missed, "collisions", (TRUTH, ENGINE)),
-    "collisions_spurious": Metric(collisions.collisions_spurious, "collisions", (TRUTH, ENGINE)),
+    "collisions_missed": Metric(
+        collisions.collisions_missed, "collisions", (TRUTH, ENGINE), title="Collisions missed"
+    ),
+    "collisions_spurious": Metric(
+        collisions.collisions_spurious, "collisions", (TRUTH, ENGINE), title="Collisions spurious"
+    ),
     "first_wrong_collision_s": Metric(
-        collisions.first_wrong_collision_s, "s", (TRUTH, ENGINE), "higher"
+        collisions.first_wrong_collision_s,
+        "s",
+        (TRUTH, ENGINE),
+        "higher",
+        title="Time of the first wrong collision",
     ),
-    "collision_delay_dt": Metric(collisions.collision_delay_dt, "dt", (TRUTH, ENGINE), "zero"),
-    "collision_delay_max_dt": Metric(collisions.collision_delay_max_dt, "dt", (TRUTH, ENGINE)),
+    "collision_delay_dt": Metric(
+        collisions.collision_delay_dt,
+        "dt",
+        (TRUTH, ENGINE),
+        "zero",
+        title="Detection delay, median",
+    ),
+    "collision_delay_max_dt": Metric(
+        collisions.collision_delay_max_dt, "dt", (TRUTH, ENGINE), title="Detection delay, largest"
+    ),
 }

@@ -23,6 +23,10 @@ from scenarios.model import Array, Trajectory
 ZERO = 1e-17
 """Where 0, and what is smaller than this, is drawn on a log axis: below the rounding of any number
 compared."""
+NOISE = 1e-9
+"""What is smaller is drawn below a break of the axis, where there is anything larger: exact answers
+are known to a billionth of a radius, and an engine that is exact has rounding left, which would
+take half of a log axis."""
 POINTS = 300
 TIME = "time (s)"
 # drawn as the zero line where there is no truth; it is no truth itself
@@ -223,27 +227,29 @@ def over_time(
     if not lines:
         return None
     duration, truth = comparison.scenario.duration, comparison.truth
-    marks: dict[str, Any] = {}
-    if truth is not None and truth.horizon < duration:
-        ink = {"dash": "dot", "width": 1, "color": style.look(style.TRUTH).light}
-        at = {
-            "x": truth.horizon,
-            "y": 1,
-            "yref": "paper",
-            "showarrow": False,
-            "xanchor": "left",
-            "yanchor": "top",
-        }
-        marks["shapes"] = [
-            {"x0": at["x"], "x1": at["x"], "y0": 0, "y1": 1, "yref": "paper", "line": ink}
-        ]
-        marks["annotations"] = [at | {"text": "truth ends"}]
     if log:  # the start is given to all: its 0 would take up half of the axis and say nothing
         lines = [ChartLine(run, x[1:], y[1:]) for run, x, y in lines]
     figure = figure_of(
         [thinned(line) for line in lines], {"title": TIME, "range": [0, duration]}, title, log=log
     )
-    return figure.update_layout(marks)
+    if truth is not None and truth.horizon < duration:
+        mark_end(figure, truth.horizon, duration)
+    return figure
+
+
+def mark_end(figure: go.Figure, horizon: float, duration: float) -> None:
+    """Draw a line into `figure` where the truth ends, and say so on the side that has more room."""
+    ink = {"dash": "dot", "width": 1, "color": style.look(style.TRUTH).light}
+    figure.add_shape(x0=horizon, x1=horizon, y0=0, y1=1, yref="paper", line=ink)
+    figure.add_annotation(
+        text="truth ends",
+        x=horizon,
+        y=1,
+        yref="paper",
+        showarrow=False,
+        xanchor="left" if horizon < duration / 2 else "right",
+        yanchor="top",
+    )
 
 
 def figure_of(
@@ -253,20 +259,29 @@ def figure_of(
     log: bool = True,
     markers: int = 7,
     guide: Sequence[dict[str, Any]] = (),
+    unit: str = "s",
+    mode: str = "lines+markers",
+    height: int | None = None,
 ) -> go.Figure:
     """A figure with a trace a line, each in its engine's look, `markers` marks on each, and `guide`
-    behind them."""
+    behind them.
+
+    unit: of x; mode: of plotly, of marks alone x is not said; height: px, if not that of all.
+    """
     traces = list(guide)
+    values = np.concatenate([line.y for line in lines])
+    y_axis, floor = broken_axis(values, NOISE) if log else ({}, -np.inf)
+    at = "" if mode == "markers" else f" at %{{x:.4g}} {unit}"
     for line in lines:
         look = style.look(line.run.engine, line.run.profile)
-        y = np.where(line.y < ZERO, ZERO, line.y) if log else line.y
+        clipped = log and bool((line.y < floor).any())
         traces.append(
             {
                 "type": "scatter",
                 "x": shortened(line.x, 5),
-                "y": shortened(y, 4 if log else 5),
+                "y": shortened(np.where(line.y < floor, floor, line.y), 4 if log else 5),
                 "name": line.run.name,
-                "mode": "lines+markers",
+                "mode": mode,
                 "connectgaps": True,
                 "line": {"color": look.light, "dash": look.plotly_dash, "width": 1.7},
                 "marker": {
@@ -275,15 +290,53 @@ def figure_of(
                     "color": look.light,
                     "maxdisplayed": markers,
                 },
-                "hovertemplate": "%{y:.3g} at %{x:.4g} s",
+                "hovertemplate": f"%{{{'customdata' if clipped else 'y'}:.3g}}{at}",
             }
+            | ({"customdata": shortened(line.y, 3)} if clipped else {})
         )
-    y_axis = {"title": title} | (decades(np.concatenate([line.y for line in lines])) if log else {})
+    layout = {"hovermode": "closest", "xaxis": x_axis, "yaxis": {"title": title} | y_axis}
     # Built in one go: adding traces one by one copies and checks every number three times.
-    return go.Figure(traces, {"hovermode": "closest", "xaxis": x_axis, "yaxis": y_axis})
+    return go.Figure(traces, layout | marked_break(y_axis, floor) | sized(height))
 
 
-def decades(values: Array) -> dict[str, object]:
+def sized(height: int | None) -> dict[str, Any]:
+    """The layout of a figure that has a height of its own, px."""
+    return {"height": height} if height else {}
+
+
+def broken_axis(values: Array, bound: float) -> tuple[dict[str, Any], float]:
+    """A log axis for `values` >= 0, and where on it to draw what is smaller than all of it.
+
+    Where some values are below `bound` and some are not, the axis is broken: it begins a little
+    below the smallest of the latter, and all that is below `bound` is drawn there, with a tick that
+    says so. Else it goes down to `ZERO`.
+    """
+    real = values[np.isfinite(values)]
+    upper = real[real >= bound]
+    if len(upper) in (0, len(real)):
+        return decades(values), ZERO
+    axis, start = decades(upper), float(np.log10(upper.min())) - 0.3
+    ticks = [(at, text) for at, text in zip(axis["tickvals"], axis["ticktext"]) if at > 10**start]
+    floor = start - 0.5
+    text = f"< 10<sup>{np.log10(bound):.0f}</sup>".replace("-", "−")
+    return axis | {
+        "range": [floor - 0.4, axis["range"][1]],
+        "tickvals": [*(at for at, _ in ticks), 10.0**floor],
+        "ticktext": [*(label for _, label in ticks), text],
+    }, float(10.0**floor)
+
+
+def marked_break(axis: Mapping[str, Any], floor: float) -> dict[str, Any]:
+    """The layout that shades what is below the break of a `broken_axis`; {} where there is none."""
+    if not axis or floor <= ZERO:
+        return {}
+    ends = {"y0": 10.0 ** axis["range"][0], "y1": floor * 10**0.4}
+    band = {"x0": 0, "x1": 1, "xref": "paper"} | ends
+    look = {"fillcolor": style.look(style.TRUTH).light, "opacity": 0.07, "line": {"width": 0}}
+    return {"shapes": [{"type": "rect", "layer": "below"} | band | look]}
+
+
+def decades(values: Array) -> dict[str, Any]:
     """Range and ticks of a log axis for `values` >= 0, with a tick "0" at `ZERO` if any is drawn
     there."""
     values = values[np.isfinite(values)]

@@ -21,7 +21,8 @@ from reports.terminal.foreign_text import encoded
 
 REPORTS = Path(__file__).parents[1]
 ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay
-CHARTED = (*ENGINE, "page/page.js")  # replays, and charts that are drawn when they come into view
+# replays, and charts that are drawn when they come into view, and printed and saved
+CHARTED = (*ENGINE, "page/page.js", "page/paper.js", "page/scrolling.js")
 
 
 def render(
@@ -94,7 +95,7 @@ def css() -> str:
     """The style sheet of all pages with the colours of style.py in front, for light and for
     dark."""
     light, dark = style.css_variables(dark=False), style.css_variables(dark=True)
-    return f":root{{{light}}}@media(prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (
+    return f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (
         REPORTS / "page" / "page.css"
     ).read_text(encoding="utf-8")
 

@@ -3,7 +3,7 @@ scenario's table."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
 from reports.compare.view import NOT_JUDGED
+from reports.page import pooled, situations
 from reports.page.style import TRUTH, heat, number
 
 OUTCOMES = {
@@ -25,13 +26,16 @@ MAPPED = "position_max_radii"
 
 class OverviewCell(NamedTuple):
     """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none),
-    failed, the best."""
+    failed, the best; and of a median its value, the worst value as text and its scene."""
 
     text: str
     remark: str = ""
     heat: int = -1
     failed: bool = False
     best: bool = False
+    value: float = np.nan
+    worst: str = ""
+    worst_in: str = ""
 
 
 class Measured(NamedTuple):
@@ -78,7 +82,7 @@ SUMMARY: dict[str, Column] = {
         "Restitution", "no unit", "largest |e measured − e asked for| of any collision"
     ),
     "wrong_collisions": Column(
-        "Wrong collisions", "collisions in all", "missed and spurious collisions, added up"
+        "Wrong collisions", "collisions", "missed and spurious collisions of a scene together"
     ),
     "failed": Column("Not played", "scenarios", "refused, crashed, diverged or timed out"),
 }
@@ -134,54 +138,74 @@ def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
 def summary(
     comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]
 ) -> dict[str, list[OverviewCell]]:
-    """`engine:profile` -> a cell for each of `SUMMARY`: medians over the scenarios, sums where the
-    unit says so.
+    """`engine:profile` -> a cell for each of `SUMMARY`: the median over the scenarios and the worst
+    of them; of the last, in how many it was not played.
 
-    Who is `untrusted` broke the protocol of the harness and is not scored; who failed somewhere is
-    never the best.
+    The best is the lowest of its group (`situations.grouped`), and whoever shows the same number.
+    Who is `untrusted` broke the protocol of the harness and is not scored.
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
-    rows: dict[str, list[OverviewCell]] = {name: [] for name in names}
-    for name in untrusted & set(names):
-        rows[name] = [OverviewCell("breaks", "breaks the protocol: not scored", failed=True)] * (
-            len(SUMMARY) - 1
-        )
-    for metric in SUMMARY:
-        if metric == "failed":
-            for name in names:
-                count = sum(name in each for each in failed)
-                rows[name].append(OverviewCell(f"{count} of {len(comparisons)}", failed=count > 0))
-            continue
-        pooled = {name: pool(metric, name, found) for name in names if name not in untrusted}
-        whole = {
-            name: value
-            for name, (value, _) in pooled.items()
-            if not any(name in each for each in failed)
-        }
-        best = min((value for value in whole.values() if not np.isnan(value)), default=np.nan)
-        for name, (value, remark) in pooled.items():
-            rows[name].append(OverviewCell(number(value), remark, best=whole.get(name) == best))
-    return rows
+    rows: dict[str, list[OverviewCell]] = {}
+    for name in names:
+        cells = [pool(metric, name, comparisons, found) for metric in SUMMARY if metric != "failed"]
+        if name in untrusted:
+            broken = OverviewCell("breaks", "breaks the protocol: not scored", failed=True)
+            cells = [broken] * len(cells)
+        count = sum(name in each for each in failed)
+        cells.append(OverviewCell(f"{count} of {len(comparisons)}", failed=count > 0, value=count))
+        rows[name] = cells
+    groups = situations.grouped(names, pooled.scores(comparisons))
+    marked = [mark_best({name: rows[name] for name in each}, untrusted) for each in groups.values()]
+    return {name: each[name] for name in names for each in marked if name in each}
 
 
-def pool(metric: str, name: str, found: Sequence[Found]) -> tuple[float, str]:
-    """The median, for collisions the sum, of a metric over the scenarios in which it is judged; in
-    how many it is, or not.
+def mark_best(
+    rows: Mapping[str, list[OverviewCell]], untrusted: Set[str]
+) -> dict[str, list[OverviewCell]]:
+    """The rows with the lowest of each column marked, and all that show the same number."""
+    scored = [rows[name] for name in rows if name not in untrusted]
+    lowest = [min(column, key=by_value).text for column in zip(*scored)]
+    return {
+        name: [
+            cell._replace(best=name not in untrusted and cell.text == best and best != "–")
+            for cell, best in zip(cells, lowest)
+        ]
+        for name, cells in rows.items()
+    }
 
-    Where nobody can miss a collision, as there is none, those that are spurious count alone.
+
+def by_value(cell: OverviewCell) -> float:
+    """What a cell of the summary is ordered by; what has no number comes last."""
+    return np.inf if np.isnan(cell.value) else cell.value
+
+
+def pool(
+    metric: str, name: str, comparisons: Sequence[Comparison], found: Sequence[Found]
+) -> OverviewCell:
+    """Median and worst of a metric over the scenarios in which it is judged, and in how many it is.
+
+    Wrong collisions are the missed and the spurious of a scene together; where nobody can miss one,
+    as there is none, those that are spurious count alone.
     """
     kinds = (
         ("collisions_missed", "collisions_spurious") if metric == "wrong_collisions" else (metric,)
     )
     known = [[each[name, kind] for kind in kinds if (name, kind) in each] for each in found]
-    judged = [[one.value for one in each if one.judged] for each in known]
-    totals = [sum(each) for each in judged if each]
+    totals = {
+        comparison.scenario.name: sum(one.value for one in each if one.judged)
+        for comparison, each in zip(comparisons, known)
+        if any(one.judged for one in each)
+    }
     left_out = sum(bool(each) for each in known) - len(totals)
     remark = f"in {len(totals)} scenarios" + (f", {NOT_JUDGED} in {left_out}" if left_out else "")
     if not totals:
-        return np.nan, remark
-    return float(np.sum(totals) if metric == "wrong_collisions" else np.median(totals)), remark
+        return OverviewCell(number(np.nan), remark)
+    value, worst_in = float(np.median(list(totals.values()))), max(totals, key=totals.__getitem__)
+    worst = totals[worst_in]
+    return OverviewCell(
+        number(value), remark, value=value, worst=number(worst) if worst else "", worst_in=worst_in
+    )
 
 
 def heat_map(

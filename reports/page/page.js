@@ -12,14 +12,15 @@ const library = unpack("library").then((bytes) => {
 });
 const drawn = new Map();  // the element of a chart -> its figure as JSON text, on light
 
-function themed(text) {
-  if (!darkPage()) return JSON.parse(text);
+function themed(text, dark = darkPage()) {
+  if (!dark) return JSON.parse(text);
   return JSON.parse(Object.values(looks).reduce((all, look) => all.replaceAll(look.light, look.dark), text));
 }
 
-function layoutOf(figure) {
+// ink: "" for the colours of the page, "paper-" for those of paper.
+function layoutOf(figure, ink = "") {
   const css = getComputedStyle(document.documentElement);
-  const [text, line, soft] = ["--text", "--line", "--soft"].map((name) => css.getPropertyValue(name).trim());
+  const [text, line, soft] = ["text", "line", "soft"].map((name) => css.getPropertyValue(`--${ink}${name}`).trim());
   const axis = { gridcolor: line, linecolor: line, zeroline: false, ticks: "outside", tickcolor: line, automargin: true };
   const layout = figure.layout;
   for (const name of ["xaxis", "yaxis"]) {
@@ -36,11 +37,15 @@ function layoutOf(figure) {
   };
 }
 
-async function drawChart(plot, text) {
-  await library;
-  const figure = themed(text);
+function withoutHidden(figure, plot) {
   const off = hiddenIn(plot.closest(".scenario"));
   for (const trace of figure.data) trace.visible = !off.has(trace.name);
+  return figure;
+}
+
+async function drawChart(plot, text) {
+  await library;
+  const figure = withoutHidden(themed(text), plot);
   drawn.set(plot, text);
   return Plotly.react(plot, figure.data, layoutOf(figure), {
     responsive: true, displaylogo: false,
@@ -53,8 +58,12 @@ function hiddenIn(scenario) {
   return new Set(off.map((box) => box.value));
 }
 
+async function chartsOf(scenario) {
+  return JSON.parse(new TextDecoder().decode(await unpack(`charts:${scenario.dataset.name}`)));
+}
+
 async function openCharts(scenario) {
-  const charts = JSON.parse(new TextDecoder().decode(await unpack(`charts:${scenario.dataset.name}`)));
+  const charts = await chartsOf(scenario);
   const watch = new IntersectionObserver((entries) => {
     for (const entry of entries.filter((each) => each.isIntersecting)) {
       watch.unobserve(entry.target);

@@ -16,9 +16,10 @@ from adapters.run import Run
 from adapters.thrust_grid import off_grid_note
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
-from reports.page import overview, style
+from reports.page import overview, pooled, situations, style
 from reports.page.charts import CHARTS, POINTS, Drawing, packed_charts
 from reports.page.documents import CHARTED, render
+from reports.page.links import neighbours
 from reports.page.replay import frames, name_of, pack, played, ratio_of
 from reports.page.trust import how_far_to_trust
 from reports.run.known_answers import MEANING
@@ -28,6 +29,7 @@ from scenarios.catalogue import family_of
 GENERATOR = "crosscheck run"
 VERDICTS = ("keeps", "departs", "breaks")
 OWN = "Scenes of your own"
+PAPER_CHARTS = ("deviation", "convergence")  # of a scene, where it is printed
 
 
 @dataclass(frozen=True)
@@ -60,18 +62,23 @@ def write_page(
     about: Mapping[str, Any],
     lessons: Mapping[str, Any],
     said: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    on_paper: Sequence[str] = (),
 ) -> None:
     """Write the page of `comparisons`, in reading order, to `path`.
 
     `findings` are the sentences on top; who is in `untrusted` is not scored; `conformance` and
     `known_answers` are the tables below them; `about` holds command, seed, machine, versions,
     started and seconds; `lessons` name -> what has its number, title and question; `said` a
-    solver's file -> what `crosscheck check` says of it.
+    solver's file -> what `crosscheck check` says of it. Scenarios `on_paper` have half a page each
+    where the page is printed, others none.
     """
     names = overview.names_of(comparisons)
     common = overview.common_settings(comparisons)
     sections = [section_of(comparison, names, common) for comparison in comparisons]
     looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
+    scores = pooled.scores(comparisons)
+    answers = situations.answers(scores[scores.middle], situated(comparisons), untrusted)
+    drawings = pooled.drawings(scores, answers, untrusted)
     html = render(
         "page/page.html.j2",
         generator=GENERATOR,
@@ -88,6 +95,15 @@ def write_page(
         steps=step_range(comparisons),
         columns=overview.SUMMARY,
         summary=overview.summary(comparisons, names, untrusted),
+        groups=situations.grouped(names, scores),
+        answers=answers,
+        far_off=situations.FAR_OFF,
+        pooled=drawings,
+        pooled_key=pooled.KEY,
+        pooled_charts=packed_charts(drawings),
+        links=neighbours(path, "report"),
+        on_paper=on_paper,
+        paper_charts=PAPER_CHARTS,
         heat_map=overview.heat_map(comparisons, names),
         conformance=conformance_matrix(conformance),
         departures=departures(conformance),
@@ -105,6 +121,14 @@ def write_page(
         searched=by_engine(searched()),
     )
     put_text(path, html)
+
+
+def situated(comparisons: Sequence[Comparison]) -> dict[str, list[str]]:
+    """Scene -> what `situations.situations_of` says of it."""
+    return {
+        each.scenario.name: situations.situations_of(each.scenario, each.truth)
+        for each in comparisons
+    }
 
 
 def section_of(

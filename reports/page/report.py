@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,21 +44,32 @@ class Report:
     said: Mapping[str, list[str]]
 
 
-def make_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, Any]) -> Report:
+def make_report(
+    folder: Path,
+    say: Callable[[str], None],
+    lessons: Mapping[str, Any],
+    on_paper: Sequence[str] = (),
+) -> Report:
     """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what
     is being done.
 
-    `lessons`: name -> a lesson, for the page's list of them.
+    `lessons`: name -> a lesson, for the page's list of them; `on_paper`: scenarios that are printed
+    with the page.
 
     Raises:
         FolderTaken: one of the three is there and is not this program's.
         ValueError: the journal cannot be used, or a scene is not the one that was played.
     """
     with writing(folder, (*TABLES, PAGE)):
-        return made_report(folder, say, lessons)
+        return made_report(folder, say, lessons, on_paper)
 
 
-def made_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, Any]) -> Report:
+def made_report(
+    folder: Path,
+    say: Callable[[str], None],
+    lessons: Mapping[str, Any],
+    on_paper: Sequence[str] = (),
+) -> Report:
     """As `make_report`, over whatever is there."""
     archive = Archive.read(folder)
     header = archive.header
@@ -96,5 +107,6 @@ def made_report(folder: Path, say: Callable[[str], None], lessons: Mapping[str, 
         about=header | {"seconds": archive.seconds},
         lessons=lessons,
         said=said,
+        on_paper=on_paper,
     )
     return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged, said)

@@ -11,7 +11,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from reports.page import style
-from reports.page.charts import ZERO, decades, shortened
+from reports.page.charts import ZERO, broken_axis, decades, marked_break, shortened, sized
 from reports.speed.models import KINDS
 from reports.speed.pareto import ACCURACIES, FAILED, front
 from scenarios.model import Array
@@ -19,8 +19,8 @@ from scenarios.model import Array
 FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"
 COST, ERROR = "engine time (µs per simulated second)", "error (radii)"
 EDGE = 0.55  # decades between the last gridline and what is drawn at the edge
-# radii: what is smaller stands there, as a tenth of the finest accuracy asked for is as good as
-# exact
+# radii: what is smaller stands below a break of the axis, as a tenth of the finest accuracy that is
+# asked for is as good as exact
 LOWEST = 1e-7
 TALL, TALLEST, PER_ROW = 400, 520, 19  # px
 
@@ -30,8 +30,8 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
     then `tall`."""
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis(COST, drawn.cost.to_numpy(float))
-    y_axis = error_axis(drawn.error.to_numpy(float))
-    traces = fronts(drawn, x_axis, y_axis)
+    y_axis, floor = error_axis(drawn.error.to_numpy(float))
+    traces = fronts(drawn, x_axis, y_axis, floor)
     for engine, profile, group in by_engine(points):
         fine = group[group.cost.notna() & np.isfinite(group.error)]
         spreads = (
@@ -40,27 +40,28 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
             else {
                 "error_x": bars(fine.cost, fine.low, fine.high),
                 "error_y": bars(
-                    *(
-                        fine[name].clip(lower=LOWEST)
-                        for name in ("error", "error_low", "error_high")
-                    )
+                    *(lifted(fine[name], floor) for name in ("error", "error_low", "error_high"))
                 ),
             }
         )
         text = [hover_text(row) for row in records(fine)]
-        traces.append(
-            line(engine, profile, fine.cost, fine.error.clip(lower=LOWEST), text, spreads)
-        )
+        values = {"customdata": shortened(fine.error, 3)}  # what is saved as CSV
+        height = lifted(fine.error, floor)
+        traces.append(line(engine, profile, fine.cost, height, text, spreads | values))
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
-    traces += at_the_edge(lost, drawn, x_axis, y_axis)
-    return figure(traces, x_axis, y_axis, TALLEST if tall else TALL)
+    traces += at_the_edge(lost, drawn, x_axis, y_axis, floor)
+    return figure(traces, x_axis, y_axis, TALLEST if tall else TALL, floor)
 
 
 def at_the_edge(
-    lost: pd.DataFrame, drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any]
+    lost: pd.DataFrame,
+    drawn: pd.DataFrame,
+    x_axis: dict[str, Any],
+    y_axis: dict[str, Any],
+    floor: float,
 ) -> list[dict[str, Any]]:
     """What failed, on the upper edge, and what was not timed, at its error; at the cost it has or
-    would have by its other dts, else at the right edge.
+    would have by its other dts, else at the right edge. `floor`: of `error_axis`.
     """
     if lost.empty:
         return []
@@ -74,33 +75,38 @@ def at_the_edge(
         cost = group.cost.where(group.cost.notna(), per_step_size * 2.0**group.step_size)
         corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside: what is outside is not drawn
         x = cost.fillna(corner).clip(upper=corner)
-        y = group.error.clip(lower=LOWEST).where(np.isfinite(group.error), top)
+        y = lifted(group.error, floor).where(np.isfinite(group.error), top)
         trace = line(engine, profile, x, y, [hover_text(row) for row in records(group)])
         traces.append(trace | {"mode": "markers", "cliponaxis": False})
     return traces
 
 
 def fronts(
-    drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any]
+    drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any], floor: float
 ) -> list[dict[str, Any]]:
     """Behind everybody, the front of all and, narrow, that of those who take steps; together where
     they are one."""
     steps = drawn[~drawn.engine.isin(KINDS)]
     return [
-        front_of(drawn, FRONT, 9, x_axis, y_axis),
-        front_of(steps, FRONT_OF_STEPS, 3, x_axis, y_axis),
+        front_of(drawn, FRONT, 9, x_axis, y_axis, floor),
+        front_of(steps, FRONT_OF_STEPS, 3, x_axis, y_axis, floor),
     ]
 
 
 def front_of(
-    drawn: pd.DataFrame, name: str, width: int, x_axis: dict[str, Any], y_axis: dict[str, Any]
+    drawn: pd.DataFrame,
+    name: str,
+    width: int,
+    x_axis: dict[str, Any],
+    y_axis: dict[str, Any],
+    floor: float,
 ) -> dict[str, Any]:
     """The edge of what the points that nobody beats beat: all above and right of it is slower or
     worse than one.
 
-    What stands at `LOWEST` counts as equal.
+    What stands at `floor`, below `LOWEST`, counts as equal.
     """
-    cost, error = drawn.cost.to_numpy(float), np.maximum(drawn.error.to_numpy(float), LOWEST)
+    cost, error = drawn.cost.to_numpy(float), lifted(drawn.error, floor).to_numpy(float)
     best = front(cost, error)
     x, y = cost[best], error[best]
     if best:
@@ -134,16 +140,15 @@ def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
     """
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     x_axis = log_axis("time / time as matched" if relative else COST, drawn.cost.to_numpy(float))
-    y_axis = (
-        log_axis("error / error as matched", drawn.error.to_numpy(float))
-        if relative
-        else error_axis(drawn.error.to_numpy(float))
+    errors = drawn.error.to_numpy(float)
+    y_axis, floor = (
+        (log_axis("error / error as matched", errors), ZERO) if relative else error_axis(errors)
     )
     traces = []
     for engine, profile, group in by_engine(drawn):
         what = profile.partition("+")[2]
         text = [turned(what, row, relative) for row in records(group)]
-        error = group.error if relative else group.error.clip(lower=LOWEST)
+        error = group.error if relative else lifted(group.error, floor)
         trace = line(engine, profile, group.cost, error, text)
         if what:  # the first and the last are named
             values = group.change.tolist()
@@ -156,8 +161,8 @@ def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
             trace["textfont"] = {"color": trace["line"]["color"], "size": 11}
         traces.append(trace)
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
-    traces += at_the_edge(lost, drawn, x_axis, y_axis)
-    return figure(traces, x_axis, y_axis, TALLEST if relative else TALL)
+    traces += at_the_edge(lost, drawn, x_axis, y_axis, floor)
+    return figure(traces, x_axis, y_axis, TALLEST if relative else TALL, floor)
 
 
 def turned(what: str, row: dict[str, Any], relative: bool) -> str:
@@ -373,17 +378,18 @@ def log_axis(title: str, values: Array) -> dict[str, Any]:
     return {"title": title} | decades(np.append(values, 1.0) if not len(values) else values)
 
 
-def error_axis(errors: Array) -> dict[str, Any]:
-    """A log axis for errors that ends at `LOWEST`, with a tick that says so if any is smaller."""
-    axis = log_axis(ERROR, np.maximum(errors, LOWEST))
-    if not (errors < LOWEST).any():
-        return axis
-    ticks = [(at, text) for at, text in zip(axis["tickvals"], axis["ticktext"]) if at > 9 * LOWEST]
-    lowest = f"≤ 10<sup>{np.log10(LOWEST):.0f}</sup>".replace("-", "−")
-    return axis | {
-        "tickvals": [*(at for at, _ in ticks), LOWEST],
-        "ticktext": [*(text for _, text in ticks), lowest],
-    }
+def error_axis(errors: Array) -> tuple[dict[str, Any], float]:
+    """A log axis for errors, and where on it those below `LOWEST` are drawn: below a break of it,
+    if there are larger ones, else at `LOWEST`."""
+    if not (errors >= LOWEST).any():
+        return log_axis(ERROR, np.maximum(errors, LOWEST)), LOWEST
+    axis, floor = broken_axis(errors, LOWEST)
+    return {"title": ERROR} | axis, floor
+
+
+def lifted(errors: pd.Series, floor: float) -> pd.Series:
+    """Where errors are drawn on an `error_axis`: those below `LOWEST` at its `floor`."""
+    return errors.where(~(errors < LOWEST), floor)
 
 
 def edge(axis: dict[str, Any], label: str) -> float:
@@ -397,8 +403,15 @@ def edge(axis: dict[str, Any], label: str) -> float:
 
 
 def figure(
-    traces: list[dict[str, Any]], x_axis: dict[str, Any], y_axis: dict[str, Any], height: int | None
+    traces: list[dict[str, Any]],
+    x_axis: dict[str, Any],
+    y_axis: dict[str, Any],
+    height: int | None,
+    floor: float = ZERO,
 ) -> go.Figure:
-    """The figure; page.js adds what all share."""
+    """The figure, with a band where `floor` is below a break of y; page.js adds what all share."""
     layout: dict[str, Any] = {"hovermode": "closest", "xaxis": x_axis, "yaxis": y_axis}
-    return go.Figure(traces, layout | ({"height": height} if height else {}))
+    broken = floor not in (ZERO, LOWEST)
+    return go.Figure(
+        traces, layout | (marked_break(y_axis, floor) if broken else {}) | sized(height)
+    )

@@ -9,11 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from reports.page import style
+from reports.page import situations, style
 from reports.page.charts import Drawing, packed_charts
 from reports.page.documents import CHARTED, render
+from reports.page.links import neighbours
+from reports.run.scenes import open_scene
 from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import RESIDUAL, TOTALS
+from reports.speed.ladder import held
 from reports.speed.order import ELSEWHERE, UNSTEADY
 from reports.speed.pareto import ACCURACIES
 from reports.speed.pooling import said_of_pool
@@ -42,6 +45,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     seconds, load."""
     names = (*results.names, *(sweep.name for sweep in results.plan.sweeps), style.TRUTH)
     looks = {name: style.look(*name.split(":", 1)) for name in names}
+    found = middle_scores(results)
     html = render(
         "speed/speed.html.j2",
         generator=GENERATOR,
@@ -52,6 +56,9 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         names=results.names,
         about=about,
         pooled=pooled_section(results),
+        answers=situations.answers(found, situated(results), set()),
+        far_off=situations.FAR_OFF,
+        links=neighbours(path, "speed"),
         sizes=sizes_section(results),
         options=options_section(results),
         sweeps=sweep_sections(results),
@@ -72,6 +79,25 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         totals=(*TOTALS, RESIDUAL),
     )
     put_text(path, html)
+
+
+def middle_scores(results: Results) -> pd.DataFrame:
+    """A row an engine and scene, at the middle of the step sizes measured: `situations.COLUMNS`;
+    angles are not measured here."""
+    points = results.points
+    sizes = points.groupby("scenario").step_size.unique()
+    middle = points.scenario.map({name: sorted(k)[len(k) // 2] for name, k in sizes.items()})
+    here = points[points.step_size == middle]
+    return here.assign(name=here.engine + ":" + here.profile, angle=np.nan)[situations.COLUMNS]
+
+
+def situated(results: Results) -> dict[str, list[str]]:
+    """Scene -> what `situations.situations_of` says of it, of those that were measured."""
+    seed, found = results.plan.seed, {}
+    for scene in results.plan.scenes:
+        if (name := open_scene(scene, seed).name) in results.asks:
+            found[name] = situations.situations_of(*held(scene, seed))
+    return found
 
 
 def section(

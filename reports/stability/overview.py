@@ -14,6 +14,8 @@ from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import AT_ONCE, PAIRS, AtGap
 from reports.terminal.counts import counted
 
+EVERYWHERE = {"never": "everywhere"}  # a cell says where it fails, not when it works
+
 
 class LimitCell(NamedTuple):
     """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none),
@@ -50,7 +52,7 @@ def cell_of(case: Case, limit: Limit | None) -> LimitCell:
     if limit.verdict == NEVER_FAILS:
         return LimitCell(limit.word, f"does not fail up to {number(limit.works_at)}", 0)
     if limit.word:
-        return LimitCell(limit.word, remark, -1, True)
+        return LimitCell(EVERYWHERE.get(limit.word, limit.word), remark, -1, True)
     values = list(case.values)
     harsher = 1 if values[-1] > values[0] else -1
     passed = sum(harsher * value < harsher * limit.fails_at for value in values) / len(values)

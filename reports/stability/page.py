@@ -15,6 +15,7 @@ from adapters.run import Run
 from reports.page import style
 from reports.page.charts import ChartLine, Drawing, figure_of, packed_charts, shortened
 from reports.page.documents import CHARTED, render
+from reports.page.links import neighbours
 from reports.page.replay import pack_layers, ratio_of
 from reports.stability import overview
 from reports.stability.failures import kept_failure, near
@@ -100,6 +101,7 @@ def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
         gaps=GAPS,
         words=overview,
         exact=EXACT,
+        links=neighbours(path, "stability"),
         form=FORMS[results.header["form"]],
     )
     put_text(path, html)
@@ -200,7 +202,11 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
         "line": {"color": style.look(style.TRUTH).light, "dash": "dot", "width": 1.3},
     }
     return Drawing(
-        title, caption, figure_of(lines, axis_of(case), predicate.unit, markers=40, guide=[guide])
+        title,
+        caption,
+        figure_of(
+            lines, axis_of(case), predicate.unit, markers=40, guide=[guide], unit=unit_of(case)
+        ),
     )
 
 
@@ -219,8 +225,15 @@ def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
     )
     title = f"{case.predicate.name.capitalize()}, share of runs"
     return Drawing(
-        title, caption, figure_of(lines, axis_of(case), "share of runs", log=False, markers=40)
+        title,
+        caption,
+        figure_of(lines, axis_of(case), "share of runs", log=False, markers=40, unit=unit_of(case)),
     )
+
+
+def unit_of(case: Case) -> str:
+    """The unit of its parameter, "" of a ratio."""
+    return "" if case.unit == "1" else case.unit
 
 
 def axis_of(case: Case) -> dict[str, Any]:

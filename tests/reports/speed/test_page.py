@@ -139,10 +139,46 @@ def test_the_front_of_a_chart_is_the_event_driven_engine(results: Results):
 
     assert mine.error.max() < charts.LOWEST
     assert len(front.x) == 3  # it, and the edge up and to the right of it
-    assert front.y[1] == front.y[2] == charts.LOWEST
+    assert front.y[1] == front.y[2] == min(drawn["event_driven:float64"].y)  # below the break
     assert front.x[0] == front.x[1] == pytest.approx(mine.cost.min(), rel=1e-3)
     assert min(steps.x) > min(front.x)
-    assert min(steps.y) > charts.LOWEST
+    assert min(steps.y) > 2 * front.y[1]
+
+
+def test_the_chart_of_speed_is_no_longer_four_fifths_empty(results: Results):
+    """Between the largest error of an exact engine and the smallest of the others the axis is
+    broken: the others have more than half of it."""
+    points = results.points[results.points.scenario == SCENES[0]]
+    low, high = charts.speed(points).layout.yaxis.range
+    rough = points[np.isfinite(points.error) & (points.error >= charts.LOWEST)].error
+
+    assert (points.error < charts.LOWEST).any()
+    assert (high - np.log10(rough.min())) / (high - low) > 0.5
+    assert (high - np.log10(rough.min())) / (high - np.log10(charts.LOWEST)) < 0.5  # unbroken
+
+
+def test_the_page_of_speed_opens_with_which_engine_for_what(
+    browser: Browser, results: Results, tmp_path: Path
+):
+    """On its first screen: a row for the scenes of each situation, and what they cost here."""
+    page = tmp_path / "speed.html"
+    write_page(page, results, about("crosscheck speed", 0) | SAID)
+    tab, heard = opened(browser, page.as_uri(), viewport={"width": 1280, "height": 900})
+    top = tab.locator(".which").bounding_box()
+    rows = tab.locator(".which tbody th").all_inner_texts()
+    costs = tab.locator(".which td[data-head=Cost]").all_inner_texts()
+    tab.context.close()
+
+    assert top is not None
+    assert top["y"] < 450
+    assert [row.splitlines()[0] for row in rows] == [
+        "Single collisions",
+        "Crowds",
+        "Spin",
+        "All scenes",
+    ]
+    assert all(cost[0].isdigit() for cost in costs)
+    assert heard == []
 
 
 def test_what_cannot_be_reached_is_above_what_costs(results: Results):

@@ -1,0 +1,98 @@
+"""All scenes of a run at once: the score of every run, and the chart of medians by situation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence, Set
+
+import numpy as np
+import pandas as pd
+
+from adapters.run import Run
+from reports.compare.comparison import Comparison
+from reports.compare.view import NOT_JUDGED
+from reports.page import situations, style
+from reports.page.charts import ChartLine, Drawing, figure_of
+from scenarios.model import Array
+
+KEY = "pooled"  # of their figures in the page
+ERROR, ANGLE = "position_max_radii", "angle_max"
+SCORES = [*situations.COLUMNS, "step_size", "middle"]
+
+
+def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
+    """A row a run of a scene with an exact answer: columns `SCORES`.
+
+    error (radii) and angle (rad) are the largest of any disk in any sample, inf without a result;
+    cost is µs of engine time per simulated second, nan without one; step_size counts from the
+    coarsest, middle says whether it is the one in the middle of the ladder.
+    """
+    rows = []
+    for comparison in comparisons:
+        # a truth that is lost before its second sample has only the start, which is given to all
+        if comparison.truth is None or len(comparison.truth) < 2:
+            continue
+        table, scenario = comparison.table, comparison.scenario
+        judged = table[(table.versus == style.TRUTH) & table.metric.isin([ERROR, ANGLE])]
+        judged = judged[~judged.note.astype(str).str.startswith(NOT_JUDGED)]
+        keys = zip(judged.engine + ":" + judged.profile, judged.dt_s, judged.metric)
+        found = dict(zip(keys, judged.value.to_numpy(float)))
+        steps = sorted({run.dt for run in comparison.runs}, reverse=True)
+        for run in comparison.runs:
+            error, angle = (
+                float(found.get((run.name, run.dt, each), np.inf)) for each in (ERROR, ANGLE)
+            )
+            cost = run.seconds / scenario.duration * 1e6 if np.isfinite(error) else np.nan
+            middle = run.dt == comparison.middle_dt
+            rows.append((scenario.name, run.name, error, angle, cost, steps.index(run.dt), middle))
+    return pd.DataFrame(rows, columns=SCORES).astype({"middle": bool})
+
+
+def drawings(
+    found: pd.DataFrame, answers: Sequence[situations.Answer], untrusted: Set[str]
+) -> dict[str, Drawing]:
+    """The chart of `scores`, without who is `untrusted`; {} if there is nothing to draw."""
+    trusted = found[~found.name.isin(untrusted)]
+    return {"situations": by_situation(trusted, answers)} if answers else {}
+
+
+def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> Drawing:
+    """A place a situation, a mark an engine at the median of its errors."""
+    names = list(dict.fromkeys(found.name))
+    middle = found[found.middle]
+    lines = []
+    for k, name in enumerate(names):
+        mine = middle[middle.name == name].set_index("scenario")
+        medians = [
+            float(mine[column_of(answer)].reindex(answer.scenes).fillna(np.inf).median())
+            for answer in answers
+        ]
+        y: Array = np.where(np.isfinite(medians), medians, np.nan)
+        x = np.arange(len(answers), dtype=np.float64) + (k - (len(names) - 1) / 2) * 0.7 / max(
+            len(names), 1
+        )
+        lines.append(ChartLine(named(name), x, y))
+    axis = {
+        "title": "",
+        "tickvals": list(range(len(answers))),
+        "ticktext": [answer.title.replace(" ", "<br>") for answer in answers],
+        "range": [-0.5, len(answers) - 0.5],
+    }
+    figure = figure_of(lines, axis, "error (radii)", mode="markers", height=340)
+    return Drawing(
+        "Error by situation",
+        "A mark is an engine: the median over the scenes of its largest position error at the"
+        " middle step size; of Spin its largest error of angle in rad, which is what a point on the"
+        " rim is off in radii. Lower is better. No mark: no result in half of the scenes.",
+        figure,
+    )
+
+
+def column_of(answer: situations.Answer) -> str:
+    """Which column of `SCORES` its errors are."""
+    return "angle" if answer.unit == "rad" else "error"
+
+
+def named(name: str) -> Run:
+    """A run that carries an engine's name, which decides how it is drawn."""
+    engine, profile = name.split(":", 1)
+    return Run(engine, profile, "", 0.0)

@@ -1,0 +1,208 @@
+"""Which engine for what: a scene belongs to a situation, and in each the engines are ranked apart
+from this project's own solvers and from its exact references."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence, Set
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from adapters.engines import ENGINES
+from scenarios.model import Scenario, Trajectory
+
+FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN = (
+    "Flight",
+    "Single collisions",
+    "Rows",
+    "Stacks and rest",
+    "Crowds",
+    "Spin",
+)
+ALL = "All scenes"
+SITUATIONS = {
+    FLIGHT: "nothing collides, in the exact answer",
+    SINGLE: "at most two disks move, or no disk meets two others",
+    ROWS: "two or more disks on one line, and a third body",
+    STACKS: "weight and e = 0: contacts that last",
+    CROWDS: "disks that meet many others",
+    SPIN: "a disk turns; these scenes count above as well",
+    ALL: "of all situations",
+}
+ENGINE, OWN, EXACT = "Engines", "Hand-written solvers of this project", "Exact references"
+RIGHT = 1e-6  # radii: a solver of this project that is closer in half of the scenes is a reference
+FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
+COLUMNS = ["scenario", "name", "error", "angle", "cost"]
+
+
+def situations_of(scenario: Scenario, truth: Trajectory | None) -> list[str]:
+    """The situation of a scene, of the first five of `SITUATIONS`, and `SPIN` if a disk turns.
+
+    truth: whose collisions say who meets whom; without one all disks may meet.
+    """
+    scene = scenario.scene
+    moving = int(np.isfinite(scene.mass).sum())
+    turns = bool(scene.angular_velocity.any()) or any(t.torque for t in scenario.thrusts)
+    met = None if truth is None else partners(truth)
+    if scene.gravity.any() and scene.restitution == 0:
+        found = STACKS
+    elif met == {}:
+        found = FLIGHT
+    elif moving > 1 and scene.n + len(scene.walls) > 2 and on_one_line(scenario):
+        found = ROWS
+    elif moving <= 2 or (met is not None and all(len(others) < 2 for others in met.values())):
+        found = SINGLE
+    else:
+        found = CROWDS
+    return [found, SPIN] if turns else [found]
+
+
+def partners(truth: Trajectory) -> dict[int, set[int]]:
+    """Disk -> which other disks it collides with, none for one that meets walls only."""
+    met: dict[int, set[int]] = {}
+    for i, j in zip(truth.collisions.i.tolist(), truth.collisions.j.tolist()):
+        for one, other in ((i, j), (j, i)):
+            if one >= 0:
+                met.setdefault(one, set()).update({other} if other >= 0 else ())
+    return met
+
+
+def on_one_line(scenario: Scenario) -> bool:
+    """Whether all centres lie on one line, and all velocities and the weight along it."""
+    scene = scenario.scene
+    spread = scene.position - scene.position[0]
+    along = [spread, scene.velocity, scene.gravity[None]]
+    rows = np.vstack([each / (np.abs(each).max() or 1.0) for each in along])
+    return int(np.linalg.matrix_rank(rows, tol=1e-9)) <= 1
+
+
+class Ranked(NamedTuple):
+    """An engine in a situation.
+
+    Attributes:
+        name: `engine:profile`.
+        median, worst: error over the scenes, radii (rad of an angle); inf: no result.
+        worst_in: the scene of the worst.
+        fails: scene -> error, of those where it is off by more than `FAR_OFF`, the worst first.
+        cost: µs of engine time per simulated second, median; nan where not known.
+    """
+
+    name: str
+    median: float
+    worst: float
+    worst_in: str
+    fails: Mapping[str, float]
+    cost: float
+
+
+class Answer(NamedTuple):
+    """A row of the table: the best engine of a situation, and the best of another engine.
+
+    Attributes:
+        title, meaning, unit: of the situation.
+        scenes: which belong to it.
+        best, other: of what takes part as an engine, the nearest to the exact answers; and the best
+            profile of any other engine, if there is one.
+        own: the best of the hand-written solvers beside it, if it is not `best` itself.
+        exact: the exact references.
+    """
+
+    title: str
+    meaning: str
+    unit: str
+    scenes: Sequence[str]
+    best: Ranked
+    other: Ranked | None
+    own: Ranked | None
+    exact: Sequence[Ranked]
+
+
+def grouped(names: Iterable[str], scores: pd.DataFrame) -> dict[str, list[str]]:
+    """`ENGINE`, `OWN`, `EXACT` -> their names in the order given; groups without a name are left
+    out.
+
+    An engine is what others made: a library, or a solver's file. A solver of this project is an
+    exact reference if the median of its errors is below `RIGHT`.
+    """
+    medians = scores.groupby("name").error.median()
+    groups: dict[str, list[str]] = {ENGINE: [], OWN: [], EXACT: []}
+    for name in names:
+        row = ENGINES.get(name)
+        if row is None or row.distributions:
+            groups[ENGINE].append(name)
+        else:
+            groups[EXACT if medians.get(name, np.inf) < RIGHT else OWN].append(name)
+    return {group: members for group, members in groups.items() if members}
+
+
+def answers(
+    scores: pd.DataFrame, situations: Mapping[str, Sequence[str]], untrusted: Set[str]
+) -> list[Answer]:
+    """A row a situation that has a scene with an exact answer, and one for all of them if there are
+    more.
+
+    scores: columns `COLUMNS`: errors in radii and in rad, inf without a result, angle nan where it
+        was not read; cost in µs per simulated second.
+    situations: scene -> what `situations_of` says. Who is `untrusted` is left out.
+    """
+    scores = scores[~scores.name.isin(untrusted)]
+    if scores.empty:
+        return []
+    groups = grouped(dict.fromkeys(scores.name), scores)
+    ranked = groups.get(ENGINE) or groups.get(OWN) or groups[EXACT]
+    rows: list[Answer] = []
+    for title, meaning in SITUATIONS.items():
+        members = [s for s in dict.fromkeys(scores.scenario) if title in [*situations[s], ALL]]
+        here = scores[scores.scenario.isin(members)]
+        by_angle = title == SPIN and not here.angle.isna().all()
+        if by_angle:
+            here = here.assign(error=here.angle.fillna(np.inf))
+        if members and not (title == ALL and len(rows) < 2):
+            rows.append(
+                answer(title, meaning, "rad" if by_angle else "radii", here, groups, ranked)
+            )
+    return rows
+
+
+def answer(
+    title: str,
+    meaning: str,
+    unit: str,
+    here: pd.DataFrame,
+    groups: Mapping[str, Sequence[str]],
+    ranked: Sequence[str],
+) -> Answer:
+    """The row of one situation, from the scores of its scenes."""
+
+    def in_order(names: Iterable[str]) -> list[Ranked]:
+        found = [rank(name, here[here.name == name]) for name in names if name in set(here.name)]
+        return sorted(found, key=lambda one: (one.median, one.worst))
+
+    best, *rest = in_order(ranked) or in_order(dict.fromkeys(here.name))
+    engine = best.name.split(":")[0]
+    own = in_order(groups.get(OWN, []))
+    return Answer(
+        title,
+        meaning,
+        unit,
+        list(dict.fromkeys(here.scenario)),
+        best,
+        next((one for one in rest if one.name.split(":")[0] != engine), None),
+        own[0] if own and own[0].name not in ranked else None,
+        in_order(name for name in groups.get(EXACT, []) if name not in ranked),
+    )
+
+
+def rank(name: str, mine: pd.DataFrame) -> Ranked:
+    """What its scores in some scenes come to."""
+    errors = mine.set_index("scenario").error.sort_values(ascending=False, kind="stable")
+    costs = mine.cost.dropna()
+    return Ranked(
+        name,
+        float(errors.median()),
+        float(errors.iloc[0]),
+        str(errors.index[0]),
+        {str(scene): float(error) for scene, error in errors.items() if error > FAR_OFF},
+        float(costs.median()) if len(costs) else np.nan,
+    )

@@ -1,0 +1,83 @@
+"""A page of three real scenes on three real engines, with hostile text where text can come from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from adapters.engines import ENGINES
+from adapters.play import play
+from adapters.run import Run
+from reports.compare.comparison import Comparison, compare
+from reports.lessons.catalogue import LESSONS
+from reports.page.page import write_page
+from scenarios.catalogue import scenario
+
+HOSTILE = (
+    "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>{{ 7 * 7 }}"
+)
+LONG = "a_name_without_a_place_to_break_it_" * 6
+PLAYED = ("reference:exercise", "pymunk:matched", "box2d:shipped")
+HEAD_ON, ORBIT, ASTEROIDS = "head_on_equal_e09", "disk_between_static_disks", "asteroids"
+
+
+def played(name: str, **changes: Any) -> Comparison:
+    """A real scenario on three real engines, with one that crashed and one that refused, both
+    saying hostile things."""
+    scene = replace(scenario(name), **changes)
+    steps = scene.substeps[1:3]
+    scene = replace(scene, substeps=steps)
+    runs = [play(ENGINES[key].make(), key, scene, scene.dt(k)) for key in PLAYED for k in steps]
+    failed = [
+        ("box2d_v3", "shipped", "crashed", HOSTILE),
+        ("box2d_v3", "matched", "unsupported", f"no {LONG}"),
+    ]
+    runs += [
+        Run(e, p, name, scene.dt(k), status, why) for e, p, status, why in failed for k in steps
+    ]
+    return compare(scene, runs)
+
+
+def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
+    """Write their page to `path`; `more` goes to `write_page`."""
+    probe = {
+        "engine": "pymunk",
+        "profile": "matched",
+        "probe": HOSTILE,
+        "asked": HOSTILE,
+        "got": 0.81,
+        "expected": 0.9,
+    }
+    conformance = pd.DataFrame([probe | {"bound": 1e-6, "verdict": "departs", "note": HOSTILE}])
+    known = {
+        "column": "ODE",
+        "dt_s": 1e-3,
+        "published_J2": 185.027,
+        "ours_J2": 185.027,
+        "source": HOSTILE,
+    }
+    about = {
+        "command": f"crosscheck --out '{HOSTILE}'",
+        "seed": 0,
+        "machine": {"system": HOSTILE},
+        "seconds": 1.0,
+    }
+    about |= {
+        "versions": {"pymunk": "7.3.1"},
+        "started": "2026-01-01T00:00:00+00:00",
+        "known_answers_text": HOSTILE,
+    }
+    write_page(
+        path,
+        comparisons,
+        untrusted=set(),
+        findings=["One.", HOSTILE, "Three."],
+        conformance=conformance,
+        known_answers=pd.DataFrame([known]),
+        about=about,
+        lessons=LESSONS,
+        **more,
+    )

@@ -1,0 +1,278 @@
+"""Which engine for what: where a scene belongs, who is ranked, and what the first screen says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from playwright.sync_api import Browser
+
+from reports.compare.comparison import Comparison
+from reports.page import charts, overview, situations
+from reports.page.links import PAGES, neighbours
+from reports.page.overview import OverviewCell
+from reports.page.pooled import scores
+from reports.page.situations import CROWDS, FLIGHT, ROWS, SINGLE, SPIN, STACKS
+from scenarios.catalogue import scenario
+from tests.reports.page.browsing import opened
+from tests.reports.page.small import ASTEROIDS, HEAD_ON, ORBIT, write_small
+
+WHERE = {
+    "free_fall": [FLIGHT, SPIN],
+    "near_miss": [FLIGHT],
+    "head_on_equal_e09": [SINGLE],
+    "mass_ratios": [SINGLE],
+    "disk_between_static_disks": [SINGLE],
+    "galperin_31": [ROWS],
+    "cradle_with_gaps": [ROWS],
+    "column_of_ten": [STACKS],
+    "gas_of_100": [CROWDS],
+    "asteroids": [CROWDS, SPIN],
+    "spin_under_torque": [FLIGHT, SPIN],
+}
+
+
+@pytest.mark.parametrize("name", WHERE)
+def test_a_scene_belongs_where_its_answer_says(name: str):
+    """By what collides with what in the exact answer, weight, and what turns."""
+    scene = scenario(name)
+    assert scene.truth is not None
+
+    found = situations.situations_of(scene, scene.truth(scene.times))
+
+    assert found[0] == WHERE[name][0]
+    assert found[1:] == ([SPIN] if scene.scene.angular_velocity.any() or scene.thrusts else [])
+
+
+def test_without_an_answer_all_disks_may_meet():
+    """Twenty disks are then a crowd, two are not."""
+    assert situations.situations_of(scenario("gas_of_100"), None)[0] == CROWDS
+    assert situations.situations_of(scenario("head_on_equal_e1"), None)[0] == SINGLE
+
+
+def score(errors: dict[str, list[float]]) -> pd.DataFrame:
+    """Scores of scenes a, b, c, ... by `engine:profile`."""
+    rows = [
+        (scene, name, error, np.nan, 100.0)
+        for name, mine in errors.items()
+        for scene, error in zip("abcde", mine)
+    ]
+    return pd.DataFrame(rows, columns=situations.COLUMNS)
+
+
+ERRORS = {
+    "reference:exercise": [1e-3, 1e-3, 1e-3],
+    "reference:ordered": [1e-14, 1e-14, 1e3],
+    "pymunk:shipped": [0.02, 0.02, 0.02],
+    "pymunk:matched": [0.01, 0.01, 50.0],
+    "box2d:matched": [0.03, 0.03, np.inf],
+}
+PLACES = {scene: [SINGLE] for scene in "abcde"}
+
+
+def test_engines_are_ranked_among_themselves_and_the_next_is_another_engine():
+    """By medians, which one scene does not drown; own solvers and exact references stand apart."""
+    [row] = situations.answers(score(ERRORS), PLACES, set())
+
+    assert (row.title, row.best.name, row.best.median) == (SINGLE, "pymunk:matched", 0.01)
+    assert (row.best.worst, row.best.worst_in, row.best.fails) == (50.0, "c", {"c": 50.0})
+    assert row.other is not None
+    assert (row.other.name, row.other.fails) == ("box2d:matched", {"c": np.inf})
+    assert row.own is not None
+    assert row.own.name == "reference:exercise"
+    assert [one.name for one in row.exact] == ["reference:ordered"]
+
+
+def test_equal_medians_are_ordered_by_the_worst_scene_and_who_breaks_the_protocol_is_left_out():
+    """Two engines of the same median; and the better one untrusted."""
+    equal = score({"pymunk:matched": [0.1, 0.1, 9.0], "box2d:matched": [0.1, 0.1, 0.2]})
+    [row] = situations.answers(equal, PLACES, set())
+    [other] = situations.answers(equal, PLACES, {"box2d:matched"})
+
+    assert row.best.name == "box2d:matched"
+    assert (other.best.name, other.other) == ("pymunk:matched", None)
+
+
+def test_where_no_engine_was_played_our_own_solvers_are_ranked():
+    """A run of them alone still has an answer; a run of nothing has none."""
+    own = score({name: ERRORS[name] for name in ("reference:exercise", "reference:ordered")})
+    [row] = situations.answers(own, PLACES, set())
+
+    assert (row.best.name, row.own) == ("reference:exercise", None)
+    assert situations.answers(own.head(0), PLACES, set()) == []
+
+
+def test_the_table_of_the_page_is_that_of_the_scores(
+    browser: Browser, path: Path, comparisons: list[Comparison]
+):
+    """On the first screen at 1280 px: the best engine is that with the lowest median."""
+    page, heard = opened(browser, path.as_uri(), viewport={"width": 1280, "height": 900})
+    table = page.locator(".which")
+    top = table.bounding_box()
+    rows = [row.locator("td").first.inner_text().split() for row in table.locator("tbody tr").all()]
+    scene = table.locator("tbody th").first.inner_text()
+    page.context.close()
+    found = scores(comparisons)
+    middle = found[found.middle & found.name.isin(["pymunk:matched", "box2d:shipped"])]
+    best = middle.groupby("name").error.median().idxmin()
+
+    assert top is not None
+    assert top["y"] < 450
+    assert scene.startswith(SINGLE)
+    assert rows[0][0] == best
+    assert heard == []
+
+
+def test_bold_is_the_best_of_a_column_of_its_group(browser: Browser, path: Path):
+    """Read off the page: the bold cells are those with the lowest number."""
+    page, _ = opened(browser, path.as_uri())
+    groups = page.evaluate(
+        """() => [...document.querySelectorAll('.summary tbody')].map(body =>
+          [...body.querySelectorAll('tr:not(.group)')].map(row => [...row.querySelectorAll('td')]
+            .map(td => [td.firstChild.textContent.trim(), td.classList.contains('best')])))"""
+    )
+    page.context.close()
+    checked = 0
+    for rows in groups:
+        for column in zip(*rows):
+            numbers = {text: as_number(text) for text, _ in column if text not in ("–", "breaks")}
+            lowest = min(numbers.values(), default=None)
+            for text, bold in column:
+                assert bold == (text in numbers and numbers[text] == lowest), column
+                checked += 1
+    assert checked >= 5 * 6
+
+
+def as_number(text: str) -> float:
+    """A number as `style.number` writes it, or the first of "1 of 3"."""
+    plain = text.split(" of ")[0].replace("−", "-").replace("∞", "inf")
+    plain = plain.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
+    if plain.startswith("10-"):
+        plain = f"1×{plain}"
+    return float(plain.replace("×10", "e"))
+
+
+def test_one_scene_does_not_drown_a_column():
+    """601 wrong collisions in one of three scenes: the median is 0, and the scene is named."""
+    cells = {
+        "a:b": [OverviewCell("0", value=0.0, worst="601", worst_in="column_of_ten")],
+        "c:d": [OverviewCell("1", value=1.0)],
+    }
+    marked = overview.mark_best(cells, set())
+
+    assert (marked["a:b"][0].best, marked["c:d"][0].best) == (True, False)
+    assert not overview.mark_best(cells, {"a:b"})["a:b"][0].best
+
+
+def test_a_link_to_another_page_is_there_only_if_the_page_is(
+    comparisons: list[Comparison], tmp_path: Path
+):
+    """None beside a page alone; a link that leads somewhere once the other is made."""
+    page = tmp_path / "latest" / "report.html"
+    page.parent.mkdir()
+    write_small(page, comparisons[:1])
+    alone = page.read_text(encoding="utf-8")
+    speed = tmp_path / "speed" / "speed.html"
+    speed.parent.mkdir()
+    speed.touch()
+    write_small(page, comparisons[:1])
+
+    assert 'href="../' not in alone
+    assert "crosscheck speed" in alone
+    assert 'href="../speed/speed.html"' in page.read_text(encoding="utf-8")
+    assert neighbours(speed, "speed")[0].href == "../latest/report.html"
+    assert len(neighbours(speed, "speed")) == len(PAGES) - 1
+
+
+def test_rounding_noise_takes_less_than_a_third_of_an_axis():
+    """Where engines are off by 1e-3 to 1 and others by rounding; a plain axis gives it most."""
+    values = np.array([1e-3, 1e-2, 1.0, 1e-16, 3e-15, 0.0])
+    axis, floor = charts.broken_axis(values, charts.NOISE)
+    low, high = axis["range"]
+
+    def share(range_of: list[float]) -> float:
+        return (np.log10(1e-3) - range_of[0]) / (range_of[1] - range_of[0])
+
+    assert share([low, high]) < 1 / 3
+    assert share(charts.decades(values)["range"]) > 0.7
+    assert 10**low < floor < 1e-3
+    assert axis["ticktext"][-1] == "< 10<sup>−9</sup>"
+
+
+def test_an_axis_of_rounding_alone_is_not_broken():
+    """There is nothing larger to make room for."""
+    axis, floor = charts.broken_axis(np.array([1e-16, 2e-15]), charts.NOISE)
+
+    assert floor == charts.ZERO
+    assert axis == charts.decades(np.array([1e-16, 2e-15]))
+
+
+def test_what_is_said_of_the_end_of_the_truth_is_not_clipped(browser: Browser, path: Path):
+    """Its words end inside the chart, also where the truth ends near the end of the scene."""
+    page, _ = opened(browser, path.as_uri(), reduced_motion="reduce")
+    plot = page.locator(f"#s-{ORBIT} .plot[data-chart=deviation]")
+    plot.scroll_into_view_if_needed()
+    text = plot.locator(".annotation-text").first
+    text.wait_for()
+    words, whole = text.bounding_box(), plot.locator(".main-svg").first.bounding_box()
+    page.context.close()
+
+    assert words is not None
+    assert whole is not None
+    assert words["x"] >= whole["x"]
+    assert words["x"] + words["width"] <= whole["x"] + whole["width"]
+
+
+def test_no_table_is_cut_at_1280(browser: Browser, path: Path):
+    """All that stand on the page show all of their columns; at 400 px some scroll."""
+    cut = []
+    for width in (1280, 400):
+        page, _ = opened(browser, path.as_uri(), viewport={"width": width, "height": 900})
+        cut.append(
+            page.evaluate(
+                """() => [...document.querySelectorAll('.scroll')]
+                  .filter(box => box.scrollWidth > box.clientWidth + 1 && !box.closest('details'))
+                  .map(box => box.firstElementChild.className)"""
+            )
+        )
+        page.context.close()
+
+    assert cut[0] == []
+    assert cut[1] != []
+
+
+def test_a_box_that_scrolls_is_reached_by_keyboard_and_has_a_name(browser: Browser, path: Path):
+    """At 400 px; what shows all of itself is passed over."""
+    page, heard = opened(browser, path.as_uri(), viewport={"width": 400, "height": 900})
+    page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
+    page.wait_for_function(
+        """() => [...document.querySelectorAll('details .scroll')]
+          .every(box => box.tabIndex === 0)"""
+    )
+    boxes = page.evaluate(
+        """() => [...document.querySelectorAll('.scroll')].filter(box => box.clientWidth).map(box =>
+          [box.scrollWidth > box.clientWidth + 1, box.tabIndex, box.getAttribute('aria-label')])"""
+    )
+    reached = page.evaluate(
+        """() => [...document.querySelectorAll('.scroll[tabindex]')].every(box => {
+          box.focus(); return document.activeElement === box; })"""
+    )
+    page.context.close()
+
+    assert {scrolls for scrolls, _, _ in boxes} == {True, False}
+    for scrolls, index, label in boxes:
+        assert (index, bool(label)) == ((0, True) if scrolls else (-1, False))
+    assert reached
+    assert heard == []
+
+
+def test_the_scenes_of_the_page_are_three(comparisons: list[Comparison]):
+    """One without an answer has no score."""
+    found = scores(comparisons)
+
+    assert set(found.scenario) == {HEAD_ON, ORBIT}
+    assert ASTEROIDS not in set(found.scenario)
+    assert found[found.middle].groupby("scenario").name.nunique().eq(5).all()
+    assert np.isinf(found[found.name == "box2d_v3:shipped"].error).all()
