@@ -84,9 +84,7 @@ def show_cost(settings: Settings) -> Shown:
         for name in COST_NAMES
     ]
     last = sizes[-1]
-    facts = [
-        (f"pairs of {size} disks", number(size * (size - 1) / 2, 7)) for size in (sizes[0], last)
-    ]
+    facts = [(f"pairs of {size} disks", str(size * (size - 1) // 2)) for size in (sizes[0], last)]
     facts += [
         (f"{curve.name}, from {sizes[0]} to {last} disks", f"{number(growth_of(curve), 2)} times")
         for curve in curves
@@ -161,12 +159,11 @@ COST = Lesson(
         (
             "Among n disks there are <code>n (n − 1) / 2</code> pairs. The exercise asks each of"
             " them in every step. An engine that first sorts the disks into cells or a tree asks"
-            " neighbours only. <code>reference:exercise</code> does so where there are many disks,"
-            " and computes the same bits."
+            " neighbours only. <code>reference:exercise</code> does so where there are many disks."
         ),
         (
             "The event-driven engine has no steps; it uses cells too, and its time is divided by"
-            " the number of steps of the others. A time is the shortest of five runs on this"
+            f" the number of steps of the others. A time is the shortest of {ROUNDS} runs on this"
             " machine, and it is longer on a busy one."
         ),
     ),
@@ -296,9 +293,8 @@ HORIZON = Lesson(
     text=(
         (
             "Two disks that meet slightly further to the side separate in another direction. So"
-            " every collision multiplies a small error by some factor, and the error grows"
-            " exponentially until it is as large as the box. This happens to the smallest error"
-            " there is, the rounding of a number. The time from which on a rounding decides is the"
+            " a collision multiplies a small error by some factor, also the smallest there is, the"
+            " rounding of a number. The time from which on a rounding decides is the"
             " <b>horizon</b>."
         ),
         (

@@ -248,7 +248,7 @@ LIMITS = Lesson(
             "A reason counts as tested if the limit follows from it, or if an engine that differs"
             " in this one thing gets farther; else it is called likely. The command"
             " <code>crosscheck stability</code> searches all cases; these are the quick ones."
-            " [digits] and [cap] show two of the reasons by themselves."
+            " [threshold] and [digits] explain two of the reasons."
         ),
     ),
     sliders=(

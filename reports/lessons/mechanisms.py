@@ -79,11 +79,11 @@ def lies_on(engine: str, own: bool, bound: float, unit: str = "") -> Claim:
     if own:
         within = f"within {number(bound, 2)} {unit}".strip() if bound else "to the last digit"
         return Claim(
-            f"Set so, the ablated reference lies on {engine}, {within}.",
+            f"With this setting the ablated reference lies on {engine}, {within}.",
             lambda shown: shown.gap(ABLATED, engine) <= bound,
         )
     return Claim(
-        f"Set so, the ablated reference does not lie on {engine}.",
+        f"With this setting the ablated reference does not lie on {engine}.",
         lambda shown: shown.gap(ABLATED, engine) > 300 * bound,
     )
 
@@ -311,7 +311,7 @@ def show_substeps(settings: Settings) -> Shown:
             lies_on("box2d_v3:matched", n == 4, single, "mm")
             if n == 4
             else Claim(
-                "Set so, the ablated reference does not lie on box2d_v3:matched.",
+                "With this setting the ablated reference does not lie on box2d_v3:matched.",
                 lambda shown: shown.gap(ABLATED, "box2d_v3:matched") > 10 * single,
             ),
         ]
@@ -377,9 +377,9 @@ def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
     )
     return [
         Claim(
-            "Box2D without continuous collision turns round a velocity that gravity has changed"
-            " already. The ball gains |v| dt of height at each bounce, where v is its speed:"
-            f" {number(1e3 * fall * dt)} mm at the first, and more at each later one.",
+            "Box2D without continuous collision (+no_ccd) turns round a velocity that gravity has"
+            " changed already. The ball gains |v| dt of height at each bounce, where v is its"
+            f" speed: {number(1e3 * fall * dt)} mm at the first, and more at each later one.",
             lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
         ),
         Claim(
@@ -673,7 +673,7 @@ MECHANISMS = (
         "Velocity or position first",
         "Why is a falling disk late by half a step?",
         "With the same gravity and the same step, one engine moves a disk with the old velocity and"
-        " the other with the new one ([thrust] shows the same with a force).",
+        " the other with the new one. [thrust] does this with a force.",
         ["pymunk:matched"],
         show_order,
         Slider("order", "Order", ("velocity first", "position first"), 0),
@@ -687,7 +687,7 @@ MECHANISMS = (
         "A bounce turns round the velocity with which a ball meets the floor. If gravity has been"
         " added to it already, the part that gravity added in this step is turned round, too. Box2D"
         " plays twice, with its continuous collision on and off, because continuous collision"
-        " hides the effect in some steps.",
+        " hides the effect at some step sizes.",
         [NO_CCD, "box2d:matched", "pymunk:matched"],
         show_gravity,
         Slider("order", "Velocity that is turned round", tuple(ORDERS), 0),
@@ -713,7 +713,7 @@ MECHANISMS = (
         "Substeps",
         "What is a step of Box2D 3.1?",
         "Box2D 3.1 cuts every step into n smaller ones, and a disk in flight has the error of the"
-        " smaller step ([order] shows the error of a whole one).",
+        " smaller step. [order] is about a whole one.",
         ["box2d_v3:matched"],
         show_substeps,
         Slider("substeps", "Substeps n", (1, 2, 4, 8), 0),
