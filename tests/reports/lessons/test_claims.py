@@ -73,7 +73,7 @@ def test_every_claim_on_a_limit_holds_for_every_engine(case: int):
 
 def distorted(shown: Shown) -> Iterator[Shown]:
     """The same sentences over other curves: of the engines only, each larger by another factor; of
-    all, upside down, scattered, with the values of the neighbour, standing still."""
+    all, upside down, scattered, steeper, with the values of the neighbour, standing still."""
 
     def others(change: Callable[[int, Curve, np.ndarray, np.ndarray], np.ndarray]) -> Shown:
         charts = []
@@ -89,6 +89,7 @@ def distorted(shown: Shown) -> Iterator[Shown]:
     yield others(lambda k, curve, y, _: y if curve.name == TRUTH else (1.5 + k) * y + 1 + k)
     yield others(lambda _, __, y, ___: -y)
     yield others(lambda _, __, y, ___: y + np.cos(np.arange(len(y))))
+    yield others(lambda _, __, y, ___: y * np.geomspace(1, 1e3, len(y)))
     yield others(lambda _, __, ___, neighbour: neighbour)
     yield others(lambda _, __, y, ___: np.full(len(y), y[0]))
 
