@@ -435,9 +435,9 @@ def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
         claims.insert(
             0,
             Claim(
-                f"Until the first collision the exact energy is level. Explicit Euler"
-                f" (reference:lesson) gains m g² dt / 2 in a second, {number(gain)} J for all disks;"
-                " symplectic Euler (reference:exercise) loses as much.",
+                "Until the first collision the exact energy is level. Explicit Euler"
+                f" (reference:lesson) gains m g² dt / 2 in a second, {number(gain)} J for all"
+                " disks; symplectic Euler (reference:exercise) loses as much.",
                 lambda shown: all(
                     np.abs(
                         shown.y(name)[: len(flight)][flight]

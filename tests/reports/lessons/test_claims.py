@@ -86,7 +86,7 @@ def distorted(shown: Shown) -> Iterator[Shown]:
             charts.append(replace(chart, curves=curves))
         return replace(shown, charts=charts)
 
-    yield others(lambda k, curve, y, _: y if curve.name == TRUTH else (1.5 + k) * y + 1 + k)
+    yield others(lambda k, curve, y, _: y if curve.name == TRUTH else (1.5 + 9 * k) * y + 1 + k)
     yield others(lambda _, __, y, ___: -y)
     yield others(lambda _, __, y, ___: y + np.cos(np.arange(len(y))))
     yield others(lambda _, __, y, ___: y * np.geomspace(1, 1e3, len(y)))
