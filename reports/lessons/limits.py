@@ -241,8 +241,8 @@ LIMITS = Lesson(
             " size, and a method may have a value from which on it <b>fails</b>: it misses a"
             " collision, cuts a spin, rounds a place away. The search tries values from gentle to"
             " harsh, a collision at several moments of its step, and stops at the first value that"
-            " fails. Then it halves the gap to the last value that works until the two are"
-            f" {QUICK.ratio - 1:.0%} apart."
+            " fails. Then it halves the gap to the last value that works until the two are at"
+            f" most {QUICK.ratio - 1:.0%} apart."
         ),
         (
             "A reason counts as tested if the limit follows from it, or if an engine that differs"

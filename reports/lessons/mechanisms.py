@@ -686,8 +686,8 @@ MECHANISMS = (
         "Why does a ball in Box2D bounce ever higher?",
         "A bounce turns round the velocity with which a ball meets the floor. If gravity has been"
         " added to it already, the part that gravity added in this step is turned round, too. Box2D"
-        " plays twice, with its continuous collision on and off, because continuous collision"
-        " hides the effect at some step sizes.",
+        " plays twice, with its continuous collision on and off (<code>+no_ccd</code>), because"
+        " continuous collision hides the effect at some step sizes.",
         [NO_CCD, "box2d:matched", "pymunk:matched"],
         show_gravity,
         Slider("order", "Velocity that is turned round", tuple(ORDERS), 0),
@@ -701,7 +701,8 @@ MECHANISMS = (
         "The exercise projects two disks apart at once. Box2D undoes a share of their overlap at a"
         " time and leaves the last bit, the <b>slop</b>, so that a contact stays a contact. Here a"
         " disk starts deep in a fixed one, for which there is no exact answer. The continuous"
-        " collision of Box2D is off, because it removes the overlap by other means.",
+        " collision of Box2D is off (<code>+no_ccd</code>), because it removes the overlap by other"
+        " means.",
         [NO_CCD],
         show_position_correction,
         Slider("share", "Share undone each time", (0.0, 0.1, 0.2, 0.4), 0),

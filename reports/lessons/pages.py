@@ -108,7 +108,7 @@ def linked(paragraph: str, links: Links) -> Markup:
 
     def link(found: re.Match[str]) -> str:
         lesson = LESSONS[found[1]]
-        title = escape(f"Lesson {lesson.number}, {lesson.title},")
+        title = escape(f"Lesson {lesson.number} ({lesson.title})")
         return (
             f'<a href="{links.lesson.format(lesson.name)}">{title}</a>' if links.lesson else title
         )

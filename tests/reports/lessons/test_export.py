@@ -97,9 +97,11 @@ def test_a_lesson_links_to_what_it_speaks_of():
     paragraph = "[thrust] does this with a force."
     page = offline(LESSONS["order"], {places: ANSWER for places in LESSONS["order"].grid})
 
-    assert linked(paragraph, LIVE).startswith('<a href="/lesson/thrust">Lesson 2, Force and thrust')
-    assert linked(paragraph, FILES).startswith('<a href="thrust.html">Lesson 2, Force and thrust')
-    assert linked(paragraph, ALONE) == "Lesson 2, Force and thrust, does this with a force."
+    assert linked(paragraph, LIVE).startswith(
+        '<a href="/lesson/thrust">Lesson 2 (Force and thrust)'
+    )
+    assert linked(paragraph, FILES).startswith('<a href="thrust.html">Lesson 2 (Force and thrust)')
+    assert linked(paragraph, ALONE) == "Lesson 2 (Force and thrust) does this with a force."
     assert 'href="https://www.pymunk.org"' in page
     assert 'href="https://box2d.org"' in page
     with pytest.raises(KeyError):
