@@ -1,5 +1,5 @@
 "use strict";
-// Line charts as SVG: two axes, a grid, and the curves of the players in their colours.
+// Line charts as SVG: two axes, a grid, and the curves of the engines in their colours.
 
 const SIZE = { width: 520, height: 290, left: 62, right: 12, top: 10, bottom: 42 };
 const EMPTY = 1e-16;  // what is 0 stands at the foot of a logarithmic axis
@@ -34,8 +34,16 @@ class Axis {
     const first = Math.ceil(this.low / step - 1e-9) * step;
     const found = [];
     for (let v = first; v <= this.high + 1e-9 * span; v += step) found.push(Math.abs(v) < 1e-9 * step ? 0 : v);
-    if (this.log && found.length < 2) return [this.low, this.high].map((v) => [10 ** v, short(10 ** v)]);
+    if (this.log && found.length < 2) return this.withinADecade();
     return found.map((v) => this.log ? [10 ** v, power(v)] : [v, short(v)]);
+  }
+
+  // 1, 2 and 5 times powers of ten; where even these are too far apart, the ends.
+  withinADecade() {
+    const decades = [Math.floor(this.low), Math.ceil(this.high)];
+    const found = decades.flatMap((v) => [1, 2, 5].map((k) => k * 10 ** v)).filter((v) => Math.log10(v) >= this.low && Math.log10(v) <= this.high);
+    const values = found.length < 2 ? [10 ** this.low, 10 ** this.high] : [...new Set(found)];
+    return values.map((v) => [v, short(v)]);
   }
 }
 
@@ -61,7 +69,7 @@ function drawChart(chart) {
   picture.append(svg("clipPath", { id: clip }));
   picture.lastChild.append(svg("rect", { x: left - 4, y: top - 4, width: width - left - right + 8, height: height - top - bottom + 8 }));
   chart.guides.forEach(([axis, value, text]) => drawGuide(picture, axis, axis === "x" ? x.place(value) : y.place(value), text));
-  chart.curves.forEach((curve, k) => drawCurve(picture, curve, x, y, chart.curves.length - k, clip));
+  chart.curves.forEach((curve, k) => drawCurve(picture, curve, x, y, [k, chart.curves.length], clip));
   figure.append(caption, picture);
   return figure;
 }
@@ -90,18 +98,51 @@ function drawGuide(picture, axis, place, text) {
   picture.append(svg("text", { class: "axis", ...at, "text-anchor": late ? "end" : "start" }, text));
 }
 
-// The lower a curve lies, the wider it is, so that those that coincide stay visible under each other.
-function drawCurve(picture, curve, x, y, rank, clip) {
+// The lower a curve lies, the wider are its line and its marks, so that those that coincide stay visible under each other.
+function drawCurve(picture, curve, x, y, [k, count], clip) {
   const look = looks[curve.name];
   const colour = look[darkPage() ? "dark" : "light"];
-  const points = curve.x.map((each, k) => [x.place(each), y.place(curve.y[k])]);
-  const path = points.map(([px, py], k) => `${k ? "L" : "M"}${px.toFixed(1)},${py.toFixed(1)}`).join("");
-  const width = curve.name === "truth" ? 1.3 : 1.5 + 0.8 * Math.min(rank - 1, 5);
-  const line = svg("path", { class: curve.faint ? "curve faint" : "curve", d: path, stroke: colour, "stroke-width": width, "stroke-dasharray": look.dash.join(","), "clip-path": `url(#${clip})` });
-  line.append(svg("title", {}, curve.name));
-  picture.append(line);
-  if (!curve.dots) return;
-  for (const [px, py] of points) {
-    picture.append(svg("path", { d: look.path, transform: `translate(${px.toFixed(1)},${py.toFixed(1)})`, fill: look.filled ? colour : "var(--page)", stroke: colour }));
+  const above = Math.min(count - k - 1, 5);
+  const points = curve.x.map((each, j) => [x.place(each), y.place(curve.y[j])]);
+  const path = points.map(([px, py], j) => `${j ? "L" : "M"}${px.toFixed(1)},${py.toFixed(1)}`).join("");
+  const width = curve.name === "truth" ? 1.3 : 1.5 + 0.7 * above;
+  const group = svg("g", { class: curve.faint ? "of faint" : "of", "data-name": curve.name });
+  group.append(svg("title", {}, nameOf(curve.name)));
+  group.append(svg("path", { class: "near", d: path, "clip-path": `url(#${clip})` }));
+  group.append(svg("path", { class: "curve", d: path, stroke: colour, "stroke-width": width, "stroke-dasharray": look.dash.join(","), "clip-path": `url(#${clip})` }));
+  for (const [px, py] of curve.dots ? points : marked(curve, points, k / count)) {
+    const size = curve.dots ? 1 + 0.3 * above : 1;
+    group.append(svg("path", { class: "mark", d: look.path, transform: `translate(${px.toFixed(1)},${py.toFixed(1)}) scale(${size})`, fill: look.filled ? colour : "var(--page)", stroke: colour, "stroke-width": 1.2 / size }));
   }
+  group.addEventListener("pointerenter", () => raise(curve.name));
+  group.addEventListener("pointerleave", () => raise(null));
+  picture.append(group);
+}
+
+// Some points of a line, each curve's at places of its own (`share` of the way between two), so that marks of curves
+// that coincide lie side by side. The exact answer has none: it is the thin line on top.
+function marked(curve, points, share) {
+  const marks = 6;
+  if (curve.name === "truth" || curve.faint || points.length < marks) return [];
+  const [from, to] = [points[0][0], points[points.length - 1][0]];
+  return Array.from({ length: marks }, (_, j) => from + (to - from) * (j + 0.1 + 0.8 * share) / marks)
+    .map((wanted) => points.reduce((best, each) => Math.abs(each[0] - wanted) < Math.abs(best[0] - wanted) ? each : best));
+}
+
+// Brings the curves of that name to the top in all charts and lets the others fade; null: all as they were.
+function raise(name) {
+  for (const picture of document.querySelectorAll(".curves svg")) {
+    picture.classList.toggle("raised", name !== null && picture.querySelector(`[data-name="${CSS.escape(name)}"]`) !== null);
+    for (const group of picture.querySelectorAll(".of")) group.classList.toggle("top", group.dataset.name === name);
+    const groups = [...picture.querySelectorAll(".of")];
+    groups.forEach((group, k) => { group.dataset.order ??= k; });
+    const order = (group) => group.dataset.name === name ? groups.length : Number(group.dataset.order);
+    const sorted = [...groups].sort((one, other) => order(one) - order(other));
+    // The group under the pointer stays where it is in the document, or the browser would say that the pointer left it.
+    for (const group of sorted) if (!group.matches(":hover")) {
+      const hovered = groups.find((each) => each.matches(":hover"));
+      hovered ? hovered.before(group) : picture.append(group);
+    }
+  }
+  for (const item of document.querySelectorAll(".names li")) item.classList.toggle("top", item.dataset.name === name);
 }

@@ -4,6 +4,7 @@
 const looks = JSON.parse(document.getElementById("looks").textContent);
 const darkness = matchMedia("(prefers-color-scheme: dark)");
 const darkPage = () => darkness.matches;
+const nameOf = (name) => document.querySelector(`.names [data-name="${CSS.escape(name)}"]`).textContent.trim();
 
 class Lesson {
   constructor() {
@@ -13,6 +14,11 @@ class Lesson {
     this.grid = packed ? inflate(packed).then((bytes) => JSON.parse(new TextDecoder().decode(bytes))) : null;
     for (const slider of this.sliders) slider.addEventListener("input", () => this.moved(slider));
     document.querySelector(".sliders").addEventListener("submit", (event) => event.preventDefault());
+    for (const item of document.querySelectorAll(".names li")) {
+      const button = item.querySelector("button");
+      for (const event of ["pointerenter", "focus"]) button.addEventListener(event, () => raise(item.dataset.name));
+      for (const event of ["pointerleave", "blur"]) button.addEventListener(event, () => raise(null));
+    }
     darkness.addEventListener("change", () => this.show(this.shown));
     this.ready = this.show(JSON.parse(document.getElementById("first").textContent));
   }
@@ -53,6 +59,8 @@ class Lesson {
     this.shown = shown;
     for (const slider of this.sliders) if (slider.name in shown.said) this.say(slider, shown.said[slider.name]);
     document.querySelector(".curves").replaceChildren(...shown.charts.map(drawChart));
+    for (const item of document.querySelectorAll(".names li")) item.hidden = !shown.drawn.includes(item.dataset.name);
+    document.querySelector(".claims").replaceChildren(...shown.claims.map(([text, holds]) => holds ? row("li", ["span", text]) : row("li", ["b", "Not in this run:"], ["span", text])));
     document.querySelector(".worked").replaceChildren(...shown.steps.map(([what, text]) => row("li", ["b", what], ["span", text])));
     document.querySelector(".facts-table tbody").replaceChildren(...shown.facts.map(([what, text]) => row("tr", ["th", what], ["td", text])));
     if (shown.film) await this.replay(shown.film);

@@ -1,5 +1,5 @@
 """The nouns of a lesson: its sliders, and what it shows for a setting of them: curves, a replay,
-numbers."""
+numbers, and claims about the curves."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from adapters.run import Run
 from reports.compare.comparison import Comparison
 from reports.compare.laws import deviation
 from reports.compare.view import cut
-from reports.page.replay import pack_layers, played, ratio_of
+from reports.page.replay import name_of, pack_layers, played, ratio_of
 from reports.page.style import TRUTH, number
 from scenarios.model import Array, Scenario, Trajectory
 from scenarios.no_truth import answered
@@ -31,21 +31,28 @@ Settings = Mapping[str, Any]
 @dataclass(frozen=True)
 class Slider:
     """One thing that can be changed. values: what it goes through; start: the index it begins
-    with."""
+    with; read_as: how the values are read where that is not the value and its unit."""
 
     key: str
     label: str
     values: Sequence[Any]
     start: int = 0
     unit: str = ""
+    read_as: Sequence[str] = ()
 
     @property
     def shown(self) -> list[str]:
         """The values as they are read."""
-        return [
+        return list(self.read_as) or [
             value if isinstance(value, str) else f"{number(value)} {self.unit}".strip()
             for value in self.values
         ]
+
+
+def time_step(interval: float, substeps: Sequence[int], start: int) -> Slider:
+    """The slider `k`, by how many steps a sample interval (s) is divided, read as dt in ms."""
+    read_as = [f"{number(1e3 * interval / k)} ms" for k in substeps]
+    return Slider("k", "Time step dt", substeps, start, read_as=read_as)
 
 
 @dataclass(frozen=True)
@@ -109,6 +116,18 @@ class LessonChart:
 
 
 @dataclass(frozen=True)
+class Claim:
+    """A sentence about the curves of a page, and what must be true of the curves for it to hold.
+
+    A sentence that is true of some settings only is claimed at these settings only. The page marks
+    a sentence that its own curves contradict; `tests/reports/lessons/test_claims.py` allows none.
+    """
+
+    text: str
+    holds: Callable[[Shown], bool | np.bool_]
+
+
+@dataclass(frozen=True)
 class Shown:
     """What a lesson shows for one setting of its sliders.
 
@@ -116,6 +135,7 @@ class Shown:
         charts: at least one.
         film: what is replayed, or None.
         facts: (what, number and unit) of this run.
+        claims: every number and every trend that the page states in words about its curves.
         steps: paragraphs with the numbers of this run filled in.
         opening: how the film opens, as `more` of `pack_layers`.
         said: slider -> what it means here, where that depends on the others.
@@ -124,9 +144,47 @@ class Shown:
     charts: Sequence[LessonChart]
     film: Comparison | None = None
     facts: Sequence[tuple[str, str]] = ()
+    claims: Sequence[Claim] = ()
     steps: Sequence[tuple[str, str]] = ()
     opening: Mapping[str, Any] = field(default_factory=dict)
     said: Mapping[str, str] = field(default_factory=dict)
+
+    def curve(self, name: str, chart: int = 0) -> Curve:
+        """The curve of that name in a chart.
+
+        Raises:
+            KeyError: if the chart has none.
+        """
+        for curve in self.charts[chart].curves:
+            if curve.name == name:
+                return curve
+        raise KeyError(f"{name}: not in the chart {self.charts[chart].title}")
+
+    def x(self, name: str, chart: int = 0) -> Array:
+        """(k,) where its points lie, in the unit of the chart."""
+        return np.asarray(self.curve(name, chart).x, float)
+
+    def y(self, name: str, chart: int = 0) -> Array:
+        """(k,) how high they lie, in the unit of the chart."""
+        return np.asarray(self.curve(name, chart).y, float)
+
+    def gap(self, name: str, other: str = TRUTH, chart: int = 0) -> float:
+        """The largest distance of two curves over the points that both have."""
+        pair = self.y(name, chart), self.y(other, chart)
+        k = min(map(len, pair))
+        return float(np.nanmax(np.abs(pair[0][:k] - pair[1][:k])))
+
+    def drawn(self) -> list[str]:
+        """Who is drawn, in a chart or in the replay."""
+        names = {curve.name for chart in self.charts for curve in chart.curves}
+        if self.film is not None:
+            names |= {name_of(run) for run, _ in played(self.film)}
+        return sorted(names)
+
+    def refusals(self) -> list[tuple[str, str]]:
+        """Who was not played to the end, and why."""
+        runs = [] if self.film is None else self.film.runs
+        return [(run.name, f"{run.status}: {run.reason}") for run in runs if run.status != "ok"]
 
     def to_json(self) -> dict[str, Any]:
         """For JSON."""
@@ -138,7 +196,9 @@ class Shown:
         return {
             "charts": [chart.to_json() for chart in self.charts],
             "film": film,
-            "facts": list(self.facts),
+            "drawn": self.drawn(),
+            "facts": [*self.facts, *self.refusals()],
+            "claims": [[claim.text, bool(claim.holds(self))] for claim in self.claims],
             "steps": list(self.steps),
             "said": dict(self.said),
         }
@@ -152,9 +212,10 @@ class Lesson:
         name: for address and file.
         number: "1", "6.3".
         title, asks: the heading, and the question it answers.
-        text: paragraphs, HTML written here and nowhere else.
+        text: paragraphs, HTML written here and nowhere else; `[order]` becomes a link to the lesson
+            of that name. What is stated in numbers or as a trend is a claim of `show`, not text.
         sliders: what can be changed.
-        names: who is drawn, in order.
+        names: who may be drawn, in the order of the legend.
         show: settings (key -> value) -> what is shown.
     """
 

@@ -8,12 +8,21 @@ from functools import cache
 from math import isfinite
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from adapters.engines import ENGINES
 from adapters.run import Run
 from reports.compare.comparison import Comparison
-from reports.lessons.lesson import Curve, Lesson, LessonChart, Settings, Shown, Slider
+from reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Settings,
+    Shown,
+    Slider,
+)
 from reports.page.style import TRUTH, number
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
@@ -102,10 +111,31 @@ def show_limits(settings: Settings) -> Shown:
         ],
         Comparison(scenario, truth, [run], pd.DataFrame()),
         [(limit.engine, in_words(limit, case)) for limit in limits if limit.engine in ENGINES],
+        limit_claims(case, found),
         in_numbers(case, trial, found),
         {"pace": scenario.duration / SECONDS} | event_of(trial),
         {"place": with_unit(f"{case.parameter} = {number(value)}", case)},
     )
+
+
+def limit_claims(case: Case, limit: Limit) -> list[Claim]:
+    """That the readings of an engine pass the line of failing once, and stay beyond it."""
+    most = case.predicate.bound or 0.0  # without a bound the share of runs that fail is drawn
+
+    def fails_from_the_limit_on(shown: Shown) -> bool:
+        x = case.harsher * shown.x(limit.engine, 1)
+        fails = ~(shown.y(limit.engine, 1) <= most)  # what was refused has no reading
+        if limit.verdict == NEVER_FAILS:
+            return not fails.any()
+        return bool(fails.any() and x[fails].min() > x[~fails].max(initial=-np.inf))
+
+    text = (
+        f"{limit.engine} works at every value that was tried."
+        if limit.verdict == NEVER_FAILS
+        else f"{limit.engine} works at every value tried before its limit, and fails or refuses at"
+        " it."
+    )
+    return [Claim(text, fails_from_the_limit_on)]
 
 
 def event_of(trial: Trial) -> dict[str, Any]:
@@ -210,21 +240,23 @@ LIMITS = Lesson(
     text=(
         (
             "Every method works in gentle scenes. Make one thing harsher, a speed, a distance, a"
-            " size, and most have a value from which on they <b>fail</b>: a collision is missed, a"
-            " spin is cut, a place is rounded away. The search tries values from gentle to harsh,"
-            " a collision at several moments of its step, stops at the first that fails, and"
-            f" halves the gap to the last that works until the two are {QUICK.ratio - 1:.0%} apart."
+            " size, and a method may have a value from which on it <b>fails</b>: it misses a"
+            " collision, cuts a spin, rounds a place away. The search tries values from gentle to"
+            " harsh, a collision at several moments of its step, and stops at the first value that"
+            " fails. Then it halves the gap to the last value that works until the two are at"
+            f" most {QUICK.ratio - 1:.0%} apart."
         ),
         (
             "A reason counts as tested if the limit follows from it, or if an engine that differs"
-            " in that one thing gets farther; else it is called likely. These are the cases that"
-            " take a second; <code>crosscheck stability</code> searches them all."
+            " in this one thing gets farther; else it is called likely. The command"
+            " <code>crosscheck stability</code> searches all cases; these are the quick ones."
+            " [threshold] and [digits] explain two of the reasons."
         ),
     ),
     sliders=(
         Slider("case", "Case", tuple(SEEN)),
-        Slider("engine", "Who plays", tuple(ENGINES), list(ENGINES).index("box2d:matched")),
-        Slider("place", "How harsh", HARSHNESS, 5),
+        Slider("engine", "Engine", tuple(ENGINES), list(ENGINES).index("box2d:matched")),
+        Slider("place", "Harshness", HARSHNESS, 5),
     ),
     names=(*ENGINES, TRUTH),
     show=show_limits,

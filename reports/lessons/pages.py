@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cache
 from threading import Lock
 from typing import Any, NamedTuple
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
@@ -40,8 +41,7 @@ OWN = {  # who plays in lessons only
 
 
 def looks_of(lesson: Lesson) -> dict[str, Look]:
-    """How each name of a lesson is drawn; what lies on another curve is dashed, so that what it
-    covers shows."""
+    """How each name of a lesson is drawn."""
     return {name: OWN.get(name) or look(*name.split(":", 1)) for name in lesson.names}
 
 
@@ -89,13 +89,31 @@ def lesson_page(
         looks=looks_of(lesson),
         connects=not grid,
         lesson=lesson,
-        text=[Markup(paragraph) for paragraph in lesson.text],
+        text=[linked(paragraph, links) for paragraph in lesson.text],
         grid=grid,
         around=around,
         links=links,
         about=about(),
         first=first,
     )
+
+
+def linked(paragraph: str, links: Links) -> Markup:
+    """The paragraph with every `[name]` of a lesson as a link to it; by number and title alone
+    where there is no other page.
+
+    Raises:
+        KeyError: if there is no such lesson.
+    """
+
+    def link(found: re.Match[str]) -> str:
+        lesson = LESSONS[found[1]]
+        title = escape(f"Lesson {lesson.number} ({lesson.title})")
+        return (
+            f'<a href="{links.lesson.format(lesson.name)}">{title}</a>' if links.lesson else title
+        )
+
+    return Markup(re.sub(r"\[(\w+)\]", link, paragraph))
 
 
 def offline(lesson: Lesson, answers: Mapping[tuple[int, ...], Any], links: Links = ALONE) -> str:

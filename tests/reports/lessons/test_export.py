@@ -13,11 +13,13 @@ from playwright.sync_api import Browser
 
 from reports.lessons import command, pages
 from reports.lessons.catalogue import LESSONS
-from reports.lessons.pages import answer_json, offline
+from reports.lessons.lesson import Shown
+from reports.lessons.pages import ALONE, FILES, LIVE, answer_json, linked, offline
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
 
 
+@pytest.mark.slow
 def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
     """It asks nothing of anywhere, its sliders work, and what it holds is what the lesson shows
     live."""
@@ -53,7 +55,7 @@ def test_all_lessons_in_a_folder_lead_to_each_other(
 ):
     """A page each and their list, with the conventions in it; nothing asks for a server. Two of
     them, for the time."""
-    few = {name: LESSONS[name] for name in ("order", "mixing")}
+    few = {name: LESSONS[name] for name in ("thrust", "order")}
     monkeypatch.setattr(command, "LESSONS", few)
     monkeypatch.setattr(pages, "LESSONS", few)
     monkeypatch.setattr(
@@ -69,6 +71,9 @@ def test_all_lessons_in_a_folder_lead_to_each_other(
     around = lesson.locator(".crumbs a").evaluate_all(
         "all => all.map((a) => a.getAttribute('href'))"
     )
+    spoken_of = lesson.locator("main > p a").evaluate_all(
+        "all => all.map((a) => a.getAttribute('href'))"
+    )
     page.context.close()
     lesson.context.close()
 
@@ -76,13 +81,41 @@ def test_all_lessons_in_a_folder_lead_to_each_other(
     assert sorted(path.name for path in (tmp_path / "all").iterdir()) == [
         "index.html",
         "made.json",
-        "mixing.html",
         "order.html",
+        "thrust.html",
     ]
-    assert sorted(links) == ["mixing.html", "order.html"]
-    assert around == ["index.html", "mixing.html"]
+    assert sorted(links) == ["order.html", "thrust.html"]
+    assert around == ["index.html", "thrust.html"]
+    assert "thrust.html" in spoken_of
     assert "pymunk 7.3.1" in text
     assert heard == more == []
+
+
+def test_a_lesson_links_to_what_it_speaks_of():
+    """To other lessons where they are: on the server, in the folder; alone it names them. To the
+    engines' own pages always."""
+    paragraph = "[thrust] does this with a force."
+    page = offline(LESSONS["order"], {places: ANSWER for places in LESSONS["order"].grid})
+
+    assert linked(paragraph, LIVE).startswith(
+        '<a href="/lesson/thrust">Lesson 2 (Force and thrust)'
+    )
+    assert linked(paragraph, FILES).startswith('<a href="thrust.html">Lesson 2 (Force and thrust)')
+    assert linked(paragraph, ALONE) == "Lesson 2 (Force and thrust) does this with a force."
+    assert 'href="https://www.pymunk.org"' in page
+    assert 'href="https://box2d.org"' in page
+    with pytest.raises(KeyError):
+        linked("[no_such_lesson]", LIVE)
+
+
+@pytest.mark.parametrize("name", LESSONS)
+def test_every_lesson_that_a_text_speaks_of_is_there(name: str):
+    """A name that is wrong raises."""
+    for paragraph in LESSONS[name].text:
+        assert "[" not in linked(paragraph, LIVE)
+
+
+ANSWER = Shown([]).to_json()  # of a lesson that shows nothing
 
 
 @pytest.mark.parametrize(
@@ -121,6 +154,7 @@ def test_what_cannot_be_written_is_reported_before_any_run(
     assert (tmp_path / "other.html").read_text() == "somebody's own"
 
 
+@pytest.mark.slow
 def test_a_page_that_cannot_be_made_leaves_the_old_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -139,6 +173,7 @@ def test_a_page_that_cannot_be_made_leaves_the_old_one(
     assert path.read_text() == whole
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_ends_the_export_in_one_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -28,7 +28,13 @@ def at(case: str, engine: str, place: int) -> tuple[int, int, int]:
     return NAMES.index(case), PLAYED.index(engine), place
 
 
-@pytest.mark.parametrize("name", ["slow_collision", "spin", "far_from_origin"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "far_from_origin",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("slow_collision", "spin")),
+    ],
+)
 def test_the_brackets_are_those_of_the_stability_report(name: str):
     """Searched here and now they hold the limits of the full form."""
     rows = {row.engine: row for row in kept() if row.case == name}
@@ -40,6 +46,7 @@ def test_the_brackets_are_those_of_the_stability_report(name: str):
         assert agrees(found[engine], row)
 
 
+@pytest.mark.slow
 def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
     """The limit of Box2D is not typed in: what is given its name without the threshold does not
     fail."""
@@ -62,6 +69,7 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
     assert fails < 1.0 < works < 1.06 * fails
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "engine", "place", "fails"),
     [
@@ -95,6 +103,7 @@ def test_the_run_fails_beyond_the_limit_and_only_there(
         )
 
 
+@pytest.mark.slow
 def test_refusals_are_shown_beside_the_exact_answer():
     """Box2D refuses a spin it would cut: there is nothing of it to draw, the reason is reported."""
     shown = LESSON.at(at("spin", "box2d:matched", 8))
@@ -114,6 +123,7 @@ def test_every_case_has_its_values_within_the_report():
         assert len(set(ladder)) == len(ladder)
 
 
+@pytest.mark.slow
 def test_the_slider_says_the_parameter_of_its_case():
     """With its unit: what the same place means depends on the case."""
     said = [
