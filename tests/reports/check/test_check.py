@@ -161,11 +161,12 @@ def test_the_numbers_beside_an_unknown_mistake_are_those_of_a_pair_that_is_wrong
             "2c",
             "the impulse is not a number (a field that does not exist",
         ),
-        (
+        pytest.param(
             "if (vn >= 0) return;",
             "vn /= sphereB.Mass;",
             "2c",
             "the impulse is not a number (a field that does not",
+            marks=pytest.mark.slow,
         ),
         (
             "if (vn >= 0) return;",
@@ -179,11 +180,12 @@ def test_the_numbers_beside_an_unknown_mistake_are_those_of_a_pair_that_is_wrong
             "2c",
             "the impulse is not a number (a field that does not",
         ),
-        (
+        pytest.param(
             "-= J / sphereB.mass * nx",
             "-= J / sphereB.mas * nx",
             "2d",
             "the velocity of B becomes NaN or infinite",
+            marks=pytest.mark.slow,
         ),
         (
             "  var overlap = ",

@@ -238,6 +238,7 @@ def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
     assert took < 10 * PATIENCE
 
 
+@pytest.mark.slow
 def test_any_name_of_a_folder_will_do(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -174,7 +174,7 @@ def imported_here() -> frozenset[str]:
     return frozenset(ours - {name.partition(".")[0] for name in before})
 
 
-@pytest.mark.parametrize("path", [":", ":/nowhere", "."])
+@pytest.mark.parametrize("path", [":", pytest.param(":/nowhere", marks=pytest.mark.slow), "."])
 def test_a_pythonpath_with_the_current_folder_runs_nothing_of_it(tmp_path: Path, path: str):
     """An empty entry of PYTHONPATH is the current folder; all that this program imports is called
     so there."""
