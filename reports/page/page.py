@@ -17,7 +17,7 @@ from adapters.thrust_grid import off_grid_note
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
 from reports.page import overview, pooled, situations, style
-from reports.page.charts import CHARTS, POINTS, Drawing, packed_charts
+from reports.page.charts import CHARTS, NOISE, POINTS, Drawing, packed_charts
 from reports.page.documents import CHARTED, render
 from reports.page.links import neighbours
 from reports.page.replay import frames, name_of, pack, played, ratio_of
@@ -91,6 +91,7 @@ def write_page(
         findings=findings,
         about=about,
         points=POINTS,
+        noise=NOISE,
         engines=versions_of(comparisons),
         steps=step_range(comparisons),
         columns=overview.SUMMARY,

@@ -82,6 +82,20 @@ def test_every_chart_on_paper_is_drawn_and_is_gone_from_the_screen_after(sheet: 
     assert sheet.locator(".sheet").count() == 0
 
 
+def test_a_page_that_is_printed_too_early_says_so(sheet: Page):
+    """In the place of a chart that is not drawn; not where it is."""
+    content = "getComputedStyle(document.querySelector('.plot[data-paper]'), '::after').content"
+    sheet.emulate_media(media="print")
+    early = sheet.evaluate(content)
+    sheet.evaluate("dispatchEvent(new Event('beforeprint'))")
+    drawn = sheet.evaluate(content)
+    sheet.evaluate("dispatchEvent(new Event('afterprint'))")
+    sheet.emulate_media(media="screen")
+
+    assert "print again" in early
+    assert drawn == "none"
+
+
 CUT = """() => [...document.querySelectorAll('table')].filter(t => t.offsetParent)
   .filter(t => t.getBoundingClientRect().right > innerWidth + 1).length"""
 
