@@ -27,7 +27,7 @@ def print_file(one: FileCheck) -> None:
     for k, sentence in enumerate(one.sentences):
         console.print(sentence if one.passed else f"{k + 1}. {sentence}", highlight=False)
     console.print()
-    table = Table("task", "verdict", "questions", "faults", box=None, padding=(0, 2, 0, 0))
+    table = Table("task", "verdict", "asked", "faults", box=None, padding=(0, 2, 0, 0))
     for task, title in TASKS.items():
         rows, word = one.of(task), one.tasks[task]
         if rows:
