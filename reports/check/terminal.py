@@ -31,7 +31,7 @@ def print_file(one: FileCheck) -> None:
         console.print(f"{k}. {sentence}", highlight=False)
         print_source(console, row)
     console.print()
-    table = Table("task", "verdict", "questions", "faults", box=None, padding=(0, 2, 0, 0))
+    table = Table("task", "verdict", "asked", "faults", box=None, padding=(0, 2, 0, 0))
     for task, title in TASKS.items():
         rows, word = one.of(task), one.tasks[task]
         if rows:

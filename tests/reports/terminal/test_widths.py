@@ -2,6 +2,7 @@
 number is cut, no table wraps."""
 
 import re
+import shutil
 from math import nan
 from pathlib import Path
 
@@ -46,11 +47,13 @@ def words_of(text: str) -> set[str]:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with two finished runs, `out` and `later`."""
+    """A folder with two finished runs, `out` and `later`, and the solvers of a `class` of one."""
     cwd = tmp_path_factory.mktemp("runs")
     for out in ("out", "later"):
         done = crosscheck(*RUN[:-1], out, "--engine", "pymunk", "--engine", "box2d_v3", cwd=cwd)
         assert done.returncode == 0, done.stderr
+    (cwd / "class" / "anna").mkdir(parents=True)
+    shutil.copy(SOLVER, cwd / "class" / "anna" / "Exercise.js")
     return cwd
 
 
@@ -82,7 +85,7 @@ def test_what_is_printed_at_once_fits_its_terminal(words: tuple, columns: int, t
         ("truth", DATA / "scenes" / "break.toml"),
         ("report", "out"),
         ("diff", "out", "later"),
-        ("check", SOLVER),
+        ("check", "class"),
         ("stability", "slow_collision", "--engine", "pymunk", "--out", "limits"),
         ("speed", "free_fall", "--engine", "pymunk", "--out", "speed"),
         ("lesson", "order", "--export", "order.html"),
