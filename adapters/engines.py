@@ -15,9 +15,9 @@ from adapters.matched import Searched
 
 def _exercise(**settings: Any) -> Engine:
     from adapters.reference import Reference
-    from reference_impl import neighbours
+    from reference_impl import verlet_list
 
-    return Reference(neighbours, **settings)
+    return Reference(verlet_list, **settings)
 
 
 def _lesson() -> Engine:
