@@ -9,7 +9,7 @@ from dataclasses import replace
 from adapters.advance import advance
 from adapters.engine import Engine, NotStarted, Unsupported
 from adapters.first_collisions import collisions_of
-from adapters.run import Run, gather, run_of
+from adapters.run import Run, gather, run_of, substeps_of
 from adapters.runaway import RUNAWAY, fault_of, reach
 from scenarios.model import Scenario, State
 
@@ -71,12 +71,3 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         collisions = collisions_of(engine, scenario.scene, dt)
         run = replace(run, trajectory=gather(scenario, states, collisions))
     return replace(run, seconds=seconds)
-
-
-def substeps_of(scenario: Scenario, dt: float) -> int:
-    """How many steps of `dt` s a sample interval has; raises `ValueError` if it does not divide."""
-    interval = scenario.sample_interval
-    substeps = round(interval / dt)
-    if substeps < 1 or abs(substeps * dt - interval) > 1e-9 * interval:
-        raise ValueError(f"dt {dt:g} s does not divide the sample interval {interval:g} s")
-    return substeps

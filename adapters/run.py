@@ -48,3 +48,12 @@ def gather(scenario: Scenario, states: Sequence[State], collisions: Collisions) 
         angular_velocity=frozen([state.angular_velocity for state in states]),
         collisions=collisions,
     )
+
+
+def substeps_of(scenario: Scenario, dt: float) -> int:
+    """How many steps of `dt` s a sample interval has; raises `ValueError` if it does not divide."""
+    interval = scenario.sample_interval
+    substeps = round(interval / dt)
+    if substeps < 1 or abs(substeps * dt - interval) > 1e-9 * interval:
+        raise ValueError(f"dt {dt:g} s does not divide the sample interval {interval:g} s")
+    return substeps

@@ -44,7 +44,13 @@ LINES = list(
 CLUSTER = [line for line in LINES if "--extra cluster" in line]
 MINUTES = {"uv run crosscheck speed"}  # and the tests themselves
 # ten seconds each, or pytest in a process of its own
-SLOW = (" stability ", " speed ", " --solver ", " run head_on_equal_e09 --engine Exercise.js ")
+SLOW = (
+    " advise ",
+    " stability ",
+    " speed ",
+    " --solver ",
+    " run head_on_equal_e09 --engine Exercise.js ",
+)
 COMMANDS = [
     pytest.param(line, marks=[pytest.mark.slow] if any(word in line for word in SLOW) else [])
     for line in LINES

@@ -186,7 +186,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     } catch (error) { problem = described(error); }
     const strayed = !question.world && witness() !== known;
     return `{"states":[${states}],"returned":${returned},"strayed":${strayed},"strange":[${list(strange(spheres))}],`
-      + `"kept":[${list(changed(before))}],"calls":${reported(calls)},"error":${problem}}`;
+      + `"kept":[${list(changed(before))}],"calls":${reported(calls, 0)},"error":${problem}}`;
   }
 
   // A sphere that writes down who reads or writes which of its numbers, and from where in the file.

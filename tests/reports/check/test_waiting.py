@@ -45,8 +45,8 @@ def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endle
         solver = pool.submit(JavaScriptSolver, read_solver(tmp_path / "Exercise.js")).result()
 
     for spent, may_repeat, answer in ((0.0, True, "7"), (0.2, True, None), (0.0, False, None)):
-        solver.engine = mock.Mock()
-        solver.engine.eval.side_effect = busy(spent)
+        solver.v8 = mock.Mock()
+        solver.v8.eval.side_effect = busy(spent)
         if answer is None:
             with pytest.raises(JSTimeoutException):
                 solver.evaluated("code", 0.2, may_repeat)

@@ -16,7 +16,13 @@ from reports.page.style import look
 TEMPLATES = sorted(REPORTS.glob("*/*.j2"))
 BASE, MACROS = "page/base.html.j2", "page/macros.html.j2"
 # no pages: they stand inside of one
-PARTS = {BASE, MACROS, "lessons/conventions.html.j2", "speed/budget.html.j2"}
+PARTS = {
+    BASE,
+    MACROS,
+    "lessons/conventions.html.j2",
+    "page/own_solvers.html.j2",
+    "speed/budget.html.j2",
+}
 
 LINKS = {"game": "", "lesson": ""}
 

@@ -49,6 +49,7 @@ def strokes_of(pdf: bytes) -> int:
     return found
 
 
+@pytest.mark.slow  # a page of its own in Chromium
 def test_charts_that_were_never_in_view_are_printed(browser: Browser, path: Path):
     """In the PDF there are the lines of all of them. Without what `beforeprint` does there are
     not: then a PDF of this page has blank charts, as it had."""
@@ -178,6 +179,7 @@ def saved(page: Page, kind: str, plot: str) -> str:
     return Path(download.value.path()).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow  # a page of its own in Chromium
 def test_the_numbers_of_a_chart_are_saved_as_they_were_computed(
     browser: Browser, path: Path, comparisons: list[Comparison]
 ):

@@ -104,6 +104,7 @@ def test_where_no_engine_was_played_our_own_solvers_are_ranked():
     assert situations.answers(own.head(0), PLACES, set()) == []
 
 
+@pytest.mark.slow  # a page of its own in Chromium
 def test_the_table_of_the_page_is_that_of_the_scores(
     browser: Browser, path: Path, comparisons: list[Comparison]
 ):
@@ -125,6 +126,7 @@ def test_the_table_of_the_page_is_that_of_the_scores(
     assert heard == []
 
 
+@pytest.mark.slow  # a page of its own in Chromium
 def test_bold_is_the_best_of_a_column_of_its_group(browser: Browser, path: Path):
     """Read off the page: the bold cells are those with the lowest number."""
     page, _ = opened(browser, path.as_uri())
@@ -209,6 +211,7 @@ def test_an_axis_of_rounding_alone_is_not_broken():
     assert axis == charts.decades(np.array([1e-16, 2e-15]))
 
 
+@pytest.mark.slow  # a page of its own in Chromium
 def test_what_is_said_of_the_end_of_the_truth_is_not_clipped(browser: Browser, path: Path):
     """Its words end inside the chart, also where the truth ends near the end of the scene."""
     page, _ = opened(browser, path.as_uri(), reduced_motion="reduce")
@@ -225,6 +228,7 @@ def test_what_is_said_of_the_end_of_the_truth_is_not_clipped(browser: Browser, p
     assert words["x"] + words["width"] <= whole["x"] + whole["width"]
 
 
+@pytest.mark.slow  # a page of its own in Chromium
 def test_no_table_is_cut_at_1280(browser: Browser, path: Path):
     """All that stand on the page show all of their columns; at 400 px some scroll."""
     cut = []
