@@ -73,15 +73,34 @@ def is_own(file: str) -> bool:
 
 
 def written(text: str, came: float) -> list[float]:
-    """What may be the e of a file: numbers that a name such as e or restitution gets, then 0.9 if
-    that or 1.9 occurs; else what came, if it or 1 more than it does."""
-    code = COMMENTS.sub(" ", text)
-    numbers = [float(number) for number in NUMBER.findall(code)]
-    found = [e for e in map(float, NAMED.findall(code)) if 0 <= e <= 1]
-    found += [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
-    if found or not 0 <= came <= 1:
+    """What may be the e of a file, the likeliest first: as `stated`, else what came, if that number
+    or 1 more than it occurs."""
+    if (found := stated(text)) or not 0 <= came <= 1:
         return found
-    return [came] * any(same(number, came) or same(number, 1 + came) for number in numbers)
+    return [came] * any(same(number, came) or same(number, 1 + came) for number in numbers_in(text))
+
+
+def stated(text: str) -> list[float]:
+    """The numbers from 0 to 1 that a name such as e or restitution gets; then 0.9 if that or 1.9
+    occurs."""
+    numbers = numbers_in(text)
+    named = [e for e in named_in(text) if 0 <= e <= 1]
+    return named + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
+
+
+def named_in(text: str) -> list[float]:
+    """The numbers that a name such as e or restitution gets."""
+    return [float(number) for number in NAMED.findall(code_of(text))]
+
+
+def numbers_in(text: str) -> list[float]:
+    """All numbers of the code."""
+    return [float(number) for number in NUMBER.findall(code_of(text))]
+
+
+def code_of(text: str) -> str:
+    """A file with blanks for its comments, so that its lines keep their numbers."""
+    return COMMENTS.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
 
 
 def probed(process: SolverProcess) -> float:

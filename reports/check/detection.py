@@ -7,8 +7,8 @@ from itertools import product
 
 import numpy as np
 
+from adapters.own_solver.restitution import code_of
 from reports.check.questions import QUESTIONS, Answer, Ball, named
-from reports.check.restitution import code_of
 from reports.check.rows import CheckRow, judged, near, shown
 
 Rule = Callable[[float, float, float, float], bool | None]

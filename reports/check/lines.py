@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from adapters.own_solver.process import SolverProcess
+from adapters.own_solver.restitution import code_of
 from reports.check.questions import QUESTIONS, Question, fresh_world
-from reports.check.restitution import code_of
 from reports.check.rows import SAME_AGAIN, CheckRow
 
 LIMIT = 0.5  # s a traced call may take: one that never comes back is known from its first accesses

@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
+from adapters.own_solver.restitution import EXERCISE, named_in, stated
 from reports.check.questions import QUESTIONS, Answer
 from reports.check.rows import CheckRow, judged, near, shown
-
-EXERCISE = 0.9
-COMMENTS = re.compile(r"/\*.*?\*/|//[^\n]*|#[^\n]*", re.DOTALL)
-NAMED = re.compile(
-    r"\b(e|eps|epsilon|cor|restitution|elasticity|bounciness|bounce|coeff\w*|c_?r)\b"
-    r"\s*(?::\s*\w+\s*)?[:=]\s*(-?\d*\.?\d+)",
-    re.IGNORECASE,
-)
-NUMBER = re.compile(r"(?<![\w.])\d*\.?\d+(?![\w.])")
-
-
-def code_of(text: str) -> str:
-    """A file with blanks for its comments, so that its lines keep their numbers."""
-    return COMMENTS.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
 
 
 @dataclass(frozen=True)
@@ -102,25 +88,11 @@ class Restitution:
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
     """What the file's text says and what its collisions give."""
     came, slow, fast = (separation(answers[name], name) for name in ("even", "slow", "fast"))
-    named, found = named_in(text), written(text)
+    named, found = named_in(text), stated(text)
     absurd = not 0 <= came <= 1 and any(near(e, came) for e in named)
     # A file may hold several such numbers, and use one of them.
     own = next((e for e in found if near(e, came)), found[0] if found else EXERCISE)
     return Restitution(own, bool(found), absurd, came, slow, fast)
-
-
-def named_in(text: str) -> list[float]:
-    """The numbers that a name such as e or restitution gets."""
-    return [float(value) for _, value in NAMED.findall(code_of(text))]
-
-
-def written(text: str) -> list[float]:
-    """What may be the e of a file: numbers that a name such as e or restitution gets; 0.9 if that
-    or 1.9 occurs."""
-    numbers = [float(x) for x in NUMBER.findall(code_of(text))]
-    return [e for e in named_in(text) if 0 <= e <= 1] + [EXERCISE] * (
-        EXERCISE in numbers or 1 + EXERCISE in numbers
-    )
 
 
 def separation(answer: Answer, name: str) -> float:

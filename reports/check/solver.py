@@ -10,6 +10,7 @@ import numpy as np
 
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
+from adapters.own_solver.restitution import code_of
 from reports.check.detection import detection_rows
 from reports.check.functions import implemented, same_again
 from reports.check.impacts import APPROACH, BACKWARDS, explain
@@ -19,7 +20,7 @@ from reports.check.loop import loop_rows
 from reports.check.motion import motion_rows
 from reports.check.projection import moved_together, projection_rows
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, ask_in_two_orders, stuck
-from reports.check.restitution import Restitution, code_of, restitution_of
+from reports.check.restitution import Restitution, restitution_of
 from reports.check.rows import CheckRow, judged, not_asked
 from reports.check.scenes import scene_rows
 

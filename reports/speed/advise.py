@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any, NoReturn
 
-from rich.table import Table
-
 from reports.page.style import number
 from reports.run.arguments import checked_engines, checked_scenes, unknown
 from reports.speed.advice import Advice, Attempt, NoAdvice, advise
@@ -19,6 +17,7 @@ from reports.speed.purposes import PURPOSES
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
 from reports.terminal.progress import Progress
+from reports.terminal.tables import print_table
 
 SHOWN = 3  # the cheapest and the next two
 LOUD, BUSY = 0.1, 0.5  # noise, and cores kept busy, beyond which a time is worth little
@@ -109,66 +108,59 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
         f" up to {number(advice.until)} of {number(advice.duration)} s",
         highlight=False,
     )
+    console.print()
     if advice.keeping:
-        console.print(table_of_choices(advice))
+        print_choices(console, advice)
     else:
         console.print("None of the engines keeps it at any step size that was tried.", style="bold")
     if advice.short:
-        console.print(table_of_short(advice))
+        console.print()
+        print_short(console, advice)
     if advice.changes:
-        console.print(table_of_changes(advice, bound))
-    console.print(sentence_on_times(advice), highlight=False)
+        console.print()
+        print_changes(console, advice, bound)
+    if advice.keeping:
+        console.print(f"\n{sentence_on_times(advice)}", highlight=False)
 
 
-def plain_table(title: str, *headings: str) -> Table:
-    """A table without lines; numbers stand on the right."""
-    table = Table(title=f"\n{title}", title_justify="left", box=None, padding=(0, 2, 0, 0))
-    for k, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if k == 0 else "right", overflow="fold")
-    return table
-
-
-def table_of_choices(advice: Advice) -> Table:
+def print_choices(console: Console, advice: Advice) -> None:
     """The cheapest and the next two."""
-    table = plain_table("Cheapest first", "engine", "dt, ms", "error", "µs per simulated s")
-    for one in advice.keeping[:SHOWN]:
-        table.add_row(one.name, number(one.dt * 1e3), number(one.error), number(one.cost * 1e6))
-    return table
+    rows = [
+        [one.name, number(one.dt * 1e3), number(one.error), number(one.cost * 1e6)]
+        for one in advice.keeping[:SHOWN]
+    ]
+    headings = ["engine", "dt, ms", "error", "µs per\nsimulated s"]
+    print_table(console, headings, rows, "Cheapest first")
 
 
-def table_of_short(advice: Advice) -> Table:
+def print_short(console: Console, advice: Advice) -> None:
     """Those that keep the error at no step size."""
     coarse, *_, fine = advice.step_sizes
     title = f"Not within it at any step size from {number(coarse * 1e3)} to {number(fine * 1e3)} ms"
-    table = plain_table(title, "engine", "least error", "at dt, ms")
-    table.add_column("why", overflow="fold")
-    for best, why in advice.short:
-        table.add_row(best.name, number(best.error), number(best.dt * 1e3), why)
-    return table
+    rows = [
+        [best.name, number(best.error), number(best.dt * 1e3), why] for best, why in advice.short
+    ]
+    print_table(console, ["engine", "least error", "at dt, ms", "why"], rows, title, ["why"])
 
 
-def table_of_changes(advice: Advice, bound: float) -> Table:
+def print_changes(console: Console, advice: Advice, bound: float) -> None:
     """What each option of the engines above costs and does here."""
     title = "What the scene does not need: one option changed, at the same step size"
-    table = plain_table(title, "engine, with", "error", "cost")
-    table.add_column("verdict", no_wrap=True)
-    for change in advice.changes:
-        table.add_row(
+    rows = [
+        [
             f"{change.plain.name}, {change.changed.change}",
             f"{number(change.plain.error, 2)} → {number(change.changed.error, 2)}",
             f"× {number(change.changed.cost / change.plain.cost, 2)}",
             change.verdict(bound, advice.noise),
-        )
-    return table
+        ]
+        for change in advice.changes
+    ]
+    print_table(console, ["engine, with", "error", "cost", "verdict"], rows, title, ["verdict"])
 
 
 def sentence_on_times(advice: Advice) -> str:
     """How far the times can be trusted."""
-    if not advice.keeping:
-        return ""
-    said = (
-        f"\nAn engine against itself differs by {advice.noise:.0%}; what is nearer costs the same."
-    )
+    said = f"An engine against itself differs by {advice.noise:.0%}; what is nearer costs the same."
     if advice.noise > LOUD or advice.busy > BUSY:
         said += " The machine is busy: measure again when it is idle."
     return said

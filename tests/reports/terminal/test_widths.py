@@ -86,6 +86,8 @@ def test_what_is_printed_at_once_fits_its_terminal(words: tuple, columns: int, t
         ("report", "out"),
         ("diff", "out", "later"),
         ("check", "class"),
+        ("check", SOLVER),
+        ("advise", "head_on_equal_e09", "--engine", "pymunk"),
         ("stability", "slow_collision", "--engine", "pymunk", "--out", "limits"),
         ("speed", "free_fall", "--engine", "pymunk", "--out", "speed"),
         ("lesson", "order", "--export", "order.html"),
