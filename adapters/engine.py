@@ -30,7 +30,7 @@ class ContactImpulse(NamedTuple):
     step: int  # from 0
     i: int  # a disk
     j: int  # the other disk, in either order; or -1 - w for wall w
-    impulse: float  # N s
+    impulse: float  # N s; NaN where the engine does not report it
 
 
 class Engine(Protocol):

@@ -67,7 +67,8 @@ class EngineRow:
             adapter.
         rounding: the relative rounding of the numbers the engine keeps.
         leaves_state: what it played before changes what it plays next, so that each cell needs a
-            process of its own; true of none below (a test plays each after others, bit for bit).
+            process of its own; true of none in `ENGINES` (a test plays each after others, bit for
+            bit).
         distributions: the installed packages, as pip names them, whose versions decide its numbers.
         mark: how it is drawn; None: a colour and a shape that no other engine has.
         work: what it lets one spend time on; None: nothing.

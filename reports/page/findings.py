@@ -78,9 +78,14 @@ def closest(off: pd.DataFrame) -> str:
         else ""
     )
     return (
-        f"Closest to the exact answers, by the largest deviation in radii, median of {len(off)}"
-        f" scenes: {best}, unbeaten in {wins}{ranking}."
+        f"Closest to the exact answers, by the largest deviation in radii,"
+        f" {over_scenes(len(off))}: {best}, unbeaten in {wins}{ranking}."
     )
+
+
+def over_scenes(count: int) -> str:
+    """What a number is of: a median, where there is more than one scene."""
+    return f"median of {count} scenes" if count != 1 else "in 1 scene"
 
 
 def worth_of_settings(off: pd.DataFrame) -> str:

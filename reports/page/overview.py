@@ -165,6 +165,8 @@ def mark_best(
 ) -> dict[str, list[OverviewCell]]:
     """The rows with the lowest of each column marked, and all that show the same number."""
     scored = [rows[name] for name in rows if name not in untrusted]
+    if not scored:
+        return dict(rows)
     lowest = [min(column, key=by_value).text for column in zip(*scored)]
     return {
         name: [

@@ -54,7 +54,7 @@ def content_key(*what: Hashable) -> str:
     source.
 
     No file but of this program is read here: what was read when the command began is in `what`, as
-    `Row.source`.
+    `EngineRow.source`.
     """
     return hashlib.sha256(repr((*what, versions(), source_hash())).encode()).hexdigest()[:16]
 

@@ -197,7 +197,7 @@ class Window:
 
     def flight_deviation(self, contribution: Offset, alpha: float) -> float:
         """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first collision; see
-        `Row.alpha` of the engines."""
+        `EngineRow.alpha`."""
         truth, scene = self.truth, self.scenario.scene
         free = truth.t < truth.collisions.t.min(initial=np.inf)
         gained = (truth.velocity - truth.velocity[0])[free][:, ~scene.static] / scene.radius[

@@ -280,3 +280,13 @@ def test_the_scenes_of_the_page_are_three(comparisons: list[Comparison]):
     assert ASTEROIDS not in set(found.scenario)
     assert found[found.middle].groupby("scenario").name.nunique().eq(5).all()
     assert np.isinf(found[found.name == "box2d_v3:shipped"].error).all()
+
+
+def test_an_engine_alone_that_breaks_the_protocol_has_its_row(comparisons: list[Comparison]):
+    """As a faulty solver's file has that is played by itself: nothing is the best of its group."""
+    names = overview.names_of(comparisons)
+
+    rows = overview.summary(comparisons, names, set(names))
+
+    assert {len(cells) for cells in rows.values()} == {len(overview.SUMMARY)}
+    assert not any(cell.best for cells in rows.values() for cell in cells)

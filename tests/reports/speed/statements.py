@@ -50,8 +50,9 @@ def caption(kept: pd.DataFrame) -> str:
     spans = [span(falls.loc[list(names)]) for names in LATE_BY_KIND.values()]
     by = ", ".join(f"by {text} for {kind}" for kind, text in zip(LATE_BY_KIND, spans))
     return (
-        f"Half the step multiplies their time by {span(grows)}, and divides their error {by}"
-        f"{' (below 1: the error grows)' if falls.min(axis=None) < 1 else ''}. They come within a"
+        f"Halving the step multiplies the time of these engines by {span(grows)}, and divides"
+        f" their error {by}"
+        f"{' (below 1: the error grows)' if falls.min(axis=None) < 1 else ''}. These come within a"
         f" millionth of a radius of the exact answer in {min(reached)} to {max(reached)} of"
         f" {of(rows.note.iloc[0])[1]} scenes. The two engines that take each collision at its own"
         f" time do so in {got['reference:ordered']} (`reference:ordered`) and"

@@ -225,9 +225,10 @@ def test_the_caption_counts_scenes_and_failures():
     """Of the event-driven engine, too."""
     assert (
         speed_figures.caption(pooled())
-        == "Half the step multiplies their time by 2.0 to 2.0, and divides their error by 2.0 to"
+        == "Halving the step multiplies the time of these engines by 2.0 to 2.0, and divides their"
+        " error by 2.0 to"
         " 2.0 for `reference:exercise` and the matched engines, by 2.0 to 2.0 for"
-        " `reference:lesson`, by 2.0 to 2.0 for the engines as shipped. They come within a"
+        " `reference:lesson`, by 2.0 to 2.0 for the engines as shipped. These come within a"
         " millionth of a radius of the exact answer in 0 to 1 of 2 scenes. The two engines that"
         " take each collision at its own time do so in 1 (`reference:ordered`) and 1"
         " (event-driven; it fails in 1)."
