@@ -71,7 +71,7 @@ def write_one(name: str, path: Path) -> None:
         with TemporaryFile(dir=path.parent):
             pass
         write_pages({path: LESSONS[name]}, ALONE, {})
-    print(legible(f"{path}: {path.stat().st_size / 1e6:.1f} MB, opens without a server"))
+    print(legible(f"{path}: {path.stat().st_size / 1e6:.1f} MB; needs no server"))
 
 
 def write_all(folder: Path) -> None:
@@ -86,11 +86,7 @@ def write_all(folder: Path) -> None:
                 ]
                 put_text(part / INDEX, index_page(FILES, rows))
     size = sum(path.stat().st_size for path in folder.glob("*.html"))
-    print(
-        legible(
-            f"{folder / INDEX}: {len(pages)} lessons, {size / 1e6:.1f} MB, opens without a server"
-        )
-    )
+    print(legible(f"{folder / INDEX}: {len(pages)} lessons, {size / 1e6:.1f} MB; needs no server"))
 
 
 @contextmanager

@@ -167,12 +167,12 @@ RUN: dict[str, tuple[str, tuple[int, ...], str]] = {
     "a ball that settles": (
         scene("0 1 0 0", "-3 0 3 0", f"{FALL}restitution = 0.5"),
         (0,),
-        "All 4 cells",
+        "4 cells ended",
     ),
     "a question in markup": (
         TWO.replace("Does a", "[/nope] [red] \\u001b]0;x\\u0007 Does a"),
         (0,),
-        "All 4 cells",
+        "4 cells ended",
     ),
     "a disk that leaves at once": (scene("0 0 1e9 0; 3 0 0 0"), (0, 1), "ended: "),
     "an answer that takes too long": (

@@ -166,7 +166,7 @@ OURS = (
         prepare=copied("out", then=partial(moved_and_linked, "out")),
         codes=(0,),
         writes=("elsewhere", "out"),
-        says="All 2 cells",
+        says="2 cells ended",
     ),
     Input(
         "a run that another process writes",
@@ -198,7 +198,7 @@ OURS = (
         prepare=copied("out"),
         codes=(0,),
         writes=("out", "out.part"),
-        says="All 2 cells",
+        says="2 cells ended",
     ),
     Input(
         "a run into a folder that is empty",
@@ -207,7 +207,7 @@ OURS = (
         prepare=lambda here: (here / "out").mkdir(),
         codes=(0,),
         writes=("out", "out.part"),
-        says="All 2 cells",
+        says="2 cells ended",
     ),
     Input(
         "a run of a scene in the folder's own scenes",

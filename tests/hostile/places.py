@@ -56,7 +56,7 @@ WHOLE = [
         environment=PLACES_OF_ALL["the plainest locale"],
         codes=(0,),
         writes=WRITES,
-        says="All 1 cells",
+        says="1 cell ended",
     ),
     Input(
         "run: streams in ASCII",
@@ -65,7 +65,7 @@ WHOLE = [
         environment={"PYTHONIOENCODING": "ascii"},
         codes=(0,),
         writes=WRITES,
-        says="All 1 cells",
+        says="1 cell ended",
     ),
     Input(
         "check: the plainest locale",
@@ -212,9 +212,9 @@ LINES: dict[str, tuple[str, tuple[int, ...], str]] = {
     "list: no output": ("$crosscheck list >&-", (1,), ""),
     "run: no output": (f"$crosscheck {' '.join(RUN)} >&-", (1,), ""),
     "truth: no error output": ("$crosscheck truth two.toml 2>&-", (0,), "horizon"),
-    "run: no error output": (f"$crosscheck {' '.join(RUN)} 2>&-", (0,), "All 1 cells"),
+    "run: no error output": (f"$crosscheck {' '.join(RUN)} 2>&-", (0,), "1 cell ended"),
     "truth: no input": ("$crosscheck truth two.toml <&-", (0,), "horizon"),
-    "run: no input": (f"$crosscheck {' '.join(RUN)} <&-", (0,), "All 1 cells"),
+    "run: no input": (f"$crosscheck {' '.join(RUN)} <&-", (0,), "1 cell ended"),
     "check: no stream at all": ("$crosscheck check plain.py <&- >&- 2>&-; test $? -le 1", (0,), ""),
     "truth: error output on a full disk": (
         "$crosscheck truth two.toml 2> /dev/full",

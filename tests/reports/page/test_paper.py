@@ -145,8 +145,7 @@ def test_a_whole_run_is_twelve_pages_at_most(
         pages.append(pages_of(page.pdf(format="A4", print_background=True)))
         page.context.close()
 
-    assert pages[0] <= 12
-    assert pages[1] > pages[0] + 39 // 2
+    assert pages[0] <= 12 < pages[1]
 
 
 def as_all_engines(comparison: Comparison, name: str) -> Comparison:
