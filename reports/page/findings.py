@@ -85,7 +85,7 @@ def closest(off: pd.DataFrame) -> str:
 
 def over_scenes(count: int) -> str:
     """What a number is of: a median, where there is more than one scene."""
-    return f"median of {count} scenes" if count != 1 else "in 1 scene"
+    return f"median of {counted(count, 'scene')}" if count != 1 else "in 1 scene"
 
 
 def worth_of_settings(off: pd.DataFrame) -> str:
@@ -104,7 +104,8 @@ def worth_of_settings(off: pd.DataFrame) -> str:
             "No engine was played in both profiles, so the worth of settings is not known from this"
             " run."
         )
-    return f"Matching an engine to the scene brings {', '.join(parts)} of {len(off)} scenes."
+    scenes = counted(len(off), "scene")
+    return f"Matching an engine to the scene brings {', '.join(parts)} of {scenes}."
 
 
 def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
@@ -113,7 +114,7 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     lost = off > FAR_OFF
     if off.empty or not lost.any(axis=None):
         return (
-            f"No engine is off by more than a radius; {cells}"
+            f"No engine that is scored is off by more than a radius; {cells}"
             if not off.empty
             else cells[0].upper() + cells[1:]
         )
@@ -121,9 +122,9 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
     return (
-        f"More than a whole radius off, or without a result: {who} of {len(off)} scenes; the"
-        f" hardest is {defeated.idxmax()}, too much for {defeated.max()} of {lost.shape[1]};"
-        f" {cells}"
+        f"More than a whole radius off, or without a result: {who} of"
+        f" {counted(len(off), 'scene')}; the hardest is {defeated.idxmax()}, too much for"
+        f" {defeated.max()} of {lost.shape[1]}; {cells}"
     )
 
 

@@ -40,6 +40,9 @@ ROUNDS, BUDGET = 11, 0.4  # of timing, and s of it for one engine
 # costs no less
 MOST_WORK, FEW = 1_000_000, 10
 TOO_FAR_OFF, SAVES_TIME, NEARER, NO_GAIN = "too far off", "saves time", "more accurate", "no gain"
+# Noise, and cores kept busy by others, beyond which times are not compared. An option is timed in
+# runs of its own, so that less than a tenth is not told from none on a quiet machine either.
+LOUD, BUSY = 0.1, 0.5
 HALF = 0.5  # of the error is left: more accurate
 
 
@@ -86,12 +89,13 @@ class Change(NamedTuple):
     plain: Attempt
     changed: Attempt
 
-    def verdict(self, bound: float, noise: float) -> str:
-        """What the change does: to the error, else to the cost if by more than `noise`."""
+    def verdict(self, bound: float, floor: float) -> str:
+        """What the change does: to the error, else to the cost if by more than the part `floor` of
+        it."""
         ratio = self.changed.cost / self.plain.cost
         if not self.changed.keeps(bound):
             return TOO_FAR_OFF
-        if ratio < 1 - noise:
+        if ratio < 1 - floor:
             return SAVES_TIME
         return NEARER if self.changed.error <= HALF * self.plain.error else NO_GAIN
 
@@ -128,6 +132,16 @@ class Advice:
     changes: Sequence[Change]
     noise: float
     busy: float
+
+    @property
+    def quiet(self) -> bool:
+        """Whether its times can be compared."""
+        return self.noise <= LOUD and not self.busy > BUSY
+
+    @property
+    def floor(self) -> float:
+        """The part of a cost by which two must differ to be told apart; inf where no two can be."""
+        return max(self.noise, LOUD) if self.quiet else inf
 
 
 def advise(

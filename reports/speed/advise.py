@@ -20,7 +20,6 @@ from reports.terminal.progress import Progress
 from reports.terminal.tables import print_table
 
 SHOWN = 3  # the cheapest and the next two
-LOUD, BUSY = 0.1, 0.5  # noise, and cores kept busy, beyond which a time is worth little
 
 
 def give_advice(
@@ -75,7 +74,7 @@ def as_plain(advice: Advice, purpose: str, bound: float) -> dict[str, Any]:
                 "change": change.changed.change,
                 "error_without": finite(change.plain.error),
                 "cost_ratio": finite(change.changed.cost / change.plain.cost),
-                "verdict": change.verdict(bound, advice.noise),
+                "verdict": change.verdict(bound, advice.floor),
             }
             for change in advice.changes
         ],
@@ -151,7 +150,7 @@ def print_changes(console: Console, advice: Advice, bound: float) -> None:
             f"{change.plain.name}, {change.changed.change}",
             f"{number(change.plain.error, 2)} → {number(change.changed.error, 2)}",
             f"× {number(change.changed.cost / change.plain.cost, 2)}",
-            change.verdict(bound, advice.noise),
+            change.verdict(bound, advice.floor),
         ]
         for change in advice.changes
     ]
@@ -160,7 +159,9 @@ def print_changes(console: Console, advice: Advice, bound: float) -> None:
 
 def sentence_on_times(advice: Advice) -> str:
     """How far the times can be trusted."""
-    said = f"An engine against itself differs by {advice.noise:.0%}; what is nearer costs the same."
-    if advice.noise > LOUD or advice.busy > BUSY:
-        said += " The machine is busy: measure again when it is idle."
-    return said
+    said = f"An engine against itself differs by {advice.noise:.0%}."
+    if advice.quiet:
+        return f"{said} Costs that differ by less than {advice.floor:.0%} are the same."
+    return (
+        f"{said} The machine is busy, so times cannot be compared: measure again when it is idle."
+    )

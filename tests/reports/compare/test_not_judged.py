@@ -189,7 +189,7 @@ def test_a_scene_known_at_its_start_only_beats_nobody():
 
     assert "No scene here has an exact answer" in findings([nothing], set())[0]
     assert (
-        "median of 1 scenes"
+        "in radii, in 1 scene"
         in findings([nothing, compared(scenario("head_on_equal_e05"))], set())[0]
     )
     assert {(cell.text, cell.heat) for cell in cells} == {(NOT_JUDGED, -1)}

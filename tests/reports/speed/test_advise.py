@@ -58,7 +58,7 @@ def test_the_advised_step_and_every_finer_one_keep_the_error(errors: list[float]
         (0.5, 0.5, SAVES_TIME),
         (0.1, 2.0, NEARER),
         (0.5, 2.0, NO_GAIN),
-        (0.5, 0.97, NO_GAIN),
+        (0.5, 0.97, NO_GAIN),  # within the floor
     ],
 )
 def test_a_change_is_judged_by_its_error_first_and_then_by_its_cost(
