@@ -3,7 +3,7 @@ not need: all from runs of the scene itself."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
@@ -11,25 +11,26 @@ from math import inf, isfinite, isnan, nan
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from adapters.engine import Engine
-from adapters.engine_row import FLOAT64
-from adapters.engines import ENGINES, row_of
+from adapters.engines import row_of
 from adapters.mechanisms.options import OPTIONS
 from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play_once
 from reports.compare.delays import jumps_of
-from reports.compare.view import View, cut
+from reports.compare.view import beside
 from reports.run.machine import busy_cores
-from reports.run.runner import run_all
 from reports.run.scenes import open_scene
 from reports.run.worker_process import Failure
 from reports.speed import ladder
 from reports.speed.budget import INTERPLAY, RESIDUAL, TIME, TOTALS, budget_of
-from reports.speed.effort import MOST_STEP_SIZES
+from reports.speed.effort import doublings
+from reports.speed.measure import done
+from reports.speed.pareto import kept_from
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
-from reports.speed.timing import WARM_UP, Sample
+from reports.speed.timing import summed_up
 from reports.terminal.progress import Progress
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
@@ -77,6 +78,11 @@ class Attempt:
         """How to make the engine."""
         made = {(option.engine, option.change): option.make for option in OPTIONS}
         return made.get((self.name, self.change)) or row_of(self.name).make
+
+    @property
+    def task(self) -> tuple[str, str, int]:
+        """What stands for it among others of its scene."""
+        return (self.name, self.change, self.substeps)
 
     def keeps(self, bound: float) -> bool:
         """Whether its error is known and at most `bound`."""
@@ -166,13 +172,12 @@ def advise(
     scenario = held_by(scene, seed)
     step_sizes = ladder_of(scenario)
     tried = run([(name, PLAIN, k) for name in names for k in step_sizes])
-    of_engine = [list(group) for _, group in groupby(tried, key=lambda one: one.name)]
-    found = [(one, coarsest_that_keeps(one, bound)) for one in of_engine]
-    keeping = [best for _, best in found if best is not None]
+    found = [(rungs, those_that_keep(rungs, bound)) for rungs in by_engine(tried)]
+    keeping = [kept[0] for _, kept in found if kept]
     changed = run([(one.name, change, one.substeps) for one in keeping for change in changes(one)])
     priced, noise, busy = timed(scene, seed, [*keeping, *changed], progress)
     plain = {one.name: one for one in priced if one.change == PLAIN}
-    short = [min(rungs, key=smallest) for rungs, best in found if best is None]
+    short = [min(rungs, key=smallest) for rungs, kept in found if not kept]
     return Advice(
         scenario.name,
         scenario.duration,
@@ -194,11 +199,14 @@ def held_by(scene: str, seed: int) -> Scenario:
         raise NoAdvice(f"no exact answer: {refusal}") from refusal
 
 
-def ladder_of(scenario: Scenario) -> list[int]:
-    """Steps in a sample interval, doubling from the scenario's own coarsest; two at least."""
-    each = scenario.samples * max(scenario.scene.n, FEW)
-    doubled = [scenario.substeps[0] * 2**k for k in range(MOST_STEP_SIZES)]
-    return [k for place, k in enumerate(doubled) if place < 2 or k * each <= MOST_WORK]
+def ladder_of(scenario: Scenario) -> tuple[int, ...]:
+    """Steps in a sample interval, coarse to fine."""
+    return doublings(scenario, MOST_WORK // max(scenario.scene.n, FEW))
+
+
+def by_engine(tried: Iterable[Attempt]) -> list[list[Attempt]]:
+    """The attempts of each engine, which stand together, in their order."""
+    return [list(group) for _, group in groupby(tried, key=lambda one: one.name)]
 
 
 def changes(one: Attempt) -> list[str]:
@@ -211,17 +219,13 @@ def smallest(one: Attempt) -> float:
     return one.error if isfinite(one.error) else inf
 
 
-def coarsest_that_keeps(rungs: Sequence[Attempt], bound: float) -> Attempt | None:
-    """Of attempts from coarse to fine the first that keeps the error, as do all after it.
+def those_that_keep(rungs: Sequence[Attempt], bound: float) -> list[Attempt]:
+    """Of attempts from coarse to fine those that keep the error, as do all after them.
 
     An attempt that keeps it by luck, with a larger error at a finer step, does not count.
     """
-    best = None
-    for one in reversed(rungs):
-        if not one.keeps(bound):
-            break
-        best = one
-    return best
+    kept = kept_from(np.array([one.error for one in rungs]), bound)
+    return [one for one, keeps in zip(rungs, kept) if keeps]
 
 
 def attempts(
@@ -235,11 +239,11 @@ def attempts(
     """(`engine:profile`, change, substeps) played, in their order; each in a worker process."""
     dt = held_by(scene, seed).dt
     wanted = [Attempt(name, change, k, dt(k), nan) for name, change, k in asked]
-    tasks = {one: partial(error_of, scene, seed, purpose, one) for one in wanted}
-    outcomes = dict(carried_out(tasks, workers, PATIENCE, progress, "playing"))
+    tasks = {one.task: partial(error_of, scene, seed, purpose, one) for one in wanted}
+    outcomes = dict(done(tasks, workers, progress, "playing", PATIENCE))
     return [
         replace(one, error=inf, reason=f"{outcome.status}: {outcome.reason}")
-        if isinstance(outcome := outcomes[one], Failure)
+        if isinstance(outcome := outcomes[one.task], Failure)
         else replace(one, error=outcome[0], reason=outcome[1])
         for one in wanted
     ]
@@ -251,10 +255,7 @@ def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, 
     run = play_once(one.make, one.name, scenario, one.dt)
     if run.status != "ok" or run.trajectory is None:
         return inf, f"{run.status}: {run.reason}"
-    rounding = ENGINES[one.name].rounding if one.name in ENGINES else FLOAT64
-    played = cut(run.trajectory, len(truth))
-    view = View(scenario, one.dt, played, truth, jumps_of(truth, scenario), rounding)
-    error = PURPOSES[purpose].error(view)
+    error = PURPOSES[purpose].error(beside(scenario, run, truth, jumps_of(truth, scenario)))
     return error, "" if not isnan(error) else "too little of it can be judged"
 
 
@@ -271,23 +272,15 @@ def timed(
     }
     task = partial(ladder.times_of, scene, seed, makes, ROUNDS, BUDGET)
     busy = busy_cores()
-    [(_, samples)] = carried_out({"time": task}, 1, ALL_ROUNDS, progress, "timing")
+    [(_, samples)] = done({("time",): task}, 1, progress, "timing", ALL_ROUNDS)
     if isinstance(samples, Failure):
         raise NoAdvice(f"the timing ended: {samples.status}: {samples.reason}")
-    cost = medians(samples)
+    times = summed_up(pd.DataFrame(samples), ["key"])
+    cost = dict(zip(times.key, times.cost))
     pairs = [cost[key[0], key[1], 1] / cost[key] for key in cost if (key[0], key[1], 1) in cost]
     noise = float(np.percentile(np.abs(np.log(pairs)), 75))
     priced = [replace(one, cost=cost[(one.name, one.change), one.substeps, 0]) for one in played]
     return priced, noise, busy
-
-
-def medians(samples: Sequence[Sample]) -> dict[Any, float]:
-    """key -> the median cost over its rounds, without the warm-up."""
-    costs: dict[Any, list[float]] = {}
-    for sample in samples:
-        if sample.round != WARM_UP:
-            costs.setdefault(sample.key, []).append(sample.cost)
-    return {key: float(np.median(values)) for key, values in costs.items()}
 
 
 def reasons(
@@ -301,13 +294,13 @@ def reasons(
 ) -> list[Short]:
     """What most of the error of each is made of at the finest step, by the error budget."""
     tasks = {
-        one: partial(budget_of, scene, seed, one.name, finest)
+        one.task: partial(budget_of, scene, seed, one.name, finest)
         for one in short
         if one.name in MECHANISMS and isfinite(one.error)
     }
-    budgets = dict(carried_out(tasks, workers, PATIENCE, progress, "error budget"))
+    budgets = dict(done(tasks, workers, progress, "error budget", PATIENCE))
     measure = "energy" if purpose == "energy" else "position_radii"
-    return [Short(one, one.reason or largest(budgets.get(one), measure)) for one in short]
+    return [Short(one, one.reason or largest(budgets.get(one.task), measure)) for one in short]
 
 
 def largest(budget: Any, measure: str) -> str:
@@ -320,19 +313,3 @@ def largest(budget: Any, measure: str) -> str:
         return ""
     most = str(max(parts, key=lambda row: row[measure])["contribution"])
     return "mostly " + {TIME: "end-of-step detection", RESIDUAL: "unknown"}.get(most, most)
-
-
-def carried_out(
-    tasks: Mapping[Any, Callable[[], Any]],
-    workers: int,
-    patience: float,
-    progress: Progress,
-    what: str,
-) -> Iterable[tuple[Any, Any]]:
-    """The tasks in worker processes, which are stopped after `patience` s; results as they come."""
-    if not tasks:
-        return
-    progress.start(len(tasks), len(tasks), what)
-    for task, outcome in run_all(tasks, workers, patience):
-        progress.done(what, "ok", "")
-        yield task, outcome

@@ -54,14 +54,20 @@ class Effort:
         return list(range(seed, seed + self.seeds)) if scene in RANDOM else [seed]
 
     def ladder(self, scenario: Scenario) -> tuple[int, ...]:
-        """Steps in a sample interval, doubling from the scenario's own coarsest."""
-        first = scenario.substeps[0]
-        step_sizes = [first * 2**k for k in range(MOST_STEP_SIZES)]
-        return tuple(
-            k
-            for n, k in enumerate(step_sizes)
-            if n < FEWEST_STEP_SIZES or k * scenario.samples <= self.most_steps
-        )
+        """Steps in a sample interval, as `doublings` with `most_steps`."""
+        return doublings(scenario, self.most_steps)
+
+
+def doublings(scenario: Scenario, most_steps: int) -> tuple[int, ...]:
+    """Steps in a sample interval, doubling from the scenario's own coarsest, as long as a run has
+    `most_steps` or less; `FEWEST_STEP_SIZES` at least."""
+    first = scenario.substeps[0]
+    step_sizes = [first * 2**k for k in range(MOST_STEP_SIZES)]
+    return tuple(
+        k
+        for n, k in enumerate(step_sizes)
+        if n < FEWEST_STEP_SIZES or k * scenario.samples <= most_steps
+    )
 
 
 QUICK = Effort(

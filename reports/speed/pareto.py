@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reports.speed.order import ELSEWHERE
 from scenarios.model import Array
@@ -36,6 +37,13 @@ def front(cost: Array, error: Array) -> list[int]:
     return kept
 
 
+def kept_from(error: Array, accuracy: float) -> NDArray[np.bool_]:
+    """(k,) of errors from coarse to fine: whether that and every finer one is at most
+    `accuracy`."""
+    kept: NDArray[np.bool_] = np.logical_and.accumulate((error <= accuracy)[::-1])[::-1]
+    return kept
+
+
 def cost_to_reach(accuracy: float, dt: Array, cost: Array, error: Array, verdict: str) -> Reached:
     """The cheapest measured dt whose error, and that of every finer one, is at most `accuracy`
     radii.
@@ -46,7 +54,7 @@ def cost_to_reach(accuracy: float, dt: Array, cost: Array, error: Array, verdict
     """
     if not np.isfinite(error).any():
         return Reached(np.nan, np.nan, FAILED)
-    held = np.logical_and.accumulate((error <= accuracy)[::-1])[::-1]
+    held = kept_from(error, accuracy)
     priced = held & np.isfinite(cost)
     if priced.any():
         k = int(np.flatnonzero(priced)[np.argmin(cost[priced])])

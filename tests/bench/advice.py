@@ -10,17 +10,17 @@ from __future__ import annotations
 
 import os
 import sys
-from itertools import groupby
 
 from adapters.engines import ENGINES
 from reports.speed.advice import (
-    Attempt,
+    LOUD,
     NoAdvice,
     advise,
     attempts,
-    coarsest_that_keeps,
+    by_engine,
     held_by,
     ladder_of,
+    those_that_keep,
     timed,
 )
 from reports.speed.plan import PLAIN
@@ -28,7 +28,6 @@ from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
 
 BOUND, PURPOSE, SEED = 0.01, "trajectory", 0
-FLOOR = 0.1  # of a cost, where the noise is less
 
 
 def main(scenes: list[str]) -> int:
@@ -52,7 +51,7 @@ def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
     advice = advise(scene, SEED, PURPOSE, BOUND, list(ENGINES), workers, progress)
     asked = [(name, PLAIN, k) for name in ENGINES for k in ladder_of(held_by(scene, SEED))]
     tried = attempts(scene, SEED, PURPOSE, workers, progress, asked)
-    keeping = [one for rungs in by_engine(tried) for one in those_that_keep(rungs)]
+    keeping = [one for rungs in by_engine(tried) for one in those_that_keep(rungs, BOUND)]
     if not advice.keeping or not keeping:
         return "none", not advice.keeping and not keeping
     again, noise, _ = timed(scene, SEED, keeping, progress)
@@ -61,18 +60,7 @@ def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
     same = [one for one in again if (one.name, one.substeps) == (best.name, best.substeps)]
     ratio = same[0].cost / cheapest.cost if same else float("inf")
     said = f"{best.name} at {best.dt:.3g} s, {ratio:.2f} of the least ({cheapest.name})"
-    return said, ratio <= 1 + max(noise, FLOOR)
-
-
-def by_engine(tried: list[Attempt]) -> list[list[Attempt]]:
-    """The attempts of each engine, coarse to fine."""
-    return [list(group) for _, group in groupby(tried, key=lambda one: one.name)]
-
-
-def those_that_keep(rungs: list[Attempt]) -> list[Attempt]:
-    """From the coarsest on that keeps the error, as do all finer ones."""
-    best = coarsest_that_keeps(rungs, BOUND)
-    return [] if best is None else rungs[rungs.index(best) :]
+    return said, ratio <= 1 + max(noise, LOUD)
 
 
 if __name__ == "__main__":

@@ -26,8 +26,8 @@ from reports.speed.advice import (
     TOO_FAR_OFF,
     Attempt,
     Change,
-    coarsest_that_keeps,
     ladder_of,
+    those_that_keep,
 )
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
@@ -43,9 +43,10 @@ def test_the_advised_step_and_every_finer_one_keep_the_error(errors: list[float]
     """And the next coarser one does not: luck at one step size does not count."""
     rungs = [attempt(2**k, 0.1 / 2**k, error) for k, error in enumerate(errors)]
 
-    best = coarsest_that_keeps(rungs, 1.0)
+    kept = those_that_keep(rungs, 1.0)
 
-    first = len(rungs) if best is None else rungs.index(best)
+    first = rungs.index(kept[0]) if kept else len(rungs)
+    assert kept == rungs[first:]
     assert all(one.error <= 1.0 for one in rungs[first:])
     assert first == 0 or not rungs[first - 1].error <= 1.0
 
