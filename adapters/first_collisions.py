@@ -34,7 +34,7 @@ def first_collisions(
     An impulse in the step after another of the same pair continues it if it is no larger than
     `weight` N s, or if the engine does not report how large it is: else it is a collision of its
     own. Impulses of less than a millionth of the pair's strongest are rounding, and left out; their
-    size counts, as a faulty solver may pull where it should push.
+    size counts, as the impulses of a faulty solver may have the wrong sign.
     """
     if not collisions:
         return NO_COLLISIONS

@@ -308,7 +308,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
 
   const commands = {
     ask, trace, accesses: traceOf, load, step, play, read: () => rows(world.spheres),
-    collisions: () => reported(world.collisions, 0), contacts: () => reported(world.log, 0),
+    contacts: () => reported(world.log, 0),
     begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
   };
 

@@ -353,10 +353,6 @@ class PythonSolver:
         """The scene's spheres as they are."""
         return [row_of(s) for s in self.spheres]
 
-    def collisions(self, _argument: Any = None) -> list[list[float]]:
-        """(step, i, j, impulse) of every pair whose velocities a call changed."""
-        return self.collision_rows
-
     def contacts(self, _argument: Any = None) -> list[list[float]]:
         """What `pair` logged."""
         return self.log
