@@ -109,6 +109,11 @@ Port = Annotated[
 Opens = Annotated[bool, typer.Option("--open", help="Open the page in a browser.")]
 
 
+def as_typed() -> str:
+    """The command, as a shell would take it again."""
+    return shlex.join(["crosscheck", *sys.argv[1:]])
+
+
 def place(text: str) -> Path:
     """A path as it was given; exits 2 for an empty one, which `Path` takes for the current
     folder."""
@@ -146,7 +151,7 @@ def run(
     what = scenes or [], engine or [], dt or [], full, seed, timings
     if resume is not None:
         run_command.resume(resume, means, alone=not any(what) and out == DEFAULT_OUT)
-    command = shlex.join(["crosscheck", *sys.argv[1:]])
+    command = as_typed()
     run_command.run_plan(run_command.RunRequest(*what, out), means, command)
 
 
@@ -365,7 +370,7 @@ def speed(
         resume,
         seed,
         out,
-        "crosscheck " + shlex.join(sys.argv[1:]),
+        as_typed(),
     )
 
 
@@ -435,7 +440,7 @@ def stability(
     """
     from reports.stability.command import find_limits
 
-    command = "crosscheck " + shlex.join(sys.argv[1:])
+    command = as_typed()
     find_limits(cases or [], vary or [], engine or [], full, resume, out, workers, command)
 
 
