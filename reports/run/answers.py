@@ -1,5 +1,5 @@
-"""The exact answer to a scene, had in a worker within a time, and kept in a file beside what is
-compared with it."""
+"""The exact answer to a scene, computed in a worker within a time limit, and kept in a file beside
+the shares that are compared with it."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from scenarios.truth.oracle.work import Clock
 from scenarios.truth.record import TruthRecord
 
 OK, NONE = "ok", "none"
-# of the time for an answer: its horizon takes up to three quarters as long as its events
+# share of the time limit; computing the horizon takes up to three quarters as long as the events
 FOR_EVENTS = 0.5
-SAID = "answer.json"  # in the file of an answer, beside the arrays of its record
+SAID = "answer.json"  # the member of an answer's file beside the arrays of its record
 
 
 class Answer(NamedTuple):
@@ -38,7 +38,7 @@ class Answer(NamedTuple):
         status: "ok"; "none", where the scene has no exact answer; "timeout", "crashed" or "error"
             as of a `Failure`.
         reason: why there is none, or "".
-        timeout_s: that it had.
+        timeout_s: the limit under which it was computed.
     """
 
     record: TruthRecord | None
@@ -48,17 +48,16 @@ class Answer(NamedTuple):
 
     @property
     def lost(self) -> str:
-        """Why a scene that may have an answer is not held to one; "" if that is not so."""
+        """Why the answer to a scene could not be computed, although it may exist; or ""."""
         return "" if self.status in (OK, NONE) else self.reason
 
-    def may_be_had(self, timeout: float) -> bool:
-        """Whether to try again: it was not had, and had less time than `timeout` s, or failed
-        otherwise."""
+    def worth_another_try(self, timeout: float) -> bool:
+        """Whether it failed for another reason than time, or within a shorter limit than `timeout`
+        s."""
         return bool(self.lost) and (self.status != "timeout" or self.timeout_s < timeout)
 
     def given_to(self, scenario: Scenario) -> Scenario:
-        """The scenario with this for its answer, so that asking for it computes nothing that takes
-        long."""
+        """The scenario with this as its truth, so that nobody computes it again."""
         if self.status != OK:
             return replace(scenario, truth=None, without_truth=self.reason)
         return (
@@ -69,7 +68,7 @@ class Answer(NamedTuple):
 
 
 def answer_of(scenario: Scenario) -> Answer:
-    """In the worker: compute it."""
+    """Compute the answer to a scenario; called in a worker."""
     scenario, truth = answered(scenario)
     if truth is None:
         return Answer(None, NONE, scenario.without_truth)
@@ -79,7 +78,7 @@ def answer_of(scenario: Scenario) -> Answer:
 
 
 def no_answer(failure: Failure, timeout: float) -> Answer:
-    """What a worker leaves that was to have it within `timeout` s and could not."""
+    """The answer of a worker that failed, or took longer than `timeout` s."""
     if failure.status == "timeout":
         return Answer(
             None,
@@ -92,7 +91,7 @@ def no_answer(failure: Failure, timeout: float) -> Answer:
 
 
 def put_answer(path: Path, answer: Answer) -> None:
-    """Write it whole or not at all."""
+    """Write an answer whole or not at all."""
     whole = io.BytesIO(b"" if answer.record is None else packed(vars(answer.record)))
     with ZipFile(whole, "a") as file:
         said = list(answer[1:])
@@ -101,15 +100,14 @@ def put_answer(path: Path, answer: Answer) -> None:
 
 
 def digest_of(file: ZipFile, name: str, said: list[Any]) -> str:
-    """16 hex digits over all that is in the file of an answer, and what it is called: by that it is
-    of its scene."""
+    """16 hex digits over the members of an answer's file and over its name, which says of which
+    scene it is."""
     inside = sorted(set(file.namelist()) - {SAID})
     return digest(b"\0".join([json.dumps([name, said, inside]).encode(), *map(file.read, inside)]))
 
 
 def read_answer(path: Path) -> Answer | None:
-    """What `put_answer` wrote; None if it is not there or not that any more, as the digest in the
-    file reports."""
+    """What `put_answer` wrote; None if the file is not there or its digest is another."""
     try:
         with opened(path) as there, ZipFile(there) as file:
             *said, written = json.loads(file.read(SAID))
@@ -127,10 +125,9 @@ def read_answer(path: Path) -> Answer | None:
 
 
 def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
-    """In the worker: the record of a scene by catalogue name or file, or why there is none.
+    """The record of a scene by catalogue name or file, or why there is none; called in a worker.
 
-    Before `timeout` s are over, after which the worker is stopped, it is that of what was found
-    until then.
+    The worker is stopped after `timeout` s. The record ends before, at the last event found.
     """
     reason = f"the limit of {timeout:g} s was reached (a longer --timeout gives more)"
     try:
@@ -140,8 +137,8 @@ def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
 
 
 def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
-    """The oracle's record, as far as a `clock` lets it, or a record of what a closed form says.
-    Raises `NoTruth`."""
+    """The oracle's record, up to where the `clock` ends it, or the collisions of a closed form as a
+    record. Raises `NoTruth`."""
     if isinstance(scenario.truth, OracleTruth):
         record = scenario.truth.record(clock)
         if record.horizon < scenario.sample_interval:

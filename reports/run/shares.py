@@ -1,9 +1,9 @@
-"""A scene's share of deviations.csv: made in a worker as soon as the last cell of the scene has
-ended, and kept.
+"""A scene's share of deviations.csv, made in a worker as soon as the last cell of the scene has
+ended.
 
-First the scene's exact answer is had, within the time that a cell may take, then all runs are set
-against it: two tasks of a worker. What could not be had in time, or at all, is said in the share,
-and the other scenes go on.
+It takes two tasks: the first computes the exact answer, within the time that a cell may take; the
+second compares all runs of the scene with it. Both results are kept in files. Where there is no
+answer in time, or none at all, the share says why, and the other scenes go on.
 """
 
 from __future__ import annotations
@@ -33,63 +33,61 @@ from reports.terminal.foreign_text import put_bytes
 from scenarios.model import Scenario
 from scenarios.regular import all_of
 
-# By which runs are compared.
-JUDGES = ("reports/compare/**/*.py", "scenarios/**/*.py")  # wherever in these folders a file lies
+# The source that decides the numbers of a share; the patterns reach into subfolders.
+JUDGES = ("reports/compare/**/*.py", "scenarios/**/*.py")
 ROOT = Path(__file__).parents[2]
-ANSWER = ".npz"  # how the file of an answer ends
-NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which nothing means NaN
-# so that the path of a solver that is not UTF-8 is the same when it is read back
-PATHS = "surrogateescape"
+ANSWER = ".npz"  # the suffix of an answer's file
+NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which an empty field is NaN
+PATHS = "surrogateescape"  # keeps the path of a solver whose name is not UTF-8
 # s that the comparison of a scene may take: all 38 of the default run take 30, on two cores
 COMPARING = 300.0
 Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order of the tables
-Task = tuple[Path, Callable[[], Any]]  # where its result is kept, and what makes it in a worker
+Task = tuple[Path, Callable[[], Any]]  # its result's file, and what a worker calls
 
 
 class Gathering:
-    """The cells of a run as they come in; of each scene that is whole, the tasks that answer and
-    compare it.
+    """Collects the cells of a run, and gives out the two tasks of each scene whose cells have all
+    ended.
 
     Attributes:
-        unkept: scene -> its share, where that may not be kept, as a file of a trajectory is gone or
-            torn.
+        unkept: scene -> its share, where the file of a trajectory is gone or torn: such a share is
+            not kept, as another copy of the file would change it.
         failed: scene -> why it could not be compared.
     """
 
     def __init__(
         self, archive: Archive, missing: Iterable[Cell], timeout: float, warn: Callable[[str], None]
     ) -> None:
-        """`timeout`: s that an exact answer may take; what has had less is tried again; `warn`
-        hears what is torn."""
+        """`timeout`: s that an exact answer may take; an answer that was stopped after less is
+        computed again. `warn` is called with a sentence for each file that is torn."""
         self.warn = warn
         self.folder, self.engines, self.timeout = archive.folder, archive.header["engines"], timeout
         self.missing = Counter(cell.scene for cell in missing)
         self.records: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
-        self.scenes: dict[Path, str] = {}  # of the tasks that were given out
-        self.had: set[Path] = set()  # of these, those that have ended
+        self.scenes: dict[Path, str] = {}  # the scene of each task given out
+        self.done: set[Path] = set()  # the tasks of these that have ended
         self.unkept: dict[str, bytes] = {}
         self.failed: dict[str, Failure] = {}
         for record in archive.records:
             self.put(record)
 
     def put(self, record: dict[str, Any]) -> None:
-        """Note the line of a cell, in the place of an earlier one."""
+        """Take the line of a cell; a later line of the same cell replaces an earlier one."""
         self.records.setdefault(record["scene"], {})[name_of(record), record["substeps"]] = record
 
-    def whole(self) -> Iterator[Task]:
-        """Of every scene of which nothing is missing, what is to be done first."""
+    def tasks(self) -> Iterator[Task]:
+        """The next task of every scene whose cells have all ended."""
         for scene in self.records:
-            yield from self.task_of(scene)
+            yield from self.next_task(scene)
 
-    def ended(self, record: dict[str, Any]) -> Iterator[Task]:
-        """The same, of the scene of a cell that has ended now."""
+    def cell_ended(self, record: dict[str, Any]) -> Iterator[Task]:
+        """The next task of the scene of a cell that has ended now."""
         self.put(record)
         self.missing[record["scene"]] -= 1
-        yield from self.task_of(record["scene"])
+        yield from self.next_task(record["scene"])
 
-    def task_of(self, scene: str) -> Iterator[Task]:
-        """The next task of a scene, if it is whole: its answer, then its share; each is given out
-        once."""
+    def next_task(self, scene: str) -> Iterator[Task]:
+        """Once all cells of a scene have ended: its answer, then its share, each given out once."""
         if self.missing[scene]:
             return
         records = in_order(self.records[scene].values(), self.engines)
@@ -97,7 +95,7 @@ class Gathering:
         answer = read_answer(asked)
         if answer is None and asked not in self.scenes and os.path.lexists(asked):
             self.warn(f"{asked.name} is not what was written: that exact answer is computed again")
-        if asked not in self.scenes and (answer is None or answer.may_be_had(self.timeout)):
+        if asked not in self.scenes and (answer is None or answer.worth_another_try(self.timeout)):
             self.scenes[asked] = scene
             yield asked, partial(answer_here, self.folder, records)
         elif answer is not None and not is_kept(path := share_file(self.folder, records, answer)):
@@ -115,31 +113,31 @@ class Gathering:
         return [
             scene
             for path, scene in self.scenes.items()
-            if path.suffix == ANSWER and path not in self.had
+            if path.suffix == ANSWER and path not in self.done
         ]
 
-    def came(self, path: Path, result: Any) -> Iterator[Task]:
-        """Keep what came of a task, and give out the next of its scene."""
+    def task_ended(self, path: Path, result: Any) -> Iterator[Task]:
+        """Keep the result of a task, and give out the next task of its scene."""
         scene = self.scenes[path]
-        self.had.add(path)
+        self.done.add(path)
         if path.suffix == ANSWER:
-            away_with_what_is_no_file(path)
+            delete_unless_file(path)
             put_answer(
                 path, no_answer(result, self.timeout) if isinstance(result, Failure) else result
             )
-            yield from self.task_of(scene)
+            yield from self.next_task(scene)
         elif isinstance(result, Failure):
             self.failed[scene] = result
         elif result.damaged:
             self.unkept[scene] = result.csv
         else:
-            away_with_what_is_no_file(path)
+            delete_unless_file(path)
             keep_share(path, result.csv)
 
 
-def away_with_what_is_no_file(path: Path) -> None:
-    """Delete a pipe or a link that has the name of an answer or a share: it would be written
-    into."""
+def delete_unless_file(path: Path) -> None:
+    """Delete a pipe or a link in the place of an answer or a share, so that nothing is written
+    into it."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
         path.unlink()
 
@@ -155,20 +153,20 @@ def name_of(record: dict[str, Any]) -> str:
 
 
 class Share(NamedTuple):
-    """A scene's part of deviations.csv; `damaged`: a file of a trajectory is gone or torn, so that
-    it is not kept."""
+    """A scene's part of deviations.csv; `damaged`: the file of a trajectory is gone or torn, and so
+    the share is not kept."""
 
     csv: bytes
     damaged: bool
 
 
 def answer_here(folder: Path, records: Records) -> Answer:
-    """In the worker: the exact answer to a scene."""
+    """Compute the exact answer to a scene; called in a worker."""
     return answer_of(scenario_of(folder, records))
 
 
 def share_of(folder: Path, records: Records, answered: Path) -> Share:
-    """In the worker: the share of a scene whose answer is kept in the file `answered`."""
+    """Compare a scene with its answer, kept in the file `answered`; called in a worker."""
     allow(COMPARING)
     answer = read_answer(answered)
     assert answer is not None
@@ -181,26 +179,26 @@ def share_of(folder: Path, records: Records, answered: Path) -> Share:
 
 
 def csv_of(table: pd.DataFrame, header: bool = True) -> bytes:
-    """What `read_share` reads."""
+    """A table as the text that `read_share` reads."""
     return table.to_csv(index=False, header=header).encode(errors=PATHS)
 
 
 def compared(folder: Path, records: Records, answer: Answer) -> Comparison:
-    """The runs behind the lines of a scene's cells, set against its answer and each other."""
+    """The runs of a scene's cells, compared with its answer and with each other."""
     scenario = answer.given_to(scenario_of(folder, records))
     return compare(scenario, [run_of(folder, record) for record in records])
 
 
 def not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
-    """A row for each run that was played to its end and is, all the same, not set against
+    """A row that says `why` for each run that ended well and yet is not compared with
     `versus`."""
     says = f"{NOT_JUDGED}: {why}"
     return table_of([status_row(run, says, versus) for run in runs if run.status == "ok"])
 
 
 def scenario_of(folder: Path, records: Records) -> Scenario:
-    """What was played, with the steps that were played; raises `Unusable` if a line does not fit
-    the scene as it is."""
+    """The scenario of a scene's cells, with the step sizes that were played; raises `Unusable` if
+    the line of a cell does not fit the scene as it is now."""
     [scenario] = [
         played_scenario(folder, record)
         for record in {one["scene_hash"]: one for one in records}.values()
@@ -211,12 +209,12 @@ def scenario_of(folder: Path, records: Records) -> Scenario:
 
 
 def keep_share(path: Path, csv: bytes) -> None:
-    """Write it whole or not at all, its digest in a line before it."""
+    """Write a share whole or not at all, after a line with its digest."""
     put_bytes(path, f"{digest(csv)}\n".encode() + csv)
 
 
 def kept_share(path: Path) -> bytes:
-    """What `keep_share` wrote; raises `OSError`, or `ValueError` if it is that no more."""
+    """What `keep_share` wrote; raises `OSError`, or `ValueError` if the digest is another."""
     first, _, csv = all_of(path).partition(b"\n")
     if first != digest(csv).encode():
         raise ValueError(f"{path}: is not what was written; delete it, and it is made again")
@@ -224,7 +222,7 @@ def kept_share(path: Path) -> bytes:
 
 
 def is_kept(path: Path) -> bool:
-    """Whether a share is there as it was written."""
+    """Whether the file of a share is there as it was written."""
     try:
         return bool(kept_share(path))
     except (OSError, ValueError):
@@ -232,7 +230,7 @@ def is_kept(path: Path) -> bool:
 
 
 def read_share(csv: bytes) -> pd.DataFrame:
-    """The table, bit for bit as it was written."""
+    """The table of a share, bit for bit as it was written."""
     empty = {column: [""] for column in NUMBERS}
     return pd.read_csv(
         io.BytesIO(csv), keep_default_na=False, na_values=empty, encoding_errors=PATHS
@@ -240,13 +238,13 @@ def read_share(csv: bytes) -> pd.DataFrame:
 
 
 def answer_file(folder: Path, records: Records) -> Path:
-    """Where the answer to a scene is kept: named by the scene and the judge's source."""
+    """The file of the answer to a scene; its name changes with the scene and the judge's source."""
     return named_by(folder, records, (records[0]["scene_hash"], judge()), ANSWER)
 
 
 def share_file(folder: Path, records: Records, answer: Answer) -> Path:
-    """Where the share of a scene is kept: named by all that decides it, its answer, the judge and
-    the files too."""
+    """The file of the share of a scene; its name changes with all that decides the share: runs,
+    answer, judge."""
     found = [as_found(folder, record) for record in records]
     files = [
         tuple(record[name] for name in ("cell", "status", "reason", "file", "damage"))
@@ -256,15 +254,15 @@ def share_file(folder: Path, records: Records, answer: Answer) -> Path:
 
 
 def named_by(folder: Path, records: Records, what: tuple[Any, ...], suffix: str) -> Path:
-    """A file of a scene that is another one when anything of `what` is."""
+    """A file of a scene, with a hash of `what` in its name."""
     digest = hashlib.sha256(repr(what).encode()).hexdigest()[:16]
     return folder / "compared" / f"{records[0]['scenario']}-{digest}{suffix}"
 
 
 @cache
 def judge(root: Path = ROOT) -> str:
-    """A hash over the source and versions by which runs are compared, so that a changed metric is
-    measured again."""
+    """A hash of the source and the versions that compare runs: after a change of a metric, shares
+    are made again."""
     files = sorted(path for pattern in JUDGES for path in root.glob(pattern))
     source = b"".join(path.read_bytes() for path in files)
     return hashlib.sha256(source + repr((versions(), pd.__version__)).encode()).hexdigest()

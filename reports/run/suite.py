@@ -131,7 +131,7 @@ def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress)
     cells = [task for task in missing if isinstance(task, Cell)]
     alone = {cell for cell in cells if plan.engines[cell.engine].leaves_state}
     gathering = Gathering(archive, cells, means.timeout, progress.note)
-    comparing: deque[Any] = deque([*checks.items(), *gathering.whole()])
+    comparing: deque[Any] = deque([*checks.items(), *gathering.tasks()])
     progress.start(len(missing) + len(checks), len(tasks))
     limits = means.timeout, means.memory
     if gathering.asked and not missing and not checks:
@@ -145,9 +145,9 @@ def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress)
                 line = keep_cell(journal, scenarios[task.scene], means, task, key, result)
                 said = f"{line['scenario']}  {task.engine}  dt {line['dt_s']:.4g} s"
                 progress.done(said, line["status"], line["reason"])
-                comparing.extend(gathering.ended(line))
+                comparing.extend(gathering.cell_ended(line))
             elif isinstance(task, Path):
-                comparing.extend(gathering.came(task, result))
+                comparing.extend(gathering.task_ended(task, result))
             elif isinstance(task, Checking):
                 progress.done(*keep_check(journal, plan, task.engine, result))
             else:

@@ -113,14 +113,14 @@ def compare_missing(
     (archive.folder / "compared").mkdir(exist_ok=True)
     # As much time as the cells had: it is the same option.
     gathering = Gathering(archive, [], max(record["timeout_s"] for record in archive.records), warn)
-    tasks = deque(gathering.whole())
+    tasks = deque(gathering.tasks())
     for records in by_scene.values():
         scenario_of(archive.folder, records)  # a scene that is another one now is found here
     with closing(run_all({}, os.cpu_count() or 1, gathering.timeout, urgent=tasks)) as results:
         for path, result in results:
             name = by_scene[gathering.scenes[path]][0]["scenario"]
             say(f"{'answered' if path.suffix == ANSWER else 'compared'}: {name}")
-            tasks.extend(gathering.came(path, result))
+            tasks.extend(gathering.task_ended(path, result))
     return gathering
 
 

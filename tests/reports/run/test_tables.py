@@ -149,16 +149,16 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_
         Cell(one["scene"], one["seed"], name_of(one), one["substeps"]) for one in archive.records
     ]
     gathering = Gathering(replace(archive, records=[]), cells, 60.0, pytest.fail)
-    made = [(record["scene"], [*gathering.ended(record)]) for record in archive.records]
+    made = [(record["scene"], [*gathering.cell_ended(record)]) for record in archive.records]
     last = {
         scene: max(k for k, (which, _) in enumerate(made) if which == scene) for scene, _ in made
     }
-    resumed = [path.name for path, _ in Gathering(archive, cells[:1], 60.0, pytest.fail).whole()]
+    resumed = [path.name for path, _ in Gathering(archive, cells[:1], 60.0, pytest.fail).tasks()]
     first = [task for _, tasks in made for task in tasks]
     assert gathering.asked == list(last)  # which the person who waits is shown
     assert not gathering.playing
-    then = [task for path, work in first for task in gathering.came(path, work())]
-    after = [task for path, work in then for task in gathering.came(path, work())]
+    then = [task for path, work in first for task in gathering.task_ended(path, work())]
+    after = [task for path, work in then for task in gathering.task_ended(path, work())]
 
     assert [k for k, (_, tasks) in enumerate(made) if tasks] == sorted(last.values())
     assert all(len(tasks) <= 1 for _, tasks in made)
@@ -166,7 +166,7 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_
         scene for scene in last if scene != cells[0].scene
     ]
     assert [path.suffix for path, _ in (*first, *then)] == [ANSWER] * 2 + [".csv"] * 2
-    assert after == list(Gathering(archive, [], 60.0, pytest.fail).whole()) == gathering.asked == []
+    assert after == list(Gathering(archive, [], 60.0, pytest.fail).tasks()) == gathering.asked == []
     assert {path: path.read_bytes() for path in (copy / "compared").glob("*.csv")} == {
         path: text for path, text in whole.items() if path.suffix == ".csv"
     }
