@@ -294,6 +294,7 @@ def all_in_plain_python():
     test_a_bounce_off_the_end_of_a_wall_is_not_one_off_its_face()
 
 
+@pytest.mark.slow
 def test_accumulation_in_plain_python_is_the_same(monkeypatch):
     """So what the next test catches is the bug."""
     monkeypatch.setattr(events, "event_loop", plain_kernels())

@@ -198,6 +198,7 @@ def plain_kernels(right="", wrong=""):
     )
 
 
+@pytest.mark.slow
 def test_the_kernels_as_plain_python_find_the_same(monkeypatch):
     """So what the next test catches is the bug, and not the way it was planted."""
     monkeypatch.setattr(events, "event_loop", plain_kernels())

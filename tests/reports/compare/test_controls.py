@@ -20,7 +20,7 @@ STILL = {"rest_on_floor", "column_of_ten"}
 """Scenes whose truth stands still: to freeze is right there, and twice no speed is none, so nothing
 is to be caught."""
 MOVING = [name for name in SCENARIOS if name not in STILL]
-FEW = {"free_fall", "falling_box", "ship_thrust", "asteroids", "gas_of_100"}
+FEW = {"free_fall", "falling_box", "ship_thrust", "asteroids"}
 VELOCITIES = (
     "velocity_max",
     "velocity_rms",

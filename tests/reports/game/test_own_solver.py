@@ -68,6 +68,7 @@ def page_of(browser: Browser, path: Path, monkeypatch: pytest.MonkeyPatch) -> It
     assert heard == []
 
 
+@pytest.mark.slow
 def test_a_right_solver_flies_as_the_reference_does(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -120,6 +121,7 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
     assert took < 10 * PATIENCE
 
 
+@pytest.mark.slow
 def test_the_page_says_that_it_waits(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

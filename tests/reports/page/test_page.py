@@ -94,7 +94,9 @@ def test_the_replay_moves_disks(page: Page) -> None:
     assert page.evaluate(picture, HEAD_ON) != before
 
 
-@pytest.mark.parametrize("name", [HEAD_ON, ORBIT, ASTEROIDS])
+@pytest.mark.parametrize(
+    "name", [HEAD_ON, *(pytest.param(name, marks=pytest.mark.slow) for name in (ORBIT, ASTEROIDS))]
+)
 def test_the_replay_shows_the_trajectory(
     page: Page, comparisons: list[Comparison], name: str
 ) -> None:
@@ -210,6 +212,7 @@ def test_failed_and_refused_runs_are_in_sight(page: Page) -> None:
     assert ["crashed" in listed[0], "refused" in listed[1]] == [True, True]
 
 
+@pytest.mark.slow
 def test_the_page_never_scrolls_sideways(browser: Browser, path: Path) -> None:
     """All fits the width, narrow or wide, however long a word is; wide tables scroll by
     themselves."""
@@ -265,6 +268,7 @@ def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:
     assert "crosscheck run nothing" in (tmp_path / "r.html").read_text()
 
 
+@pytest.mark.slow
 def test_the_browser_of_these_tests_hears_what_a_page_asks_for(
     browser: Browser, tmp_path: Path
 ) -> None:

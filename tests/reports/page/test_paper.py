@@ -202,6 +202,7 @@ def test_the_numbers_of_a_chart_are_saved_as_they_were_computed(
     assert heard == []
 
 
+@pytest.mark.slow
 def test_a_chart_is_saved_as_a_picture_with_its_title_and_legend(browser: Browser, path: Path):
     """As SVG, in the colours of paper also where the page is dark, without what is hidden."""
     page, heard = opened(

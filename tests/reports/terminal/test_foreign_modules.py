@@ -174,7 +174,9 @@ def imported_here() -> frozenset[str]:
     return frozenset(ours - {name.partition(".")[0] for name in before})
 
 
-@pytest.mark.parametrize("path", [":", pytest.param(":/nowhere", marks=pytest.mark.slow), "."])
+@pytest.mark.parametrize(
+    "path", [".", *(pytest.param(path, marks=pytest.mark.slow) for path in (":", ":/nowhere"))]
+)
 def test_a_pythonpath_with_the_current_folder_runs_nothing_of_it(tmp_path: Path, path: str):
     """An empty entry of PYTHONPATH is the current folder; all that this program imports is called
     so there."""
@@ -252,7 +254,11 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], 
 
 
 @pytest.mark.parametrize(
-    "begin", [["-P", "-c", "from reports.__main__ import main; main()"], ["-m", "reports"]]
+    "begin",
+    [
+        ["-P", "-c", "from reports.__main__ import main; main()"],
+        pytest.param(["-m", "reports"], marks=pytest.mark.slow),
+    ],
 )
 @pytest.mark.parametrize(
     "words",
