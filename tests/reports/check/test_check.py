@@ -36,7 +36,7 @@ def test_the_catalogue_is_large_enough_and_covers_every_task():
 
 
 @pytest.mark.parametrize(
-    "solvers", [FAST_CORRECT, pytest.param(CORRECT, marks=pytest.mark.slow)], ids=["some", "all"]
+    "solvers", [FAST_CORRECT, pytest.param(CORRECT, marks=pytest.mark.long)], ids=["some", "all"]
 )
 def test_no_correct_solver_is_faulted(solvers: list[Path]):
     """However it is written: no fault, and every task asked that the file has."""
@@ -54,7 +54,7 @@ def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
     ] == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_committed_table_is_what_comes_out(tmp_path: Path):
     """All mutants: found, cause first, the second fault of those with two, as the table says; and
     38 of 40 or better."""

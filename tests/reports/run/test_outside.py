@@ -188,7 +188,7 @@ def test_no_more_workers_are_started_than_the_machine_can_hold(
     assert "limit of 1024 open files, of which each takes 5): 184 do" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_thousand_workers_crash_nothing(tmp_path: Path):
     """As many are started as can be, with memory enough for each."""
     done = crosscheck(*SMALL, "--workers", "1000", "--out", "out", cwd=tmp_path)

@@ -119,7 +119,7 @@ def test_what_numba_keeps_would_be_taken_for_another_text(
     assert np.array_equal(first.trajectory.position, second.trajectory.position)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("file", ["plain.js", "plain.py", "beside"])
 def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
@@ -139,7 +139,7 @@ def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", ["plain.js", "beside"])
+@pytest.mark.parametrize("file", ["plain.js", pytest.param("beside", marks=pytest.mark.long)])
 def test_a_file_that_vanishes_during_a_run_is_played_to_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):

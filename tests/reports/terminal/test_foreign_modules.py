@@ -264,8 +264,8 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], 
     "words",
     [
         ["list", "engines"],
-        pytest.param(["check", "my_plain.py"], marks=pytest.mark.slow),
-        pytest.param(["check", "my_plain.js"], marks=pytest.mark.slow),
+        pytest.param(["check", "my_plain.py"], marks=pytest.mark.long),
+        pytest.param(["check", "my_plain.js"], marks=pytest.mark.long),
         pytest.param(
             [
                 "run",
@@ -279,7 +279,7 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], 
                 "--out",
                 "../out",
             ],
-            marks=pytest.mark.slow,
+            marks=pytest.mark.long,
         ),
     ],
 )

@@ -77,7 +77,14 @@ def test_a_stream_that_takes_nothing_is_one_sentence(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "stream", [">/dev/full", ">&-", "| head -0; exit ${PIPESTATUS[0]}", "2>/dev/full", "2>&- >&-"]
+    "stream",
+    [
+        ">/dev/full",
+        *(
+            pytest.param(stream, marks=pytest.mark.long)
+            for stream in (">&-", "| head -0; exit ${PIPESTATUS[0]}", "2>/dev/full", "2>&- >&-")
+        ),
+    ],
 )
 def test_what_was_computed_is_kept_whatever_becomes_of_the_streams(tmp_path: Path, stream: str):
     """The run is whole in its place; a closed number of a stream is not taken by the journal and
@@ -117,7 +124,9 @@ PLACES = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("place", [*PLACES, "German"])
+@pytest.mark.parametrize(
+    "place", [*(pytest.param(place, marks=pytest.mark.long) for place in PLACES), "German"]
+)
 def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
     tmp_path: Path, place: str, request: pytest.FixtureRequest
 ):
