@@ -199,6 +199,7 @@ def test_nothing_of_it_is_in_the_source_itself():
     ] == []
 
 
+@pytest.mark.slow
 def test_all_that_is_added_is_known_everywhere(grown: Path):
     """Tables, colour, version, feature, variant, error budget and lesson; and nothing else has
     changed its look."""

@@ -159,6 +159,7 @@ def test_a_brute_force_algorithm_finds_the_same_collisions(seed):
 
 
 FILES = ("contact_times", "queue", "disks", "search", "rest", "impacts", "loop")
+DEAR = ("stale record kept", "wall end forgotten")  # a second each: of thirty scenes and more
 BUGS = {
     "stale record kept": ("b.count == a.partner_count", "True"),
     "nearest image": (
@@ -205,7 +206,9 @@ def test_the_kernels_as_plain_python_find_the_same(monkeypatch):
     compare_all(range(12))
 
 
-@pytest.mark.parametrize("bug", BUGS)
+@pytest.mark.parametrize(
+    "bug", [pytest.param(bug, marks=[pytest.mark.slow] * (bug in DEAR)) for bug in BUGS]
+)
 def test_a_planted_bug_is_caught_by_brute_force(bug, monkeypatch):
     """Each by a wrong list of collisions in one of forty scenes."""
     monkeypatch.setattr(events, "event_loop", plain_kernels(*BUGS[bug]))

@@ -231,6 +231,7 @@ def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smalle
     assert abs(smallest.yours.position[-1] - smallest.truth.position[-1]).max() > 0.005
 
 
+@pytest.mark.slow
 def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Without any time to draw scenes, a pair that collides is tried."""
     monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
@@ -247,6 +248,7 @@ def test_a_right_solver_has_no_failing_scene():
         assert smallest_scene(process, 0.9) is None
 
 
+@pytest.mark.slow
 def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
     browser: Browser, folder: Path, smallest: Smallest
 ):

@@ -116,7 +116,7 @@ def test_keys_held_and_released_move_the_ship(page: Page):
     assert angle == pytest.approx((32 * FRAME) ** 2 * 1.5 + dt * 32 * FRAME / 2, abs=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_scripted_flight_wins(page: Page):
     """With the keys of `steered_home` pressed and released in the page."""
     wish(page, asteroids=0)
@@ -130,6 +130,7 @@ def test_a_scripted_flight_wins(page: Page):
     assert page.locator("#banner.won").inner_text() == "You won"
 
 
+@pytest.mark.slow
 def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
     page: Page, tmp_path: Path
 ):
@@ -190,7 +191,7 @@ def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Pa
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_saved_flight_is_shown_again_to_the_same_bits(
     browser: Browser, page: Page, tmp_path: Path
 ):
@@ -365,7 +366,7 @@ def test_with_reduced_motion_nothing_moves_by_itself(first_frame: Page):
     assert "starts the flight" in first_frame.locator("#banner").inner_text()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_frame_time_is_measured_by_a_command():
     """`python -m tests.bench.game` prints a row for each thing timed, and how fast the flight
     goes."""

@@ -67,6 +67,7 @@ def test_every_chart_is_drawn_once_it_is_in_view(page: Page, name: str, charts: 
         assert len(names) >= len(PLAYED) - 1
 
 
+@pytest.mark.slow
 def test_nothing_is_drawn_before_it_is_in_view(browser: Browser, path: Path) -> None:
     """A page just opened has drawn no chart and unpacked no replay of its last scenario."""
     page, _ = opened(browser, path.as_uri())
@@ -169,6 +170,7 @@ def test_the_legend_hides_an_engine_everywhere(page: Page) -> None:
     assert plot.evaluate(visible) is True
 
 
+@pytest.mark.slow
 def test_charts_follow_the_dark(page: Page) -> None:
     """Where the reader turns to dark, the lines that are drawn take the colours of the dark."""
     with_engine(page, HEAD_ON)

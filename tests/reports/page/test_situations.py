@@ -168,6 +168,7 @@ def test_one_scene_does_not_drown_a_column():
     assert not overview.mark_best(cells, {"a:b"})["a:b"][0].best
 
 
+@pytest.mark.slow
 def test_a_link_to_another_page_is_there_only_if_the_page_is(
     comparisons: list[Comparison], tmp_path: Path
 ):

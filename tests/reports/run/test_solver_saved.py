@@ -67,7 +67,7 @@ def place(folder: Path, file: str, factor: int) -> Path:
     return folder / "solver.py"
 
 
-QUICK = ("plain.py", "compiled beside")
+QUICK = ("plain.py",)
 SAVED = [
     pytest.param(file, marks=() if file in QUICK else pytest.mark.slow)
     for file in (*TEXTS, "beside", "compiled", "compiled beside")

@@ -241,7 +241,7 @@ def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets
     assert reported[3] > 10
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("engine", ["pymunk:shipped", "box2d:matched"])
 def test_the_limit_of_a_fast_gas_is_that_of_other_draws_too(engine: str):
     """Sixteen other gases move it by less than a half; the first of them that fails comes at any

@@ -314,20 +314,23 @@ def test_without_the_safe_path_a_module_beside_readme_is_run(clone: tuple[Path, 
 @pytest.mark.parametrize(
     "words",
     [
-        [
-            "run",
-            "head_on_equal_e09",
-            "--dt",
-            str(1 / 60),
-            "--engine",
-            "pymunk:matched",
-            "--engine",
-            "my_arrays.py",
-            "--out",
-            "../out",
-        ],
+        pytest.param(
+            [
+                "run",
+                "head_on_equal_e09",
+                "--dt",
+                str(1 / 60),
+                "--engine",
+                "pymunk:matched",
+                "--engine",
+                "my_arrays.py",
+                "--out",
+                "../out",
+            ],
+            marks=pytest.mark.long,
+        ),
         ["check", "my_plain.py"],
-        ["truth", "head_on_equal_e09"],
+        pytest.param(["truth", "head_on_equal_e09"], marks=pytest.mark.long),
     ],
 )
 def test_a_command_runs_nothing_of_the_folder_it_is_started_in(ran, words: list[str]):
