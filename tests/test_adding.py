@@ -283,7 +283,11 @@ def test_a_run_has_them_in_its_tables_and_on_its_page(grown: Path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("command", "names"), [("speed", ["free_fall"]), ("stability", ["slow_collision"])]
+    ("command", "names"),
+    [
+        ("speed", ["free_fall"]),
+        pytest.param("stability", ["slow_collision"], marks=pytest.mark.long),
+    ],
 )
 def test_speed_and_stability_have_the_engine_on_their_pages(
     grown: Path, command: str, names: list[str]

@@ -67,9 +67,9 @@ def place(folder: Path, file: str, factor: int) -> Path:
     return folder / "solver.py"
 
 
-QUICK = ("plain.py",)
+MARKS = {"plain.py": (), "plain.js": pytest.mark.slow, "compiled beside": pytest.mark.slow}
 SAVED = [
-    pytest.param(file, marks=() if file in QUICK else pytest.mark.slow)
+    pytest.param(file, marks=MARKS.get(file, pytest.mark.long))
     for file in (*TEXTS, "beside", "compiled", "compiled beside")
 ]
 

@@ -86,7 +86,7 @@ def test_what_is_printed_at_once_fits_its_terminal(words: tuple, columns: int, t
         ("report", "out"),
         ("diff", "out", "later"),
         ("check", "class"),
-        ("check", SOLVER),
+        pytest.param(("check", SOLVER), marks=pytest.mark.long),
         pytest.param(("advise", "head_on_equal_e09", "--engine", "pymunk"), marks=pytest.mark.long),
         pytest.param(
             ("stability", "slow_collision", "--engine", "pymunk", "--out", "limits"),
