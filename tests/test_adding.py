@@ -199,6 +199,7 @@ def test_nothing_of_it_is_in_the_source_itself():
     ] == []
 
 
+@pytest.mark.slow
 def test_all_that_is_added_is_known_everywhere(grown: Path):
     """Tables, colour, version, feature, variant, error budget and lesson; and nothing else has
     changed its look."""
@@ -282,7 +283,11 @@ def test_a_run_has_them_in_its_tables_and_on_its_page(grown: Path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("command", "names"), [("speed", ["free_fall"]), ("stability", ["slow_collision"])]
+    ("command", "names"),
+    [
+        ("speed", ["free_fall"]),
+        pytest.param("stability", ["slow_collision"], marks=pytest.mark.long),
+    ],
 )
 def test_speed_and_stability_have_the_engine_on_their_pages(
     grown: Path, command: str, names: list[str]

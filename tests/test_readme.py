@@ -44,15 +44,17 @@ LINES = list(
 CLUSTER = [line for line in LINES if "--extra cluster" in line]
 MINUTES = {"uv run crosscheck speed"}  # and the tests themselves
 # ten seconds each, or pytest in a process of its own
-SLOW = (
-    " advise ",
-    " stability ",
-    " speed ",
-    " --solver ",
-    " run head_on_equal_e09 --engine Exercise.js ",
-)
+MARKS = {
+    " advise ": pytest.mark.long,
+    " stability my_scene.toml ": pytest.mark.long,
+    " speed free_fall slow_collision ": pytest.mark.long,
+    " stability ": pytest.mark.slow,
+    " speed ": pytest.mark.slow,
+    " --solver ": pytest.mark.slow,
+    " run head_on_equal_e09 --engine Exercise.js ": pytest.mark.slow,
+}
 COMMANDS = [
-    pytest.param(line, marks=[pytest.mark.slow] if any(word in line for word in SLOW) else [])
+    pytest.param(line, marks=[mark for words, mark in MARKS.items() if words in line][:1])
     for line in LINES
     if line not in CLUSTER
     and line not in MINUTES

@@ -225,6 +225,7 @@ for order in (EXERCISE, BOX2D, PYMUNK, BOX2D_V3):
 """
 
 
+@pytest.mark.slow
 def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
     """A crowd with walls, gravity, friction and a static disk, through every stage."""
     outputs = [

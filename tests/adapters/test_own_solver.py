@@ -120,7 +120,7 @@ LACKING = {"integrate_missing.js", "integrate_missing.py"}
 @pytest.mark.parametrize(
     "mutant",
     [
-        pytest.param(one, id=one.name, marks=[] if one.name in WATCHED else pytest.mark.slow)
+        pytest.param(one, id=one.name, marks=[] if one.name in WATCHED else pytest.mark.long)
         for one in MUTANTS
     ],
 )
@@ -232,7 +232,7 @@ def test_a_file_that_ends_its_process_is_a_crash(tmp_path: Path):
     assert "ended its own process (exit status 3)" in played.reason
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_file_that_fails_does_not_spoil_the_run_of_the_others(tmp_path: Path):
     """Exit 1, as one engine could not be compared at all; a row each, and the right one is
     played."""

@@ -48,7 +48,13 @@ def test_falling_boxes_are_answered_beyond_their_first_rest():
 @pytest.mark.skipif(
     not has_balls(), reason="python-flint is an extra: without it no row is certified"
 )
-@pytest.mark.parametrize(("name", "one"), [(name, one) for name, _, one in questions()])
+@pytest.mark.parametrize(
+    ("name", "one"),
+    [
+        pytest.param(name, one, marks=[pytest.mark.long] if k % 4 else [])
+        for k, (name, _, one) in enumerate(questions())
+    ],
+)
 def test_the_figures_are_what_is_computed(name: str, one: Scenario):
     """The same collisions, rests and horizon to the microsecond they are written with; nothing
     overlaps, energy falls."""

@@ -81,8 +81,15 @@ def found(request: pytest.FixtureRequest) -> dict[Key, Outcome]:
     return {key: outcome for key, outcome, _ in play_all(keys)}
 
 
+# Every 50th is for the gate: some of each family.
 @pytest.mark.slow
-@pytest.mark.parametrize("key", ALL, ids=": ".join)
+@pytest.mark.parametrize(
+    "key",
+    [
+        pytest.param(key, marks=[pytest.mark.long] if k % 50 else [], id=": ".join(key))
+        for k, key in enumerate(ALL)
+    ],
+)
 def test_an_input_ends_as_it_should(found: dict[Key, Outcome], key: Key):
     """With the outcome that is kept, which is none of the bad ones."""
     word, code, printed = found[key]

@@ -92,12 +92,17 @@ def compared(scenario: Scenario, motion: Motion, record: TruthRecord) -> Compare
     return Compared(len(own), distance, faults)
 
 
+@pytest.mark.parametrize(
+    "seeds",
+    [range(0, SCENES, 4), pytest.param(range(SCENES), marks=pytest.mark.long)],
+    ids=["a fourth", "all"],
+)
 def test_the_oracle_gives_the_events_and_positions_of_a_motion_that_asks_all_pairs(
-    record_property: Record,
+    record_property: Record, seeds: range
 ):
     """Of hundreds of random scenes; and it never ends before that motion does."""
     found, ends, refused = [], Counter(), []
-    for seed in range(SCENES):
+    for seed in seeds:
         scenario = random_scene(seed)
         motion = Motion(scenario, MOST_EVENTS)
         try:
@@ -120,7 +125,7 @@ def test_the_oracle_gives_the_events_and_positions_of_a_motion_that_asks_all_pai
 
     assert not refused
     assert not faults
-    assert sum(result.events for _, result in found) > 10 * SCENES
+    assert sum(result.events for _, result in found) > 10 * len(seeds)
 
 
 def test_every_restitution_meets_all_surroundings():

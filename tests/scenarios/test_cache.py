@@ -139,7 +139,7 @@ def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert truth_cache.folder() == tmp_path / "own"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_answer_with_any_bit_turned_is_what_was_written_or_none(tmp_path: Path):
     """Nothing but the answer is ever read, and no bit ends in an error: its sums tell, or its
     header cannot be read."""

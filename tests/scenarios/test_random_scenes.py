@@ -100,14 +100,14 @@ def test_a_few_random_scenes_are_as_the_exact_answer_has_them():
     agree(random_scenarios(2 * len(LAYOUTS)))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("chunk", range(CHUNKS))
 def test_all_random_scenes_end_played_or_refused_by_name(chunk):
     """Five hundred."""
     sweep(random_scenarios(LONG)[chunk::CHUNKS])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("chunk", range(CHUNKS))
 def test_all_random_scenes_are_as_the_exact_answer_has_them(chunk):
     """The same five hundred."""

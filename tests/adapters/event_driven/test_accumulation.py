@@ -294,6 +294,7 @@ def all_in_plain_python():
     test_a_bounce_off_the_end_of_a_wall_is_not_one_off_its_face()
 
 
+@pytest.mark.slow
 def test_accumulation_in_plain_python_is_the_same(monkeypatch):
     """So what the next test catches is the bug."""
     monkeypatch.setattr(events, "event_loop", plain_kernels())
@@ -306,8 +307,8 @@ def test_accumulation_in_plain_python_is_the_same(monkeypatch):
         ("if held == 0.0 or", "if True or"),  # nothing lies still in a corner
         # What rattles is not noticed, and a wall's end lifts a disk to its face: both rattle on for
         # seconds.
-        pytest.param("if run.collisions < COLLISIONS:", "if True:", marks=pytest.mark.slow),
-        pytest.param("if abs(gap) < ROUNDING", "if gap < ROUNDING", marks=pytest.mark.slow),
+        pytest.param("if run.collisions < COLLISIONS:", "if True:", marks=pytest.mark.long),
+        pytest.param("if abs(gap) < ROUNDING", "if gap < ROUNDING", marks=pytest.mark.long),
         # it is left to the first of its two walls
         pytest.param("fall_into(walls, a, w, k) > 0.0", "False", marks=pytest.mark.slow),
     ],

@@ -159,6 +159,7 @@ def test_a_brute_force_algorithm_finds_the_same_collisions(seed):
 
 
 FILES = ("contact_times", "queue", "disks", "search", "rest", "impacts", "loop")
+DEAR = ("stale record kept", "wall end forgotten")  # a second each: of thirty scenes and more
 BUGS = {
     "stale record kept": ("b.count == a.partner_count", "True"),
     "nearest image": (
@@ -198,13 +199,16 @@ def plain_kernels(right="", wrong=""):
     )
 
 
+@pytest.mark.slow
 def test_the_kernels_as_plain_python_find_the_same(monkeypatch):
     """So what the next test catches is the bug, and not the way it was planted."""
     monkeypatch.setattr(events, "event_loop", plain_kernels())
     compare_all(range(12))
 
 
-@pytest.mark.parametrize("bug", BUGS)
+@pytest.mark.parametrize(
+    "bug", [pytest.param(bug, marks=[pytest.mark.slow] * (bug in DEAR)) for bug in BUGS]
+)
 def test_a_planted_bug_is_caught_by_brute_force(bug, monkeypatch):
     """Each by a wrong list of collisions in one of forty scenes."""
     monkeypatch.setattr(events, "event_loop", plain_kernels(*BUGS[bug]))

@@ -43,7 +43,10 @@ def test_the_committed_figures_are_those_of_the_literature(packing):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("packing", PACKINGS)
+@pytest.mark.parametrize(
+    "packing",
+    [PACKINGS[0], *(pytest.param(packing, marks=pytest.mark.long) for packing in PACKINGS[1:])],
+)
 def test_the_committed_figures_come_out_again(packing):
     """Other code generation rounds otherwise, and chaos makes it another sample: within the errors
     of both."""

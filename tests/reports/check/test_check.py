@@ -22,7 +22,7 @@ from tests.solvers.mutants import CORRECT, MUTANTS
 
 # A solver takes half a second: some here, of either language and any task; all of both lists in the
 # long test.
-FAST, FAST_CORRECT = MUTANTS[::24], CORRECT[::8]
+FAST, FAST_CORRECT = MUTANTS[::48], CORRECT[::12]
 
 
 def test_the_catalogue_is_large_enough_and_covers_every_task():
@@ -36,7 +36,7 @@ def test_the_catalogue_is_large_enough_and_covers_every_task():
 
 
 @pytest.mark.parametrize(
-    "solvers", [FAST_CORRECT, pytest.param(CORRECT, marks=pytest.mark.slow)], ids=["some", "all"]
+    "solvers", [FAST_CORRECT, pytest.param(CORRECT, marks=pytest.mark.long)], ids=["some", "all"]
 )
 def test_no_correct_solver_is_faulted(solvers: list[Path]):
     """However it is written: no fault, and every task asked that the file has."""
@@ -54,7 +54,7 @@ def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
     ] == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_committed_table_is_what_comes_out(tmp_path: Path):
     """All mutants: found, cause first, the second fault of those with two, as the table says; and
     38 of 40 or better."""
@@ -71,6 +71,7 @@ def test_the_committed_table_is_what_comes_out(tmp_path: Path):
     assert {rows[mutant.name]["second is found"] for mutant in two} == {"yes"}
 
 
+@pytest.mark.slow
 def test_the_same_file_gets_the_same_rows():
     """Nothing is random, and no clock is read."""
     path = CORRECT[-1]
@@ -141,6 +142,7 @@ def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):
     assert "Came:" in sentences[0]
 
 
+@pytest.mark.slow
 def test_the_numbers_beside_an_unknown_mistake_are_those_of_a_pair_that_is_wrong(tmp_path: Path):
     """Of five pairs the first comes out right: what came is not what was expected."""
     text = (CORRECT[0].parent / "plain.js").read_text()
@@ -168,17 +170,19 @@ def test_the_numbers_beside_an_unknown_mistake_are_those_of_a_pair_that_is_wrong
             "the impulse is not a number (a field that does not",
             marks=pytest.mark.slow,
         ),
-        (
+        pytest.param(
             "if (vn >= 0) return;",
             "vn *= vn / vn;",
             "2c",
             "the velocities of a pair at relative rest become NaN or infinite",
+            marks=pytest.mark.slow,
         ),
-        (
+        pytest.param(
             "/ (1 / sphereA.mass + 1 / sphereB.mass)",
             "/ 0",
             "2c",
             "the impulse is not a number (a field that does not",
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             "-= J / sphereB.mass * nx",
@@ -278,6 +282,7 @@ def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path)
     assert read_solver(tmp_path / "without.js").beside == ()
 
 
+@pytest.mark.slow
 def test_the_gl_matrix_beside_the_file_comes_before_that_of_npm_and_the_nearest_package_first(
     tmp_path: Path,
 ):
@@ -303,6 +308,7 @@ def test_the_gl_matrix_beside_the_file_comes_before_that_of_npm_and_the_nearest_
         assert library_read(solver) == mark
 
 
+@pytest.mark.slow
 def test_from_version_3_on_the_names_are_taken_out_of_gl_matrix(tmp_path: Path):
     """Unless the file has such a name of its own, which stays as it is."""
     (tmp_path / "gl-matrix.js").write_text("var glMatrix = { vec2: { mark: 5 } };")

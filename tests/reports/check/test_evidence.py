@@ -118,7 +118,16 @@ def test_where_a_call_fails_is_read_from_what_it_had_done(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["endless_in_d.js", "endless_in_d.py", "endless_in_b.js"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "endless_in_d.js",
+        *(
+            pytest.param(name, marks=pytest.mark.long)
+            for name in ("endless_in_d.py", "endless_in_b.js")
+        ),
+    ],
+)
 def test_an_endless_loop_is_filed_under_the_part_it_stands_in(name: str, tmp_path: Path):
     """It is stopped; what it had written until then says where it is."""
     (mutant,) = (mutant for mutant in MUTANTS if mutant.name == name)

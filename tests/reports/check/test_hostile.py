@@ -15,7 +15,7 @@ from reports.check.rows import CheckRow
 from reports.check.solver import check_solver
 from reports.check.verdict import FileCheck
 
-pytestmark = pytest.mark.slow  # waits for what hangs, twice for each function
+pytestmark = pytest.mark.long  # waits for what hangs, twice for each function
 
 Results = dict[str, list[CheckRow] | NotASolver]
 # for one file on a busy machine: two calls that are stopped late, a process that starts

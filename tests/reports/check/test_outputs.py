@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -45,35 +44,41 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
-# A process of its own loads for seconds what this one has; that it ends the same is for the long
+# A process of its own loads for seconds what this one has; that it ends the same is for the slow
 # test.
-@pytest.mark.parametrize("call", [crosscheck, pytest.param(process, marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[crosscheck, pytest.param(process, marks=pytest.mark.slow)])
+def checked(
+    request: pytest.FixtureRequest, folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Any, Any, Path]:
+    """How the command ends for the right file and for the wrong one, and where it was given."""
+    where = tmp_path_factory.mktemp("here")
+    right, wrong = (
+        request.param("check", folder / who / "Exercise.js", cwd=where) for who in ("anna", "ben")
+    )
+    return right, wrong, where
+
+
 def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(
-    folder: Path, tmp_path: Path, call: Callable[..., Any]
+    checked: tuple[Any, Any, Path],
 ):
     """The first line is the sentence to begin with; the page, and it alone, is where the command
     was given."""
-    right, wrong = (
-        call("check", folder / who / "Exercise.js", cwd=tmp_path) for who in ("anna", "ben")
-    )
+    right, wrong, where = checked
 
     assert (right.returncode, wrong.returncode) == (0, 1)
     assert right.stdout.startswith("No fault found")
     assert wrong.stdout.replace("\n", " ").startswith(
         "1. Task 2c impulse, impulse: it divides by (mA + mB)"
     )
-    assert [path.name for path in tmp_path.iterdir()] == ["check.html"]
+    assert [path.name for path in where.iterdir()] == ["check.html"]
 
 
 def test_the_terminal_tells_faults_from_free_choices_by_a_word_and_shows_the_line(
-    folder: Path, tmp_path: Path
+    checked: tuple[Any, Any, Path],
 ):
     """Without any colour: faults before free choices, each row with its verdict; the line and the
     formula below the sentence. Where there is no fault, nothing is said to be expected."""
-    right, wrong = (
-        crosscheck("check", folder / who / "Exercise.js", cwd=tmp_path).stdout
-        for who in ("anna", "ben")
-    )
+    right, wrong = (done.stdout for done in checked[:2])
     said = " ".join(wrong.split())
 
     assert "line 63 var J = -(1 + restitution) * vn / (sphereA.mass + sphereB.mass);" in said
@@ -226,6 +231,7 @@ def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smalle
     assert abs(smallest.yours.position[-1] - smallest.truth.position[-1]).max() > 0.005
 
 
+@pytest.mark.slow
 def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Without any time to draw scenes, a pair that collides is tried."""
     monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
@@ -242,6 +248,7 @@ def test_a_right_solver_has_no_failing_scene():
         assert smallest_scene(process, 0.9) is None
 
 
+@pytest.mark.slow
 def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
     browser: Browser, folder: Path, smallest: Smallest
 ):

@@ -20,7 +20,7 @@ STILL = {"rest_on_floor", "column_of_ten"}
 """Scenes whose truth stands still: to freeze is right there, and twice no speed is none, so nothing
 is to be caught."""
 MOVING = [name for name in SCENARIOS if name not in STILL]
-FEW = {"free_fall", "falling_box", "ship_thrust", "asteroids", "gas_of_100"}
+FEW = {"free_fall", "falling_box", "ship_thrust", "asteroids"}
 VELOCITIES = (
     "velocity_max",
     "velocity_rms",
@@ -92,7 +92,7 @@ def test_what_stands_still_is_not_to_be_caught(name: str):
 
 @pytest.mark.parametrize("make", [Freezes, DoublesSpeed, GainsEnergy])
 @pytest.mark.parametrize(
-    "name", [name if name in FEW else pytest.param(name, marks=pytest.mark.slow) for name in MOVING]
+    "name", [name if name in FEW else pytest.param(name, marks=pytest.mark.long) for name in MOVING]
 )
 def test_an_engine_that_does_so_is_caught_in_the_tables(name: str, make: type[Exact]):
     """Played and compared as any engine: by energy or momentum, wherever the disks are; the sound

@@ -158,7 +158,7 @@ CAN = {change: [name for name in SCENES if (change, name) not in LEFT_OUT] for c
 # Every change and every scene is in the quarter that is played here; the long test has the others.
 PAIRS = [
     pytest.param(
-        name, change, marks=[] if j % 4 == k % min(4, len(CAN[change])) else [pytest.mark.slow]
+        name, change, marks=[] if j % 4 == k % min(4, len(CAN[change])) else [pytest.mark.long]
     )
     for k, change in enumerate(CHANGES)
     for j, name in enumerate(CAN[change])

@@ -69,7 +69,9 @@ def against_truth(table: pd.DataFrame, metric: str, dt: float) -> pd.DataFrame:
     return table[(table.metric == metric) & (table.versus == "truth") & (table.dt_s == dt)]
 
 
-@pytest.mark.parametrize("name", ["falling_box", "gas_of_100"])
+@pytest.mark.parametrize(
+    "name", ["falling_box", pytest.param("gas_of_100", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("metric", CARRIED)
 def test_a_crowded_scene_is_judged_at_every_step_size(name: str, metric: str):
     """From nearly all of its samples, and says from how many; a stepping engine has no perfect

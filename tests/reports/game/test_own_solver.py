@@ -68,6 +68,7 @@ def page_of(browser: Browser, path: Path, monkeypatch: pytest.MonkeyPatch) -> It
     assert heard == []
 
 
+@pytest.mark.slow
 def test_a_right_solver_flies_as_the_reference_does(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -93,7 +94,7 @@ def test_a_right_solver_flies_as_the_reference_does(
 @pytest.mark.parametrize(
     ("act", "reason"),
     [
-        ("throw new Error('out of fuel')", "out of fuel"),
+        pytest.param("throw new Error('out of fuel')", "out of fuel", marks=pytest.mark.slow),
         pytest.param(FOREVER, "does not come back", marks=pytest.mark.slow),
     ],
 )
@@ -120,6 +121,7 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
     assert took < 10 * PATIENCE
 
 
+@pytest.mark.slow
 def test_the_page_says_that_it_waits(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -373,7 +375,7 @@ def test_a_frame_under_thrust_is_one_exchange_with_the_file(
     assert count["exchanges"] - before == 20 * exchanges
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_files_and_two_engines_keep_the_clock(browser: Browser, tmp_path: Path):
     """In Chromium, under thrust: what engines and picture take fits into a frame, by the least of
     many, as everything else on the machine adds to it. `python -m tests.bench.game` prints the

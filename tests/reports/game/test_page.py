@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +35,8 @@ def url() -> Iterator[str]:
         yield url
 
 
-@pytest.fixture
-def page(browser: Browser, url: str) -> Iterator[Page]:
+@contextmanager
+def paused(browser: Browser, url: str) -> Iterator[Page]:
     """The game, paused at its first frame; whatever it complained of fails the test."""
     page, heard = opened(
         browser, url, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
@@ -44,6 +45,20 @@ def page(browser: Browser, url: str) -> Iterator[Page]:
     yield page
     page.context.close()
     assert heard == []
+
+
+@pytest.fixture
+def page(browser: Browser, url: str) -> Iterator[Page]:
+    """A game to fly."""
+    with paused(browser, url) as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def first_frame(browser: Browser, url: str) -> Iterator[Page]:
+    """A game to look at, opened once: it stays at its first frame."""
+    with paused(browser, url) as page:
+        yield page
 
 
 def wish(page: Page, **fields: object) -> None:
@@ -101,7 +116,7 @@ def test_keys_held_and_released_move_the_ship(page: Page):
     assert angle == pytest.approx((32 * FRAME) ** 2 * 1.5 + dt * 32 * FRAME / 2, abs=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_scripted_flight_wins(page: Page):
     """With the keys of `steered_home` pressed and released in the page."""
     wish(page, asteroids=0)
@@ -115,6 +130,7 @@ def test_a_scripted_flight_wins(page: Page):
     assert page.locator("#banner.won").inner_text() == "You won"
 
 
+@pytest.mark.slow
 def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
     page: Page, tmp_path: Path
 ):
@@ -140,6 +156,7 @@ def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
     assert page.evaluate("game.now.flyers[1].deviation") > 1e-3
 
 
+@pytest.mark.slow
 def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Path):
     """Real keys in real time; the file, played by the harness, ends in the very state that the page
     showed."""
@@ -174,7 +191,7 @@ def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Pa
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_saved_flight_is_shown_again_to_the_same_bits(
     browser: Browser, page: Page, tmp_path: Path
 ):
@@ -200,6 +217,7 @@ def test_a_saved_flight_is_shown_again_to_the_same_bits(
     assert heard == []
 
 
+@pytest.mark.slow
 def test_any_scene_file_can_be_flown(browser: Browser):
     """Walls, static disks and no wrap: drawn and played to its end, with no earth to win."""
     scenario = read_scene_file(
@@ -216,6 +234,7 @@ def test_any_scene_file_can_be_flown(browser: Browser):
     assert heard == []
 
 
+@pytest.mark.slow
 def test_a_finger_steers_too(page: Page):
     """The button acts as long as it is held."""
     wish(page, asteroids=0)
@@ -230,6 +249,7 @@ def test_a_finger_steers_too(page: Page):
     assert page.evaluate("game.now.ship[2]") == pytest.approx(0.25 * 20 * FRAME, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_a_lost_connection_is_reported_and_mended(page: Page):
     """The page says so, and begins anew when the server is there again."""
     fly(page, 3)
@@ -240,6 +260,7 @@ def test_a_lost_connection_is_reported_and_mended(page: Page):
     page.wait_for_function("() => !game.field.seen && game.now.frame === 0", timeout=10_000)
 
 
+@pytest.mark.slow
 def test_another_engine_can_be_solid(page: Page):
     """Its row is first in the flight; a ghost can be left out."""
     page.locator("[name=solid][value='pymunk:shipped']").check()
@@ -288,11 +309,13 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
     assert heard == []
 
 
-def test_the_table_is_on_the_first_screen(page: Page):
+def test_the_table_is_on_the_first_screen(first_frame: Page):
     """All ten engines at 1280 x 900."""
-    bottom = page.evaluate("document.querySelector('.engines').getBoundingClientRect().bottom")
+    bottom = first_frame.evaluate(
+        "document.querySelector('.engines').getBoundingClientRect().bottom"
+    )
 
-    assert page.locator("tr[data-engine]").count() == len(ENGINES)
+    assert first_frame.locator("tr[data-engine]").count() == len(ENGINES)
     assert bottom <= 900
 
 
@@ -319,13 +342,13 @@ RADII = """() => {
 }"""
 
 
-def test_labels_of_rings_at_one_place_do_not_lie_on_each_other(page: Page):
+def test_labels_of_rings_at_one_place_do_not_lie_on_each_other(first_frame: Page):
     """Nor on the ship's name, nor outside of the field, wherever the place is; their rings have
     different radii."""
-    width, height, _ = page.evaluate("game.sky.size")
-    first, second, elsewhere = page.evaluate(RADII)
+    width, height, _ = first_frame.evaluate("game.sky.size")
+    first, second, elsewhere = first_frame.evaluate(RADII)
 
-    for taken in page.evaluate(BOXES):
+    for taken in first_frame.evaluate(BOXES):
         for k, (left, top, right, bottom) in enumerate(taken):
             assert min(left, top, width - right, height - bottom) > -1
             for other in taken[:k]:
@@ -335,15 +358,15 @@ def test_labels_of_rings_at_one_place_do_not_lie_on_each_other(page: Page):
     assert elsewhere == first
 
 
-def test_with_reduced_motion_nothing_moves_by_itself(page: Page):
+def test_with_reduced_motion_nothing_moves_by_itself(first_frame: Page):
     """The flight waits for the engine."""
-    page.wait_for_timeout(200)
+    first_frame.wait_for_timeout(200)
 
-    assert page.evaluate("[game.now.frame, game.paused]") == [0, True]
-    assert "starts the flight" in page.locator("#banner").inner_text()
+    assert first_frame.evaluate("[game.now.frame, game.paused]") == [0, True]
+    assert "starts the flight" in first_frame.locator("#banner").inner_text()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_frame_time_is_measured_by_a_command():
     """`python -m tests.bench.game` prints a row for each thing timed, and how fast the flight
     goes."""
@@ -362,6 +385,7 @@ def test_the_frame_time_is_measured_by_a_command():
     assert float(lines[-1].split()[0]) > 1.0
 
 
+@pytest.mark.slow
 def test_the_page_tells_its_frame_time(page: Page):
     """Pictures a second, and what the engines take of a frame."""
     fly(page, 30)
@@ -371,6 +395,7 @@ def test_the_page_tells_its_frame_time(page: Page):
     )
 
 
+@pytest.mark.slow
 def test_a_page_of_an_earlier_server_is_loaded_anew(browser: Browser):
     """Started again with other engines on the same port, as after a change of one's solver: the new
     ones fly."""

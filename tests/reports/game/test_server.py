@@ -221,6 +221,7 @@ def test_a_flight_is_the_same_whatever_another_tab_does_meanwhile(monkeypatch: p
     assert bits(together) == bits(alone)
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_reported(served: Served, tmp_path: Path):
     """Exit 0, no traceback, with a tab open; where the port is taken the next free one is used and
     named."""

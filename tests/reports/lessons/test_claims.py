@@ -24,7 +24,7 @@ from reports.stability.limits import LIMIT, QUICK
 from tests.reports.page.browsing import opened
 
 COSTLY = ("box", "crowd", "horizon", "limits")  # a second or more for each setting
-EVERY = [pytest.param(name, marks=pytest.mark.slow if name in COSTLY else ()) for name in LESSONS]
+EVERY = [pytest.param(name, marks=pytest.mark.long if name in COSTLY else ()) for name in LESSONS]
 TIMED = "crowd"  # its curves are times, which a busy machine disturbs
 
 
@@ -55,7 +55,7 @@ def test_every_claim_holds_at_the_ends_of_all_sliders(name: str):
         assert wrong == [], places
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in LESSONS if name not in (TIMED, "limits")])
 def test_every_claim_holds_at_every_setting(name: str):
     """Between the ends, too."""
@@ -63,7 +63,7 @@ def test_every_claim_holds_at_every_setting(name: str):
         assert false_claims(LESSONS[name].at(places)) == [], places
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("case", range(len(LESSONS["limits"].sliders[0].values)))
 def test_every_claim_on_a_limit_holds_for_every_engine(case: int):
     """In each case; a case without an engine has none."""

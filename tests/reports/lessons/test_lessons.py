@@ -27,8 +27,8 @@ from scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened, overhang, served
 
 BROWSED, COSTLY = ("order",), ("box", "crowd", "horizon", "limits")
-EVERY = [pytest.param(name, marks=() if name in BROWSED else pytest.mark.slow) for name in LESSONS]
-SLOW = [pytest.param(name, marks=pytest.mark.slow if name in COSTLY else ()) for name in LESSONS]
+EVERY = [pytest.param(name, marks=() if name in BROWSED else pytest.mark.long) for name in LESSONS]
+SLOW = [pytest.param(name, marks=pytest.mark.long if name in COSTLY else ()) for name in LESSONS]
 
 
 @pytest.mark.parametrize(

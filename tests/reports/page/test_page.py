@@ -67,6 +67,7 @@ def test_every_chart_is_drawn_once_it_is_in_view(page: Page, name: str, charts: 
         assert len(names) >= len(PLAYED) - 1
 
 
+@pytest.mark.slow
 def test_nothing_is_drawn_before_it_is_in_view(browser: Browser, path: Path) -> None:
     """A page just opened has drawn no chart and unpacked no replay of its last scenario."""
     page, _ = opened(browser, path.as_uri())
@@ -94,7 +95,9 @@ def test_the_replay_moves_disks(page: Page) -> None:
     assert page.evaluate(picture, HEAD_ON) != before
 
 
-@pytest.mark.parametrize("name", [HEAD_ON, ORBIT, ASTEROIDS])
+@pytest.mark.parametrize(
+    "name", [HEAD_ON, *(pytest.param(name, marks=pytest.mark.slow) for name in (ORBIT, ASTEROIDS))]
+)
 def test_the_replay_shows_the_trajectory(
     page: Page, comparisons: list[Comparison], name: str
 ) -> None:
@@ -167,6 +170,7 @@ def test_the_legend_hides_an_engine_everywhere(page: Page) -> None:
     assert plot.evaluate(visible) is True
 
 
+@pytest.mark.slow
 def test_charts_follow_the_dark(page: Page) -> None:
     """Where the reader turns to dark, the lines that are drawn take the colours of the dark."""
     with_engine(page, HEAD_ON)
@@ -210,6 +214,7 @@ def test_failed_and_refused_runs_are_in_sight(page: Page) -> None:
     assert ["crashed" in listed[0], "refused" in listed[1]] == [True, True]
 
 
+@pytest.mark.slow
 def test_the_page_never_scrolls_sideways(browser: Browser, path: Path) -> None:
     """All fits the width, narrow or wide, however long a word is; wide tables scroll by
     themselves."""
@@ -265,6 +270,7 @@ def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:
     assert "crosscheck run nothing" in (tmp_path / "r.html").read_text()
 
 
+@pytest.mark.slow
 def test_the_browser_of_these_tests_hears_what_a_page_asks_for(
     browser: Browser, tmp_path: Path
 ) -> None:

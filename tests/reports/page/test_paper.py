@@ -68,6 +68,7 @@ def test_charts_that_were_never_in_view_are_printed(browser: Browser, path: Path
     assert pages_of(made[0]) <= 12
 
 
+@pytest.mark.slow
 def test_every_chart_on_paper_is_drawn_and_is_gone_from_the_screen_after(sheet: Page):
     """One of all scenes, two of the scene that was asked for; none is left behind."""
     sheet.evaluate("dispatchEvent(new Event('beforeprint'))")
@@ -131,7 +132,7 @@ def test_a_scene_that_is_asked_for_has_half_a_page_and_others_none(sheet: Page):
     assert (others, controls) == (False, 0)
 
 
-@pytest.mark.slow  # 39 scenes, as many as a whole run has and one more
+@pytest.mark.long  # 39 scenes, as many as a whole run has and one more
 def test_a_whole_run_is_twelve_pages_at_most(
     browser: Browser, comparisons: list[Comparison], tmp_path: Path
 ):
@@ -202,6 +203,7 @@ def test_the_numbers_of_a_chart_are_saved_as_they_were_computed(
     assert heard == []
 
 
+@pytest.mark.slow
 def test_a_chart_is_saved_as_a_picture_with_its_title_and_legend(browser: Browser, path: Path):
     """As SVG, in the colours of paper also where the page is dark, without what is hidden."""
     page, heard = opened(

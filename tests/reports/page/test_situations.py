@@ -168,6 +168,7 @@ def test_one_scene_does_not_drown_a_column():
     assert not overview.mark_best(cells, {"a:b"})["a:b"][0].best
 
 
+@pytest.mark.slow
 def test_a_link_to_another_page_is_there_only_if_the_page_is(
     comparisons: list[Comparison], tmp_path: Path
 ):
@@ -247,6 +248,7 @@ def test_no_table_is_cut_at_1280(browser: Browser, path: Path):
     assert cut[1] != []
 
 
+@pytest.mark.slow
 def test_a_box_that_scrolls_is_reached_by_keyboard_and_has_a_name(browser: Browser, path: Path):
     """At 400 px; what shows all of itself is passed over."""
     page, heard = opened(browser, path.as_uri(), viewport={"width": 400, "height": 900})

@@ -114,7 +114,7 @@ def test_an_edited_answer_is_as_good_as_none(tmp_path: Path, edit: str):
 
 @pytest.mark.parametrize(
     "edit",
-    [pytest.param(name, marks=pytest.mark.slow) if k else name for k, name in enumerate(EDITS)],
+    [pytest.param(name, marks=pytest.mark.long) if k else name for k, name in enumerate(EDITS)],
 )
 def test_an_edited_answer_is_computed_again_and_said(whole: Path, tmp_path: Path, edit: str):
     """All numbers are as they were, though every share was deleted with it."""
@@ -180,7 +180,9 @@ def test_numbers_of_a_record_are_numbers_and_its_texts_texts():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("place", ["trajectories", "compared"])
+@pytest.mark.parametrize(
+    "place", ["trajectories", pytest.param("compared", marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize(
     "words", [("report", "out"), ("diff", "whole", "out")], ids=["report", "diff"]
 )

@@ -247,7 +247,7 @@ def test_a_line_that_does_not_fit_its_scene_is_named(
         assert f"the line of the cell {cell}: {at[0]} = {value!r}" in done.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_is_taken_ends_no_command_with_a_traceback(made: Path, tmp_path: Path):
     """Of the edits that the schema lets pass, a sample goes to every command; an exception would
     fail this test."""

@@ -297,7 +297,7 @@ def test_a_file_that_never_ends_has_no_digest(tmp_path: Path):
     assert digest_of("/dev/zero") == digest_of(tmp_path) == digest_of("a\0b") == ""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pages_are_made_of_what_is_taken(stability: Path, tmp_path: Path):
     """Of the edits that are let pass, a sample is written: an exception would fail this test."""
     whole = [json.loads(line) for line in (stability / JOURNAL).read_text().splitlines()]

@@ -18,7 +18,7 @@ def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return undisturbed(LONG, tmp_path_factory.mktemp("long"))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_parent_that_is_killed_leaves_all_that_had_ended(long: Path, tmp_path: Path):
     """`kill -9` in the middle, then resume: nothing lost, nothing twice, and no worker outlives
     it."""
@@ -57,7 +57,7 @@ def test_workers_that_are_killed_are_replaced_and_their_cells_played_again(
     assert_nothing_lost(tmp_path / "out", long)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("how", "code", "word"),
     [(signal.SIGINT, 130, "Interrupted."), (signal.SIGTERM, 143, "Terminated.")],

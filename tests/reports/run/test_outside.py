@@ -188,7 +188,7 @@ def test_no_more_workers_are_started_than_the_machine_can_hold(
     assert "limit of 1024 open files, of which each takes 5): 184 do" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_thousand_workers_crash_nothing(tmp_path: Path):
     """As many are started as can be, with memory enough for each."""
     done = crosscheck(*SMALL, "--workers", "1000", "--out", "out", cwd=tmp_path)
@@ -214,7 +214,7 @@ def test_a_solver_that_is_stopped_is_not_said_to_be_in_a_line_of_this_program(tm
     assert not ended.outside
 
 
-@pytest.mark.parametrize("name", ["UPPER.PY", "Mixed.Py"])
+@pytest.mark.parametrize("name", ["UPPER.PY", pytest.param("Mixed.Py", marks=pytest.mark.slow)])
 def test_a_solver_may_be_called_in_capitals(tmp_path: Path, name: str):
     """As `check` takes it: no engine of that name is looked for."""
     (tmp_path / name).write_text("nonsense(")

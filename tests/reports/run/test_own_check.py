@@ -63,7 +63,7 @@ def test_sentences_are_numbered_where_there_are_some():
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_run_says_what_check_says(tmp_path: Path):
     """The second command of the README, of a faulty file: played at every step, with the same cause
     first on the page and in the terminal; a resumed run does not check again what it has."""

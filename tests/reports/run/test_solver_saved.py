@@ -67,9 +67,9 @@ def place(folder: Path, file: str, factor: int) -> Path:
     return folder / "solver.py"
 
 
-QUICK = ("plain.js", "plain.py", "compiled beside")
+MARKS = {"plain.py": (), "plain.js": pytest.mark.slow, "compiled beside": pytest.mark.slow}
 SAVED = [
-    pytest.param(file, marks=() if file in QUICK else pytest.mark.slow)
+    pytest.param(file, marks=MARKS.get(file, pytest.mark.long))
     for file in (*TEXTS, "beside", "compiled", "compiled beside")
 ]
 
@@ -103,9 +103,8 @@ def test_the_text_that_was_read_is_played_whatever_is_saved_since(
     assert before.source != after.source
 
 
-@pytest.mark.parametrize(
-    "file", [pytest.param("compiled", marks=pytest.mark.slow), "compiled beside"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("file", ["compiled", "compiled beside"])
 def test_what_numba_keeps_would_be_taken_for_another_text(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
@@ -120,7 +119,7 @@ def test_what_numba_keeps_would_be_taken_for_another_text(
     assert np.array_equal(first.trajectory.position, second.trajectory.position)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("file", ["plain.js", "plain.py", "beside"])
 def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
@@ -140,7 +139,7 @@ def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", ["plain.js", "beside"])
+@pytest.mark.parametrize("file", ["plain.js", pytest.param("beside", marks=pytest.mark.long)])
 def test_a_file_that_vanishes_during_a_run_is_played_to_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
@@ -178,6 +177,7 @@ def flight(out: Path) -> tuple[list[str], list[bytes]]:
     return keys, [load_trajectory(trajectory_file(out, key)).position.tobytes() for key in keys]
 
 
+@pytest.mark.slow
 def test_the_page_of_a_check_shows_the_text_that_was_checked(tmp_path: Path):
     """Its digest and its smallest scene, though the file is gone since."""
     path = place(tmp_path, "plain.js", 2)

@@ -132,7 +132,7 @@ def test_advice_names_those_that_keep_the_error_and_those_that_do_not(tmp_path: 
     assert all(one["error"] > 0.001 and one["why"] for one in short.values())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_where_no_engine_keeps_the_error_the_answer_is_none_and_why(tmp_path: Path):
     """Exit 1, as a comparison that was asked for could not be made."""
     words = ["bouncing_ball_e09", "--engine", "box2d:shipped", "--error", "1e-6"]

@@ -133,6 +133,7 @@ def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
     assert rows.loc[RESIDUAL].position_radii <= 1e-12
 
 
+@pytest.mark.slow
 def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce():
     """All eight with known mechanisms; float32 alone leaves less than a thousandth of an engine's
     error."""

@@ -101,6 +101,7 @@ def test_no_one_scene_is_the_pooled_curve():
         assert not np.isclose(middle_half(each), each, rtol=1e-6).any()
 
 
+@pytest.mark.slow
 def test_the_scenes_and_the_median_of_before_fail_both():
     """Negative control: with the scenes of before the statistic moves by more, and their median was
     free_fall's own closed form, a g dt t / 2 over the radius, at every step.
@@ -118,7 +119,7 @@ def test_the_scenes_and_the_median_of_before_fail_both():
     assert median_moved(errors) > 10 * MOST
 
 
-@pytest.mark.slow  # ten engines through fourteen scenes
+@pytest.mark.long  # ten engines through fourteen scenes
 def test_no_one_scene_is_the_pooled_curve_of_any_engine():
     """All engines and profiles."""
     assert most_moved(errors_of(QUICK.scenes, tuple(ENGINES))) < MOST

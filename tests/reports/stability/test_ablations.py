@@ -56,7 +56,9 @@ def found(case: str, engine: str) -> tuple[Search, Limit]:
         ("restitution", "pymunk:shipped", RESTITUTION),  # e2 for e
         ("far_from_origin", "box2d:matched", "float32"),
         ("bounce_drift", "reference:exercise", FLIGHT),  # symplectic Euler
-        ("bounce_drift", "reference:lesson", FLIGHT),  # explicit Euler
+        pytest.param(
+            "bounce_drift", "reference:lesson", FLIGHT, marks=pytest.mark.slow
+        ),  # explicit Euler
     ],
 )
 def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, engine: str, mechanisms: str):

@@ -74,7 +74,7 @@ def test_in_a_large_box_the_rate_is_enskogs_and_the_pressure_that_of_the_bulk():
     assert found.force / (2 * size.sum()) == pytest.approx(z * n / size.prod(), rel=1e-5)
 
 
-@pytest.mark.parametrize("packing", [0.2, 0.4, 0.6])
+@pytest.mark.parametrize("packing", [0.2, 0.4, pytest.param(0.6, marks=pytest.mark.slow)])
 def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literature(packing: float):
     """Two gases of a hundred disks, within 1 % (scaled particle theory, corners) and four block
     errors.
@@ -181,6 +181,7 @@ def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_
         assert verdict(MOMENTUM_DRIFTS, scenario, replace(one, velocity=frozen(velocity))).failed
 
 
+@pytest.mark.slow
 def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
     """At packing 0.6 an engine that detects at the end of a step has a tenth too few collisions; in
     order within it, not."""
@@ -240,7 +241,7 @@ def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets
     assert reported[3] > 10
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("engine", ["pymunk:shipped", "box2d:matched"])
 def test_the_limit_of_a_fast_gas_is_that_of_other_draws_too(engine: str):
     """Sixteen other gases move it by less than a half; the first of them that fails comes at any

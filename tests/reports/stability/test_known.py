@@ -82,6 +82,7 @@ def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
     )
 
 
+@pytest.mark.slow
 def test_only_the_speculative_margin_makes_spurious_collisions():
     """Box2D 3.1, within four slops: as shipped 0.02 m, 0.04 of the sum of the radii; nobody
     else."""
@@ -215,6 +216,7 @@ def test_a_restitution_of_a_pair_is_e_squared_only_in_pymunk_as_shipped():
     assert limit("restitution", "pymunk:matched").verdict == "does not fail"
 
 
+@pytest.mark.slow
 def test_a_pair_keeps_its_velocities_up_to_a_mass_ratio_of_1e8():
     """Alone, no engine has trouble with unequal masses."""
     assert all(

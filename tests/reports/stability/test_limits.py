@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import replace
 from functools import cache
 from math import isfinite, isnan
+from typing import Any
 
 import pytest
 
@@ -68,6 +69,13 @@ def name_of(row: Kept) -> str:
     return f"{row.case}-{row.engine}"
 
 
+def some_of(rows: list[Kept]) -> list[Any]:
+    """Every tenth is for the gate, the others are for the long run."""
+    return [
+        pytest.param(row, marks=[pytest.mark.long] if k % 10 else []) for k, row in enumerate(rows)
+    ]
+
+
 @pytest.mark.parametrize("row", SOME, ids=name_of)
 def test_the_quick_form_finds_the_limit_of_the_full_one(row: Kept):
     """Of the cases that take a tenth of a second."""
@@ -75,7 +83,7 @@ def test_the_quick_form_finds_the_limit_of_the_full_one(row: Kept):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("row", SEARCHED, ids=name_of)
+@pytest.mark.parametrize("row", some_of(SEARCHED), ids=name_of)
 def test_the_quick_form_finds_a_limit_of_the_full_one_in_every_case(row: Kept):
     """The suite's own scenes among them."""
     assert_agrees(row)
@@ -106,7 +114,7 @@ def wrong_ends(row: Kept) -> list[float]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("row", [row for row in REST if row not in SEARCHED], ids=name_of)
+@pytest.mark.parametrize("row", some_of([row for row in REST if row not in SEARCHED]), ids=name_of)
 def test_a_limit_of_the_full_form_works_and_fails_where_it_says(row: Kept):
     """All phases of the last value that works and the first one that fails."""
     assert wrong_ends(row) == []

@@ -174,7 +174,9 @@ def imported_here() -> frozenset[str]:
     return frozenset(ours - {name.partition(".")[0] for name in before})
 
 
-@pytest.mark.parametrize("path", [":", pytest.param(":/nowhere", marks=pytest.mark.slow), "."])
+@pytest.mark.parametrize(
+    "path", [".", *(pytest.param(path, marks=pytest.mark.slow) for path in (":", ":/nowhere"))]
+)
 def test_a_pythonpath_with_the_current_folder_runs_nothing_of_it(tmp_path: Path, path: str):
     """An empty entry of PYTHONPATH is the current folder; all that this program imports is called
     so there."""
@@ -252,14 +254,18 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], 
 
 
 @pytest.mark.parametrize(
-    "begin", [["-P", "-c", "from reports.__main__ import main; main()"], ["-m", "reports"]]
+    "begin",
+    [
+        ["-P", "-c", "from reports.__main__ import main; main()"],
+        pytest.param(["-m", "reports"], marks=pytest.mark.slow),
+    ],
 )
 @pytest.mark.parametrize(
     "words",
     [
         ["list", "engines"],
-        pytest.param(["check", "my_plain.py"], marks=pytest.mark.slow),
-        pytest.param(["check", "my_plain.js"], marks=pytest.mark.slow),
+        pytest.param(["check", "my_plain.py"], marks=pytest.mark.long),
+        pytest.param(["check", "my_plain.js"], marks=pytest.mark.long),
         pytest.param(
             [
                 "run",
@@ -273,7 +279,7 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], 
                 "--out",
                 "../out",
             ],
-            marks=pytest.mark.slow,
+            marks=pytest.mark.long,
         ),
     ],
 )
@@ -308,20 +314,23 @@ def test_without_the_safe_path_a_module_beside_readme_is_run(clone: tuple[Path, 
 @pytest.mark.parametrize(
     "words",
     [
-        [
-            "run",
-            "head_on_equal_e09",
-            "--dt",
-            str(1 / 60),
-            "--engine",
-            "pymunk:matched",
-            "--engine",
-            "my_arrays.py",
-            "--out",
-            "../out",
-        ],
+        pytest.param(
+            [
+                "run",
+                "head_on_equal_e09",
+                "--dt",
+                str(1 / 60),
+                "--engine",
+                "pymunk:matched",
+                "--engine",
+                "my_arrays.py",
+                "--out",
+                "../out",
+            ],
+            marks=pytest.mark.long,
+        ),
         ["check", "my_plain.py"],
-        ["truth", "head_on_equal_e09"],
+        pytest.param(["truth", "head_on_equal_e09"], marks=pytest.mark.long),
     ],
 )
 def test_a_command_runs_nothing_of_the_folder_it_is_started_in(ran, words: list[str]):

@@ -47,13 +47,18 @@ def test_an_outlet_takes_all_and_remembers_the_first_fault():
         pytest.param(
             "$C list engines >&-", 1, REFUSED + "Bad file descriptor", marks=pytest.mark.slow
         ),
-        ("$C list engines | head -0; exit ${PIPESTATUS[0]}", 1, REFUSED + "Broken pipe"),
+        pytest.param(
+            "$C list engines | head -0; exit ${PIPESTATUS[0]}",
+            1,
+            REFUSED + "Broken pipe",
+            marks=pytest.mark.slow,
+        ),
         pytest.param("$C list engines >/dev/null", 0, "", marks=pytest.mark.slow),
         pytest.param(
             "$C list nothing >&-", 2, "list 'nothing' is not known", marks=pytest.mark.slow
         ),
         pytest.param("$C list nothing 2>&-", 2, "", marks=pytest.mark.slow),
-        ("$C list nothing 2>/dev/full", 2, ""),
+        pytest.param("$C list nothing 2>/dev/full", 2, "", marks=pytest.mark.slow),
         ("$C list engines <&- >&- 2>&-", 1, ""),
         ("PYTHONOPTIMIZE=2 $C list engines", 2, "PYTHONOPTIMIZE=2"),
     ],
@@ -72,7 +77,14 @@ def test_a_stream_that_takes_nothing_is_one_sentence(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "stream", [">/dev/full", ">&-", "| head -0; exit ${PIPESTATUS[0]}", "2>/dev/full", "2>&- >&-"]
+    "stream",
+    [
+        ">/dev/full",
+        *(
+            pytest.param(stream, marks=pytest.mark.long)
+            for stream in (">&-", "| head -0; exit ${PIPESTATUS[0]}", "2>/dev/full", "2>&- >&-")
+        ),
+    ],
 )
 def test_what_was_computed_is_kept_whatever_becomes_of_the_streams(tmp_path: Path, stream: str):
     """The run is whole in its place; a closed number of a stream is not taken by the journal and
@@ -112,7 +124,9 @@ PLACES = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("place", [*PLACES, "German"])
+@pytest.mark.parametrize(
+    "place", [*(pytest.param(place, marks=pytest.mark.long) for place in PLACES), "German"]
+)
 def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
     tmp_path: Path, place: str, request: pytest.FixtureRequest
 ):

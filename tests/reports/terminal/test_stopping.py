@@ -76,6 +76,8 @@ STALLED = {
     ),
     "a cell in replay": (["replay", "", "--out", "done"], "reports.run.playing:play_once"),
 }
+# what the gate plays of these
+FEW = ("the answer in run", "a limit in stability", "a scene in check")
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +102,10 @@ def place(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("how", BOTH)
-@pytest.mark.parametrize("stage", STALLED)
+@pytest.mark.parametrize(
+    "stage",
+    [pytest.param(stage, marks=[] if stage in FEW else [pytest.mark.long]) for stage in STALLED],
+)
 def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(
     place: Path, stage: str, how: int
 ):
@@ -137,7 +142,9 @@ def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: 
 @pytest.mark.parametrize(
     "words", [["run"], ["list"], ["diff", "done", "done"], ["report", "done"], ["check", SOLVERS]]
 )
-@pytest.mark.parametrize("after", [0.3, 1.0, 2.0])
+@pytest.mark.parametrize(
+    "after", [1.0, *(pytest.param(after, marks=pytest.mark.long) for after in (0.3, 2.0))]
+)
 def test_a_command_ends_whenever_it_is_signalled(place: Path, words: list, how: int, after: float):
     """While it imports, starts workers, writes: after so many s, wherever that is; what has ended
     by itself is done."""

@@ -35,7 +35,7 @@ SCENE = (Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml").r
 ONE = ("--engine", "reference:exercise", "--dt", "0.02")
 AGAIN = ("run", "my.toml", *ONE, "--out", "out")
 # Not every pair in the fast suite, but each member of every pair.
-THOROUGH = pytest.mark.slow
+THOROUGH = pytest.mark.long
 # A command line of each that makes a folder.
 COMMANDS = {
     "run": AGAIN,
@@ -254,7 +254,10 @@ def test_a_link_to_nothing_is_refused(tmp_path: Path, command: str, to: str):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(name, marks=[pytest.mark.long] * (name != "run")) for name in COMMANDS],
+)
 def test_where_there_is_no_current_folder_any_more_it_is_said(tmp_path: Path, command: str):
     """It was deleted under the feet of the command: exit 2, one line, nothing is made."""
     gone = (

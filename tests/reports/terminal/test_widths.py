@@ -77,7 +77,7 @@ def test_what_is_printed_at_once_fits_its_terminal(words: tuple, columns: int, t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("columns", WIDTHS)
+@pytest.mark.parametrize("columns", [40, pytest.param(80, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     "words",
     [
@@ -86,10 +86,15 @@ def test_what_is_printed_at_once_fits_its_terminal(words: tuple, columns: int, t
         ("report", "out"),
         ("diff", "out", "later"),
         ("check", "class"),
-        ("check", SOLVER),
-        ("advise", "head_on_equal_e09", "--engine", "pymunk"),
-        ("stability", "slow_collision", "--engine", "pymunk", "--out", "limits"),
-        ("speed", "free_fall", "--engine", "pymunk", "--out", "speed"),
+        pytest.param(("check", SOLVER), marks=pytest.mark.long),
+        pytest.param(("advise", "head_on_equal_e09", "--engine", "pymunk"), marks=pytest.mark.long),
+        pytest.param(
+            ("stability", "slow_collision", "--engine", "pymunk", "--out", "limits"),
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            ("speed", "free_fall", "--engine", "pymunk", "--out", "speed"), marks=pytest.mark.long
+        ),
         ("lesson", "order", "--export", "order.html"),
     ],
     ids=lambda words: f"{words[0]}-{Path(words[1]).stem}",
@@ -100,7 +105,7 @@ def test_what_takes_its_time_fits_its_terminal(words: tuple, columns: int, runs:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("columns", WIDTHS)
+@pytest.mark.parametrize("columns", [40, pytest.param(80, marks=pytest.mark.long)])
 def test_a_run_counts_on_a_terminal_in_whole_numbers(columns: int, tmp_path: Path):
     """Whatever is shown of the count and the time left is shown whole, beside what is played."""
     done = on_terminal(columns, *RUN, "--engine", "pymunk", cwd=tmp_path)
