@@ -3,7 +3,7 @@ grammar."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 import pandas as pd
@@ -16,16 +16,20 @@ FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
-    """Three sentences: who is closest, what settings are worth, where each fails; a fourth on who
-    is not counted."""
+    """Three sentences: who is closest, what settings are worth, where each fails; of none who is
+    `untrusted`."""
     off = position_errors(comparisons).drop(columns=list(untrusted), errors="ignore")
     statuses = [run.status for comparison in comparisons for run in comparison.runs]
-    sentences = [closest(off), worth_of_settings(off), where_it_fails(off, statuses)]
-    if untrusted:
-        sentences.append(
-            f"Not counted, as it broke the protocol of the harness: {', '.join(sorted(untrusted))}."
-        )
-    return sentences
+    return [closest(off), worth_of_settings(off), where_it_fails(off, statuses)]
+
+
+def not_counted(broken: Mapping[str, str]) -> list[str]:
+    """A sentence for each engine that broke the protocol: name -> the probe that it missed, and
+    how."""
+    return [
+        f"Not counted: {name} breaks the protocol of the harness. {how}"
+        for name, how in sorted(broken.items())
+    ]
 
 
 def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
