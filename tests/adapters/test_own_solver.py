@@ -11,7 +11,7 @@ import pytest
 
 from adapters.conformance.conform import ask, conform
 from adapters.own_solver.engine import engine_file
-from adapters.own_solver.restitution import OwnRestitution, written
+from adapters.own_solver.restitution import own_restitution
 from adapters.play import play
 from scenarios.catalogue import scenario
 from scenarios.families.exercise import asteroid_field
@@ -250,7 +250,7 @@ def test_a_file_is_refused_only_for_a_restitution_that_is_written_into_it(
     text: str, came: float, wanted: float, fits: bool
 ):
     """What its collisions have may be a fault's doing."""
-    assert OwnRestitution(tuple(written(text, came)), came).fits(wanted) is fits
+    assert own_restitution(text, came).fits(wanted) is fits
 
 
 @pytest.mark.parametrize(
