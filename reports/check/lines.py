@@ -131,6 +131,7 @@ WRITTEN = {
     "position": ("position",),
     "spin": ("angularVelocity",),
     "angle": ("alpha",),
+    "turns": ("alpha",),
     "coasting": ("velocity", "angularVelocity"),
     "force kept": ("force", "torque"),
     "sphere kept": ("mass", "MoI", "size"),

@@ -43,6 +43,7 @@ FORMULAS = {
     "position": "x' = x + v' dt, with the new velocity v'",
     "spin": "w' = w + (torque / MoI) dt",
     "angle": "alpha' = alpha + w' dt, with the new angular velocity w'",
+    "turns": "alpha' = alpha + w' dt; alpha and alpha + 2 pi are the same direction",
     "coasting": "v' = v + (F / mass) dt, w' = w + (torque / MoI) dt, with F = 0 and torque = 0",
     "2a": "the spheres collide if |xA - xB| < sizeA + sizeB",
     "2b": "|xA' - xB'| = sizeA + sizeB; both are moved along n = (xA - xB) / |xA - xB|",

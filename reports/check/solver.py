@@ -17,7 +17,7 @@ from reports.check.impacts import APPROACH, BACKWARDS, explain
 from reports.check.impulse import impulse_rows
 from reports.check.lines import SHOWN, Source
 from reports.check.loop import loop_rows
-from reports.check.motion import motion_rows
+from reports.check.motion import TURNED, motion_rows
 from reports.check.projection import moved_together, projection_rows
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, ask_in_two_orders, stuck
 from reports.check.restitution import Restitution, restitution_of
@@ -115,7 +115,7 @@ def hinted(rows: list[CheckRow], text: str) -> list[CheckRow]:
 SET_IN_CONDITION = re.compile(r"\b(if|while)\s*\(\s*[\w.]+\s*=(?![=>])")
 
 
-MOTION = ("force", "force, other numbers", "coast", "force twice")
+MOTION = ("force", "force, other numbers", "coast", "force twice", *TURNED)
 
 
 def loads(process: SolverProcess) -> CheckRow:
