@@ -24,8 +24,9 @@ class Finding:
         got: the answer, a number in the unit of the question, or words.
         expected: the answer of an engine that keeps to protocol and scene.
         bound: how far a number may be from it.
-        verdict: "keeps"; "departs": plays by the protocol, but other physics than the scene states;
-            "breaks": no number of this engine may be trusted.
+        verdict: "keeps"; "not asked": it refuses the scene of the question, and `note` says why;
+            "departs": plays by the protocol, but other physics than the scene states; "breaks": no
+            number of this engine may be trusted.
         note: what was raised or refused, or what limits the reading.
     """
 
@@ -44,7 +45,8 @@ def conform(name: str, row: EngineRow) -> list[Finding]:
     """One finding a probe, in the order of `PROBES`; only the finding "make" if the engine cannot
     be made.
 
-    Whatever an engine raises becomes a finding: a refusal (`Unsupported`) departs, all else breaks.
+    Whatever an engine raises becomes a finding: a refusal (`Unsupported`) is not asked further; all
+    else misses the probe.
     """
     engine, profile = name.split(":")
     try:
@@ -75,13 +77,13 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
     probe = PROBES[name]
     try:
         reading = probe.read(row)
-        verdict = "keeps" if reading.kept else probe.failure
+        verdict = "keeps" if reading.kept else missed(probe, row)
     except Unsupported as refusal:
-        reading, verdict = ProbeReading("refused", "an answer", note=str(refusal)), "departs"
+        reading, verdict = ProbeReading("refused", "an answer", note=str(refusal)), "not asked"
     except Exception as error:  # an engine may raise anything; the finding says what
         reading, verdict = (
             ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}"),
-            "breaks",
+            missed(probe, row) if is_own(row) else "breaks",
         )
     return Finding(
         engine,
@@ -94,3 +96,13 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
         verdict,
         reading.note,
     )
+
+
+def missed(probe: Probe, row: EngineRow) -> str:
+    """The verdict on who misses a probe."""
+    return "departs" if probe.handed_on and is_own(row) else probe.failure
+
+
+def is_own(row: EngineRow) -> bool:
+    """Whether it is a solver's own file, to which the harness hands on what the scene states."""
+    return bool(row.source)

@@ -54,7 +54,7 @@ def slow_flight(row: EngineRow) -> ProbeReading:
 def fast_flight(row: EngineRow) -> ProbeReading:
     """Speed in m/s of a free disk after 4 steps of 1/64 s, 16 radii each."""
     speed = 512.0
-    with loaded(row, one_disk(velocity=(speed, 0.0)), 1 / 64) as engine:
+    with loaded(row, one_disk(velocity=(speed, 0.0)), dt=1 / 64) as engine:
         engine.step(4)
         return ProbeReading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
 
@@ -62,7 +62,7 @@ def fast_flight(row: EngineRow) -> ProbeReading:
 def fast_spin(row: EngineRow) -> ProbeReading:
     """Spin in rad/s of a free disk after 4 steps of 1/64 s, three quarters of a turn each."""
     spin = 300.0
-    with loaded(row, one_disk(spin=spin), 1 / 64) as engine:
+    with loaded(row, one_disk(spin=spin), dt=1 / 64) as engine:
         engine.step(4)
         return ProbeReading(float(engine.read().angular_velocity[0]), spin, 2 * row.rounding * spin)
 

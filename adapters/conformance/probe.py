@@ -3,19 +3,20 @@ with its bound."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.engine import Engine
+from adapters.engine import Engine, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.first_collisions import first_collisions
 from scenarios.model import Array, Scene, frozen
 
+EXERCISE = 0.9  # the restitution that the exercise states
 DT = 1 / 256  # s; a power of two, so that a whole number of steps is a time without rounding
 
 
@@ -45,19 +46,49 @@ class Probe:
         read: makes fresh engines from a row of `ENGINES` and closes them again.
         failure: "breaks" if a miss means that the adapter breaks the protocol, so that no number of
             the engine may be trusted; "departs" if it means other physics than the scene states.
+        handed_on: it reads what an adapter hands on to its library (mass, forces, dt) or reports
+            from it (collisions). To a solver's own file the harness hands it on, so that a miss is
+            the physics of the file, and departs.
     """
 
     asked: str
     read: Callable[[EngineRow], ProbeReading]
     failure: Literal["breaks", "departs"]
+    handed_on: bool = False
 
 
 @contextmanager
-def loaded(row: EngineRow, scene: Scene, dt: float = DT) -> Iterator[Engine]:
-    """A fresh engine with `scene` in it, closed at the end whatever happens."""
+def loaded(row: EngineRow, *scenes: Scene, dt: float = DT) -> Iterator[Engine]:
+    """A fresh engine with the first of `scenes` in it that it does not refuse, closed at the end
+    whatever happens."""
     with closing(row.make()) as engine:
-        engine.load(scene, dt)
+        load_first(engine, scenes, dt)
         yield engine
+
+
+def load_first(engine: Engine, scenes: Sequence[Scene], dt: float) -> Scene:
+    """Load the first scene that the engine does not refuse, and return it; raises `Unsupported` if
+    it refuses all."""
+    *fuller, last = scenes
+    for scene in fuller:
+        with suppress(Unsupported):
+            engine.load(scene, dt)
+            return scene
+    engine.load(last, dt)
+    return last
+
+
+def simplified(scene: Scene) -> tuple[Scene, ...]:
+    """`scene`, then what a solver of the exercise plays of it, which has no walls, no static disks
+    and a restitution of its own: without the first two, with the exercise's e, one disk alone."""
+    moving = np.where(scene.static, 1.0, scene.mass)
+    bare = replace(scene, walls=np.zeros((0, 2, 2)), mass=moving, inertia=moving)
+    alone = {
+        name: value[:1]
+        for name, value in vars(bare).items()
+        if name not in ("walls", "gravity", "restitution", "wrap")
+    }
+    return scene, bare, replace(bare, restitution=EXERCISE), replace(bare, **alone)
 
 
 def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:
@@ -120,9 +151,10 @@ def reported(engine: Engine, dt: float = DT) -> str:
 
 
 def history(engine: Engine, steps: int = 60) -> list[tuple[str, bytes]]:
-    """What an engine does from now on: (what and when, its bytes) for every array at every 10th
-    step, then the collisions."""
+    """What an engine does from now on, with a force in the first step: (what and when, its bytes)
+    for every array at every 10th step, then the collisions."""
     seen: list[tuple[str, bytes]] = []
+    engine.apply_force(0, np.array([3.0, 1.0]), 0.5)
     for k in range(0, steps + 1, 10):
         if k:
             engine.step(10)

@@ -1,5 +1,5 @@
 """The restitution of somebody's file: the number that is written into it, beside the one that its
-collisions have."""
+collisions have. What plays a file and what checks it read it here."""
 
 from __future__ import annotations
 
@@ -27,18 +27,23 @@ class OwnRestitution:
     """Of a file with the exercise's functions, which take none.
 
     Attributes:
-        written: the numbers from 0 to 1 in its text that may be it, the likeliest first.
+        stated: the numbers from 0 to 1 that its text gives to a name such as e or restitution; then
+            0.9, if that or 1.9 occurs in it.
         came: separation over approach speed of two equal spheres that meet head-on; NaN where no
             collision came of it.
+        occurs: whether what came, or 1 more, is a number of its text.
     """
 
-    written: tuple[float, ...]
+    stated: tuple[float, ...]
     came: float
+    occurs: bool
 
     @property
     def own(self) -> float | None:
-        """The number that the file is written for; None if its text holds none."""
-        return next((e for e in self.written if same(e, self.came)), next(iter(self.written), None))
+        """The number that the file is written for: of those that are stated the one that came, else
+        the first; else what came, if it occurs. None if its text holds none."""
+        first = next(iter(self.stated), self.came if self.occurs else None)
+        return next((e for e in self.stated if same(e, self.came)), first)
 
     def fits(self, wanted: float) -> bool:
         """Whether the file can be played where a scene wants this restitution.
@@ -47,7 +52,7 @@ class OwnRestitution:
         is one whose collisions have what is wanted, or ought to have it: a fault makes any number
         of them.
         """
-        fitting = any(same(e, wanted) for e in (*self.written, self.came))
+        fitting = any(same(e, wanted) for e in (*self.stated, self.came))
         return fitting or self.own is None
 
     def __str__(self) -> str:
@@ -61,23 +66,24 @@ class OwnRestitution:
 
 def restitution_of(solver: SolverText, process: SolverProcess) -> OwnRestitution:
     """What the text of a file says, and what its collisions give."""
-    text = "\n".join([solver.text, *(module for file, module in solver.beside if is_own(file))])
-    came = probed(process)
-    return OwnRestitution(tuple(written(text, came)), came)
+    return own_restitution(own_text(solver), probed(process))
+
+
+def own_text(solver: SolverText) -> str:
+    """All that its author wrote."""
+    return "\n".join([solver.text, *(module for file, module in solver.beside if is_own(file))])
+
+
+def own_restitution(text: str, came: float) -> OwnRestitution:
+    """What a text says of the restitution, beside the one that `came` of its collisions."""
+    occurs = any(same(number, came) or same(number, 1 + came) for number in numbers_in(text))
+    return OwnRestitution(tuple(stated(text)), came, 0 <= came <= 1 and occurs)
 
 
 def is_own(file: str) -> bool:
     """Whether what lies beside a solver is its author's: the other thing that is read is
     gl-matrix."""
     return file.endswith(".py")
-
-
-def written(text: str, came: float) -> list[float]:
-    """What may be the e of a file, the likeliest first: as `stated`, else what came, if that number
-    or 1 more than it occurs."""
-    if (found := stated(text)) or not 0 <= came <= 1:
-        return found
-    return [came] * any(same(number, came) or same(number, 1 + came) for number in numbers_in(text))
 
 
 def stated(text: str) -> list[float]:
@@ -119,7 +125,13 @@ def probed(process: SolverProcess) -> float:
     if answer["error"] or not answer["states"]:
         return nan
     a, b = answer["states"][-1]
-    return float(b[2] - a[2]) / 2.0
+    return separation(2.0, a[2], b[2])
+
+
+def separation(closing: float, a: float, b: float) -> float:
+    """The speed of separation of two that now move at `a` and `b` m/s along x, over the speed at
+    which they closed."""
+    return float(b - a) / closing
 
 
 def same(one: float, other: float) -> bool:

@@ -1,19 +1,20 @@
 "use strict";
-// The page of a check: one replay, its legend, light and dark.
+// The page of a check: a replay of each of its scenes, its legend, light and dark.
 
 const looks = JSON.parse(document.getElementById("looks").textContent);
 const darkness = matchMedia("(prefers-color-scheme: dark)");
 const darkPage = () => darkness.matches;
 
-async function openReplay(element) {
-  const player = new Player(element, readPack(await unpack("replay")), looks);
+async function openReplay(section) {
+  const number = section.dataset.scene;
+  const pack = readPack(await unpack(`replay:${number}`));
+  const player = new Player(section.querySelector(".player"), pack, looks);
   player.seek(0);
-  players.smallest = player;
-  document.querySelectorAll(".legend input").forEach((box) => {
+  players[number] = player;
+  section.querySelectorAll(".legend input").forEach((box) => {
     box.onchange = () => player.show(box.value, box.checked);
   });
   darkness.addEventListener("change", () => player.draw());
 }
 
-const element = document.querySelector(".player");
-if (element) openReplay(element);
+document.querySelectorAll("[data-scene]").forEach(openReplay);

@@ -17,7 +17,7 @@ from adapters.own_solver.gl_matrix import HANDED_OUT
 from adapters.own_solver.process import SolverProcess
 from reports.check.functions import keeps_state
 from reports.check.machine import as_json, as_junit
-from reports.check.terminal import print_class, print_file
+from reports.check.terminal import print_class, print_file, print_scene
 from reports.check.verdict import NONE, FileCheck, check_file
 from reports.run.made import may_overwrite, sealed
 from reports.run.runner import run_all
@@ -53,11 +53,14 @@ def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) 
     if json_wanted:
         print(json.dumps(as_json(checks), indent=2, allow_nan=False))
     else:
-        print_class(path, checks) if path.is_dir() else print_file(checks[0])
+        print_class(path, checks, others_in(path)) if path.is_dir() else print_file(checks[0])
     if junit is not None:
         write(junit, as_junit(checks))
     if page is not None:
-        make_page(page, checks[0])
+        scenes = scenes_of(checks[0])
+        if scenes and not json_wanted:
+            print_scene(scenes[0], page)
+        make_page(page, checks[0], scenes)
     sys.exit(DONE if all(one.passed for one in checks) else FAILED)
 
 
@@ -94,6 +97,15 @@ def files_of(path: Path) -> list[Path]:
         one for one in theirs if one.parent == path and one.is_dir() and one.name not in owners
     ]
     return found if any(file.parent == path for file in found) else sorted(found + empty)
+
+
+def others_in(folder: Path) -> list[str]:
+    """The names of what lies in the folder itself and can be no solver, such as an archive."""
+    return sorted(
+        one.name
+        for one in folder.iterdir()
+        if one.is_file() and one.suffix.lower() not in KINDS and not one.name.startswith(NOBODYS)
+    )
 
 
 def places_for(page: Path | None, junit: Path | None) -> None:
@@ -142,36 +154,41 @@ def not_checked(file: Path, failure: Failure) -> FileCheck:
     return FileCheck(file, [], f"{file}: could not be checked: {failure.status}: {failure.reason}")
 
 
-def make_page(path: Path, one: FileCheck) -> None:
-    """Look for the smallest scene that shows a fault, and write the page."""
+def scenes_of(one: FileCheck) -> list[Smallest]:
+    """Of each fault that has a sentence the smallest scene that shows it, if one is found."""
+    if not one.faults or one.restitution is None or one.solver is None:
+        return []
+    tasks = [row.task for row in one.findings]
+    search = partial(scenes_here, one.solver, one.restitution, tasks, keeps_state(one.rows))
+    with closing(run_all({one.path: search}, 1, CHECKING)) as results:
+        [(_, found)] = results
+    return [] if isinstance(found, Failure) else found  # the rows say how it failed
+
+
+def make_page(path: Path, one: FileCheck, scenes: Sequence[Smallest]) -> None:
+    """Write the page."""
     from reports.check.page import write_page
 
-    smallest: Smallest | None = None
-    if one.faults and one.restitution is not None and one.solver is not None:
-        task: dict[Hashable, Any] = {
-            path: partial(smallest_here, one.solver, one.restitution, keeps_state(one.rows))
-        }
-        with closing(run_all(task, 1, CHECKING)) as results:
-            [(_, found)] = results
-        smallest = None if isinstance(found, Failure) else found  # the rows say how it failed
     try:
-        write_page(path, one, smallest)
+        write_page(path, one, scenes)
     except OSError as fault:
         say(f"--page {path}: {fault.strerror or fault}; name another file")
         sys.exit(BAD_INPUT)
     say(f"{path.resolve()}")
 
 
-def smallest_here(solver: SolverText, restitution: float, afresh: bool) -> Smallest | None:
-    """In a worker: the smallest scene that shows a fault of a solver; None if none is found, or the
+def scenes_here(
+    solver: SolverText, restitution: float, tasks: Sequence[str], afresh: bool
+) -> list[Smallest]:
+    """In a worker: the smallest scenes that show faults of a solver in these tasks; none if the
     solver fails."""
-    from reports.check.smallest import smallest_scene
+    from reports.check.smallest import smallest_scenes
 
     try:
         with SolverProcess(solver) as process:
-            return smallest_scene(process, restitution, afresh)
+            return smallest_scenes(process, restitution, tasks, afresh)
     except SolverFailed:
-        return None
+        return []
 
 
 def write(path: Path, text: str) -> None:

@@ -70,7 +70,7 @@ def same_again(
             f"{len(mine)} of {len(answers)} answers depend on what was asked before",
             "none does",
             False,
-            f"{function} keeps a value{where} from one call to the next. Below, each question was"
+            f"{function} keeps a value{where} from one call to the next, so each other question was"
             " asked in a fresh world",
         )
     ]

@@ -95,6 +95,10 @@ IMPULSES: dict[str, Impulse] = {
     "the normal is not normalised in one of its two places (after the displacement)": scaled(
         lambda h, e: h.s
     ),
+    "the normal is divided by the sum of the sizes, not by the distance": scaled(
+        lambda h, e: (h.d / h.s) ** 2
+    ),
+    "e is squared": scaled(lambda h, e: (1 + e * e) / (1 + e)),
     "it is divided by the distance once too often": scaled(lambda h, e: 1 / h.d),
     "it is divided by the distance once too often (after the displacement)": scaled(
         lambda h, e: 1 / h.s

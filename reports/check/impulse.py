@@ -118,7 +118,8 @@ def normal_impulse(seen: Seen) -> CheckRow:
         f"What impulse does A get from B, for masses of {masses}?",
         f"{shown(seen.received @ seen.pair.n)} N s along the normal",
         f"{shown(seen.right_impulse @ seen.pair.n)} N s",
-        seen.right_c,
+        # what is wrong across the normal is the next row's
+        seen.right_c or near(seen.received @ seen.pair.n, seen.right_impulse @ seen.pair.n),
         seen.impulse,
     )
 
@@ -139,16 +140,16 @@ def tangential_impulse(seen: Seen) -> CheckRow:
 
 def spoilt_rows(seen: Seen, restitution: Restitution, task: str) -> list[CheckRow]:
     """Energy and restitution, in the task whose mistake they show."""
-    added, pair = energy(seen.pair, seen.change), seen.pair
-    expected = -(1 - seen.e**2) / 2 * pair.mu * pair.vn**2
+    added = energy(seen.pair, seen.change)
+    kept = bool(added <= 1e-9)  # J; any loss is explained by the rows on the impulse
     return [
         judged(
             "energy",
             task,
-            "How much kinetic energy does the collision add?",
-            f"{shown(added)} J",
-            f"{shown(expected)} J",
-            bool(added <= 1e-9),  # J; any loss is explained by the rows on the impulse
+            "Does the collision add kinetic energy?",
+            "no" if kept else f"yes, {shown(added)} J",
+            "no",
+            kept,
             seen.mistake,
         ),
         replace(
@@ -240,11 +241,27 @@ def partly(answers: dict[str, Answer], e: float) -> str:
     A and B matters."""
     if symmetry(answers, "").verdict == "fault":
         return UNALIKE
+    if only_across(answers, e):
+        return FRICTION
     wrong = wrong_collisions(answers, e)
     if 0 < len(wrong) < len(COLLISIONS):
         names = ", ".join(name.removeprefix("collision/") for name in wrong)
         return f"unknown: it is right for some pairs and wrong for others ({names})"
     return ""
+
+
+FRICTION = "the velocities along the tangent are changed, too: the exercise has no friction"
+
+
+def only_across(answers: dict[str, Answer], e: float) -> bool:
+    """Whether the impulse along the normal is right in every collision, and momentum is kept."""
+    for name, question in COLLISIONS.items():
+        h = collision_of(question.balls, answers[name].last)
+        came = changes(question.balls, answers[name].last)
+        along = h.ma * came[0] @ h.n
+        if not (near(along, IMPULSES[""](h, e) @ h.n) and near(h.ma * came[0], -h.mb * came[1])):
+            return False
+    return True
 
 
 def wrong_collisions(answers: dict[str, Answer], e: float) -> list[str]:

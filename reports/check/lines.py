@@ -15,7 +15,7 @@ from reports.check.rows import SAME_AGAIN, CheckRow
 LIMIT = 0.5  # s a traced call may take: one that never comes back is known from its first accesses
 # task -> the question that shows which lines do what
 SHOWN = {"1": "force", "2": "collision/light on heavy"}
-MOST = 3  # lines of a row
+MOST = 5  # lines of a row
 LONGEST = 160  # characters of a line; a minified file is a single one
 
 
@@ -131,6 +131,7 @@ WRITTEN = {
     "position": ("position",),
     "spin": ("angularVelocity",),
     "angle": ("alpha",),
+    "turns": ("alpha",),
     "coasting": ("velocity", "angularVelocity"),
     "force kept": ("force", "torque"),
     "sphere kept": ("mass", "MoI", "size"),
@@ -146,6 +147,57 @@ CALLED = {
     "integration first": "sphereSphereCollisionHandling",
     "edges in a step": "projectObjects",
 }
+
+
+# causes that lie where the normal of a pair is made, and those that name it but lie elsewhere
+ABOUT_NORMAL = re.compile(r"\bnormal\b|\bd[xy] is")
+ABOUT_OTHERS = re.compile(r"velocit|normal part|overlap|sum of the sizes")
+GUARD = re.compile(r"==\s*0\b")  # two at the same place
+ASSIGNS = re.compile(r"([\w.,\s\[\]]+?)\s*[-+*/]?=(?![=>])")
+
+
+def assigned(statement: str) -> list[str]:
+    """The variables that a line of code sets: nx of "var nx = ...", nx and ny of "nx, ny = ..."."""
+    sides = (found[1].replace("var ", "") for found in ASSIGNS.finditer(statement))
+    return [name for side in sides for name in re.findall(r"\w+(?=\s*(?:,|\]|$))", side)]
+
+
+def detecting(seen: Sequence[Access]) -> list[int]:
+    """The lines that read the size of either sphere for the first time, before anything is
+    written."""
+    first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
+    sizes = [a for a in seen[:first_write] if a.field == "size"]
+    both = next((k + 1 for k, a in enumerate(sizes) if a.sphere != sizes[0].sphere), 1)
+    return [a.line for a in sizes[:both]]
+
+
+def displacing(seen: Sequence[Access], cause: str) -> list[int]:
+    """The lines that write positions; of one sphere, if only that one is at fault. Before them the
+    last that reads sizes, where the overlap is computed, if the cause is in that."""
+    who = re.match(r"(?:only )?([AB])\b", cause)
+    spheres = {"AB".index(who[1])} if who else {0, 1}
+    writes = [a.line for a in seen if is_write(a, "position") and a.sphere in spheres]
+    overlap = [a.line for a in seen if a.field == "size" and a.line not in writes][-1:]
+    return [*(overlap if re.search(r"size|overlap|bracket", cause) else []), *writes]
+
+
+def impelling(seen: Sequence[Access], cause: str) -> list[int]:
+    """The lines that compute the impulse from the velocities or the masses, whichever the cause is
+    about; where there is none the lines that write velocities."""
+    displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
+    moving = {a.line for a in seen if is_write(a, "position")}
+    writes = [a.line for a in seen if is_write(a, "velocity")]
+    about: tuple[str, ...] = ("velocity", "mass")
+    if re.search(r"velocit|scalar product|relative", cause):
+        about = ("velocity",)
+    elif re.search(r"mass|bracket|\(1 [+-] e\)|e = ", cause):
+        about = ("mass",)
+    for fields in (about, ("velocity", "mass")):
+        for after in (seen[displaced + 1 :], seen):
+            used = [a.line for a in after if a.kind == "r" and a.field in fields]
+            if found := [line for line in used if line not in {*writes, *moving}]:
+                return found
+    return writes
 
 
 def cut(line: str) -> str:
@@ -190,7 +242,7 @@ class Source:
             numbers = self.assigning(re.findall(r"global (\w+)", row.cause))
         else:
             numbers = self.accessing(row)
-        shown = sorted(set(numbers) - {0})[:MOST]
+        shown = sorted([k for k in dict.fromkeys(numbers) if k][:MOST])
         return [(k, cut(self.lines[k - 1].strip())) for k in shown if k <= len(self.lines)]
 
     def accessing(self, row: CheckRow) -> list[int]:
@@ -203,19 +255,45 @@ class Source:
                 for a in seen
                 if a.kind == "w" and a.field in WRITTEN[row.name] and a.sphere in who
             ]
-        first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
+        made = self.making(seen, row.cause)
         if row.task == "2a":
-            return [a.line for a in seen[:first_write] if a.field == "size"]
+            return [*made, *detecting(seen)]
         if row.task == "2b":
-            return [a.line for a in seen if is_write(a, "position")]
-        velocities = [a.line for a in seen if is_write(a, "velocity")]
-        if row.task == "2d":
-            return velocities
+            return made or displacing(seen, row.cause)
         if row.task == "2c":
-            used = [a.line for a in seen if a.kind == "r" and a.field in ("velocity", "mass")]
-            displacing = {a.line for a in seen if is_write(a, "position")}
-            return [line for line in used if line not in {*velocities, *displacing}] or velocities
-        return []
+            return made or impelling(seen, row.cause)
+        return [a.line for a in seen if is_write(a, "velocity")]
+
+    def making(self, seen: Sequence[Access], cause: str) -> list[int]:
+        """The lines that make the normal, or the distance from it, if the cause is about that.
+
+        These read positions and write none; those after them, until a velocity is written, that
+        change what they have made; and for the distance those that use it before anything is
+        written.
+        """
+        if ABOUT_OTHERS.search(cause) or not (ABOUT_NORMAL.search(cause) or "square" in cause):
+            return []
+        code = code_of(self.text).splitlines()
+        written = {a.line for a in seen if a.kind == "w"}
+        first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
+        read = dict.fromkeys(a.line for a in seen[:first_write] if a.field == "position")
+        reads = [line for line in read if line and line not in written]
+        if not reads:
+            return []
+        made = {name for line in reads for name in assigned(code[line - 1])}
+        kicks = [a.line for a in seen if is_write(a, "velocity") and a.line > max(reads)]
+        after = [
+            k
+            for k in range(max(reads) + 1, min(kicks, default=max(reads) + 1))
+            if k not in written and not code[k - 1].lstrip().startswith("if")
+        ]
+        changes = [k for k in after if made & {*assigned(code[k - 1])}]
+        if ABOUT_NORMAL.search(cause):
+            return [*reads, *changes] if len(reads + changes) <= MOST else [*changes, *reads]
+        used = rf"\b(?:{'|'.join(made)})\b"
+        sums = [k for k in range(max(reads) + 1, max(reads) + 5) if k - 1 < len(code)]
+        sums = [k for k in sums if k not in changes and not GUARD.search(code[k - 1])]
+        return [k for k in sums if made and re.search(used, code[k - 1])][:2]
 
     def calls(self, name: str) -> list[int]:
         """The lines of performSimStep that a row of the step is about; of one about the edges that

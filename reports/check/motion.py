@@ -15,6 +15,7 @@ from reports.check.questions import QUESTIONS, Answer, Ball
 from reports.check.rows import CheckRow, Law, follows, judged, near, shown
 from scenarios.model import Array
 
+TURNED = ("turned", "turned far", "turned back")
 FORCED = ("force", "force, other numbers", "coast")
 X: Array = np.array([1.0, 0.0])
 Y: Array = np.array([0.0, 1.0])
@@ -59,6 +60,24 @@ UNDER_FORCE: dict[str, Law] = {
     "a step of 0.001 s is written into the file and used instead of dt": lambda v, f, m, _o, _dt: (
         v + f / m * 0.001
     ),
+    "dt is divided by 1000, though it is in seconds already": lambda v, f, m, _o, dt: (
+        v + f / m * dt / 1000
+    ),
+}
+# the same of a torque, with the size as a sixth
+UNDER_TORQUE: dict[str, Law] = {
+    name: (lambda *given, law=law: law(*given[:5])) for name, law in UNDER_FORCE.items()
+} | {
+    "the torque is multiplied by the size; it needs no lever": lambda w, t, i, _m, dt, r: (
+        w + t * r / i * dt
+    ),
+    "the torque is divided by the size; it needs no lever": lambda w, t, i, _m, dt, r: (
+        w + t / r / i * dt
+    ),
+    "mass size2 / 2 is used instead of the {mass}": lambda w, t, _i, m, dt, r: (
+        w + t / (m * r * r / 2) * dt
+    ),
+    "mass size2 is used instead of the {mass}": lambda w, t, _i, m, dt, r: w + t / (m * r * r) * dt,
 }
 # (x or alpha, v or w before, the same after, acceleration by the right formula, dt) -> x' or alpha'
 MOVED: dict[str, Law] = {
@@ -99,6 +118,9 @@ MOVED: dict[str, Law] = {
     "a step of 0.001 s is written into the file and used instead of dt": (
         lambda x, _v, new, _a, _dt: x + new * 0.001
     ),
+    "dt is divided by 1000, though it is in seconds already": lambda x, _v, new, _a, dt: (
+        x + new * dt / 1000
+    ),
     "the old {velocity} is converted to degrees": lambda x, v, _n, _a, dt: x + np.degrees(v * dt),
 }
 
@@ -110,7 +132,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
         for name in FORCED
     ]
     linear = [(np.array(b.v), np.array(b.F), b.m, b.MoI, dt) for b, dt, _ in seen]
-    angular = [(np.array(b.w), np.array(b.torque), b.MoI, b.m, dt) for b, dt, _ in seen]
+    angular = [(np.array(b.w), np.array(b.torque), b.MoI, b.m, dt, b.r) for b, dt, _ in seen]
     # The positions are judged by the velocities that came, so that one mistake is found once.
     places = [
         (np.array(b.x), np.array(b.v), np.array(a.v), np.array(b.F) / b.m, dt) for b, dt, a in seen
@@ -132,10 +154,19 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
         "spin",
         "What angular velocity has it after one step under a torque?",
         "rad/s",
-        UNDER_FORCE,
+        UNDER_TORQUE,
         angular,
         [a.w for a in after],
         {"mass": "MoI", "other": "mass"},
+    )
+    angle = law_row(
+        "angle",
+        "What is its angle then, its angular velocity being what came?",
+        "rad",
+        MOVED,
+        angles,
+        [a.alpha for a in after],
+        {"velocity": "angular velocity"},
     )
     return [
         velocity,
@@ -149,15 +180,8 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
             {"velocity": "velocity"},
         ),
         spin,
-        law_row(
-            "angle",
-            "What is its angle then, its angular velocity being what came?",
-            "rad",
-            MOVED,
-            angles,
-            [a.alpha for a in after],
-            {"velocity": "angular velocity"},
-        ),
+        angle,
+        *([turning(answers)] if angle.verdict == "right" else []),
         coasting(seen[2][0], seen[2][2], velocity.cause or spin.cause),
         lasting(answers["force twice"]),
         untouched(seen),
@@ -207,6 +231,7 @@ def one_axis(laws: dict[str, Law], given: list[tuple[Any, ...]], came: list[Any]
 
 def damped(given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
     """Where the velocity is also multiplied by a constant: which."""
+    given = [question[:5] for question in given]
     coasting_v, coasting_came = np.asarray(given[2][0]), np.asarray(came[2], float)
     factor = float(np.mean(coasting_came / coasting_v))
     law: Law = lambda v, f, m, _o, dt: factor * (v + f / m * dt)  # noqa: E731
@@ -214,6 +239,25 @@ def damped(given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
     if follows({"after": law, "before": late}, given, came):
         return f"it is multiplied by {factor:.4g} in every step: the exercise has no damping"
     return None
+
+
+def turning(answers: dict[str, Answer]) -> CheckRow:
+    """An angle beyond half a turn: it may be set back by whole turns, which is free."""
+    seen = [(QUESTIONS[name], answers[name].last[0]) for name in TURNED]
+    ways = [
+        (question.balls[0].alpha + after.w * question.calls[0][2], after.alpha)
+        for question, after in seen
+    ]
+    turns = [(came - right) / (2 * np.pi) for right, came in ways]
+    whole = [near(turn, np.round(turn)) for turn in turns]
+    right, came = ways[whole.index(False) if False in whole else 0]
+    asked = "What is the angle of a sphere that is turned by more than half a turn?"
+    got, expected = f"{shown(came)} rad", f"{shown(right)} rad, or whole turns more or less"
+    if all(whole) and not near(turns, 0.0):
+        said = "it is set back by whole turns, which leaves the direction as it is"
+        return CheckRow("turns", "1", asked, got, expected, "free choice", said)
+    cause = f"it is set back by {shown(abs(came - right))} rad, which is no whole turn of 2 pi"
+    return judged("turns", "1", asked, got, expected, all(whole), cause)
 
 
 def coasting(before: Ball, after: Ball, mistake: str) -> CheckRow:

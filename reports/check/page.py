@@ -3,11 +3,14 @@ the exact one."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import NamedTuple
 
 from adapters.run import Run
 from reports.check.rows import TASKS, Verdict, shown
+from reports.check.scene_words import scene_lines
 from reports.check.smallest import DT, Smallest
 from reports.check.verdict import FileCheck
 from reports.page import style
@@ -15,7 +18,7 @@ from reports.page.documents import ENGINE, render
 from reports.page.replay import pack_layers, ratio_of
 from reports.run.made import sealed
 from reports.terminal.foreign_text import put_text
-from scenarios.model import Scenario, Trajectory
+from scenarios.model import Trajectory
 
 GENERATOR = "crosscheck check"
 # apart from the truth in any light, by style.py
@@ -37,37 +40,54 @@ GROUPS: dict[Verdict, tuple[str, str]] = {
 SCRIPTS = (*ENGINE, "check/check.js")
 
 
-def write_page(path: Path, check: FileCheck, smallest: Smallest | None) -> None:
-    """Write the page of one file to `path`, over whatever is there."""
-    layers = layers_of(check.path.name, smallest)
-    names = [style.TRUTH if run is None else run.name for run, _ in layers]
+class SceneShown(NamedTuple):
+    """A smallest scene as the page has it: in words, and as a replay of some layers."""
+
+    smallest: Smallest
+    lines: list[str]
+    layers: list[str]
+    replay: str
+    ratio: float
+
+
+def write_page(path: Path, check: FileCheck, scenes: Sequence[Smallest]) -> None:
+    """Write the page of one file, with the smallest scenes that show its faults, to `path`, over
+    whatever is there."""
+    shows = [scene_shown(check.path.name, smallest) for smallest in scenes]
+    names = dict.fromkeys(name for one in shows for name in one.layers)
     looks = {name: style.look(name) if name == style.TRUTH else YOURS for name in names}
     html = render(
         "check/check.html.j2",
         generator=GENERATOR,
-        scripts=SCRIPTS if smallest else (),
+        scripts=SCRIPTS if shows else (),
         styles=["check/check.css"],
         looks=looks,
         name=check.path.name,
         check=check,
         tasks=TASKS,
         groups=GROUPS,
-        smallest=smallest,
-        layers=names,
-        scene=[] if smallest is None else scene_lines(smallest.scenario),
+        shows=shows,
         dt=shown(DT),
-        replay="" if smallest is None else pack_layers(smallest.scenario, layers),
-        ratio=1 if smallest is None else ratio_of(smallest.scenario, layers),
         version=version("crosscheck2d"),
         digest="" if check.solver is None else check.solver.digest,
     )
     put_text(path, sealed(html))
 
 
-def layers_of(name: str, smallest: Smallest | None) -> list[tuple[Run | None, Trajectory]]:
+def scene_shown(name: str, smallest: Smallest) -> SceneShown:
+    """A scene for the page of the file of this name."""
+    scenario, layers = smallest.scenario, layers_of(name, smallest)
+    return SceneShown(
+        smallest,
+        scene_lines(scenario),
+        [style.TRUTH if run is None else run.name for run, _ in layers],
+        pack_layers(scenario, layers),
+        ratio_of(scenario, layers),
+    )
+
+
+def layers_of(name: str, smallest: Smallest) -> list[tuple[Run | None, Trajectory]]:
     """The file's motion, and the exact one on top, as the replay takes them."""
-    if smallest is None:
-        return []
     yours = Run(
         name.replace(":", "_"), "own", smallest.scenario.name, DT, trajectory=smallest.yours
     )
@@ -75,17 +95,3 @@ def layers_of(name: str, smallest: Smallest | None) -> list[tuple[Run | None, Tr
         [] if smallest.truth is None else [(None, smallest.truth)]
     )
     return [(yours, smallest.yours), *exact]
-
-
-def scene_lines(scenario: Scenario) -> list[str]:
-    """A scene in words, a line a sphere."""
-    scene, lines = scenario.scene, []
-    for k in range(scene.n):
-        lines.append(
-            f"at {shown(scene.position[k])} m, {shown(scene.velocity[k])} m/s, size"
-            f" {shown(scene.radius[k])} m, mass {shown(scene.mass[k])} kg"
-        )
-        for thrust in (thrust for thrust in scenario.thrusts if thrust.disk == k):
-            lines[-1] += f", force {shown(thrust.force)} N, torque {shown(thrust.torque)} N m"
-            lines[-1] += f", MoI {shown(scene.inertia[k])} kg m²"
-    return lines

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from adapters.own_solver.restitution import EXERCISE
 from reports.check.impacts import BACKWARDS, Finding
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, Ball, direction, finite
 from reports.check.rows import CheckRow, judged, near, not_asked, shown
@@ -44,6 +45,12 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "it is divided by the distance once too often": lambda s, a, b: s.overlap / s.distance,
     "they are moved by the sum of the sizes, not by the overlap": lambda s, a, b: s.sizes,
     "they are moved by their distance, not by the overlap": lambda s, a, b: s.distance,
+    "the normal is divided by the sum of the sizes, not by the distance": lambda s, a, b: (
+        s.overlap * s.distance / s.sizes
+    ),
+    "the overlap is multiplied by e, which belongs to the velocities": lambda s, a, b: (
+        EXERCISE * s.overlap
+    ),
     "the overlap is taken of squares": lambda s, a, b: s.sizes**2 - s.distance**2,
     "the overlap is size plus distance": lambda s, a, b: s.sizes + s.distance,
     "the squared distance is used as the distance": lambda s, a, b: (
@@ -96,9 +103,9 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
         judged(
             "one point",
             "2b",
-            "How far apart are the centres of a pair after it?",
-            f"{shown(distance)} m",
-            f"{shown(shift.sizes)} m: they meet in one point",
+            "How far apart are the centres of a pair after the call?",
+            f"centres {shown(distance)} m apart",
+            f"{shown(shift.sizes)} m, the sum of their sizes",
             all(met),
             "" if all(met) else BACKWARDS if backwards else total_cause(seen),
         ),
@@ -106,7 +113,7 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
             "normal",
             "2b",
             "Are they moved along the line of their centres?",
-            f"{shown(shift.across)} m across it",
+            f"moved {shown(shift.across)} m across the line of their centres",
             "0 m across it",
             along,
             no_numbers(seen) or across_cause(seen),

@@ -1,4 +1,4 @@
-"""The restitution of a file: what is written into it, and what comes out of its collisions."""
+"""The rows on the restitution of a file: what is written into it, and what its collisions have."""
 
 from __future__ import annotations
 
@@ -6,7 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adapters.own_solver.restitution import EXERCISE, named_in, stated
+from adapters.own_solver.restitution import (
+    EXERCISE,
+    OwnRestitution,
+    named_in,
+    own_restitution,
+    separation,
+)
 from reports.check.questions import QUESTIONS, Answer
 from reports.check.rows import CheckRow, judged, near, shown
 
@@ -16,25 +22,32 @@ class Restitution:
     """Of a file.
 
     Attributes:
-        own: the value written into it, or the exercise's if none is found.
-        named: whether it is written in, by a name or as a number.
+        read: what its text says, and what came of a pair that closes at 2 m/s.
         absurd: whether what came is not from 0 to 1, and a name such as e or restitution gets it.
-        came: separation over approach speed of two equal spheres that meet head-on at 2 m/s.
-        slow, fast: the same at 2 mm/s and at 200 m/s.
+        slow, fast: what comes of pairs that close at 2 mm/s and at 200 m/s.
     """
 
-    own: float
-    named: bool
+    read: OwnRestitution
     absurd: bool
-    came: float
     slow: float
     fast: float
+
+    @property
+    def came(self) -> float:
+        """Separation over approach speed of two equal spheres that meet head-on at 2 m/s."""
+        return self.read.came
+
+    @property
+    def own(self) -> float:
+        """The value that the file states, or the exercise's if it states none: a number that only
+        occurs may be any other."""
+        return self.read.own if self.read.stated and self.read.own is not None else EXERCISE
 
     @property
     def candidates(self) -> list[float]:
         """The values a collision is explained by: the file's own first, then what came, if nothing
         contradicts it."""
-        free = 0 <= self.came <= 1 and not self.named
+        free = 0 <= self.came <= 1 and not self.read.stated
         return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
 
     @property
@@ -77,9 +90,9 @@ class Restitution:
         return judged(
             "any speed",
             "2c",
-            "Is it the same for pairs that close at 2 mm/s and at 200 m/s?",
+            "What is it for pairs that close at 2 mm/s and at 200 m/s?",
             f"{shown(self.slow)} and {shown(self.fast)}",
-            shown(self.came),
+            f"as at 2 m/s, {shown(self.came)}",
             near([self.slow, self.fast], self.came),
             mistake or "the restitution depends on the speed",
         )
@@ -87,18 +100,15 @@ class Restitution:
 
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
     """What the file's text says and what its collisions give."""
-    came, slow, fast = (separation(answers[name], name) for name in ("even", "slow", "fast"))
-    named, found = named_in(text), stated(text)
-    absurd = not 0 <= came <= 1 and any(near(e, came) for e in named)
-    # A file may hold several such numbers, and use one of them.
-    own = next((e for e in found if near(e, came)), found[0] if found else EXERCISE)
-    return Restitution(own, bool(found), absurd, came, slow, fast)
+    came, slow, fast = (restitution_in(answers[name], name) for name in ("even", "slow", "fast"))
+    absurd = not 0 <= came <= 1 and any(near(e, came) for e in named_in(text))
+    return Restitution(own_restitution(text, came), absurd, slow, fast)
 
 
-def separation(answer: Answer, name: str) -> float:
-    """Separation over approach speed; NaN if the call failed."""
+def restitution_in(answer: Answer, name: str) -> float:
+    """Of the head-on pair of a question; NaN if the call failed."""
     if answer.failed or not answer.balls:
         return float("nan")
     a, b = QUESTIONS[name].balls
     after = answer.last
-    return float((after[1].v[0] - after[0].v[0]) / (a.v[0] - b.v[0]))
+    return separation(a.v[0] - b.v[0], after[0].v[0], after[1].v[0])

@@ -39,11 +39,12 @@ READ = {
 # The formula of the exercise, by the row's name where it has one of its own, else by its task; a
 # prime marks the value after the step or the collision.
 FORMULAS = {
-    "velocity": "v' = v + F / mass dt",
+    "velocity": "v' = v + (F / mass) dt",
     "position": "x' = x + v' dt, with the new velocity v'",
-    "spin": "w' = w + torque / MoI dt",
+    "spin": "w' = w + (torque / MoI) dt",
     "angle": "alpha' = alpha + w' dt, with the new angular velocity w'",
-    "coasting": "v' = v + F / mass dt, w' = w + torque / MoI dt, here with F = 0 and torque = 0",
+    "turns": "alpha' = alpha + w' dt; alpha and alpha + 2 pi are the same direction",
+    "coasting": "v' = v + (F / mass) dt, w' = w + (torque / MoI) dt, with F = 0 and torque = 0",
     "2a": "the spheres collide if |xA - xB| < sizeA + sizeB",
     "2b": "|xA' - xB'| = sizeA + sizeB; both are moved along n = (xA - xB) / |xA - xB|",
     "2c": "J = -(1 + e) (vA - vB).n / (n.n (1/mA + 1/mB)), e = 0.9",

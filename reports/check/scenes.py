@@ -148,7 +148,8 @@ def scene_row(
         got = f"a sphere is turned by {shown(turned.max())} rad too much or too little"
         expected = f"at most {shown(may_turn[-1])} rad, by dt = {shown(dt)} s"
         return judged(scenario.name, "scenes", scenario.asks, got, expected, False, cause)
-    got = f"sphere {disk} is {shown(away[at, disk])} m away at {shown(truth.t[at])} s"
+    where = f"{shown(away[at, disk])} m from its exact position"
+    got = f"sphere {disk} is {where} at {shown(truth.t[at])} s"
     expected = f"at most {shown(allowed[at, 0])} m, by dt = {shown(dt)} s"
     return judged(
         scenario.name, "scenes", scenario.asks, got, expected, bool(ratio.max() <= 1), cause
@@ -213,49 +214,56 @@ def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) 
     return room
 
 
-def first_wrong(scenario: Scenario, contacts: Array, dt: float) -> str:
+def first_wrong(scenario: Scenario, contacts: Array, dt: float, part: str = "") -> str:
     """The first contact that is not what the formula makes of the state before it, in a sentence;
-    "" if none."""
+    "" if none. `part`: only what is wrong in this part of task 2, as in `contact_faults`."""
     scene = scenario.scene
     for row in contacts:
         step, i, j = int(row[0]), int(row[1]), int(row[2])
-        if fault := contact_fault(row[3:].reshape(2, 2, 4), scene, i, j):
+        faults = contact_faults(row[3:].reshape(2, 2, 4), scene, i, j)
+        if fault := faults.get(part, "") if part else next(iter(faults.values()), ""):
             return f"{scenario.name}, spheres {i} and {j} at {shown((step + 1) * dt)} s: {fault}"
     return ""
 
 
-def contact_fault(states: Array, scene: Scene, i: int, j: int) -> str:
-    """What is wrong with one call: states (2, 2, 4) before and after, of i and j, x, y, vx, vy; ""
-    if nothing is."""
+def contact_faults(states: Array, scene: Scene, i: int, j: int) -> dict[str, str]:
+    """What is wrong with one call, by the part of task 2 that it shows: "2a", "2b", or "2c", which
+    stands for the velocities; {} if nothing is.
+
+    states: (2, 2, 4) before and after, of i and j, x, y, vx, vy.
+    """
     (a, b), (a2, b2) = states
     if not np.isfinite(states).all():
-        return "the numbers become NaN or infinite"
+        wrong = "the numbers become NaN or infinite"
+        lost = "2c" if np.isfinite(states[..., :2]).all() else "2b"
+        return {lost: wrong}
     r, reach = a[:2] - b[:2], scene.radius[i] + scene.radius[j]
     d = float(np.hypot(*r))
     came = np.array([a2[2:] - a[2:], b2[2:] - b[2:]])
     touching = abs(d - reach) <= TOLERANCE * reach
     if d == 0 or (touching and near(came, 0.0)):
-        return ""
+        return {}
     if d > reach and not touching:
-        return (
-            ""
-            if near(states[1], states[0])
-            else f"they collide at a distance of {shown(d)} m, beyond {shown(reach)} m"
-        )
+        if near(states[1], states[0]):
+            return {}
+        return {"2a": f"they collide at a distance of {shown(d)} m, beyond {shown(reach)} m"}
     n, apart = r / d, float(np.hypot(*(a2[:2] - b2[:2])))
     vn = float((a[2:] - b[2:]) @ n)
     J = -(1 + scene.restitution) * vn / (1 / scene.mass[i] + 1 / scene.mass[j])
     change = np.array([J / scene.mass[i] * n, -J / scene.mass[j] * n])
     free = vn >= 0 and near(came, 0.0)
+    faults = {}
+    if vn < 0 and not touching and near(states[1], states[0]):
+        faults["2a"] = f"they overlap by {shown(reach - d)} m, and nothing is changed"
     if not (near(apart, reach) or (vn >= 0 and near(apart, d))):
-        return f"their centres are {shown(apart)} m apart after it, not {shown(reach)} m"
-    if free or near(came, change):
-        return ""
-    k = 0 if not near(came[0], change[0]) else 1
-    return (
-        f"sphere {(i, j)[k]} has {shown(states[1, k, 2:])} m/s after it, not"
-        f" {shown(states[0, k, 2:] + change[k])} m/s"
-    )
+        faults["2b"] = f"their centres are {shown(apart)} m apart after it, not {shown(reach)} m"
+    if not (free or near(came, change)):
+        k = 0 if not near(came[0], change[0]) else 1
+        faults["2c"] = (
+            f"sphere {(i, j)[k]} has {shown(states[1, k, 2:])} m/s after it, not"
+            f" {shown(states[0, k, 2:] + change[k])} m/s"
+        )
+    return faults
 
 
 # question, s, then a row x, y, vx, vy (m, m/s) for every sphere, radii m, masses kg

@@ -3,9 +3,9 @@ forms alone."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from tempfile import TemporaryDirectory
 from time import monotonic
@@ -51,26 +51,50 @@ FIRST: list[Example] = [
 @dataclass(frozen=True)
 class Smallest:
     """A scene that shows a fault, what is wrong in it, the file's motion and the exact one where
-    there is one."""
+    there is one.
+
+    of: the numbers, from 1, of the faults that it shows.
+    """
 
     scenario: Scenario
     fault: str
     yours: Trajectory
     truth: Trajectory | None
+    of: tuple[int, ...] = (1,)
 
 
-def smallest_scene(process: SolverProcess, e: float, afresh: bool = False) -> Smallest | None:
+# task -> what a scene shows of it: a flight, an overlap that is seen or not, a distance, velocities
+PARTS = {"1": "1", "2a": "2a", "2b": "2b", "2c": "2c", "2d": "2c", "file": "", "scenes": ""}
+
+
+def smallest_scenes(
+    process: SolverProcess, e: float, tasks: Sequence[str], afresh: bool = False
+) -> list[Smallest]:
+    """Of each fault, by its task, the smallest scene that shows it; one scene for those that show
+    in the same. Of the loop there is none: a scene is played by the loop of the exercise."""
+    found = []
+    for part in dict.fromkeys(PARTS[task] for task in tasks if task in PARTS):
+        of = tuple(k for k, task in enumerate(tasks, 1) if PARTS.get(task) == part)
+        if scene := smallest_scene(process, e, afresh, part):
+            found.append(replace(scene, of=of))
+    return found
+
+
+def smallest_scene(
+    process: SolverProcess, e: float, afresh: bool = False, part: str = ""
+) -> Smallest | None:
     """The smallest that is found within `SECONDS`; None if none shows a fault.
 
     afresh: each scene is played by the file loaded anew, as one that keeps state needs.
+    part: one of `PARTS`, the only one that counts; "" for any.
     """
     play = partial(play_scene, process, dt=DT, afresh=afresh)
-    best = next((example for example in FIRST if fault_of(play, *example, e)), None)
+    best = next((example for example in FIRST if fault_of(play, *example, e, part)), None)
     deadline = monotonic() + SECONDS
 
     def faulty(example: Example) -> bool:
         nonlocal best
-        if monotonic() > deadline or not fault_of(play, *example, e):
+        if monotonic() > deadline or not fault_of(play, *example, e, part):
             return False
         best = example if best is None else min(best, example, key=size)
         return True
@@ -90,7 +114,7 @@ def smallest_scene(process: SolverProcess, e: float, afresh: bool = False) -> Sm
     # nothing found, or the time was up while it shrank
     with homeless(), suppress(NoSuchExample, Flaky):
         find(scene, faulty, settings=rules)
-    return shown_by(play, *without_idlers(play, *best, e), e) if best else None
+    return shown_by(play, *without_idlers(play, *best, e, part), e, part) if best else None
 
 
 def size(example: Example) -> tuple[int, int]:
@@ -114,14 +138,14 @@ def homeless() -> Iterator[None]:
 
 
 def without_idlers(
-    play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float
+    play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
 ) -> tuple[list[Sphere], tuple[int, int, int]]:
     """The scene without the spheres that the fault does not need: the time may be up before
     hypothesis sees to it."""
     for k in range(len(spheres)):
         fewer = spheres[:k] + spheres[k + 1 :]
-        if fewer and fault_of(play, fewer, thrust, e):
-            return without_idlers(play, fewer, thrust, e)
+        if fewer and fault_of(play, fewer, thrust, e, part):
+            return without_idlers(play, fewer, thrust, e, part)
     return spheres, thrust
 
 
@@ -160,8 +184,11 @@ def scenario_of(
     )
 
 
-def fault_of(play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float) -> str:
-    """What is wrong with the file's motion in a scene; "" if nothing is, or it is no scene."""
+def fault_of(
+    play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
+) -> str:
+    """What is wrong with the file's motion in a scene, in one of `PARTS`; "" if nothing is, or it
+    is no scene."""
     scenario = scenario_of(spheres, thrust, e, DURATION)
     if scenario is None:
         return ""
@@ -169,7 +196,8 @@ def fault_of(play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e:
         played = play(scenario)
     except SolverFailed as failure:
         return str(failure) if failure.kind == "error" else ""
-    return first_wrong(scenario, played.contacts, DT) or flight_fault(scenario, played)
+    met = "" if part == "1" else first_wrong(scenario, played.contacts, DT, part)
+    return met or (flight_fault(scenario, played) if part in ("", "1") else "")
 
 
 def flight_fault(scenario: Scenario, played: SceneAnswer) -> str:
@@ -196,11 +224,13 @@ def flight_fault(scenario: Scenario, played: SceneAnswer) -> str:
     return ""
 
 
-def shown_by(play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float) -> Smallest:
+def shown_by(
+    play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
+) -> Smallest:
     """The scene with the file's motion and the exact one."""
     scenario = scenario_of(spheres, thrust, e, INTERVAL)
     assert scenario is not None
-    fault = fault_of(play, spheres, thrust, e)
+    fault = fault_of(play, spheres, thrust, e, part)
     played = play(scenario)
     kicked = [row for row in played.contacts if not near(row[[5, 6, 9, 10]], row[[13, 14, 17, 18]])]
     collisions = Collisions.of(

@@ -10,14 +10,14 @@ import numpy as np
 
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import code_of
+from adapters.own_solver.restitution import code_of, own_text
 from reports.check.detection import detection_rows
 from reports.check.functions import implemented, same_again
 from reports.check.impacts import APPROACH, BACKWARDS, explain
 from reports.check.impulse import impulse_rows
 from reports.check.lines import SHOWN, Source
 from reports.check.loop import loop_rows
-from reports.check.motion import motion_rows
+from reports.check.motion import TURNED, motion_rows
 from reports.check.projection import moved_together, projection_rows
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, ask_in_two_orders, stuck
 from reports.check.restitution import Restitution, restitution_of
@@ -42,7 +42,7 @@ def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
         return [judged("loads", "file", LOADS, f"no: {failure}", "yes", False, str(failure))], None
     try:
         with process:
-            return rows_of(process, solver.text)
+            return rows_of(process, solver.text, own_text(solver))
     except SolverFailed as failure:
         lost = judged(
             "answers",
@@ -59,9 +59,11 @@ def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
 LOADS = "Can the file be loaded, and does it leave the language as it is?"
 
 
-def rows_of(process: SolverProcess, text: str) -> tuple[list[CheckRow], float | None]:
-    """The rows of a file that is loaded, and its restitution; raises `SolverFailed` if its process
-    is lost."""
+def rows_of(
+    process: SolverProcess, text: str, with_beside: str
+) -> tuple[list[CheckRow], float | None]:
+    """The rows of a file that is loaded, and its restitution; `with_beside`: its text with that of
+    its own modules. Raises `SolverFailed` if its process is lost."""
     asked = {
         k: q
         for k, q in QUESTIONS.items()
@@ -70,7 +72,7 @@ def rows_of(process: SolverProcess, text: str) -> tuple[list[CheckRow], float | 
     answers, others = ask_in_two_orders(process, asked)
     source = Source(process, text)
     rows = [loads(process), *task_1(process, answers, others, text)]
-    contact, restitution = task_2(process, answers, others, source)
+    contact, restitution = task_2(process, answers, others, source, with_beside)
     rows += contact
     faulty = any(row.verdict == "fault" for row in rows)
     if stuck(answers):
@@ -113,7 +115,7 @@ def hinted(rows: list[CheckRow], text: str) -> list[CheckRow]:
 SET_IN_CONDITION = re.compile(r"\b(if|while)\s*\(\s*[\w.]+\s*=(?![=>])")
 
 
-MOTION = ("force", "force, other numbers", "coast", "force twice")
+MOTION = ("force", "force, other numbers", "coast", "force twice", *TURNED)
 
 
 def loads(process: SolverProcess) -> CheckRow:
@@ -143,7 +145,11 @@ def task_1(
 
 
 def task_2(
-    process: SolverProcess, answers: dict[str, Answer], others: dict[str, Answer], source: Source
+    process: SolverProcess,
+    answers: dict[str, Answer],
+    others: dict[str, Answer],
+    source: Source,
+    with_beside: str,
 ) -> tuple[list[CheckRow], Restitution | None]:
     """The rows of the collision function, and its restitution where it has one."""
     mine, text = {k: answer for k, answer in answers.items() if k not in MOTION}, source.text
@@ -161,7 +167,7 @@ def task_2(
     if not reacts(mine):
         why = "the overlapping pairs of these questions are taken to be apart"
         return rows + not_judged("2a", why), None
-    restitution = restitution_of(text, mine)
+    restitution = restitution_of(with_beside, mine)
     found = explain(mine, restitution)
     if found is not None and found.impulse == APPROACH and moved_together(mine):
         found = replace(found, impulse=BACKWARDS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.padding import Padding
 from rich.table import Table
@@ -11,11 +12,15 @@ from rich.text import Text
 
 from adapters.own_solver.file import printable
 from reports.check.rows import FOLLOWS, TASKS, CheckRow
-from reports.check.verdict import FileCheck
+from reports.check.scene_words import scene_lines
+from reports.check.verdict import FileCheck, named
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import legible
 from reports.terminal.tables import print_table
+
+if TYPE_CHECKING:
+    from reports.check.smallest import Smallest
 
 STYLE = {"right": "green", "fault": "bold red", "free choice": "yellow", "not asked": "dim"}
 SHORT = {"right": "ok", "free choice": "ok", "fault": "FAULT", "not asked": "-"}
@@ -61,6 +66,19 @@ def print_source(console: Console, row: CheckRow) -> None:
         console.print(Padding(grid, (0, 0, 0, 3)))
 
 
+def print_scene(one: Smallest, page: Path) -> None:
+    """The smallest scene of the first fault in words, and where the replay is."""
+    console = Console()
+    which = " and ".join(map(str, one.of))
+    title = f"\nThe smallest scene that shows fault {which}, played in {page.name}:"
+    console.print(title, highlight=False)
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    for k, line in enumerate(scene_lines(one.scenario)):
+        grid.add_row(Text(f"sphere {k}", "dim"), line)
+    grid.add_row(Text("wrong", STYLE["fault"]), legible(one.fault))
+    console.print(Padding(grid, (0, 0, 0, 3)), highlight=False)
+
+
 def print_rows(console: Console, title: str, rows: Sequence[CheckRow]) -> None:
     """A title, and a row a paragraph: its verdict in a word, where it belongs, what is said."""
     console.print(f"\n{title}", highlight=False)
@@ -86,9 +104,9 @@ def elided(name: str, room: int) -> str:
     return f"{name[: max(room - end - 1, 1)]}…{name[-end:]}"
 
 
-def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
+def print_class(folder: Path, checks: Sequence[FileCheck], others: Sequence[str]) -> None:
     """A row a file, a verdict for every task or "-" if it is no solver; below, of each the sentence
-    to begin with."""
+    to begin with. `others`: the files that lie beside them and are no solvers."""
     console = Console()
     widest = {
         task: max(len(task), *(len(SHORT[one.tasks[task]]) for one in checks)) for task in TASKS
@@ -114,3 +132,5 @@ def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
     rest = f"; {refused} not checked" if refused else ""
     files = counted(len(checks) - refused, "file")
     console.print(f"\n{right} of {files} without a fault{rest}.", highlight=False)
+    if others:
+        console.print(f"No .js and no .py file, so not read: {named(others)}.", highlight=False)

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from adapters.own_solver.file import NotASolver, SolverText, read_solver
+from adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
 from reports.check.rows import FOLLOWS, SAME_AGAIN, TASKS, CheckRow, Verdict, worst
 from reports.check.solver import examine
 
 MOST = 3  # sentences
 NONE = "holds no .js and no .py file"
+NAMED = 3  # files that are none
 
 
 @dataclass(frozen=True)
@@ -95,10 +96,22 @@ def task_title(task: str) -> str:
 def check_file(path: Path) -> FileCheck:
     """The check of one file, whatever it is; of a folder, that there is none."""
     if path.is_dir():
-        return FileCheck(path, [], f"{path}: {NONE}")
+        return FileCheck(path, [], f"{path}: {nothing_in(path)}")
     try:
         solver = read_solver(path)
         rows, restitution = examine(solver)
         return FileCheck(path, rows, restitution=restitution, solver=solver)
     except NotASolver as refusal:
         return FileCheck(path, [], str(refusal))
+
+
+def nothing_in(folder: Path) -> str:
+    """That it holds no solver, and what it holds."""
+    others = named(sorted(one.name for one in folder.rglob("*") if one.is_file()))
+    return f"{NONE}, only {others}" if others else NONE
+
+
+def named(names: Sequence[str]) -> str:
+    """At most `NAMED` of them, and how many more there are; "" of none."""
+    more = f" and {len(names) - NAMED} more" * (len(names) > NAMED)
+    return ", ".join(map(printable, names[:NAMED])) + more

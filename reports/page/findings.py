@@ -3,11 +3,12 @@ grammar."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 import pandas as pd
 
+from adapters.engines import OWN
 from reports.compare.comparison import Comparison
 from reports.page.overview import MAPPED, values
 from reports.terminal.counts import counted
@@ -16,16 +17,49 @@ FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
-    """Three sentences: who is closest, what settings are worth, where each fails; a fourth on who
-    is not counted."""
+    """Three sentences: who is closest, what settings are worth, where each fails; of none who is
+    `untrusted`. A solver's own file that refuses scenes has a sentence of its own."""
     off = position_errors(comparisons).drop(columns=list(untrusted), errors="ignore")
-    statuses = [run.status for comparison in comparisons for run in comparison.runs]
-    sentences = [closest(off), worth_of_settings(off), where_it_fails(off, statuses)]
-    if untrusted:
-        sentences.append(
-            f"Not counted, as it broke the protocol of the harness: {', '.join(sorted(untrusted))}."
-        )
-    return sentences
+    refusals = own_refusals(comparisons)
+    ranked = off.drop(columns=list(refusals), errors="ignore")
+    if ranked.columns.empty:
+        ranked = off
+    statuses = [
+        run.status
+        for comparison in comparisons
+        for run in comparison.runs
+        if comparison.scenario.name not in refusals.get(run.name, {})
+    ]
+    own = [asked_in_part(off[name], refusals[name]) for name in refusals if name in off]
+    return [closest(ranked), worth_of_settings(ranked), where_it_fails(ranked, statuses), *own]
+
+
+def own_refusals(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]:
+    """A solver's own file -> the scenes that it refuses, and why: what the exercise does not ask
+    for is not missing in it."""
+    found: dict[str, dict[str, str]] = {}
+    for comparison in comparisons:
+        for run in comparison.runs:
+            if run.name.endswith(OWN) and run.status == "unsupported":
+                found.setdefault(run.name, {})[comparison.scenario.name] = run.reason
+    return found
+
+
+def asked_in_part(off: pd.Series, refused: Mapping[str, str]) -> str:
+    """How far a solver's own file is off where it is asked, and why it is not asked elsewhere."""
+    asked = off.drop(index=list(refused), errors="ignore")
+    why = "; ".join(dict.fromkeys(refused.values()))
+    number = f"{asked.median():.2g} radii off, {over_scenes(len(asked))}; " if len(asked) else ""
+    return f"{off.name}: {number}not asked in {counted(len(refused), 'scene')} ({why})."
+
+
+def not_counted(broken: Mapping[str, str]) -> list[str]:
+    """A sentence for each engine that broke the protocol: name -> the probe that it missed, and
+    how."""
+    return [
+        f"Not counted: {name} breaks the protocol of the harness. {how}"
+        for name, how in sorted(broken.items())
+    ]
 
 
 def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:

@@ -27,7 +27,7 @@ from reports.terminal.foreign_text import put_text
 from scenarios.catalogue import family_of
 
 GENERATOR = "crosscheck run"
-VERDICTS = ("keeps", "departs", "breaks")
+VERDICTS = ("keeps", "not asked", "departs", "breaks")
 OWN = "Scenes of your own"
 PAPER_CHARTS = ("deviation", "convergence")  # of a scene, where it is printed
 
@@ -100,6 +100,8 @@ def write_page(
         answers=answers,
         far_off=situations.FAR_OFF,
         pooled=drawings,
+        charted=pooled.with_marks(drawings),
+        untrusted=untrusted,
         pooled_key=pooled.KEY,
         pooled_charts=packed_charts(drawings),
         links=neighbours(path, "report"),

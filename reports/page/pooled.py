@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 import pandas as pd
@@ -53,6 +53,12 @@ def drawings(
     """The chart of `scores`, without who is `untrusted`; {} if there is nothing to draw."""
     trusted = found[~found.name.isin(untrusted)]
     return {"situations": by_situation(trusted, answers)} if answers else {}
+
+
+def with_marks(drawings: Mapping[str, Drawing]) -> list[str]:
+    """The engines that have a mark in one of the charts."""
+    traces = [t for drawing in drawings.values() if drawing.figure for t in drawing.figure.data]
+    return [t.name for t in traces if any(y is not None and np.isfinite(y) for y in t.y)]
 
 
 def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> Drawing:

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from reports.compare.comparison import Comparison
-from reports.page.findings import findings
+from reports.page.findings import findings, not_counted
 from reports.page.page import write_page
 from reports.run.archive import Archive
 from reports.run.made import writing
@@ -85,13 +85,14 @@ def made_report(
         key=lambda row: (row["column"], row["dt_s"], row["made_by"]),
         reverse=True,
     )
-    untrusted = {
-        f"{row['engine']}:{row['profile']}"
+    broken = {
+        f"{row['engine']}:{row['profile']}": how_broken(row)
         for rows in asked
-        for row in rows
+        for row in reversed(rows)  # so that the first of them is said
         if row["verdict"] == "breaks"
     }
-    sentences = findings(comparisons, untrusted)
+    untrusted = set(broken)
+    sentences = [*findings(comparisons, untrusted), *not_counted(broken)]
     said = {
         name: archive.checked[name]["checked"]["says"]
         for name in header["engines"]
@@ -110,3 +111,9 @@ def made_report(
         on_paper=on_paper,
     )
     return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged, said)
+
+
+def how_broken(row: Mapping[str, Any]) -> str:
+    """The probe of the protocol that an engine missed: the question, and what came."""
+    note = f" ({row['note']})" if row["note"] else ""
+    return f"{row['asked']} {str(row['got']).capitalize()}{note}; expected: {row['expected']}."

@@ -82,7 +82,7 @@ class Probed(Line):
     got: Said
     expected: Said
     bound: Number
-    verdict: Literal["keeps", "departs", "breaks"]
+    verdict: Literal["keeps", "not asked", "departs", "breaks"]
     note: Words
 
 

@@ -121,7 +121,7 @@ def test_a_disk_that_leaves_the_box_is_set_onto_the_opposite_edge_and_keeps_its_
         restitution=0.5,
         wrap=BOX,
     )
-    with loaded(ENGINES[name], scene, 1 / 64) as engine:
+    with loaded(ENGINES[name], scene, dt=1 / 64) as engine:
         start = engine.read()
         engine.step()
         over = engine.read()

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adapters.conformance.conform import ask, conform
 from adapters.own_solver.engine import engine_file
-from adapters.own_solver.restitution import OwnRestitution, written
+from adapters.own_solver.restitution import own_restitution
 from adapters.play import play
 from scenarios.catalogue import scenario
 from scenarios.families.exercise import asteroid_field
@@ -143,6 +144,71 @@ def test_a_faulty_file_is_played(tmp_path: Path, mutant: Mutant):
         assert len(played.trajectory) > 0
 
 
+NO_WALLS = "the exercise has no walls"
+FALLS_UP = {"sphere.velocity.y += sphere.force.y": "sphere.velocity.y -= sphere.force.y"}
+FORGETS_NOTHING = {  # its acceleration grows with the number of calls
+    "function integrate(": "let steps = 0;\nfunction integrate(",
+    "sphere.force.y / sphere.mass * dt": "sphere.force.y / sphere.mass * dt * (1 + steps++)",
+}
+
+
+def changed(folder: Path, changes: dict[str, str]) -> Path:
+    """The right file with these texts in the place of others."""
+    text = RIGHT.read_text()
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "Exercise.js").write_text(text)
+    return folder / "Exercise.js"
+
+
+@pytest.mark.parametrize(
+    ("changes", "probe", "verdict", "note"),
+    [
+        (FALLS_UP, "same_instant", "departs", ""),
+        (FALLS_UP, "load_forgets", "keeps", ""),
+        (FORGETS_NOTHING, "load_forgets", "breaks", ""),
+        ({}, "load_forgets", "keeps", ""),
+        ({}, "walls_are_reported", "not asked", NO_WALLS),
+    ],
+)
+def test_a_probe_tells_wrong_physics_from_a_broken_protocol_in_a_file(
+    tmp_path: Path, changes: dict[str, str], probe: str, verdict: str, note: str
+):
+    """What is wrong in the file's physics departs and is scored; state that it keeps breaks; what
+    the exercise has not is not asked."""
+    found = ask("x", "own", probe, engine_file(changed(tmp_path, changes)))
+
+    assert (found.verdict, found.note) == (verdict, note)
+
+
+# wrong in every way that a basic probe can see
+WRONG_PHYSICS = ("integrate_empty.py", "dt_missing.py", "dt_squared.js", "force_cleared.py")
+WRONG_PHYSICS += ("force_not_by_mass.py", "torque_by_mass.py", "damped.js", "b_forgotten.py")
+BREAKING = {
+    "state_in_a_list.py": "load_forgets",
+    "state_in_integrate.js": "load_forgets",
+    "typo_in_c.py": "stays_finite",  # it throws where two collide
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "mutant",
+    [m for m in MUTANTS if m.name in (*WRONG_PHYSICS, *BREAKING)],
+    ids=lambda mutant: mutant.name,
+)
+def test_only_a_file_that_breaks_the_protocol_is_not_scored(tmp_path: Path, mutant: Mutant):
+    """By all probes: wrong physics misses some of them and is scored."""
+    found = conform("x:own", engine_file(mutant.write(tmp_path), patience=2.0))
+    broken = {finding.probe for finding in found if finding.verdict == "breaks"}
+
+    if mutant.name in BREAKING:
+        assert BREAKING[mutant.name] in broken
+    else:
+        assert not broken
+
+
 def test_a_file_without_collisions_plays_a_lone_disk(tmp_path: Path):
     """Nothing of it is missing there; where two meet, the function is."""
     text = RIGHT.read_text().replace("function sphereSphere", "function laterSphereSphere")
@@ -184,7 +250,7 @@ def test_a_file_is_refused_only_for_a_restitution_that_is_written_into_it(
     text: str, came: float, wanted: float, fits: bool
 ):
     """What its collisions have may be a fault's doing."""
-    assert OwnRestitution(tuple(written(text, came)), came).fits(wanted) is fits
+    assert own_restitution(text, came).fits(wanted) is fits
 
 
 @pytest.mark.parametrize(

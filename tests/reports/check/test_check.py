@@ -14,7 +14,7 @@ from adapters.own_solver.file import SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.questions import QUESTIONS, Ball, ask
 from reports.check.rows import TASKS
-from reports.check.scenes import bounds, contact_fault, scene_of, scenes, truth_of
+from reports.check.scenes import bounds, contact_faults, scene_of, scenes, truth_of
 from reports.check.solver import check_solver
 from reports.check.verdict import FileCheck
 from tests.reports.check.confusion import TABLE, judged, said_first, said_too
@@ -236,21 +236,24 @@ def test_a_contact_is_judged_by_the_formula():
     before = [[0.0, 0.0, 1.0, 0.0], [0.9, 0.0, -1.0, 0.0]]
     after = [[-0.05, 0.0, -0.9, 0.0], [0.95, 0.0, 0.9, 0.0]]
 
-    assert contact_fault(np.array([before, after]), scene, 0, 1) == ""
+    assert contact_faults(np.array([before, after]), scene, 0, 1) == {}
     after[1][2] = 0.91
-    assert "sphere 1 has (0.91, 0) m/s after it, not (0.9, 0) m/s" in contact_fault(
-        np.array([before, after]), scene, 0, 1
+    assert (
+        "sphere 1 has (0.91, 0) m/s after it, not (0.9, 0) m/s"
+        in contact_faults(np.array([before, after]), scene, 0, 1)["2c"]
     )
     at_touch = np.array([before, after]) + [
         [[0, 0, 0, 0], [0.1, 0, 0, 0]],
         [[0.05, 0, 0, 0], [0.05, 0, 0, 0]],
     ]
-    assert "sphere 1 has (0.91, 0) m/s after it" in contact_fault(at_touch, scene, 0, 1), (
+    assert "sphere 1 has (0.91, 0) m/s after it" in contact_faults(at_touch, scene, 0, 1)["2c"], (
         "who reacts at a touch is judged"
     )
-    assert contact_fault(at_touch[[0, 0]], scene, 0, 1) == "", "who does not is free"
+    assert contact_faults(at_touch[[0, 0]], scene, 0, 1) == {}, "who does not is free"
     far = np.array([before, after]) + np.array([[0.0] * 4, [0.3, 0.0, 0.0, 0.0]])
-    assert "collide at a distance" in contact_fault(far, scene, 0, 1)
+    assert "collide at a distance" in contact_faults(far, scene, 0, 1)["2a"]
+    apart = np.array([before, before]) + [np.zeros((2, 4)), [[-0.1, 0, 0, 0], [0.1, 0, 0, 0]]]
+    assert list(contact_faults(apart, scene, 0, 1)) == ["2b", "2c"], "each part by itself"
 
 
 READS_IT = """function integrate(sphere, dt) {

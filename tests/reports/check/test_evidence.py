@@ -11,7 +11,7 @@ import pytest
 
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
-from reports.check.lines import Access, accesses_of, part_of
+from reports.check.lines import Access, Source, accesses_of, part_of
 from reports.check.machine import SCHEMA, as_json
 from reports.check.questions import QUESTIONS, ask, ask_in_two_orders
 from reports.check.rows import CheckRow
@@ -148,7 +148,8 @@ def test_a_fault_shows_the_lines_of_the_file_and_the_formula(checks: dict[str, F
 
     jsonschema.validate(reported, json.loads(SCHEMA.read_text()))
     assert "counted twice" in overlap.cause
-    assert all("position" in line and text[k - 1].strip() == line for k, line in overlap.lines)
+    assert overlap.lines[0][1].startswith("var overlap")
+    assert all("overlap" in line and text[k - 1].strip() == line for k, line in overlap.lines)
     assert overlap.formula.startswith("|xA' - xB'| = sizeA + sizeB")
     assert [line for _, line in sign.lines] == [
         "sphereB.velocity.x += J / sphereB.mass * nx;",
@@ -157,6 +158,28 @@ def test_a_fault_shows_the_lines_of_the_file_and_the_formula(checks: dict[str, F
     assert rows["velocity of B"]["formula"] == "vA' = vA + J n / mA, vB' = vB - J n / mB"
     assert rows["velocity of B"]["lines"][0]["line"] == sign.lines[0][0]
     assert rows["velocity"]["lines"] == []
+
+
+@pytest.mark.parametrize(
+    ("cause", "task", "lines"),
+    [
+        ("the normal is not normalised", "2c", [47, 48, 52, 53]),
+        ("dx is used for dy, too", "2a", [47, 48, 50, 52, 53]),
+        ("the squared distance is used as the distance", "2b", [49]),
+        ("A is moved along x only", "2b", [56, 57]),
+        ("brackets are missing: sizes / 2 - distance", "2b", [55, 56, 57, 58, 59]),
+        ("the velocity of B is left out", "2c", [61]),
+        ("the mass of A is used for both", "2c", [63]),
+    ],
+)
+def test_the_lines_are_those_in_which_the_cause_is(cause: str, task: str, lines: list[int]):
+    """Not all that the part of the task reads or writes: of plain.js, whose lines are known."""
+    solver = read_solver(CORRECT_FILES / "plain.js")
+    row = CheckRow("a row", task, "", "", "", "fault", cause)
+    with SolverProcess(solver) as process:
+        found = Source(process, solver.text).of(row)
+
+    assert [line for line, _ in found] == lines
 
 
 @pytest.mark.parametrize("name", ["complex_numbers.py", "plain.js"])

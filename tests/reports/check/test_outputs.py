@@ -19,7 +19,7 @@ from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check import command
 from reports.check.machine import SCHEMA
-from reports.check.smallest import Smallest, smallest_scene
+from reports.check.smallest import Smallest, smallest_scene, smallest_scenes
 from reports.check.verdict import check_file
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, process
@@ -232,6 +232,20 @@ def test_the_smallest_scene_has_two_spheres_and_shows_the_fault(smallest: Smalle
 
 
 @pytest.mark.slow
+def test_each_fault_has_a_scene_that_shows_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A wrong angle in a flight of one sphere, a wrong overlap in a pair; faults of one kind share
+    theirs."""
+    monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)  # those that are tried first suffice
+    text = RIGHT.read_text().replace("sphere.alpha += ", "sphere.alpha -= ")
+    (tmp_path / "two.js").write_text(text.replace("nx * overlap / 2", "nx * overlap"))
+    with SolverProcess(read_solver(tmp_path / "two.js")) as process:
+        found = smallest_scenes(process, 0.9, ["1", "2b", "2c", "2d", "loop"])
+
+    assert [(one.of, one.scenario.scene.n) for one in found] == [((1,), 1), ((2,), 2)]
+    assert "is turned by" in found[0].fault
+    assert "their centres are" in found[1].fault
+
+
 def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Without any time to draw scenes, a pair that collides is tried."""
     monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
@@ -257,10 +271,10 @@ def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
     from reports.check.page import write_page
 
     page_path = folder / "page.html"
-    write_page(page_path, check_file(folder / "ben" / "Exercise.js"), smallest)
+    write_page(page_path, check_file(folder / "ben" / "Exercise.js"), [smallest])
     page, heard = opened(browser, page_path.as_uri(), viewport={"width": 1280, "height": 800})
-    page.wait_for_function("players.smallest")
-    at_end = "name => { players.smallest.seek(1); return players.smallest.positions(name); }"
+    page.wait_for_function("players[1]")
+    at_end = "name => { players[1].seek(1); return players[1].positions(name); }"
     shown = {name: page.evaluate(at_end, name) for name in ("Exercise.js:own", "truth")}
     title = page.locator("h1").inner_text()
     groups = page.locator("h2").all_inner_texts()
@@ -291,6 +305,6 @@ def test_text_of_a_file_is_inert_on_its_page(tmp_path: Path):
 
     path = tmp_path / "evil.js"
     path.write_text("throw new Error('<script>alert(1)</script>')")
-    write_page(tmp_path / "check.html", check_file(path), None)
+    write_page(tmp_path / "check.html", check_file(path), [])
 
     assert "<script>alert" not in (tmp_path / "check.html").read_text()

@@ -1,0 +1,20 @@
+"""A scene of a check in words."""
+
+from __future__ import annotations
+
+from reports.check.rows import shown
+from scenarios.model import Scenario
+
+
+def scene_lines(scenario: Scenario) -> list[str]:
+    """A scene in words, a line a sphere."""
+    scene, lines = scenario.scene, []
+    for k in range(scene.n):
+        lines.append(
+            f"at {shown(scene.position[k])} m, {shown(scene.velocity[k])} m/s, size"
+            f" {shown(scene.radius[k])} m, mass {shown(scene.mass[k])} kg"
+        )
+        for thrust in (thrust for thrust in scenario.thrusts if thrust.disk == k):
+            lines[-1] += f", force {shown(thrust.force)} N, torque {shown(thrust.torque)} N m"
+            lines[-1] += f", MoI {shown(scene.inertia[k])} kg m²"
+    return lines

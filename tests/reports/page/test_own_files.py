@@ -1,0 +1,60 @@
+"""What the page says of a solver's own file that is asked in some scenes only, or not scored."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from adapters.run import Run
+from reports.page.charts import ChartLine, Drawing, figure_of
+from reports.page.findings import asked_in_part, not_counted
+from reports.page.page import conformance_matrix
+from reports.page.pooled import with_marks
+from reports.page.report import how_broken
+
+
+def test_who_has_no_mark_in_the_chart_has_none_in_its_legend():
+    """A line of no number is a trace without a mark."""
+    lines = [
+        ChartLine(Run(name, "own", "", 0.0), np.arange(2.0), np.array(y))
+        for name, y in (("a.js", [1.0, np.nan]), ("b.js", [np.nan, np.nan]))
+    ]
+    drawing = Drawing("Error", "", figure_of(lines, {}, "error", mode="markers"))
+
+    assert with_marks({"situations": drawing}) == ["a.js:own"]
+
+
+def test_who_is_not_counted_is_named_with_the_probe_that_it_missed():
+    """The reason is what the probe read, not only that there is one."""
+    row = {
+        "asked": "Where does a used engine differ from a fresh one after load?",
+        "got": "position after 10 steps",
+        "expected": "nowhere",
+        "note": "",
+    }
+
+    assert not_counted({"a.js:own": how_broken(row)}) == [
+        "Not counted: a.js:own breaks the protocol of the harness. Where does a used engine differ"
+        " from a fresh one after load? Position after 10 steps; expected: nowhere."
+    ]
+    assert not_counted({}) == []
+
+
+def test_a_file_is_not_asked_where_the_exercise_does_not_ask():
+    """Its number is of the scenes that it plays; the others are counted, with why."""
+    off = pd.Series({"head_on": 0.25, "oblique": 0.75, "wall": np.inf}, name="a.js:own")
+
+    assert asked_in_part(off, {"wall": "the exercise has no walls"}) == (
+        "a.js:own: 0.5 radii off, median of 2 scenes; not asked in 1 scene (the exercise has no"
+        " walls)."
+    )
+
+
+def test_a_refusal_in_the_table_of_probes_is_not_asked():
+    """It is worse than what is kept, and no departure."""
+    rows = [
+        {"engine": "a.js", "profile": "own", "probe": "walls", "verdict": verdict}
+        for verdict in ("keeps", "not asked", "not asked")
+    ]
+
+    assert conformance_matrix(pd.DataFrame(rows)) == {"walls": {"a.js:own": ("not asked", 2)}}
