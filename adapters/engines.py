@@ -15,9 +15,9 @@ from adapters.matched import Searched
 
 def _exercise(**settings: Any) -> Engine:
     from adapters.reference import Reference
-    from reference_impl import verlet_list
+    from reference_impl import neighbours
 
-    return Reference(verlet_list, **settings)
+    return Reference(neighbours, **settings)
 
 
 def _lesson() -> Engine:

@@ -16,7 +16,7 @@ from scenarios.model import Array, Scene, State
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
 METHODS = {  # of the variants by their module
     "exercise": {"integrator": "symplectic Euler"},
-    "verlet_list": {"integrator": "symplectic Euler"},
+    "neighbours": {"integrator": "symplectic Euler"},
     "lesson": {"integrator": "explicit Euler"},
     "ordered": {
         "integrator": "parabolas",

@@ -172,11 +172,29 @@ def move(rows, i: int, nx: float, ny: float, by: float) -> None:  # type: ignore
 def wrap(x, world: World) -> None:  # type: ignore[no-untyped-def]
     """As `projectObjects`: a centre beyond an edge of the box is set onto the opposite edge; its
     velocity stays."""
-    for axis in range(2):
-        if world.low[axis] == -inf and world.high[axis] == inf:
-            continue
+    if world.low[0] > -inf or world.high[0] < inf or world.low[1] > -inf or world.high[1] < inf:
         for i in range(len(x)):
-            if x[i, axis] < world.low[axis]:
-                x[i, axis] = world.high[axis]
-            elif x[i, axis] > world.high[axis]:
-                x[i, axis] = world.low[axis]
+            wrap_disk(x, i, world)
+
+
+@kernel
+def outside(x, i: int, world: World) -> bool:  # type: ignore[no-untyped-def]
+    """Whether the centre of disk `i` is beyond an edge."""
+    return (
+        x[i, 0] < world.low[0]
+        or x[i, 0] > world.high[0]
+        or x[i, 1] < world.low[1]
+        or x[i, 1] > world.high[1]
+    )
+
+
+@kernel
+def wrap_disk(x, i: int, world: World) -> bool:  # type: ignore[no-untyped-def]
+    """The same for disk `i`; whether it was beyond an edge."""
+    beyond = False
+    for axis in range(2):
+        if x[i, axis] < world.low[axis]:
+            x[i, axis], beyond = world.high[axis], True
+        elif x[i, axis] > world.high[axis]:
+            x[i, axis], beyond = world.low[axis], True
+    return beyond

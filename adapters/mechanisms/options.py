@@ -44,12 +44,10 @@ def listing() -> Any:
     """The reference's solver with a neighbour list for the fewest disks, too: the same source."""
     from numba import njit
 
-    from reference_impl import verlet_list
+    from reference_impl import neighbours
 
-    advance = FunctionType(
-        verlet_list.advance.py_func.__code__, vars(verlet_list) | {"LISTED_FROM": 0}
-    )
-    return SimpleNamespace(__name__="verlet_list", advance=njit(error_model="numpy")(advance))
+    advance = FunctionType(neighbours.advance.py_func.__code__, vars(neighbours) | {"WORTH": 0})
+    return SimpleNamespace(__name__="neighbours", advance=njit(error_model="numpy")(advance))
 
 
 OPTIONS: tuple[Option, ...] = tuple(
