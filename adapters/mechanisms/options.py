@@ -46,9 +46,7 @@ def listing() -> Any:
 
     from reference_impl import neighbours
 
-    advance = FunctionType(
-        neighbours.advance.py_func.__code__, vars(neighbours) | {"WORTH": 0}
-    )
+    advance = FunctionType(neighbours.advance.py_func.__code__, vars(neighbours) | {"WORTH": 0})
     return SimpleNamespace(__name__="neighbours", advance=njit(error_model="numpy")(advance))
 
 

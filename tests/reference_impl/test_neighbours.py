@@ -81,7 +81,7 @@ def listed(disks, world, left=LASTS, dt=DT):
     """The list of disks as they are now."""
     near = empty_list(len(disks.radius), len(world.walls))
     near.length[STRIDE] = neighbours.longest_stride(disks, dt)
-    build_list(near, disks, world, left)
+    build_list(near, disks.position, disks.radius, world, left)
     return near
 
 
@@ -168,7 +168,7 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
     position = scene.position - scene.position.mean(axis=0)
     disks = make_disks(position, scene.velocity, scene.radius, scene.mass)
     near = listed(disks, World(walls=scene.walls))
-    skin, pairs = near.length[HALF_SKIN] / 0.49, slice(near.count[PAIRS])
+    skin, pairs = near.length[HALF_SKIN] / 0.49, slice(near.found[PAIRS])
     apart = np.hypot(*(position[:, None] - position).transpose(2, 0, 1)) - 1.0
     wanted = np.argwhere(np.triu(apart < skin, 1))
     assert holds(near)
