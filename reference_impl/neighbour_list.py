@@ -21,7 +21,7 @@ THIN, THICK = 0.125, 3.0
 FEW = 64  # disks, up to which asking all pairs finds the near ones sooner than cells do
 FAR = 2.0**31  # cells from the origin, up to where rounding cannot put a disk into the wrong one
 ROOM = 32  # near pairs a disk, and near walls, beyond which a list is given up
-ROUNDING = 2.0**-52  # of a coordinate, by which a step may be longer than v dt
+ROUNDING = 2.0**-23  # of a coordinate, by which a step may be longer than v dt: in float32, too
 
 PAIRS, WALLS, EDGES = 0, 1, 2  # places in `found`
 NO_ROOM = -1  # in place of how many there are
@@ -43,13 +43,14 @@ class NeighbourList(NamedTuple):
 
 
 @compiled
-def empty_list(n: int, walls: int) -> NeighbourList:
-    """Room for the list of n disks and so many walls; it does not hold yet."""
+def empty_list(radius, walls: int) -> NeighbourList:  # type: ignore[no-untyped-def]
+    """Room for the list of disks of these radii (n,) m and so many walls; it does not hold yet."""
+    n = len(radius)
     pairs, sides = min(n * (n - 1) // 2, ROOM * n), min(n * walls, ROOM * n)
     return NeighbourList(
         first=np.empty(pairs, np.uint32),
         second=np.empty(pairs, np.uint32),
-        reach=np.empty(pairs),
+        reach=np.empty(pairs, radius.dtype),
         disk=np.empty(sides, np.uint32),
         wall=np.empty(sides, np.uint32),
         edge=np.empty(n, np.uint32),

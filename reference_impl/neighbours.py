@@ -74,7 +74,7 @@ def advance_blocks(disks, world, dt: float, count: int) -> list:  # type: ignore
 def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> None:
     """Advance by near pairs, however few the disks and steps are."""
     kicks, k = kicks_of(disks, world, dt), 0
-    near = empty_list(len(disks.radius), len(world.walls))
+    near = empty_list(disks.radius, len(world.walls))
     while True:
         k = take_quiet_steps(disks, world, kicks, dt, near, k, count)
         if k == count:

@@ -56,7 +56,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     acceleration, k = accelerations_of(disks, world), 0
-    near = empty_list(len(disks.radius), len(world.walls))
+    near = empty_list(disks.radius, len(world.walls))
     while True:
         k = fly_until_meeting(disks, world, acceleration, near, dt, k, count)
         if k == count:
