@@ -13,17 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_impl.compiled import compiled, kernel
-from reference_impl.state import Disks, World
+from reference_impl.state import World
 
 LASTS = 20  # steps of the fastest disk that a list is made for, unless fewer are left
 # the skin in mean radii: at least, so that disks at rest may fall; at most
-THIN, THICK = 0.125, 2.0
+THIN, THICK = 0.125, 3.0
 FEW = 64  # disks, up to which asking all pairs finds the near ones sooner than cells do
 FAR = 2.0**31  # cells from the origin, up to where rounding cannot put a disk into the wrong one
 ROOM = 32  # near pairs a disk, and near walls, beyond which a list is given up
-ROUNDING = 2.0**-52  # of a coordinate, by which a step may be longer than v dt
+ROUNDING = 2.0**-23  # of a coordinate, by which a step may be longer than v dt: in float32, too
 
-PAIRS, WALLS, EDGES = 0, 1, 2  # places in `count`
+PAIRS, WALLS, EDGES = 0, 1, 2  # places in `found`
 NO_ROOM = -1  # in place of how many there are
 HALF_SKIN, SLACK, STRIDE = 0, 1, 2  # places in `length`
 
@@ -37,23 +37,24 @@ class NeighbourList(NamedTuple):
     disk: np.ndarray  # (room,) the disks near a wall, and
     wall: np.ndarray  # (room,) which wall it is, in the order of their double loop
     edge: np.ndarray  # (n,) the disks whose centre is near an edge of the box
-    count: np.ndarray  # (3,) how many there are of each: `PAIRS`, `WALLS`, `EDGES`
+    found: np.ndarray  # (3,) how many there are of each: `PAIRS`, `WALLS`, `EDGES`
     home: np.ndarray  # (n, 2) m: where the disks were when this was found
     length: np.ndarray  # (3,) m: `HALF_SKIN`, `SLACK`, `STRIDE`
 
 
 @compiled
-def empty_list(n: int, walls: int) -> NeighbourList:
-    """Room for the list of n disks and so many walls; it does not hold yet."""
+def empty_list(radius, walls: int) -> NeighbourList:  # type: ignore[no-untyped-def]
+    """Room for the list of disks of these radii (n,) m and so many walls; it does not hold yet."""
+    n = len(radius)
     pairs, sides = min(n * (n - 1) // 2, ROOM * n), min(n * walls, ROOM * n)
     return NeighbourList(
         first=np.empty(pairs, np.uint32),
         second=np.empty(pairs, np.uint32),
-        reach=np.empty(pairs),
+        reach=np.empty(pairs, radius.dtype),
         disk=np.empty(sides, np.uint32),
         wall=np.empty(sides, np.uint32),
         edge=np.empty(n, np.uint32),
-        count=np.zeros(3, np.int64),
+        found=np.zeros(3, np.int64),
         home=np.empty((n, 2)),
         length=np.array([0.0, -inf, 0.0]),
     )
@@ -75,9 +76,9 @@ def take_step(near: NeighbourList, faster: float) -> None:
 @kernel
 def account_for(near: NeighbourList, x, i: int, stride: float) -> None:  # type: ignore[no-untyped-def]
     """A collision has moved disk i, x (n, 2) m, and from now on it moves by up to `stride` m a
-    step."""
+    step: in this one, too, where a collision acts before its end."""
     dx, dy = x[i, 0] - near.home[i, 0], x[i, 1] - near.home[i, 1]
-    slack = near.length[HALF_SKIN] - sqrt(dx * dx + dy * dy)
+    slack = near.length[HALF_SKIN] - sqrt(dx * dx + dy * dy) - stride
     if slack < near.length[SLACK]:
         near.length[SLACK] = slack
     if stride > near.length[STRIDE]:
@@ -85,24 +86,24 @@ def account_for(near: NeighbourList, x, i: int, stride: float) -> None:  # type:
 
 
 @compiled
-def build_list(near: NeighbourList, disks: Disks, world: World, left: int) -> None:
-    """Find what is near anew: all pairs that are apart by less than a skin, and the disks within
-    half a skin of a wall or an edge; `left` steps to go.
+def build_list(near: NeighbourList, x, radius, world: World, left: int) -> None:  # type: ignore[no-untyped-def]
+    """Find what is near anew: all pairs of the disks at x (n, 2) m that are apart by less than a
+    skin, and those within half a skin of a wall or an edge; `left` steps to go.
 
     `STRIDE` says how thick the skin must be. Where a list would be too long, or a disk is too far
     out, it does not hold.
     """
-    x, n = disks.position, len(disks.radius)
-    skin = skin_for(disks.radius, near.length[STRIDE], left)
+    n = len(radius)
+    skin = skin_for(radius, near.length[STRIDE], left)
     # 2 % of the skin are more than what rounding makes of all the distances.
     near.length[HALF_SKIN], near.length[SLACK] = 0.49 * skin, -inf
     if n <= FEW:
-        find_by_all_pairs(near, x, disks.radius, skin)
+        find_by_all_pairs(near, x, radius, skin)
     else:
-        find_by_cells(near, x, disks.radius, skin)
-    find_walls(near, x, disks.radius, world.walls, 0.5 * skin)
+        find_by_cells(near, x, radius, skin)
+    find_walls(near, x, radius, world.walls, 0.5 * skin)
     find_edges(near, x, world, 0.5 * skin)
-    if near.count[PAIRS] != NO_ROOM and near.count[WALLS] != NO_ROOM:
+    if near.found[PAIRS] != NO_ROOM and near.found[WALLS] != NO_ROOM:
         for i in range(n):
             near.home[i, 0], near.home[i, 1] = x[i, 0], x[i, 1]
         near.length[SLACK] = near.length[HALF_SKIN]
@@ -126,7 +127,7 @@ def find_by_all_pairs(near: NeighbourList, x, radius, skin: float) -> None:  # t
             if dx * dx + dy * dy < (reach + skin) * (reach + skin):
                 near.first[count], near.second[count], near.reach[count] = i, j, reach
                 count += 1
-    near.count[PAIRS] = count
+    near.found[PAIRS] = count
 
 
 @kernel
@@ -140,11 +141,11 @@ def find_walls(near: NeighbourList, x, radius, walls, margin: float) -> None:  #
             low, high = min(walls[w, 0, 1], walls[w, 1, 1]), max(walls[w, 0, 1], walls[w, 1, 1])
             if left - reach < x[i, 0] < right + reach and low - reach < x[i, 1] < high + reach:
                 if count == len(near.disk):
-                    near.count[WALLS] = NO_ROOM
+                    near.found[WALLS] = NO_ROOM
                     return
                 near.disk[count], near.wall[count] = i, w
                 count += 1
-    near.count[WALLS] = count
+    near.found[WALLS] = count
 
 
 @kernel
@@ -156,7 +157,7 @@ def find_edges(near: NeighbourList, x, world: World, margin: float) -> None:  # 
         if not (left < x[i, 0] < right and low < x[i, 1] < high):
             near.edge[count] = i
             count += 1
-    near.count[EDGES] = count
+    near.found[EDGES] = count
 
 
 @compiled
@@ -165,9 +166,9 @@ def find_by_cells(near: NeighbourList, x, radius, skin: float) -> None:  # type:
     # wider than needed by more than rounding
     cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))
     first, second = near_pairs(cells, skin)
-    near.count[PAIRS] = NO_ROOM
+    near.found[PAIRS] = NO_ROOM
     if len(cells.disk) > 0 and len(first) <= len(near.first):
-        near.count[PAIRS] = count = len(first)
+        near.found[PAIRS] = count = len(first)
         put_in_order(near.first[:count], near.second[:count], first, second, len(x))
         for p in range(count):
             near.reach[p] = radius[near.first[p]] + radius[near.second[p]]

@@ -35,10 +35,10 @@ from reference_impl.neighbour_list import (
     holds,
     take_step,
 )
-from reference_impl.state import Disks, World
+from reference_impl.state import Disks, World, disks_of, world_of
 
 WORTH = 64  # disks times steps, from which on a list is cheaper than all pairs
-EARLY = 0.2  # of half the skin: what is kept for what the collisions of a step move
+EARLY = 0.1  # of half the skin: what is kept for what the collisions of a step move
 # disks a new list in mid-step: more of them would cost more than asking all pairs
 REBUILD = 256
 BLOCK = 256  # disks that turn at a time: few enough for the nearest cache
@@ -50,8 +50,7 @@ class Kicks(NamedTuple):
 
     velocity: np.ndarray  # (2n,) m/s, x and y in turn
     spin: np.ndarray  # (n,) rad/s
-    # (m, 2) who moves: the disks from .. to .., at most a block, without the static ones
-    moving: np.ndarray
+    moving: np.ndarray  # (m, 2) who moves, as `moving` has it
     strongest: float  # m: no disk moves by more in a step than it did in the one before
 
 
@@ -66,17 +65,23 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 
 
 @compiled
+def advance_blocks(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
+    """`advance`, entered sooner: with the blocks of `disks_block` and `world_block`."""
+    return advance(disks_of(disks), world_of(world), dt, count)
+
+
+@compiled
 def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> None:
     """Advance by near pairs, however few the disks and steps are."""
     kicks, k = kicks_of(disks, world, dt), 0
-    near = empty_list(len(disks.radius), len(world.walls))
+    near = empty_list(disks.radius, len(world.walls))
     while True:
         k = take_quiet_steps(disks, world, kicks, dt, near, k, count)
         if k == count:
             break
         if used_up(near):
             near.length[STRIDE] = longest_stride(disks, dt)
-            build_list(near, disks, world, count - k)
+            build_list(near, disks.position, disks.radius, world, count - k)
         collide_near(disks, world, dt, near, k, count, collisions)
         collide_near_walls(disks, world, dt, near, k, collisions)
         wrap_near(disks, world, near)
@@ -108,11 +113,11 @@ def used_up(near: NeighbourList) -> bool:
 @kernel
 def touch(disks: Disks, world: World, near: NeighbourList) -> bool:
     """Whether any two disks do, or a disk and a wall, or the centre of one is beyond an edge."""
-    if next_touching(disks, near, 0) < near.count[PAIRS]:
+    if next_touching(disks, near, 0) < near.found[PAIRS]:
         return True
-    if next_touching_wall(disks, world, near, 0) < near.count[WALLS]:
+    if next_touching_wall(disks, world, near, 0) < near.found[WALLS]:
         return True
-    for e in range(near.count[EDGES]):
+    for e in range(near.found[EDGES]):
         if outside(disks.position, near.edge[e], world):
             return True
     return False
@@ -122,7 +127,7 @@ def touch(disks: Disks, world: World, near: NeighbourList) -> bool:
 def kicks_of(disks: Disks, world: World, dt: float) -> Kicks:
     """Rounded as in `exercise.integrate`."""
     n, g, strongest2 = len(disks.mass), world.gravity, 0.0
-    kick, spin, moving, runs = np.zeros(2 * n), np.zeros(n), np.zeros((n, 2), np.uint32), 0
+    kick, spin = np.zeros(2 * n), np.zeros(n)
     for i in range(n):
         if disks.mass[i] == inf:
             continue
@@ -131,11 +136,21 @@ def kicks_of(disks: Disks, world: World, dt: float) -> Kicks:
         kick[2 * i], kick[2 * i + 1] = kx, ky
         strongest2 = max(strongest2, kx * kx + ky * ky)
         spin[i] = disks.torque[i] / disks.inertia[i] * dt
-        if runs == 0 or moving[runs - 1, 1] != i or i % BLOCK == 0:
-            moving[runs, 0] = i
-            runs += 1
-        moving[runs - 1, 1] = i + 1
-    return Kicks(kick, spin, moving[:runs], sqrt(strongest2) * abs(dt))
+    return Kicks(kick, spin, moving(disks.mass), sqrt(strongest2) * abs(dt))
+
+
+@compiled
+def moving(mass):  # type: ignore[no-untyped-def]
+    """(m, 2): the disks from .. to .., at most a `BLOCK`, without the static ones."""
+    runs, count = np.zeros((len(mass), 2), np.uint32), 0
+    for i in range(len(mass)):
+        if mass[i] == inf:
+            continue
+        if count == 0 or runs[count - 1, 1] != i or i % BLOCK == 0:
+            runs[count, 0] = i
+            count += 1
+        runs[count - 1, 1] = i + 1
+    return runs[:count]
 
 
 @kernel
@@ -184,8 +199,8 @@ def collide_near(
         collide_from(disks, world, k, collisions, 0, 1)
         return
     p, rebuilds = next_touching(disks, near, 0), 0
-    while p < near.count[PAIRS]:
-        i, j = np.int64(near.first[p]), np.int64(near.second[p])
+    while p < near.found[PAIRS]:
+        i, j = int(near.first[p]), int(near.second[p])
         impulse = collide(disks, i, j, world)
         if impulse != 0.0:
             collisions.append((k, i, j, impulse))
@@ -195,7 +210,7 @@ def collide_near(
         if not holds(near):
             if rebuilds <= len(disks.radius) // REBUILD:
                 near.length[STRIDE] = longest_stride(disks, dt)
-                build_list(near, disks, world, count - k)
+                build_list(near, disks.position, disks.radius, world, count - k)
                 rebuilds += 1
                 p = first_after(near, i, j)
             if not holds(near):
@@ -217,7 +232,7 @@ def next_touching(disks: Disks, near: NeighbourList, p: int) -> int:
     """The number of the next near pair that is `touching`, from p on; their count if there is
     none."""
     x, first, second, reach = disks.position, near.first, near.second, near.reach
-    while p < near.count[PAIRS]:
+    while p < near.found[PAIRS]:
         i, j = np.uintp(first[p]), np.uintp(second[p])  # which are not negative: that is not asked
         dx, dy = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1]
         if dx * dx + dy * dy < reach[p] * reach[p]:
@@ -230,7 +245,7 @@ def next_touching(disks: Disks, near: NeighbourList, p: int) -> int:
 def first_after(near: NeighbourList, i: int, j: int) -> int:
     """The number of the first near pair after (i, j)."""
     p = 0
-    while p < near.count[PAIRS] and (
+    while p < near.found[PAIRS] and (
         near.first[p] < i or (near.first[p] == i and near.second[p] <= j)
     ):
         p += 1
@@ -257,15 +272,15 @@ def collide_near_walls(
         collide_walls(disks, world, k, collisions)
         return
     b = next_touching_wall(disks, world, near, 0)
-    while b < near.count[WALLS]:
-        i = np.int64(near.disk[b])
+    while b < near.found[WALLS]:
+        i = int(near.disk[b])
         # as it is moved, it may touch a later one that it was not near
         for w in range(near.wall[b], len(world.walls)):
             impulse = collide_wall(disks, i, w, world)
             if impulse != 0.0:
                 collisions.append((k, i, -1 - w, impulse))
         account(disks, near, i, dt)
-        while b < near.count[WALLS] and near.disk[b] == i:
+        while b < near.found[WALLS] and near.disk[b] == i:
             b += 1
         b = next_touching_wall(disks, world, near, b)
 
@@ -274,7 +289,7 @@ def collide_near_walls(
 def next_touching_wall(disks: Disks, world: World, near: NeighbourList, b: int) -> int:
     """The number of the next disk that is `touching_wall` with one near it, from b on; their count
     if there is none."""
-    while b < near.count[WALLS]:
+    while b < near.found[WALLS]:
         if touching_wall(disks.position, disks.radius, near.disk[b], world.walls, near.wall[b]):
             break
         b += 1
@@ -288,7 +303,7 @@ def wrap_near(disks: Disks, world: World, near: NeighbourList) -> None:
     if not holds(near):
         wrap(disks.position, world)
         return
-    for e in range(near.count[EDGES]):
-        i = np.int64(near.edge[e])
+    for e in range(near.found[EDGES]):
+        i = int(near.edge[e])
         if wrap_disk(disks.position, i, world):
             near.length[SLACK] = -inf
