@@ -15,6 +15,13 @@ from adapters.matched import Searched
 
 def _exercise(**settings: Any) -> Engine:
     from adapters.reference import Reference
+    from reference_impl import exercise
+
+    return Reference(exercise, **settings)
+
+
+def _neighbours(**settings: Any) -> Engine:
+    from adapters.reference import Reference
     from reference_impl import neighbours
 
     return Reference(neighbours, **settings)
@@ -115,6 +122,13 @@ ENGINES: dict[str, EngineRow] = {
         FLOAT64,
         options={"kept in float32": {"precision": np.float32}},
     ),
+    "reference:neighbours": _Reference(
+        _neighbours,
+        "the same to the bit, sooner: asks only pairs of a neighbour list",
+        1.0,
+        FLOAT64,
+        bits_of="reference:exercise",
+    ),
     "reference:lesson": _Reference(
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
     ),
@@ -208,6 +222,9 @@ ENGINES: dict[str, EngineRow] = {
         mark=Mark("#6b5f00", "#d9c84a", "star"),
     ),
 }
+
+# whose numbers differ from each other's
+DISTINCT = {name: row for name, row in ENGINES.items() if not row.bits_of}
 
 OWN = ":own"  # the profile of a solver's file, whose path is its engine
 

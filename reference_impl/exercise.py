@@ -8,7 +8,7 @@ source runs as plain Python and gives the same bits.
 from math import inf, sqrt
 
 from reference_impl.compiled import compiled, kernel
-from reference_impl.state import BY_INVERSE_MASS, EQUAL, Disks, World, disks_of, world_of
+from reference_impl.state import BY_INVERSE_MASS, EQUAL, Disks, World
 
 
 @compiled
@@ -19,12 +19,6 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     for k in range(count):
         step(disks, world, dt, k, collisions)
     return collisions
-
-
-@compiled
-def advance_blocks(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
-    """`advance`, entered sooner: with the blocks of `disks_block` and `world_block`."""
-    return advance(disks_of(disks), world_of(world), dt, count)
 
 
 @compiled
@@ -178,29 +172,11 @@ def move(rows, i: int, nx: float, ny: float, by: float) -> None:  # type: ignore
 def wrap(x, world: World) -> None:  # type: ignore[no-untyped-def]
     """As `projectObjects`: a centre beyond an edge of the box is set onto the opposite edge; its
     velocity stays."""
-    if world.low[0] > -inf or world.high[0] < inf or world.low[1] > -inf or world.high[1] < inf:
-        for i in range(len(x)):
-            wrap_disk(x, i, world)
-
-
-@kernel
-def outside(x, i: int, world: World) -> bool:  # type: ignore[no-untyped-def]
-    """Whether the centre of disk `i` is beyond an edge."""
-    return (
-        x[i, 0] < world.low[0]
-        or x[i, 0] > world.high[0]
-        or x[i, 1] < world.low[1]
-        or x[i, 1] > world.high[1]
-    )
-
-
-@kernel
-def wrap_disk(x, i: int, world: World) -> bool:  # type: ignore[no-untyped-def]
-    """The same for disk `i`; whether it was beyond an edge."""
-    beyond = False
     for axis in range(2):
-        if x[i, axis] < world.low[axis]:
-            x[i, axis], beyond = world.high[axis], True
-        elif x[i, axis] > world.high[axis]:
-            x[i, axis], beyond = world.low[axis], True
-    return beyond
+        if world.low[axis] == -inf and world.high[axis] == inf:
+            continue
+        for i in range(len(x)):
+            if x[i, axis] < world.low[axis]:
+                x[i, axis] = world.high[axis]
+            elif x[i, axis] > world.high[axis]:
+                x[i, axis] = world.low[axis]

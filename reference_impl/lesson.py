@@ -9,7 +9,7 @@ file, know one method.
 from math import inf, sqrt
 
 from reference_impl.compiled import compiled
-from reference_impl.state import Disks, World, disks_of, world_of
+from reference_impl.state import Disks, World
 
 
 @compiled
@@ -20,12 +20,6 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     for k in range(count):
         step(disks, world, dt, k, collisions)
     return collisions
-
-
-@compiled
-def advance_blocks(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
-    """`advance`, entered sooner: with the blocks of `disks_block` and `world_block`."""
-    return advance(disks_of(disks), world_of(world), dt, count)
 
 
 @compiled

@@ -15,7 +15,9 @@ import numpy as np
 from reference_impl.compiled import compiled, kernel
 from reference_impl.state import World
 
-LASTS = 20  # steps of the fastest disk that a list is made for, unless fewer are left
+LASTS = 16  # steps of the fastest disk that a list is made for, unless fewer are left
+HALF = 0.49  # of the skin: 2 % of it are more than what rounding makes of all the distances
+EARLY = 0.1  # of half the skin: what is kept for what the collisions of a step move
 # the skin in mean radii: at least, so that disks at rest may fall; at most
 THIN, THICK = 0.125, 3.0
 FEW = 64  # disks, up to which asking all pairs finds the near ones sooner than cells do
@@ -67,6 +69,12 @@ def holds(near: NeighbourList) -> bool:
 
 
 @kernel
+def used_up(near: NeighbourList) -> bool:
+    """Whether too little is left of half the skin for what collisions move."""
+    return near.length[SLACK] < EARLY * near.length[HALF_SKIN] or not holds(near)
+
+
+@kernel
 def take_step(near: NeighbourList, faster: float) -> None:
     """All have moved by a step; the fastest is by `faster` m a step faster than before."""
     near.length[STRIDE] += faster
@@ -95,8 +103,7 @@ def build_list(near: NeighbourList, x, radius, world: World, left: int) -> None:
     """
     n = len(radius)
     skin = skin_for(radius, near.length[STRIDE], left)
-    # 2 % of the skin are more than what rounding makes of all the distances.
-    near.length[HALF_SKIN], near.length[SLACK] = 0.49 * skin, -inf
+    near.length[HALF_SKIN], near.length[SLACK] = HALF * skin, -inf
     if n <= FEW:
         find_by_all_pairs(near, x, radius, skin)
     else:
@@ -111,10 +118,10 @@ def build_list(near: NeighbourList, x, radius, world: World, left: int) -> None:
 
 @kernel
 def skin_for(radius, stride: float, left: int) -> float:  # type: ignore[no-untyped-def]
-    """m: the thicker, the more pairs are asked in vain; the thinner, the sooner the list is out of
-    date."""
-    size = radius.mean()
-    return min(max(2.0 * min(LASTS, left) * stride, THIN * size), THICK * size)
+    """m: the thicker, the more pairs are asked in vain; the thinner, the sooner the list is used
+    up. Few steps that are left are taken with one list."""
+    size, way = radius.mean(), min(LASTS, left) * stride
+    return min(max(way / (HALF * (1.0 - EARLY)), THIN * size), THICK * size)
 
 
 @kernel

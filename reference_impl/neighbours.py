@@ -15,14 +15,11 @@ from reference_impl.exercise import (
     collide,
     collide_wall,
     collide_walls,
-    outside,
     touching_wall,
     wrap,
-    wrap_disk,
 )
 from reference_impl.neighbour_list import (
     EDGES,
-    HALF_SKIN,
     PAIRS,
     ROUNDING,
     SLACK,
@@ -34,11 +31,11 @@ from reference_impl.neighbour_list import (
     empty_list,
     holds,
     take_step,
+    used_up,
 )
-from reference_impl.state import Disks, World, disks_of, world_of
+from reference_impl.state import Disks, World
 
 WORTH = 64  # disks times steps, from which on a list is cheaper than all pairs
-EARLY = 0.1  # of half the skin: what is kept for what the collisions of a step move
 # disks a new list in mid-step: more of them would cost more than asking all pairs
 REBUILD = 256
 BLOCK = 256  # disks that turn at a time: few enough for the nearest cache
@@ -65,24 +62,18 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 
 
 @compiled
-def advance_blocks(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
-    """`advance`, entered sooner: with the blocks of `disks_block` and `world_block`."""
-    return advance(disks_of(disks), world_of(world), dt, count)
-
-
-@compiled
 def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> None:
     """Advance by near pairs, however few the disks and steps are."""
     kicks, k = kicks_of(disks, world, dt), 0
     near = empty_list(disks.radius, len(world.walls))
     while True:
-        k = take_quiet_steps(disks, world, kicks, dt, near, k, count)
+        k, p = take_quiet_steps(disks, world, kicks, dt, near, k, count)
         if k == count:
             break
         if used_up(near):
             near.length[STRIDE] = longest_stride(disks, dt)
             build_list(near, disks.position, disks.radius, world, count - k)
-        collide_near(disks, world, dt, near, k, count, collisions)
+        collide_near(disks, world, dt, near, k, p, count, collisions)
         collide_near_walls(disks, world, dt, near, k, collisions)
         wrap_near(disks, world, near)
         k += 1
@@ -92,29 +83,25 @@ def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions
 @kernel
 def take_quiet_steps(
     disks: Disks, world: World, kicks: Kicks, dt: float, near: NeighbourList, k: int, count: int
-) -> int:
-    """Take steps from step k on until one, which it returns, in which two touch or the list is used
-    up: in that one all have flown, and nothing else was done."""
+) -> tuple[int, int]:
+    """Take steps from step k on until one in which two touch or the list is used up: in that one
+    all have flown, and nothing else was done. Returns it, and the number of the first near pair
+    that may touch."""
     while k < count:
         fly(disks, kicks, dt)
         take_step(near, kicks.strongest)
-        if used_up(near) or touch(disks, world, near):
-            break
+        if used_up(near):
+            return k, 0
+        p = next_touching(disks, near, 0)
+        if p < near.found[PAIRS] or touch_edges(disks, world, near):
+            return k, p
         k += 1
-    return k
+    return k, 0
 
 
 @kernel
-def used_up(near: NeighbourList) -> bool:
-    """Whether too little is left of half the skin for what collisions move."""
-    return near.length[SLACK] < EARLY * near.length[HALF_SKIN] or not holds(near)
-
-
-@kernel
-def touch(disks: Disks, world: World, near: NeighbourList) -> bool:
-    """Whether any two disks do, or a disk and a wall, or the centre of one is beyond an edge."""
-    if next_touching(disks, near, 0) < near.found[PAIRS]:
-        return True
+def touch_edges(disks: Disks, world: World, near: NeighbourList) -> bool:
+    """Whether any disk touches a wall, or the centre of one is beyond an edge of the box."""
     if next_touching_wall(disks, world, near, 0) < near.found[WALLS]:
         return True
     for e in range(near.found[EDGES]):
@@ -192,13 +179,21 @@ def turn(disks: Disks, kicks: Kicks, dt: float, count: int) -> None:
 
 @pasted
 def collide_near(
-    disks: Disks, world: World, dt: float, near: NeighbourList, k: int, count: int, collisions: list
+    disks: Disks,
+    world: World,
+    dt: float,
+    near: NeighbourList,
+    k: int,
+    p: int,
+    count: int,
+    collisions: list,
 ) -> None:
-    """Collide the near pairs in order; all pairs that are left, where the list does not hold."""
+    """Collide the near pairs from number p on in order; all pairs that are left, where the list does
+    not hold."""
     if not holds(near):
         collide_from(disks, world, k, collisions, 0, 1)
         return
-    p, rebuilds = next_touching(disks, near, 0), 0
+    p, rebuilds = next_touching(disks, near, p), 0
     while p < near.found[PAIRS]:
         i, j = int(near.first[p]), int(near.second[p])
         impulse = collide(disks, i, j, world)
@@ -303,7 +298,25 @@ def wrap_near(disks: Disks, world: World, near: NeighbourList) -> None:
     if not holds(near):
         wrap(disks.position, world)
         return
+    x = disks.position
     for e in range(near.found[EDGES]):
         i = int(near.edge[e])
-        if wrap_disk(disks.position, i, world):
-            near.length[SLACK] = -inf
+        if not outside(x, i, world):
+            continue
+        for axis in range(2):
+            if x[i, axis] < world.low[axis]:
+                x[i, axis] = world.high[axis]
+            elif x[i, axis] > world.high[axis]:
+                x[i, axis] = world.low[axis]
+        near.length[SLACK] = -inf
+
+
+@kernel
+def outside(x, i: int, world: World) -> bool:  # type: ignore[no-untyped-def]
+    """Whether the centre of disk `i` is beyond an edge of the box."""
+    return (
+        x[i, 0] < world.low[0]
+        or x[i, 0] > world.high[0]
+        or x[i, 1] < world.low[1]
+        or x[i, 1] > world.high[1]
+    )

@@ -31,9 +31,10 @@ from reference_impl.neighbour_list import (
     empty_list,
     holds,
     take_step,
+    used_up,
 )
-from reference_impl.neighbours import moving, used_up
-from reference_impl.state import Disks, World, disks_of, world_of
+from reference_impl.neighbours import moving
+from reference_impl.state import Disks, World
 
 REST = 1 / 16  # of a step
 MOST = 8  # collisions a disk and step, on average
@@ -58,19 +59,13 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     acceleration, k = accelerations_of(disks, world), 0
     near = empty_list(disks.radius, len(world.walls))
     while True:
-        k = fly_until_meeting(disks, world, acceleration, near, dt, k, count)
+        k, first = fly_until_meeting(disks, world, acceleration, near, dt, k, count)
         if k == count:
             break
-        resolve(disks, world, acceleration, near, dt, k, count, collisions)
+        resolve(disks, world, acceleration, near, dt, k, first, count, collisions)
         k += 1
     turn(disks, acceleration, dt, count)
     return collisions
-
-
-@compiled
-def advance_blocks(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
-    """`advance`, entered sooner: with the blocks of `disks_block` and `world_block`."""
-    return advance(disks_of(disks), world_of(world), dt, count)
 
 
 @compiled
@@ -92,7 +87,7 @@ def accelerations_of(disks: Disks, world: World) -> Accelerations:
 
 
 @kernel
-def fly_until_meeting(
+def fly_until_meeting(  # type: ignore[no-untyped-def]
     disks: Disks,
     world: World,
     acceleration: Accelerations,
@@ -100,16 +95,21 @@ def fly_until_meeting(
     dt: float,
     k: int,
     count: int,
-) -> int:
-    """Take steps from step k on until one, which it returns, in which two meet or the list is used
-    up: in that one all have flown, and nothing else was done."""
+):
+    """Take steps from step k on until one in which two meet or the list is used up: in that one all
+    have flown, and nothing else was done. Returns it and its `first_meeting`, as far as the list
+    knows."""
+    first = inf, NOBODY, NOBODY
     while k < count:
         fly(disks, acceleration, dt)
         take_step(near, acceleration.strongest * dt * dt)
-        if used_up(near) or first_meeting(disks, world, acceleration.now, near, -dt)[1] != NOBODY:
+        if used_up(near):
+            break
+        first = first_meeting(disks, world, acceleration.now, near, -dt)
+        if first[1] != NOBODY:
             break
         k += 1
-    return k
+    return k, first
 
 
 @kernel
@@ -148,22 +148,23 @@ def turn(disks: Disks, acceleration: Accelerations, dt: float, count: int) -> No
 
 
 @pasted
-def resolve(
+def resolve(  # type: ignore[no-untyped-def]
     disks: Disks,
     world: World,
     acceleration: Accelerations,
     near: NeighbourList,
     dt: float,
     k: int,
+    first,
     count: int,
     collisions: list,
 ) -> None:
-    """Meeting after meeting of a step in which all have flown to its end."""
-    now = -dt
+    """Meeting after meeting, from the first on, of a step in which all have flown to its end."""
     if used_up(near):
         find_near(disks, world, acceleration.now, near, dt, count - k)
+        first = first_meeting(disks, world, acceleration.now, near, -dt)
     for _ in range(MOST * len(disks.radius)):
-        now, i, j = first_meeting(disks, world, acceleration.now, near, now)
+        now, i, j = first
         if i == NOBODY:
             break
         if j == EDGE:
@@ -178,6 +179,7 @@ def resolve(
                 account_for(near, disks.position, j, way_of(disks, acceleration.now, j, dt))
         if not holds(near):
             find_near(disks, world, acceleration.now, near, dt, count - k)
+        first = first_meeting(disks, world, acceleration.now, near, now)
 
 
 @compiled

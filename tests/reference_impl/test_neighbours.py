@@ -16,6 +16,7 @@ from reference_impl.neighbour_list import (
     LASTS,
     PAIRS,
     STRIDE,
+    THICK,
     build_list,
     empty_list,
     holds,
@@ -89,7 +90,7 @@ def listed(disks, world, left=LASTS, dt=DT):
 def collide_once(disks, world, near, k, count):
     """The collisions of one step of which the list is given."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
-    neighbours.collide_near(disks, world, DT, near, k, count, collisions)
+    neighbours.collide_near(disks, world, DT, near, k, 0, count, collisions)
     return collisions
 
 
@@ -172,7 +173,7 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
     apart = np.hypot(*(position[:, None] - position).transpose(2, 0, 1)) - 1.0
     wanted = np.argwhere(np.triu(apart < skin, 1))
     assert holds(near)
-    assert 0.1 < skin <= 1.0
+    assert 0.1 < skin <= THICK * 0.5
     assert np.stack([near.first, near.second], 1)[pairs].tolist() == wanted.tolist()
     assert (near.reach[pairs] == 1.0).all()
 
