@@ -117,24 +117,27 @@ _BULLETS = "continuous collision, what moves is a bullet"
 ENGINES: dict[str, EngineRow] = {
     "reference:exercise": _Reference(
         _exercise,
-        "hand-written solver of exercise 11: symplectic Euler, project, impulse",
+        "hand-written, exercise 11: symplectic Euler; 182 lines, asks every pair",
         1.0,
         FLOAT64,
         options={"kept in float32": {"precision": np.float32}},
     ),
     "reference:neighbours": _Reference(
         _neighbours,
-        "the same to the bit, sooner: asks only pairs of a neighbour list",
+        "reference:exercise to the bit, sooner: 617 lines, no pair asked that is far",
         1.0,
         FLOAT64,
         bits_of="reference:exercise",
     ),
     "reference:lesson": _Reference(
-        _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
+        _lesson,
+        "hand-written, the lesson: explicit Euler; 127 lines, asks every pair",
+        0.0,
+        FLOAT64,
     ),
     "reference:ordered": _Reference(
         _ordered,
-        "hand-written: exact flight, collisions in the order in which they happen within a step",
+        "hand-written: exact flight, collisions in order; 459 lines, no projection",
         0.5,
         FLOAT64,
     ),

@@ -160,7 +160,7 @@ NO_CLAIM = {
     "meeting": {"Find the impulse": "defines e"},
     "crowd": {
         "Among n disks": "counts pairs",
-        "The exercise asks each": "defines the curve reference:every_pair",
+        "The exercise asks each": "says what reference:exercise does",
         "A time is the shortest": "says how it is measured",
     },
     "threshold": {
