@@ -188,8 +188,8 @@ def collide_near(
     count: int,
     collisions: list,
 ) -> None:
-    """Collide the near pairs from number p on in order; where the list does not hold, all pairs that
-    are left."""
+    """Collide the near pairs from number p on in order; where the list does not hold, all that are
+    left."""
     if not holds(near):
         collide_from(disks, world, k, collisions, 0, 1)
         return
