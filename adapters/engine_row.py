@@ -77,6 +77,8 @@ class EngineRow:
         variants: name, which goes behind a "+" -> what `crosscheck stability` plays besides to test
             a reason.
         searched: reads what `crosscheck tune` searches; None: nothing.
+        bits_of: the row whose numbers it gives to the last bit, at another cost; where only the
+            numbers count, it does not play beside that one unless asked for. "": of none.
         source: what distinguishes a solver's file that was saved from its earlier text; "" for an
             engine of this program.
     """
@@ -92,4 +94,5 @@ class EngineRow:
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     variants: Mapping[str, Variant] = field(default_factory=dict, hash=False)
     searched: Callable[[], Searched] | None = None
+    bits_of: str = ""
     source: str = ""

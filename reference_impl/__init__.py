@@ -1,2 +1,2 @@
-"""The disk solver by hand: `exercise`, `lesson`, `ordered`; `verlet_list` and `neighbours` make the
-first fast for many."""
+"""The disk solver by hand: `exercise`, `lesson`, `ordered`, and `neighbours`, which is `exercise`
+without the pairs that cannot touch."""

@@ -9,6 +9,9 @@ from numba import njit
 
 compiled = njit(cache=True, error_model="numpy")
 
+# What makes arrays or lists is compiled; pasted where it is called, if it is handed many arrays.
+pasted = njit(cache=True, error_model="numpy", forceinline=True)
+
 # A kernel makes no array and no list, so nothing needs counting: numba would count every use of an
 # array it is handed, which took half of the time of a step of 100 disks, and the only switch is one
 # it calls private. It is pasted where it is called, because handing over all the arrays takes

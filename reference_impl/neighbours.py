@@ -1,213 +1,322 @@
-"""Which disks are near each other, and which are near a wall, so that many disks need not ask every
-pair in every step.
+"""The exercise's solver with a neighbour list: the same steps, bit for bit, sooner.
 
-A neighbour list (Verlet, Phys. Rev. 159, 98, 1967), found by cells. It decides what is asked, never
-what is
-answered: the pairs stand in the order of the double loop over i < j, and one that is left out
-cannot touch as long as neither of its disks has moved by half the skin.
+`exercise` is the solver; read that. This leaves out what cannot touch, by the list of
+`neighbour_list`, and divides by the masses once a call.
 """
 
-from math import floor, sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from reference_impl.compiled import compiled, kernel
+from reference_impl import exercise
+from reference_impl.compiled import compiled, kernel, pasted
+from reference_impl.exercise import (
+    collide,
+    collide_wall,
+    collide_walls,
+    touching_wall,
+    wrap,
+)
+from reference_impl.neighbour_list import (
+    EDGES,
+    PAIRS,
+    ROUNDING,
+    SLACK,
+    STRIDE,
+    WALLS,
+    NeighbourList,
+    account_for,
+    build_list,
+    empty_list,
+    holds,
+    take_step,
+    used_up,
+)
 from reference_impl.state import Disks, World
 
-LASTS = 16  # steps of the fastest disk that a list is made for, unless fewer are left
-# the skin in mean radii: at least, so that disks at rest may fall; at most
-THIN, THICK = 0.125, 2.0
-FAR = 2.0**31  # cells from the origin, up to where rounding cannot put a disk into the wrong one
-ROOM = 32  # near pairs a disk, beyond which a list is given up
+WORTH = 64  # disks times steps, from which on a list is cheaper than all pairs
+# disks a new list in mid-step: more of them would cost more than asking all pairs
+REBUILD = 256
+BLOCK = 256  # disks that turn at a time: few enough for the nearest cache
 
 
-class NeighbourList(NamedTuple):
-    """What may touch as long as no disk is farther than `half_skin` from its home."""
+class Kicks(NamedTuple):
+    """What force, torque and gravity do in a step, and to whom; the same in every step of a
+    call."""
 
-    listed: bool  # False: too dense or too far out for a list, so everything may touch
-    home: np.ndarray  # (2n,) m: where the disks were when this was found, x and y in turn
-    half_skin: float  # m
-    first: np.ndarray  # (p,) the near pairs, first < second, in the order of the double loop
-    second: np.ndarray  # (p,)
-    reach2: np.ndarray  # (p,) m2: squared sum of the radii
-    disk: np.ndarray  # (b,) the disks near a wall, and
-    wall: np.ndarray  # (b,) which wall it is, in the order of their double loop
+    velocity: np.ndarray  # (2n,) m/s, x and y in turn
+    spin: np.ndarray  # (n,) rad/s
+    moving: np.ndarray  # (m, 2) who moves, as `moving` has it
+    strongest: float  # m: no disk moves by more in a step than it did in the one before
 
 
 @compiled
-def build_list(disks: Disks, world: World, dt: float, left: int) -> NeighbourList:
-    """All pairs that are apart by less than a skin, and the disks within half a skin of a wall;
-    `left` steps to go.
+def advance(disks: Disks, world: World, dt: float, count: int) -> list:
+    """As `exercise.advance`, to the bit."""
+    if len(disks.radius) * count < WORTH:
+        return exercise.advance(disks, world, dt, count)
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+    advance_listed(disks, world, dt, count, collisions)
+    return collisions
 
-    Both disks of a pair may use up half of the skin. `half_skin` is a little less than that: 2 % of
-    the skin are more than what rounding makes of all the distances.
-    """
-    x, radius = disks.position, disks.radius
-    skin = skin_for(disks, dt, left)
-    # wider than needed by more than rounding
-    cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))
-    first, second = near_pairs(cells, skin)
-    first, second = in_order(first, second, len(x))
-    reach2 = (radius[first] + radius[second]) ** 2
-    listed = len(cells.disk) > 0 and len(first) <= ROOM * len(x)
-    disk, wall = near_walls(x, radius, 0.5 * skin, world.walls)
-    return NeighbourList(
-        listed, x.copy().reshape(-1), 0.49 * skin, first, second, reach2, disk, wall
-    )
+
+@compiled
+def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> None:
+    """Advance by near pairs, however few the disks and steps are."""
+    kicks, k = kicks_of(disks, world, dt), 0
+    near = empty_list(disks.radius, len(world.walls))
+    while True:
+        k, p = take_quiet_steps(disks, world, kicks, dt, near, k, count)
+        if k == count:
+            break
+        if used_up(near):
+            near.length[STRIDE] = longest_stride(disks, dt)
+            build_list(near, disks.position, disks.radius, world, count - k)
+        collide_near(disks, world, dt, near, k, p, count, collisions)
+        collide_near_walls(disks, world, dt, near, k, collisions)
+        wrap_near(disks, world, near)
+        k += 1
+    turn(disks, kicks, dt, count)
 
 
 @kernel
-def skin_for(disks: Disks, dt: float, left: int) -> float:
-    """m: the thicker, the more pairs are asked in vain; the thinner, the sooner the list is out of
-    date."""
-    fastest = 0.0
+def take_quiet_steps(
+    disks: Disks, world: World, kicks: Kicks, dt: float, near: NeighbourList, k: int, count: int
+) -> tuple[int, int]:
+    """Take steps from step k on until one in which two touch or the list is used up: in that one
+    all have flown, and nothing else was done. Returns it, and the number of the first near pair
+    that may touch."""
+    while k < count:
+        fly(disks, kicks, dt)
+        take_step(near, kicks.strongest)
+        if used_up(near):
+            return k, 0
+        p = next_touching(disks, near, 0)
+        if p < near.found[PAIRS] or touch_edges(disks, world, near):
+            return k, p
+        k += 1
+    return k, 0
+
+
+@kernel
+def touch_edges(disks: Disks, world: World, near: NeighbourList) -> bool:
+    """Whether any disk touches a wall, or the centre of one is beyond an edge of the box."""
+    if next_touching_wall(disks, world, near, 0) < near.found[WALLS]:
+        return True
+    for e in range(near.found[EDGES]):
+        if outside(disks.position, near.edge[e], world):
+            return True
+    return False
+
+
+@compiled
+def kicks_of(disks: Disks, world: World, dt: float) -> Kicks:
+    """Rounded as in `exercise.integrate`."""
+    n, g, strongest2 = len(disks.mass), world.gravity, 0.0
+    kick, spin = np.zeros(2 * n), np.zeros(n)
+    for i in range(n):
+        if disks.mass[i] == inf:
+            continue
+        kx = (g[0] + disks.force[i, 0] / disks.mass[i]) * dt
+        ky = (g[1] + disks.force[i, 1] / disks.mass[i]) * dt
+        kick[2 * i], kick[2 * i + 1] = kx, ky
+        strongest2 = max(strongest2, kx * kx + ky * ky)
+        spin[i] = disks.torque[i] / disks.inertia[i] * dt
+    return Kicks(kick, spin, moving(disks.mass), sqrt(strongest2) * abs(dt))
+
+
+@compiled
+def moving(mass):  # type: ignore[no-untyped-def]
+    """(m, 2): the disks from .. to .., at most a `BLOCK`, without the static ones."""
+    runs, count = np.zeros((len(mass), 2), np.uint32), 0
+    for i in range(len(mass)):
+        if mass[i] == inf:
+            continue
+        if count == 0 or runs[count - 1, 1] != i or i % BLOCK == 0:
+            runs[count, 0] = i
+            count += 1
+        runs[count - 1, 1] = i + 1
+    return runs[:count]
+
+
+@kernel
+def longest_stride(disks: Disks, dt: float) -> float:
+    """m: no disk moves farther in a step as long as its velocity stays."""
+    v, x, fastest2, farthest = disks.velocity, disks.position, 0.0, 0.0
     for i in range(len(disks.mass)):
-        speed = abs(disks.velocity[i, 0]) + abs(disks.velocity[i, 1])
-        if speed > fastest:
-            fastest = speed
-    size = disks.radius.mean()
-    return min(max(2.0 * min(LASTS, left) * fastest * abs(dt), THIN * size), THICK * size)
+        speed2 = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1]
+        if speed2 > fastest2 and disks.mass[i] != inf:
+            fastest2 = speed2
+        far = max(abs(x[i, 0]), abs(x[i, 1]))
+        if far > farthest:
+            farthest = far
+    return sqrt(fastest2) * abs(dt) + farthest * ROUNDING
 
 
 @kernel
-def beyond_skin(x, home, i: int, half_skin: float) -> bool:  # type: ignore[no-untyped-def]
-    """Whether disk i is farther from its home than half the skin; x (2n,) m, as `home`: rows of two
-    are no vectors."""
-    dx, dy = x[2 * i] - home[2 * i], x[2 * i + 1] - home[2 * i + 1]
-    return dx * dx + dy * dy > half_skin * half_skin
-
-
-class Cells(NamedTuple):
-    """The square cells of the plane, rolled up on a ring: cell (a, b) is number a + b row, modulo
-    their count.
-
-    Far cells may share a number, neighbours never do. The disks in cell c are start[c] to start[c +
-    1] of the lists; the first two cells stand there once more at the end, so that three cells in a
-    row are always one piece.
-    """
-
-    row: int
-    start: np.ndarray  # (cells + 3,)
-    # (m,) which disk it is; empty if one is too far out to say in which cell it is
-    disk: np.ndarray
-    number: np.ndarray  # (m,) of its cell
-    place: np.ndarray  # (m, 3) m: x, y and radius, side by side as they are needed
-
-
-@compiled
-def sort_into_cells(x, radius, side: float) -> Cells:  # type: ignore[no-untyped-def]
-    """A counting sort of the disks at x (n, 2) m by their cells of `side` m."""
-    n, count = len(x), 16
-    while count < n:
-        count *= 2
-    row = int(sqrt(count)) | 1
-    of, start = np.empty(n, np.uint32), np.zeros(count + 3, np.uint32)
-    for i in range(n):
-        a, b = x[i, 0] / side, x[i, 1] / side
-        if not (abs(a) < FAR and abs(b) < FAR):
-            return Cells(row, start, of[:0], of[:0], np.empty((0, 3)))
-        of[i] = (floor(a) + floor(b) * row) & (count - 1)
-        start[of[i] + 2] += 1
-    for c in range(2, count + 2):
-        start[c] += start[c - 1]  # of the cell before, until that one is filled
-
-    m = n + np.int64(start[3])
-    disk, number, place = np.empty(m, np.uint32), np.empty(m, np.uint32), np.empty((m, 3))
-    for i in range(n):
-        q = start[of[i] + 1]
-        start[of[i] + 1] += 1
-        disk[q], number[q] = i, of[i]
-        place[q, 0], place[q, 1], place[q, 2] = x[i, 0], x[i, 1], radius[i]
-    start[count + 1 :] = n + start[1:3]
-    disk[n:], place[n:] = disk[: m - n], place[: m - n]
-    return Cells(row, start, disk, number, place)
-
-
-@compiled
-def near_pairs(cells: Cells, skin: float):  # type: ignore[no-untyped-def]
-    """(p,), (p,): the pairs that are apart by less than the skin, first < second, in no order."""
-    n = cells.start[-3] if len(cells.disk) else 0
-    first, second = np.empty(4 * n, np.uint32), np.empty(4 * n, np.uint32)
-    q, count = 0, 0
-    while q < n and count <= ROOM * n:
-        q, count = add_pairs(cells, skin, first, second, q, count)
-        if q < n:
-            first, second = longer(first), longer(second)
-    return first[:count], second[:count]
+def fly(disks: Disks, kicks: Kicks, dt: float) -> None:
+    """As `exercise.integrate`, but for the angles."""
+    x, v = disks.position.reshape(-1), disks.velocity.reshape(-1)
+    for run in range(len(kicks.moving)):
+        for c in range(2 * np.int64(kicks.moving[run, 0]), 2 * np.int64(kicks.moving[run, 1])):
+            v[c] += kicks.velocity[c]
+            x[c] += v[c] * dt
 
 
 @kernel
-def add_pairs(cells: Cells, skin: float, first, second, q: int, count: int) -> tuple[int, int]:  # type: ignore[no-untyped-def]
-    """Write the pairs of the disks from q on behind the first `count`, as far as there is room;
-    returns both anew."""
-    start, disk, place, last = cells.start, cells.disk, cells.place, len(cells.start) - 4
-    for p in range(q, start[-3]):
-        # The rest of its own cell and the next one, then three cells in the row above: each pair is
-        # met once.
-        c = np.int64(cells.number[p])
-        above = (c + cells.row - 1) & last
-        begin, end = p + 1, start[c + 2]
-        if count + end - begin + start[above + 3] - start[above] > len(first):
-            return p, count
-        i, x, y, r = disk[p], place[p, 0], place[p, 1], place[p, 2] + skin
-        for _ in range(2):
-            for k in range(begin, end):
-                dx, dy, reach = x - place[k, 0], y - place[k, 1], r + place[k, 2]
-                # Written in any case, kept if it counts: a branch that nobody can foresee would
-                # take longer.
-                first[count], second[count] = min(i, disk[k]), max(i, disk[k])
-                count += dx * dx + dy * dy < reach * reach
-            begin, end = start[above], start[above + 3]
-    return start[-3], count
+def turn(disks: Disks, kicks: Kicks, dt: float, count: int) -> None:
+    """The angles and spins of all steps, at last, as no collision asks for them: a block is fetched
+    once for all of them."""
+    angle, spin = disks.angle, disks.angular_velocity
+    for run in range(len(kicks.moving)):
+        begin, end = np.int64(kicks.moving[run, 0]), np.int64(kicks.moving[run, 1])
+        for _ in range(count):
+            for i in range(begin, end):
+                spin[i] += kicks.spin[i]
+                angle[i] += spin[i] * dt
+
+
+@pasted
+def collide_near(
+    disks: Disks,
+    world: World,
+    dt: float,
+    near: NeighbourList,
+    k: int,
+    p: int,
+    count: int,
+    collisions: list,
+) -> None:
+    """Collide the near pairs from number p on in order; where the list does not hold, all that are
+    left."""
+    if not holds(near):
+        collide_from(disks, world, k, collisions, 0, 1)
+        return
+    p, rebuilds = next_touching(disks, near, p), 0
+    while p < near.found[PAIRS]:
+        i, j = int(near.first[p]), int(near.second[p])
+        impulse = collide(disks, i, j, world)
+        if impulse != 0.0:
+            collisions.append((k, i, j, impulse))
+        account(disks, near, i, dt)
+        account(disks, near, j, dt)
+        p += 1
+        if not holds(near):
+            if rebuilds <= len(disks.radius) // REBUILD:
+                near.length[STRIDE] = longest_stride(disks, dt)
+                build_list(near, disks.position, disks.radius, world, count - k)
+                rebuilds += 1
+                p = first_after(near, i, j)
+            if not holds(near):
+                collide_from(disks, world, k, collisions, i, j + 1)
+                return
+        p = next_touching(disks, near, p)
+
+
+@kernel
+def account(disks: Disks, near: NeighbourList, i: int, dt: float) -> None:
+    """Of disk i, which a collision has moved."""
+    v = disks.velocity
+    stride = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1]) * abs(dt)
+    account_for(near, disks.position, i, stride)
+
+
+@kernel
+def next_touching(disks: Disks, near: NeighbourList, p: int) -> int:
+    """The number of the next near pair that is `touching`, from p on; their count if there is
+    none."""
+    x, first, second, reach = disks.position, near.first, near.second, near.reach
+    while p < near.found[PAIRS]:
+        i, j = np.uintp(first[p]), np.uintp(second[p])  # which are not negative: that is not asked
+        dx, dy = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1]
+        if dx * dx + dy * dy < reach[p] * reach[p]:
+            break
+        p += 1
+    return p
+
+
+@kernel
+def first_after(near: NeighbourList, i: int, j: int) -> int:
+    """The number of the first near pair after (i, j)."""
+    p = 0
+    while p < near.found[PAIRS] and (
+        near.first[p] < i or (near.first[p] == i and near.second[p] <= j)
+    ):
+        p += 1
+    return p
 
 
 @compiled
-def longer(array):  # type: ignore[no-untyped-def]
-    """The array (p,) with as much room again."""
-    return np.concatenate((array, np.empty_like(array)))
+def collide_from(disks: Disks, world: World, k: int, collisions: list, i: int, j: int) -> None:
+    """Collide all pairs from (i, j) on, as the double loop of `exercise.step` does."""
+    n = len(disks.radius)
+    for a in range(i, n):
+        for b in range(max(a + 1, j if a == i else 0), n):
+            impulse = collide(disks, a, b, world)
+            if impulse != 0.0:
+                collisions.append((k, a, b, impulse))
 
 
-@compiled
-def in_order(first, second, n: int):  # type: ignore[no-untyped-def]
-    """The pairs in the order of the double loop: sorted by the second, then by the first, which
-    keeps that order."""
-    second, first = sorted_by(second, first, n)
-    return sorted_by(first, second, n)
+@pasted
+def collide_near_walls(
+    disks: Disks, world: World, dt: float, near: NeighbourList, k: int, collisions: list
+) -> None:
+    """Collide the disks that are near a wall, in order; all, where the list does not hold."""
+    if not holds(near):
+        collide_walls(disks, world, k, collisions)
+        return
+    b = next_touching_wall(disks, world, near, 0)
+    while b < near.found[WALLS]:
+        i = int(near.disk[b])
+        # as it is moved, it may touch a later one that it was not near
+        for w in range(near.wall[b], len(world.walls)):
+            impulse = collide_wall(disks, i, w, world)
+            if impulse != 0.0:
+                collisions.append((k, i, -1 - w, impulse))
+        account(disks, near, i, dt)
+        while b < near.found[WALLS] and near.disk[b] == i:
+            b += 1
+        b = next_touching_wall(disks, world, near, b)
 
 
-@compiled
-def sorted_by(key, other, n: int):  # type: ignore[no-untyped-def]
-    """Both (p,) arrays by a counting sort of the keys, numbers below n; equal keys stay in
-    order."""
-    free = np.zeros(n + 1, np.uint32)
-    for k in key:
-        free[k + 1] += 1
-    for k in range(n):
-        free[k + 1] += free[k]
-    keys, others = np.empty_like(key), np.empty_like(other)
-    for p in range(len(key)):
-        q = free[key[p]]
-        free[key[p]] += 1
-        keys[q], others[q] = key[p], other[p]
-    return keys, others
+@kernel
+def next_touching_wall(disks: Disks, world: World, near: NeighbourList, b: int) -> int:
+    """The number of the next disk that is `touching_wall` with one near it, from b on; their count
+    if there is none."""
+    while b < near.found[WALLS]:
+        if touching_wall(disks.position, disks.radius, near.disk[b], world.walls, near.wall[b]):
+            break
+        b += 1
+    return b
 
 
-@compiled
-def near_walls(x, radius, margin: float, walls):  # type: ignore[no-untyped-def]
-    """(b,), (b,): the disks, in order, that are within the margin of the upright rectangle around a
-    wall, and which."""
-    disk, wall, count = (
-        np.empty(len(x) * len(walls), np.uint32),
-        np.empty(len(x) * len(walls), np.uint32),
-        0,
+@pasted
+def wrap_near(disks: Disks, world: World, near: NeighbourList) -> None:
+    """Wrap the disks that are near an edge; all, where the list does not hold, as it does not with
+    a disk that was set onto the opposite edge."""
+    if not holds(near):
+        wrap(disks.position, world)
+        return
+    x = disks.position
+    for e in range(near.found[EDGES]):
+        i = int(near.edge[e])
+        if not outside(x, i, world):
+            continue
+        for axis in range(2):
+            if x[i, axis] < world.low[axis]:
+                x[i, axis] = world.high[axis]
+            elif x[i, axis] > world.high[axis]:
+                x[i, axis] = world.low[axis]
+        near.length[SLACK] = -inf
+
+
+@kernel
+def outside(x, i: int, world: World) -> bool:  # type: ignore[no-untyped-def]
+    """Whether the centre of disk `i` is beyond an edge of the box."""
+    return (
+        x[i, 0] < world.low[0]
+        or x[i, 0] > world.high[0]
+        or x[i, 1] < world.low[1]
+        or x[i, 1] > world.high[1]
     )
-    for i in range(len(x)):
-        reach = radius[i] + margin
-        for w in range(len(walls)):
-            left, right = min(walls[w, 0, 0], walls[w, 1, 0]), max(walls[w, 0, 0], walls[w, 1, 0])
-            low, high = min(walls[w, 0, 1], walls[w, 1, 1]), max(walls[w, 0, 1], walls[w, 1, 1])
-            if left - reach < x[i, 0] < right + reach and low - reach < x[i, 1] < high + reach:
-                disk[count], wall[count] = i, w
-                count += 1
-    return disk[:count].copy(), wall[:count].copy()

@@ -6,17 +6,34 @@ parabolas; then, as long as two met on the way, the two that met first go back t
 touched, get the impulse there, and fly to the end anew. Times count back from the end of the step:
 s = 0 is the end, s = -dt the start.
 
-Every search asks all pairs, so this is for some hundred disks at most. Where collisions accumulate
-(a ball that bounces ever lower, a stack) the work is bounded: a bounce that would last less than a
-`REST` of a step is the last one, and after `MOST` collisions a disk the rest of a step goes
-unresolved, which shows as overlap. Compiled by numba, as `exercise` is.
+Every search asks the pairs of a neighbour list. Where collisions accumulate (a ball that bounces
+ever lower, a stack) the work is bounded: a bounce that would last less than a `REST` of a step is
+the last one, and after `MOST` collisions a disk the rest of a step goes unresolved, which shows as
+overlap. Compiled by numba, as `exercise` is.
 """
 
 from math import inf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from reference_impl.compiled import compiled
+from reference_impl.compiled import compiled, kernel, pasted
+from reference_impl.neighbour_list import (
+    EDGES,
+    PAIRS,
+    ROUNDING,
+    SLACK,
+    STRIDE,
+    WALLS,
+    NeighbourList,
+    account_for,
+    build_list,
+    empty_list,
+    holds,
+    take_step,
+    used_up,
+)
+from reference_impl.neighbours import moving
 from reference_impl.state import Disks, World
 
 REST = 1 / 16  # of a step
@@ -24,117 +41,259 @@ MOST = 8  # collisions a disk and step, on average
 NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the world
 
 
+class Accelerations(NamedTuple):
+    """What accelerates the disks: all steps of a call alike, but for what rests on another."""
+
+    steady: np.ndarray  # (n, 2) m/s2, by force and gravity
+    now: np.ndarray  # (n, 2) m/s2, and by what holds those at rest until the end of a step
+    turning: np.ndarray  # (n,) rad/s2
+    moving: np.ndarray  # (m, 2) who moves, as `moving` has it
+    strongest: float  # m/s2, of the steady ones
+
+
 @compiled
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
     w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
-    acceleration = np.zeros_like(disks.velocity)
-    for k in range(count):
-        step(disks, world, acceleration, dt, k, collisions)
+    acceleration, k = accelerations_of(disks, world), 0
+    near = empty_list(disks.radius, len(world.walls))
+    while True:
+        k, first = fly_until_meeting(disks, world, acceleration, near, dt, k, count)
+        if k == count:
+            break
+        resolve(disks, world, acceleration, near, dt, k, first, count, collisions)
+        k += 1
+    turn(disks, acceleration, dt, count)
     return collisions
 
 
 @compiled
-def step(disks: Disks, world: World, acceleration, dt: float, k: int, collisions: list) -> None:  # type: ignore[no-untyped-def]
-    """One step: fly, then resolve meeting after meeting. `acceleration` (n, 2) m/s2 is what
-    accelerates each disk now."""
-    fly(disks, world, acceleration, dt)
-    now = -dt
+def accelerations_of(disks: Disks, world: World) -> Accelerations:
+    """By force, torque and gravity."""
+    steady, turning = np.zeros_like(disks.velocity), np.zeros_like(disks.angle)
+    strongest2 = 0.0
+    for i in range(len(disks.mass)):
+        if disks.mass[i] == inf:
+            continue
+        ax = world.gravity[0] + disks.force[i, 0] / disks.mass[i]
+        ay = world.gravity[1] + disks.force[i, 1] / disks.mass[i]
+        steady[i, 0], steady[i, 1] = ax, ay
+        strongest2 = max(strongest2, ax * ax + ay * ay)
+        turning[i] = disks.torque[i] / disks.inertia[i]
+    return Accelerations(
+        steady, np.zeros_like(steady), turning, moving(disks.mass), sqrt(strongest2)
+    )
+
+
+@kernel
+def fly_until_meeting(  # type: ignore[no-untyped-def]
+    disks: Disks,
+    world: World,
+    acceleration: Accelerations,
+    near: NeighbourList,
+    dt: float,
+    k: int,
+    count: int,
+):
+    """Take steps from step k on until one in which two meet or the list is used up: in that one all
+    have flown, and nothing else was done. Returns it and its `first_meeting`, as far as the list
+    knows."""
+    first = inf, NOBODY, NOBODY
+    while k < count:
+        fly(disks, acceleration, dt)
+        take_step(near, acceleration.strongest * dt * dt)
+        if used_up(near):
+            break
+        first = first_meeting(disks, world, acceleration.now, near, -dt)
+        if first[1] != NOBODY:
+            break
+        k += 1
+    return k, first
+
+
+@kernel
+def fly(disks: Disks, acceleration: Accelerations, dt: float) -> None:
+    """x + v dt + a dt2 / 2 and v + a dt for all, as if nobody met.
+
+    What rounding cuts off is kept for the next time (Kahan, Comm. ACM 8, 40, 1965): hundreds of
+    small steps would else round ten times as much as the few flights event by event that they are.
+    """
+    x, v, cut = (
+        disks.position.reshape(-1),
+        disks.velocity.reshape(-1),
+        disks.remainder.reshape(-1),
+    )
+    a, steady = acceleration.now.reshape(-1), acceleration.steady.reshape(-1)
+    for run in range(len(acceleration.moving)):
+        begin, end = np.int64(acceleration.moving[run, 0]), np.int64(acceleration.moving[run, 1])
+        for c in range(2 * begin, 2 * end):
+            a[c] = steady[c]
+            before, way = x[c], v[c] * dt + steady[c] * (dt * dt / 2) + cut[c]
+            x[c] = before + way
+            cut[c] = way - (x[c] - before)
+            v[c] += steady[c] * dt
+
+
+@kernel
+def turn(disks: Disks, acceleration: Accelerations, dt: float, count: int) -> None:
+    """The angles and spins of all steps, at last, as no collision asks for them."""
+    angle, spin, turning = disks.angle, disks.angular_velocity, acceleration.turning
+    for run in range(len(acceleration.moving)):
+        begin, end = np.int64(acceleration.moving[run, 0]), np.int64(acceleration.moving[run, 1])
+        for _ in range(count):
+            for i in range(begin, end):
+                angle[i] += spin[i] * dt + turning[i] * (dt * dt / 2)
+                spin[i] += turning[i] * dt
+
+
+@pasted
+def resolve(  # type: ignore[no-untyped-def]
+    disks: Disks,
+    world: World,
+    acceleration: Accelerations,
+    near: NeighbourList,
+    dt: float,
+    k: int,
+    first,
+    count: int,
+    collisions: list,
+) -> None:
+    """Meeting after meeting, from the first on, of a step in which all have flown to its end."""
+    if used_up(near):
+        find_near(disks, world, acceleration.now, near, dt, count - k)
+        first = first_meeting(disks, world, acceleration.now, near, -dt)
     for _ in range(MOST * len(disks.radius)):
-        now, i, j = first_meeting(disks, world, acceleration, now, dt)
+        now, i, j = first
         if i == NOBODY:
             break
         if j == EDGE:
             carry_over(disks.position, world, i)
+            near.length[SLACK] = -inf
         else:
-            impulse = collide(disks, world, acceleration, i, j, now, dt)
+            impulse = collide(disks, world, acceleration.now, i, j, now, dt)
             if impulse > 0.0:
                 collisions.append((k, i, j, impulse))
+            account_for(near, disks.position, i, way_of(disks, acceleration.now, i, dt))
+            if j >= 0:
+                account_for(near, disks.position, j, way_of(disks, acceleration.now, j, dt))
+        if not holds(near):
+            find_near(disks, world, acceleration.now, near, dt, count - k)
+        first = first_meeting(disks, world, acceleration.now, near, now)
 
 
 @compiled
-def fly(disks: Disks, world: World, acceleration, dt: float) -> None:  # type: ignore[no-untyped-def]
-    """x + v dt + a dt2 / 2 and v + a dt for all, as if nobody met; turning alike."""
-    x, v, spin = disks.position, disks.velocity, disks.angular_velocity
+def find_near(  # type: ignore[no-untyped-def]
+    disks: Disks, world: World, acceleration, near: NeighbourList, dt: float, left: int
+) -> None:
+    """Build the list at the end of a step: in the step, each may have been a step away from it."""
+    longest = 0.0
     for i in range(len(disks.mass)):
-        if disks.mass[i] == inf:
-            continue
-        for axis in range(2):
-            acceleration[i, axis] = world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
-            move(
-                x, disks.remainder, i, axis, v[i, axis] * dt + acceleration[i, axis] * (dt * dt / 2)
-            )
-            v[i, axis] += acceleration[i, axis] * dt
-        turning = disks.torque[i] / disks.inertia[i]
-        disks.angle[i] += spin[i] * dt + turning * (dt * dt / 2)
-        spin[i] += turning * dt
+        if disks.mass[i] != inf:
+            longest = max(longest, way_of(disks, acceleration, i, dt))
+    near.length[STRIDE] = longest
+    build_list(near, disks.position, disks.radius, world, left)
+    near.length[SLACK] -= longest
+
+
+@kernel
+def way_of(disks: Disks, acceleration, i: int, dt: float) -> float:  # type: ignore[no-untyped-def]
+    """m: disk i gets no farther in a step."""
+    x, v, a = disks.position, disks.velocity, acceleration
+    speed = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+    strength = sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1])
+    return (speed + strength * abs(dt)) * abs(dt) + ROUNDING * max(abs(x[i, 0]), abs(x[i, 1]))
+
+
+@kernel
+def first_meeting(  # type: ignore[no-untyped-def]
+    disks: Disks, world: World, acceleration, near: NeighbourList, now: float
+) -> tuple[float, int, int]:
+    """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or
+    the edge. Of meetings at the same instant, that of the least i; of a disk, before a wall."""
+    first = inf, NOBODY, NOBODY
+    if holds(near):
+        for p in range(near.found[PAIRS]):
+            i, j = int(near.first[p]), int(near.second[p])
+            first = sooner(first, of_disks(disks, acceleration, near, i, j, now), i, j)
+        for b in range(near.found[WALLS]):
+            i, w = int(near.disk[b]), int(near.wall[b])
+            first = sooner(first, of_wall(disks, world, acceleration, near, i, w, now), i, -1 - w)
+        for e in range(near.found[EDGES]):
+            i = int(near.edge[e])
+            first = sooner(first, of_edge(disks, world, i, now), i, EDGE)
+    else:
+        for i in range(len(disks.radius)):
+            for j in range(i + 1, len(disks.radius)):
+                first = sooner(first, of_disks(disks, acceleration, near, i, j, now), i, j)
+            for w in range(len(world.walls)):
+                s = of_wall(disks, world, acceleration, near, i, w, now)
+                first = sooner(first, s, i, -1 - w)
+            first = sooner(first, of_edge(disks, world, i, now), i, EDGE)
+    return first
+
+
+@kernel
+def sooner(  # type: ignore[no-untyped-def]
+    first, s: float, i: int, j: int
+):
+    """The earlier of two meetings."""
+    if s < first[0] or (s == first[0] and i < first[1]):
+        return s, i, j
+    return first
+
+
+@kernel
+def of_disks(disks: Disks, acceleration, near: NeighbourList, i: int, j: int, now: float) -> float:  # type: ignore[no-untyped-def]
+    """When two disks meet from `now` on, or inf."""
+    x, radius, mass = disks.position, disks.radius, disks.mass
+    # Who met within the step cannot be farther apart at its end than both ways: passing through is
+    # seen, too.
+    dx, dy = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1]
+    reach = radius[i] + radius[j] + 2.0 * near.length[STRIDE]
+    if dx * dx + dy * dy < reach * reach and not (mass[i] == inf and mass[j] == inf):
+        return meeting(path_to_disk(x, disks.velocity, acceleration, radius, i, j), now)
+    return inf
+
+
+@kernel
+def of_wall(  # type: ignore[no-untyped-def]
+    disks: Disks, world: World, acceleration, near: NeighbourList, i: int, w: int, now: float
+) -> float:
+    """When a disk meets a wall from `now` on, or inf."""
+    x, walls, reach = disks.position, world.walls, disks.radius[i] + near.length[STRIDE]
+    left, right = min(walls[w, 0, 0], walls[w, 1, 0]), max(walls[w, 0, 0], walls[w, 1, 0])
+    low, high = min(walls[w, 0, 1], walls[w, 1, 1]), max(walls[w, 0, 1], walls[w, 1, 1])
+    beside = left - reach < x[i, 0] < right + reach and low - reach < x[i, 1] < high + reach
+    if beside and disks.mass[i] != inf:
+        return meeting(
+            path_to_wall(x, disks.velocity, acceleration, disks.radius, i, walls, w), now
+        )
+    return inf
+
+
+@kernel
+def of_edge(disks: Disks, world: World, i: int, now: float) -> float:
+    """When the centre of a disk leaves the box from `now` on, or inf."""
+    first, x = inf, disks.position
+    if disks.mass[i] == inf:
+        return inf
+    for axis in range(2):
+        beyond = max(world.low[axis] - x[i, axis], x[i, axis] - world.high[axis])
+        if beyond > 0.0:
+            first = min(first, max(now, -beyond / abs(disks.velocity[i, axis])))
+    return first
 
 
 @compiled
 def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[no-untyped-def]
-    """Move disk i, and keep what rounding cuts off for the next time (Kahan, Comm. ACM 8, 40,
-    1965).
-
-    Hundreds of small steps would else round ten times as much as the few flights event by event
-    that they are.
-    """
+    """Move disk i as `fly` does, and keep what rounding cuts off."""
     before, way = x[i, axis], way + remainder[i, axis]
     x[i, axis] = before + way
     remainder[i, axis] = way - (x[i, axis] - before)
 
 
-@compiled
-def first_meeting(  # type: ignore[no-untyped-def]
-    disks: Disks, world: World, acceleration, now: float, dt: float
-) -> tuple[float, int, int]:
-    """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or
-    the edge."""
-    x, radius, mass, walls = disks.position, disks.radius, disks.mass, world.walls
-    n, way = len(radius), longest_way(disks.velocity, acceleration, dt)
-    first, who, whom = inf, NOBODY, NOBODY
-    for i in range(n):
-        for j in range(i + 1, n):
-            # Who met within the step cannot be farther apart at its end than both ways: passing
-            # through is seen, too.
-            dx, dy, reach = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], radius[i] + radius[j] + 2.0 * way
-            if dx * dx + dy * dy < reach * reach and not (mass[i] == inf and mass[j] == inf):
-                s = meeting(path_to_disk(x, disks.velocity, acceleration, radius, i, j), now)
-                if s < first:
-                    first, who, whom = s, i, j
-        if mass[i] == inf:
-            continue
-        reach = radius[i] + way
-        for w in range(len(walls)):
-            left, right = min(walls[w, 0, 0], walls[w, 1, 0]), max(walls[w, 0, 0], walls[w, 1, 0])
-            low, high = min(walls[w, 0, 1], walls[w, 1, 1]), max(walls[w, 0, 1], walls[w, 1, 1])
-            if left - reach < x[i, 0] < right + reach and low - reach < x[i, 1] < high + reach:
-                s = meeting(path_to_wall(x, disks.velocity, acceleration, radius, i, walls, w), now)
-                if s < first:
-                    first, who, whom = s, i, -1 - w
-        for axis in range(2):
-            beyond = max(world.low[axis] - x[i, axis], x[i, axis] - world.high[axis])
-            if beyond > 0.0:
-                s = max(now, -beyond / abs(disks.velocity[i, axis]))
-                if s < first:
-                    first, who, whom = s, i, EDGE
-    return first, who, whom
-
-
-@compiled
-def longest_way(velocity, acceleration, dt: float) -> float:  # type: ignore[no-untyped-def]
-    """m: no disk gets farther in a step."""
-    fastest2, strongest2 = 0.0, 0.0
-    for i in range(len(velocity)):
-        fastest2 = max(fastest2, velocity[i, 0] * velocity[i, 0] + velocity[i, 1] * velocity[i, 1])
-        strongest2 = max(
-            strongest2,
-            acceleration[i, 0] * acceleration[i, 0] + acceleration[i, 1] * acceleration[i, 1],
-        )
-    return (sqrt(fastest2) + sqrt(strongest2) * dt) * dt
-
-
-@compiled
+@kernel
 def path_to_disk(x, v, acceleration, radius, i: int, j: int):  # type: ignore[no-untyped-def]
     """How disk i moves as seen from disk j, which is a wall without length."""
     return (
@@ -150,7 +309,7 @@ def path_to_disk(x, v, acceleration, radius, i: int, j: int):  # type: ignore[no
     )
 
 
-@compiled
+@kernel
 def path_to_wall(x, v, acceleration, radius, i: int, walls, w: int):  # type: ignore[no-untyped-def]
     """How disk i moves as seen from the start of wall w: place, velocity, acceleration; the wall,
     and the reach."""
@@ -167,7 +326,7 @@ def path_to_wall(x, v, acceleration, radius, i: int, walls, w: int):  # type: ig
     )
 
 
-@compiled
+@kernel
 def contact(path, s: float) -> tuple[float, float, float, float]:  # type: ignore[no-untyped-def]
     """At s: the gap in m, how fast it opens in m/s, and the normal, from the nearest point of the
     other to the disk."""

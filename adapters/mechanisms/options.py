@@ -5,9 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
-from types import FunctionType, SimpleNamespace
-from typing import Any
+from functools import partial
 
 from adapters.engine import Engine
 from adapters.engines import ENGINES, changed
@@ -33,25 +31,6 @@ class Option:
         return ENGINES[self.engine].make
 
 
-def _always_listing() -> Engine:
-    from adapters.reference import Reference
-
-    return Reference(listing())
-
-
-@cache
-def listing() -> Any:
-    """The reference's solver with a neighbour list for the fewest disks, too: the same source."""
-    from numba import njit
-
-    from reference_impl import verlet_list
-
-    advance = FunctionType(
-        verlet_list.advance.py_func.__code__, vars(verlet_list) | {"LISTED_FROM": 0}
-    )
-    return SimpleNamespace(__name__="verlet_list", advance=njit(error_model="numpy")(advance))
-
-
 OPTIONS: tuple[Option, ...] = tuple(
     option
     for name, row in ENGINES.items()
@@ -61,9 +40,9 @@ OPTIONS: tuple[Option, ...] = tuple(
             for change, settings in row.options.items()
         ),
         *(
-            [Option(name, "broad phase, always", _always_listing)]
-            if name == "reference:exercise"
-            else []
+            Option(name, f"as {other}", same.make)
+            for other, same in ENGINES.items()
+            if same.bits_of == name
         ),
     )
 )

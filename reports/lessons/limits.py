@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.engines import ENGINES
+from adapters.engines import DISTINCT
 from adapters.run import Run
 from reports.compare.comparison import Comparison
 from reports.lessons.lesson import (
@@ -110,7 +110,7 @@ def show_limits(settings: Settings) -> Shown:
             readings(case, limits, engine, value),
         ],
         Comparison(scenario, truth, [run], pd.DataFrame()),
-        [(limit.engine, in_words(limit, case)) for limit in limits if limit.engine in ENGINES],
+        [(limit.engine, in_words(limit, case)) for limit in limits if limit.engine in DISTINCT],
         limit_claims(case, found),
         in_numbers(case, trial, found),
         {"pace": scenario.duration / SECONDS} | event_of(trial),
@@ -168,7 +168,7 @@ def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> 
         )
         for mine in (False, True)
         for each in limits
-        if each.engine in ENGINES and mine == (each.engine == engine)
+        if each.engine in DISTINCT and mine == (each.engine == engine)
     ]
     guides = [("x", value, "here"), *([("y", bound, "fails above")] if bound else [])]
     axis = case.parameter if case.unit == "1" else f"{case.parameter} in {case.unit}"
@@ -255,9 +255,9 @@ LIMITS = Lesson(
     ),
     sliders=(
         Slider("case", "Case", tuple(SEEN)),
-        Slider("engine", "Engine", tuple(ENGINES), list(ENGINES).index("box2d:matched")),
+        Slider("engine", "Engine", tuple(DISTINCT), list(DISTINCT).index("box2d:matched")),
         Slider("place", "Harshness", HARSHNESS, 5),
     ),
-    names=(*ENGINES, TRUTH),
+    names=(*DISTINCT, TRUTH),
     show=show_limits,
 )

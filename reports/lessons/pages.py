@@ -18,7 +18,6 @@ from starlette.routing import BaseRoute, Route
 from adapters.engines import ENGINES
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
-from reports.lessons.crowd import EVERY_PAIR
 from reports.lessons.lesson import Lesson
 from reports.lessons.mechanisms import ABLATED
 from reports.page.documents import ENGINE, deflated, fragment, render
@@ -36,7 +35,6 @@ GROUPS = {
 MEASURING = Lock()  # two pages that ask at once get one measurement
 OWN = {  # who plays in lessons only
     ABLATED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
-    EVERY_PAIR: look("reference")._replace(dash=(7, 5)),
 }
 
 

@@ -68,7 +68,7 @@ PALETTE = (
     Mark("#3d6b1f", "#a4d67a", "pentagon"),
     Mark("#7a4a21", "#e0a878", "bowtie"),
 )
-DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3)}
+DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3), "neighbours": (7, 5)}
 CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep

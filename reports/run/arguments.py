@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from adapters.engines import ENGINES, OWN, read_row
+from adapters.engines import DISTINCT, ENGINES, OWN, read_row
 from adapters.own_solver.file import KINDS, NotASolver
 from reports.run.scenes import open_scene, with_steps
 from reports.terminal.exits import FolderTaken, refuse
@@ -84,10 +84,12 @@ def checked_scenes(
     return scenes
 
 
-def checked_engines(asked: Sequence[str]) -> list[str]:
+def checked_engines(asked: Sequence[str], unasked: Iterable[str] = DISTINCT) -> list[str]:
     """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; if none
-    is asked all."""
-    chosen, own, faults = set(), [], []
+    is asked those of `unasked`."""
+    chosen: set[str] = set()
+    own: list[str] = []
+    faults: list[str] = []
     for name in asked:
         if (file := Path(name.removesuffix(OWN))).suffix.lower() in KINDS:
             own += [f"{file}{OWN}"]
@@ -99,9 +101,11 @@ def checked_engines(asked: Sequence[str]) -> list[str]:
                 unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)})
             )
         chosen |= matching
+    if not asked:
+        chosen.update(unasked)
     if faults:
         refuse(faults)
-    return [row for row in ENGINES if row in chosen or not asked] + list(dict.fromkeys(own))
+    return [row for row in ENGINES if row in chosen] + list(dict.fromkeys(own))
 
 
 def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any, NoReturn
 
+from adapters.engines import ENGINES
 from reports.page.style import number
 from reports.run.arguments import checked_engines, checked_scenes, unknown
 from reports.speed.advice import Advice, Attempt, NoAdvice, advise
@@ -31,7 +32,7 @@ def give_advice(
         refuse([unknown("purpose", purpose, PURPOSES) + f"; allowed: {', '.join(PURPOSES)}"])
     bound = bound_of(error)
     (checked,) = checked_scenes([scene], [], False, seed)
-    names = checked_engines(engines)
+    names = checked_engines(engines, ENGINES)
     with stoppable(), Progress() as progress:
         try:
             advice = advise(checked, seed, purpose, bound, names, os.cpu_count() or 1, progress)

@@ -11,7 +11,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
-from adapters.engines import OWN, row_of
+from adapters.engines import ENGINES, OWN, row_of
 from reports.page import style
 from reports.run.arguments import checked_engines, checked_scenes, opening
 from reports.run.folders import discard, given_back, open_part, place_of, replace_folder
@@ -57,7 +57,12 @@ def run_speed(
     named = checked_scenes(scenes, [], False, seed)
     effort = replace(effort, scenes=tuple(named)) if named else effort
     plan = SpeedPlan(
-        effort.scenes, checked_engines(engines), effort, seed, os.cpu_count() or 1, whole=not named
+        effort.scenes,
+        checked_engines(engines, ENGINES),
+        effort,
+        seed,
+        os.cpu_count() or 1,
+        whole=not named,
     )
     header = about(command, seed)
     with opening(out):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from adapters.engines import DISTINCT
 from reports.speed.results import Results
 from reports.terminal.foreign_text import put_text
 
@@ -118,11 +119,14 @@ def keep(folder: Path) -> None:
     """Keep figures, orders of convergence, and how much of the errors is explained, of a
     measurement in `folder`.
 
-    The latter two hold no times: the same versions give the same rows on any machine of a kind.
+    The latter two hold no times: the same versions give the same rows on any machine of a kind, and
+    an engine that gives another's bits has no rows of its own.
     """
     KEPT.write_bytes((folder / "speed_figures.csv").read_bytes())
     for path in (ORDERS, EXPLAINED):
-        read(folder / f"speed_{path.name}").to_csv(path, index=False, float_format="%.4g")
+        table = read(folder / f"speed_{path.name}")
+        distinct = (table.engine + ":" + table.profile).isin(DISTINCT)
+        table[distinct].to_csv(path, index=False, float_format="%.4g")
 
 
 def read(path: Path = KEPT) -> pd.DataFrame:

@@ -3,11 +3,12 @@ one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from itertools import pairwise
 from math import nan, sqrt
 
+from adapters.engines import DISTINCT
 from adapters.run import Run
 from reports.stability.predicates import Predicate
 from reports.stability.variants import VARIANTS, Variant, played
@@ -246,7 +247,7 @@ class Limit:
         return sum(trial.runs for trial in self.trials)
 
 
-def engines_of(case: Case) -> list[str]:
-    """Who plays a case: every row of `ENGINES`, and the case's own variants, in the order of
+def engines_of(case: Case, rows: Container[str] = DISTINCT) -> list[str]:
+    """Who plays a case: these rows of `ENGINES`, and the case's own variants, in the order of
     `VARIANTS`."""
-    return [name for name, engine in VARIANTS.items() if not engine.change or name in case.also]
+    return [name for name in VARIANTS if name in rows or name in case.also]

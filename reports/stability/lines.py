@@ -225,7 +225,7 @@ def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
         path, _, what = one.case.rpartition(":")
         if one.case not in CASES and (path not in files or what not in VARIES):
             return f"limit.case = {one.case!r}: must be a case, or one of a file of the header"
-        engines = engines_of(CASES[one.case]) if one.case in CASES else [*ENGINES]
+        engines = engines_of(CASES[one.case], ENGINES) if one.case in CASES else [*ENGINES]
     else:
         engines = MAPS[one.name].engines([*ENGINES]) if isinstance(one, MapOf) else [*ENGINES]
     return "" if one.engine in engines else f"engine = {one.engine!r}: must be one that plays this"

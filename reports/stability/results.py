@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from adapters.engines import ENGINES
 from reports.run.journal import JOURNAL, Journal, plain
 from reports.run.journal_lines import checked_lines, no_use
 from reports.run.machine import about
@@ -157,7 +158,7 @@ def tasks_of(plan: StabilityPlan) -> list[Task]:
     for name in plan.cases:
         tasks += [
             Task("limit", name, engine, plan.form)
-            for engine in engines_of(case_named(name))
+            for engine in engines_of(case_named(name), ENGINES)
             if engine.split("+")[0] in plan.engines
         ]
     rank = {name: k for k, name in enumerate(SLOWEST_FIRST)}
@@ -195,7 +196,9 @@ def read(folder: Path) -> StabilityResults:
     maps = [one for one in results.values() if isinstance(one, MapOf)]
     laws = [one for one in results.values() if isinstance(one, LawOf)]
     order = {name: k for k, name in enumerate(CASES)}
-    engines = list(dict.fromkeys(engine for case in CASES.values() for engine in engines_of(case)))
+    engines = list(
+        dict.fromkeys(engine for case in CASES.values() for engine in engines_of(case, ENGINES))
+    )
     limits.sort(
         key=lambda limit: (
             order.get(limit.case, len(order)),

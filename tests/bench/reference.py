@@ -31,7 +31,7 @@ from adapters.box2d import Box2DEngine
 from adapters.box2d_v3 import Box2DV3
 from adapters.pymunk import Pymunk
 from adapters.reference import Reference
-from reference_impl import ordered, verlet_list
+from reference_impl import neighbours, ordered
 from reports.run.machine import about, busy_cores
 from scenarios.model import Scene
 from tests.adapters.event_driven.gases import boxed_asteroids, boxed_gas
@@ -114,8 +114,8 @@ def engines(scene: Scene, dt: float) -> dict[str, Step]:
     """Everyone who steps, and the reference a second time: what it measures against itself is the
     noise."""
     steps = {
-        "reference:exercise": reference(verlet_list, scene, dt),
-        "reference:exercise again": reference(verlet_list, scene, dt),
+        "reference:exercise": reference(neighbours, scene, dt),
+        "reference:exercise again": reference(neighbours, scene, dt),
     }
     for profile in ("matched", "shipped"):
         steps[f"pymunk:{profile}"] = pymunk(profile, scene, dt)
@@ -163,15 +163,15 @@ def compared(
 def added(n: int) -> float:
     """Bytes a disk that playing n disks adds at most to what the process holds; scene and compiled
     code not counted."""
-    warm = Reference(verlet_list)
+    warm = Reference(neighbours)
     warm.load(boxed_gas(1000, 0.3), DT)
     scene = boxed_gas(n, 0.3)
     Path("/proc/self/clear_refs").write_text("5")  # forget the peak so far (Linux, proc(5))
     before = status("VmRSS")
-    engine = Reference(verlet_list)
+    engine = Reference(neighbours)
     engine.load(scene, DT)
     for _ in range(5):
-        verlet_list.advance(engine.disks, engine.world, DT, 20)
+        neighbours.advance(engine.disks, engine.world, DT, 20)
     return (status("VmHWM") - before) / n
 
 
@@ -201,7 +201,7 @@ def gases() -> Iterator[Figure]:
 
 def sizes() -> Iterator[Figure]:
     """What a disk costs among many, and what room it takes."""
-    sized = {str(n): reference(verlet_list, boxed_gas(n, 0.3), DT) for n in SIZES}
+    sized = {str(n): reference(neighbours, boxed_gas(n, 0.3), DT) for n in SIZES}
     measured = {n: samples * 1e3 / n for n, samples in zip(SIZES, times(sized, 50).values())}
     for n, samples in measured.items():
         low, middle, high = np.quantile(samples, [0.25, 0.5, 0.75])
@@ -217,7 +217,7 @@ def in_order() -> Iterator[Figure]:
     asteroids, dt = boxed_asteroids(0), 1 / 60
     steps = {
         "reference:ordered": reference(ordered, asteroids, dt),
-        "reference:exercise": reference(verlet_list, asteroids, dt),
+        "reference:exercise": reference(neighbours, asteroids, dt),
         "pymunk:matched": pymunk("matched", asteroids, dt),
         "pymunk:shipped": pymunk("shipped", asteroids, dt),
     }

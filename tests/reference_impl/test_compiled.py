@@ -9,9 +9,10 @@ from pathlib import Path
 
 SCENE = """
 import sys, numpy as np
-from reference_impl import verlet_list, exercise, lesson, ordered
+from reference_impl import exercise, lesson, neighbours, ordered
+from reference_impl.neighbour_list import FEW
 from reference_impl.state import World, make_disks
-SOLVERS = ((exercise, 4, 600), (lesson, 4, 600), (ordered, 4, 600), (verlet_list, 9, 200))
+SOLVERS = ((exercise, 4, 600), (lesson, 4, 600), (ordered, 4, 600), (neighbours, 9, 200))
 for solver, side, steps in SOLVERS:
     grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2)
     n = np.arange(side**2)
@@ -26,7 +27,7 @@ for solver, side, steps in SOLVERS:
     disks.force[3], disks.torque[7] = [0.3, 0.2], 0.05
     collisions = solver.advance(disks, world, 0.01, steps)
     assert {min(j, 0) for _, _, j, _ in collisions} == {0, -1, -2} and len(collisions) > 100
-    assert solver is not verlet_list or len(n) >= verlet_list.LISTED_FROM
+    assert solver is not neighbours or len(n) > FEW
     played = b"".join(array.tobytes() for array in disks)
     sys.stdout.buffer.write(played + np.array(collisions).tobytes())
 """

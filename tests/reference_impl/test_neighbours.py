@@ -9,8 +9,18 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from reference_impl import exercise, verlet_list
-from reference_impl.neighbours import LASTS, build_list
+from reference_impl import exercise, neighbours
+from reference_impl.neighbour_list import (
+    FEW,
+    HALF_SKIN,
+    LASTS,
+    PAIRS,
+    STRIDE,
+    THICK,
+    build_list,
+    empty_list,
+    holds,
+)
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
 from tests.adapters.event_driven.gases import boxed_gas
 
@@ -24,7 +34,7 @@ def scenes(draw):
     disks, walls, wrap."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     n = draw(
-        st.integers(2, 90) | st.integers(verlet_list.REBUILD, 3 * verlet_list.REBUILD)
+        st.integers(2, 90) | st.integers(neighbours.REBUILD, 3 * neighbours.REBUILD)
     )  # from there on it may rebuild again in a step
     # area of all disks over that of the box
     fill = draw(st.sampled_from([0.05, 0.3, 0.8, 2.0, 8.0, 100.0]))
@@ -62,28 +72,26 @@ def copy_of(disks):
 
 @njit
 def by_list(disks, world, dt, count):
-    """As `verlet_list.advance`, however few the disks are; the collisions, and in how many steps
-    all pairs had to be asked."""
+    """As `neighbours.advance`, however few the disks and steps are."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
-    return collisions, verlet_list.advance_listed(disks, world, dt, count, collisions)
+    neighbours.advance_listed(disks, world, dt, count, collisions)
+    return collisions
+
+
+def listed(disks, world, left=LASTS, dt=DT):
+    """The list of disks as they are now."""
+    near = empty_list(disks.radius, len(world.walls))
+    near.length[STRIDE] = neighbours.longest_stride(disks, dt)
+    build_list(near, disks.position, disks.radius, world, left)
+    return near
 
 
 @njit
-def until_beyond_skin(disks, world, near):
-    """In which step of one the list of near pairs ends to hold: 0, or 1 if it lasts."""
+def collide_once(disks, world, near, k, count):
+    """The collisions of one step of which the list is given."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
-    return verlet_list.play(
-        disks,
-        world,
-        DT,
-        1,
-        collisions,
-        verlet_list.accelerations_of(disks, world, DT),
-        near,
-        0,
-        0,
-        0,
-    )[0]
+    neighbours.collide_near(disks, world, DT, near, k, 0, count, collisions)
+    return collisions
 
 
 def same(a, b):
@@ -98,13 +106,9 @@ def test_a_list_gives_the_bits_and_the_collisions_of_all_pairs(scene, count):
     disks, world = scene
     other = copy_of(disks)
     collisions = exercise.advance(disks, world, DT, count)
-    reported, unlisted = by_list(other, world, DT, count)
-    event(
-        f"by list: {np.sign(count - unlisted)}, by all pairs: {np.sign(unlisted)}, collisions:"
-        f" {len(collisions) > 0}"
-    )
+    event(f"list: {holds(listed(disks, world))}, collisions: {len(collisions) > 0}")
+    assert by_list(other, world, DT, count) == collisions
     assert same(disks, other)
-    assert reported == collisions
 
 
 def heap(n=300, fill=3.0):
@@ -118,49 +122,74 @@ def heap(n=300, fill=3.0):
 def test_a_disk_moved_beyond_the_skin_in_mid_step_rebuilds_the_list_at_once():
     """In a heap the list is out of date before the first step ends; kept to its end, it would miss
     pairs."""
-    world, first, other, stale = World(), heap(), heap(), heap()
+    world, first, renewed, stale = World(), heap(), heap(), heap()
     collisions = exercise.advance(first, world, DT, 1)
-    exercise.integrate(other, world, DT)
-    near = build_list(other, world, DT, 1)
-    assert near.listed
-    assert until_beyond_skin(other, world, near) == 0
-
-    reported, _ = by_list(renewed := heap(), world, DT, 1)
+    for disks in renewed, stale:
+        exercise.integrate(disks, world, DT)
+    near = listed(renewed, world, 1)
+    home = near.home.copy()
+    assert holds(near)
+    assert collide_once(renewed, world, near, 0, 1) == collisions
+    assert not np.array_equal(near.home, home)
     assert same(first, renewed)
-    assert reported == collisions
 
-    exercise.integrate(stale, world, DT)
-    kept = build_list(stale, world, DT, 1)._replace(half_skin=np.inf)
-    assert until_beyond_skin(stale, world, kept) == 1
+    kept = listed(stale, world, 1)
+    kept.length[:] = np.inf
+    collide_once(stale, world, kept, 0, 1)
     assert not same(first, stale)
 
 
+def test_a_disk_moves_by_less_than_half_the_skin_as_long_as_the_list_holds():
+    """Under gravity and through collisions, from one list to the next; measured the slow way."""
+    scene = boxed_gas(100, 0.3)
+    disks = make_disks(scene.position, scene.velocity, scene.radius, scene.mass)
+    world, lasted = World(restitution=1.0, walls=scene.walls, gravity=np.array([0.0, -10.0])), []
+    kicks = neighbours.kicks_of(disks, world, DT / 4)
+    for _ in range(20):
+        near = listed(disks, world, LASTS, DT / 4)
+        steps = 0
+        while True:
+            neighbours.fly(disks, kicks, DT / 4)
+            neighbours.take_step(near, kicks.strongest)
+            if not holds(near):
+                break
+            collide_once(disks, world, near, 0, 1)
+            farthest = np.hypot(*(disks.position - near.home).T).max()
+            assert farthest < near.length[HALF_SKIN]
+            steps += 1
+        lasted.append(steps)
+    assert min(lasted) > 1
+
+
+@pytest.mark.parametrize("n", [FEW, 500])
 @pytest.mark.parametrize("packing", [0.1, 0.3, 0.6])
-def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double_loop(packing):
+def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double_loop(packing, n):
     """Counted the slow way, in a gas around the origin, where cells have negative numbers."""
-    scene = boxed_gas(500, packing)
+    scene = boxed_gas(n, packing)
     position = scene.position - scene.position.mean(axis=0)
     disks = make_disks(position, scene.velocity, scene.radius, scene.mass)
-    near = build_list(disks, World(walls=scene.walls), DT, LASTS)
-    skin = near.half_skin / 0.49
+    near = listed(disks, World(walls=scene.walls))
+    skin, pairs = near.length[HALF_SKIN] / 0.49, slice(near.found[PAIRS])
     apart = np.hypot(*(position[:, None] - position).transpose(2, 0, 1)) - 1.0
     wanted = np.argwhere(np.triu(apart < skin, 1))
-    assert near.listed
-    assert 0.1 < skin <= 1.0
-    assert np.stack([near.first, near.second], 1).tolist() == wanted.tolist()
-    assert (near.reach2 == 1.0).all()
+    assert holds(near)
+    assert 0.1 < skin <= THICK * 0.5
+    assert np.stack([near.first, near.second], 1)[pairs].tolist() == wanted.tolist()
+    assert (near.reach[pairs] == 1.0).all()
 
 
 def test_a_list_is_made_for_the_steps_that_are_left_but_not_for_more_than_it_pays():
     """Its skin is as thick as the fastest disk needs; thicker, a call of few steps would ask many
     pairs in vain."""
-    scene, dt = boxed_gas(500, 0.3), DT / 4
+    scene, dt = boxed_gas(500, 0.3), DT / 8
     disks, world = make_disks(scene.position, scene.velocity, scene.radius, scene.mass), World()
     half_skin = {
-        left: build_list(disks, world, dt, left).half_skin for left in (2, 4, 8, LASTS, 2 * LASTS)
+        left: listed(disks, world, left, dt).length[HALF_SKIN]
+        for left in (LASTS // 4, LASTS // 2, LASTS, 2 * LASTS)
     }
-    assert half_skin[8] == 2 * half_skin[4] == 4 * half_skin[2] > 0.0
-    assert half_skin[LASTS] == half_skin[2 * LASTS] == 2 * half_skin[8]
+    assert half_skin[LASTS // 2] == pytest.approx(2 * half_skin[LASTS // 4], rel=1e-9)
+    assert half_skin[LASTS // 2] > 0.0
+    assert half_skin[LASTS] == half_skin[2 * LASTS] == 2 * half_skin[LASTS // 2]
 
 
 @pytest.mark.parametrize("far", [1e12, 1e300, np.inf, np.nan])
@@ -170,21 +199,20 @@ def test_a_disk_lost_in_space_leaves_no_list_but_the_same_bits(far):
     disks.position[7] = [far, 0.0]
     other = copy_of(disks)
     collisions = exercise.advance(disks, world, DT, 5)
-    reported, unlisted = by_list(other, world, DT, 5)
-    assert unlisted == 5
+    assert not holds(listed(other, world))
     assert collisions
+    assert by_list(other, world, DT, 5) == collisions
     assert same(disks, other)
-    assert reported == collisions
 
 
 def test_disks_all_in_one_place_are_not_listed():
     """Every pair is near: a list would be as long as the double loop, and hold memory besides."""
     disks = make_disks(np.zeros((300, 2)), np.zeros((300, 2)), np.ones(300), np.ones(300))
-    assert not build_list(disks, World(), DT, 1).listed
+    assert not holds(listed(disks, World(), 1))
 
 
-@pytest.mark.parametrize("n", [verlet_list.LISTED_FROM - 1, verlet_list.LISTED_FROM, 1000])
-def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_list_begins(n):
+@pytest.mark.parametrize("n", [3, FEW, FEW + 1, 1000])
+def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_cells_begin(n):
     """As the harness plays it: in several calls."""
     scene = boxed_gas(n, 0.3)
     first, other = (
@@ -192,7 +220,18 @@ def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_list_begins(n):
     )
     world = World(restitution=1.0, walls=scene.walls)
     for count in (1, 7, 30):
-        assert verlet_list.advance(other, world, DT, count) == exercise.advance(
+        assert neighbours.advance(other, world, DT, count) == exercise.advance(
             first, world, DT, count
         )
         assert same(first, other)
+
+
+@pytest.mark.slow
+def test_a_gas_kept_in_float32_plays_as_by_all_pairs():
+    """Where every number rounds a billion times as much."""
+    scene = boxed_gas(100, 0.3)
+    disks = make_disks(scene.position, 5 * scene.velocity, scene.radius, scene.mass)
+    first, other = (type(disks)(*(a.astype(np.float32) for a in disks)) for _ in range(2))
+    world = World(restitution=1.0, walls=scene.walls)
+    assert neighbours.advance(other, world, DT, 60) == exercise.advance(first, world, DT, 60)
+    assert same(first, other)

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES
+from adapters.engines import DISTINCT, ENGINES
 from reports.lessons import limits
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.limits import HARSHNESS, SEEN, limits_of
@@ -19,7 +19,7 @@ from reports.stability.variants import Variant
 from tests.reports.stability.kept_limits import agrees, kept
 
 LESSON = LESSONS["limits"]
-PLAYED = list(ENGINES)
+PLAYED = list(DISTINCT)
 NAMES = [seen.case for seen in SEEN.values()]
 
 
