@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
+from reports.compare.pareto import ACCURACIES, FAILED, front
 from reports.page import style
 from reports.page.charts import ZERO, broken_axis, decades, marked_break, shortened, sized
 from reports.speed.models import KINDS
-from reports.speed.pareto import ACCURACIES, FAILED, front
 from scenarios.model import Array
 
 FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from adapters.engines import OWN, row_of
+from reports.compare.pareto import ACCURACIES
+from reports.compare.pooling import said_of_pool
 from reports.page import style
 from reports.run.arguments import checked_engines, checked_scenes, opening
 from reports.run.folders import discard, given_back, open_part, place_of, replace_folder
@@ -25,9 +27,7 @@ from reports.speed.explained import sentence
 from reports.speed.kept import Kept
 from reports.speed.measure import measure
 from reports.speed.page import write_page
-from reports.speed.pareto import ACCURACIES
 from reports.speed.plan import SpeedPlan
-from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal.console import Console
 from reports.terminal.counts import counted

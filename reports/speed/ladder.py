@@ -16,7 +16,7 @@ from adapters.engine import Engine
 from adapters.play import play_once
 from reports.compare import laws
 from reports.run.scenes import open_scene
-from reports.speed.timing import Sample, Spent, Timed, interleaved
+from reports.run.timing import Sample, Spent, Timed, interleaved
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import NoTruth
 

@@ -25,7 +25,7 @@ from reports.run.journal_lines import (
     number,
     sentence,
 )
-from reports.speed.timing import WARM_UP
+from reports.run.timing import WARM_UP
 from scenarios.model import Scenario
 
 

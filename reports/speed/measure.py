@@ -16,12 +16,12 @@ from adapters.mechanisms.table import MECHANISMS
 from reports.run.machine import busy_cores
 from reports.run.runner import run_all
 from reports.run.scenes import open_scene
+from reports.run.timing import Sample
 from reports.run.worker_process import Failure
 from reports.speed import budget, ladder, models, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept
 from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
-from reports.speed.timing import Sample
 from reports.terminal.progress import Progress
 
 # s a ladder and a timing may take: against what hangs, no limit of what is measured

@@ -9,6 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from reports.compare.order import ELSEWHERE, UNSTEADY
+from reports.compare.pareto import ACCURACIES
+from reports.compare.pooling import said_of_pool
 from reports.page import situations, style
 from reports.page.charts import Drawing, packed_charts
 from reports.page.documents import CHARTED, render
@@ -17,9 +20,6 @@ from reports.run.scenes import open_scene
 from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import RESIDUAL, TOTALS
 from reports.speed.ladder import held
-from reports.speed.order import ELSEWHERE, UNSTEADY
-from reports.speed.pareto import ACCURACIES
-from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.speed.versus import OWN
 from reports.terminal.foreign_text import put_text

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from reports.compare.pareto import ACCURACIES, FAILED, NOT_TIMED, UNREACHABLE
+from reports.compare.pooling import POOLED, pooled
 from reports.speed import explained, models, tables, versus
 from reports.speed.measure import Measured
-from reports.speed.pareto import ACCURACIES, FAILED, NOT_TIMED, UNREACHABLE
 from reports.speed.plan import SpeedPlan
-from reports.speed.pooling import POOLED, pooled
 from reports.terminal.foreign_text import put_text
 
 QUIET = 0.05  # how far from 1 an engine against itself may read

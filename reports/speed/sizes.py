@@ -10,8 +10,8 @@ from time import perf_counter
 import numpy as np
 
 from adapters.engine import Engine, Unsupported
-from reports.speed.order import line_interval
-from reports.speed.timing import Sample, Spent, Timed, interleaved
+from reports.compare.order import line_interval
+from reports.run.timing import Sample, Spent, Timed, interleaved
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scene
 

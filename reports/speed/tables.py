@@ -11,14 +11,14 @@ import pandas as pd
 
 from adapters.engines import ENGINES
 from adapters.mechanisms.options import SWEEPS
+from reports.compare.order import FINEST, NEARER, Order, median_interval, order_of
+from reports.compare.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
+from reports.compare.pooling import WHO, pooled
 from reports.run.scenes import open_scene
+from reports.run.timing import summed_up
 from reports.speed.measure import IDLE, SIZE, Measured
-from reports.speed.order import FINEST, NEARER, Order, median_interval, order_of
-from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
 from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
-from reports.speed.pooling import WHO, pooled
 from reports.speed.sizes import exponent
-from reports.speed.timing import summed_up
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:

@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from reports.compare.order import ORDER
+from reports.compare.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
 from reports.speed import charts, tables, versus
 from reports.speed.effort import QUICK
 from reports.speed.measure import SIZE, Measured
-from reports.speed.order import ORDER
-from reports.speed.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
 from reports.speed.plan import PLAIN, SpeedPlan
 from reports.speed.results import Results
 

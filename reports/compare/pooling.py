@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from reports.speed.order import FINEST
+from reports.compare.order import FINEST
 from scenarios.model import Array
 
 WHO = ["engine", "profile"]

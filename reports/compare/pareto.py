@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.speed.order import ELSEWHERE
+from reports.compare.order import ELSEWHERE
 from scenarios.model import Array
 
 ACCURACIES = {"10 %": 0.1, "1 %": 0.01, "0.1 %": 0.001, "1e-6": 1e-6}  # of a radius
