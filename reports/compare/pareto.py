@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from reports.compare.order import ELSEWHERE
 from scenarios.model import Array
 
+NEAR = 0.1  # radii: the accuracy that sentences speak of
 ACCURACIES = {"10 %": 0.1, "1 %": 0.01, "0.1 %": 0.001, "1e-6": 1e-6}  # of a radius
 UNREACHABLE = "unreachable at any dt"
 NOT_REACHED = "not reached"

@@ -52,9 +52,8 @@ class Results:
         """See `tables.points`; and idle, what as many steps cost where there is nothing to do, µs
         per simulated s."""
         points = tables.points(self.measured, self.plan.seed)
-        each = {(row.engine, row.profile): row.step_us for row in self.driving.itertuples()}
-        steps = [each.get(who, np.nan) for who in zip(points.engine, points.profile)]
-        return points.assign(idle=np.array(steps, float) / points.dt_s)
+        scenarios = {tables.asks_of(scene)[0]: scene for scene in self.plan.scenes}
+        return points.assign(idle=tables.idle(self.bindings, points, scenarios))
 
     @cached_property
     def orders(self) -> pd.DataFrame:
@@ -148,7 +147,12 @@ class Results:
     @cached_property
     def driving(self) -> pd.DataFrame:
         """See `tables.driving`."""
-        return tables.driving(self.measured)
+        return tables.driving(self.bindings)
+
+    @cached_property
+    def bindings(self) -> pd.DataFrame:
+        """See `tables.bindings`."""
+        return tables.bindings(self.measured)
 
     @property
     def sizes(self) -> pd.DataFrame:
