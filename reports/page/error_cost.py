@@ -11,8 +11,8 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from reports.compare.order import FINEST, NEARER
-from reports.compare.pareto import NEAR, kept_from
-from reports.compare.pooling import POOLED, WHO, middle_half, pooled
+from reports.compare.pareto import NEAR, front, kept_from
+from reports.compare.pooling import POOLED, UNSURE, WHO, middle_half, pooled, without
 from reports.page import style
 from reports.page.charts import Drawing, broken_axis, decades, marked_break, shortened
 from reports.run.timing import Noise, noise_of
@@ -24,7 +24,6 @@ KEY = "error-cost"  # of its figures in the page
 TIME, STEPS = "engine time (µs per simulated second)", "steps per simulated second"
 ERROR = "largest error (radii)"
 TALL = 460  # px
-LEAST = 1e-3  # µs: what is left of a cost that is all binding is drawn there
 MARGIN = 1 + BUSY  # a difference of costs within the noise that is let pass is none
 GOOD = "#1d8a63"  # the best corner, on a light and on a dark page
 
@@ -68,12 +67,14 @@ class ErrorCost(NamedTuple):
         sentences: three, on speed and error.
         fault: why there are no times, or "".
         caption: what a point is.
+        costs: a row an engine, see `costs_of`; empty without times.
     """
 
     drawings: Mapping[str, Drawing]
     sentences: Sequence[str]
     fault: str
     caption: str
+    costs: Sequence[Mapping[str, Any]]
 
 
 def error_cost(scores: pd.DataFrame, clock: Clock, untrusted: Set[str]) -> ErrorCost | None:
@@ -92,7 +93,21 @@ def error_cost(scores: pd.DataFrame, clock: Clock, untrusted: Set[str]) -> Error
         for scene, table in tables.items()
     }
     said = sentences(found, next(iter(tables.values())), clock.fault)
-    return ErrorCost(drawings, said, clock.fault, caption(len(scenes), clock))
+    costs = [] if clock.fault else costs_of(found, next(iter(tables.values())))
+    return ErrorCost(drawings, said, clock.fault, caption(len(scenes), clock), costs)
+
+
+def costs_of(found: pd.DataFrame, table: pd.DataFrame) -> list[dict[str, Any]]:
+    """name, cost and bare (without the binding's part; µs per simulated second) of every engine at
+    each step size of the first picture, and read: µs of a read-out, median over the scenes."""
+    reads = found.groupby(WHO).read.median()
+    rows = []
+    for engine, profile, group in by_engine(table):
+        group = group.sort_values("step_size")
+        both = list(zip(group.cost.tolist(), bare(group).tolist()))
+        read = float(reads[engine, profile])
+        rows.append({"name": f"{engine}:{profile}", "costs": both, "read": read})
+    return rows
 
 
 def title_of(scene: str, scenes: int) -> str:
@@ -108,10 +123,11 @@ def caption(scenes: int, clock: Clock) -> str:
             f", over {scenes} scenes that need different things: the geometric mean without the"
             " best and the worst quarter"
         )
+    left = "fewer steps" if clock.fault else "cheaper"
     said += (
-        ". Lower is nearer to the exact answer, further left is cheaper. A dotted line that ends in"
-        " a cross: smaller steps bring this engine no nearer, so an error below it is not reached at"
-        " any step size."
+        f". Lower is nearer to the exact answer, further left is {left}. A dotted line that ends in"
+        " a cross: smaller steps bring this engine no nearer, so an error below it is not reached"
+        " at any step size."
     )
     if clock.fault:
         return said
@@ -141,8 +157,7 @@ def points(scores: pd.DataFrame, clock: Clock) -> pd.DataFrame:
     )
     timed = found[found.scenario.isin(times.scenario)]
     both = timed.merge(times[[*keys, "cost", "idle", "read"]], on=keys, how="left")
-    # What an empty step costs is part of the cost, whatever the noise of the two says.
-    return both.assign(idle=np.fmin(both.idle, both.cost))
+    return both.assign(idle=both.idle.where(both.cost.notna(), 0.0))
 
 
 def picture(table: pd.DataFrame, axis: str) -> go.Figure:
@@ -150,7 +165,7 @@ def picture(table: pd.DataFrame, axis: str) -> go.Figure:
     drawn = table[table.cost.notna() & np.isfinite(table.error)]
     costs, errors = (drawn[column].to_numpy(float) for column in ("cost", "error"))
     x_axis: dict[str, Any] = {"title": axis} | decades(np.append(costs, 1.0))
-    x_axis["range"] = ends(np.append(costs, bare(drawn)[bare(drawn) > 10 * LEAST]))
+    x_axis["range"] = ends(np.append(costs, bare(drawn)))
     broken, floor = (
         broken_axis(errors, FINEST) if (errors >= FINEST).any() else (decades(errors), 0)
     )
@@ -166,7 +181,13 @@ def picture(table: pd.DataFrame, axis: str) -> go.Figure:
         "height": TALL,
     }
     layout |= marked_break(y_axis, floor) if floor > 0 else {}
-    return go.Figure(traces, layout | best_corner(layout.get("shapes", [])))
+    return go.Figure(
+        traces,
+        layout
+        | best_corner(
+            layout.get("shapes", []), "near and cheap" if axis == TIME else "near in few steps"
+        ),
+    )
 
 
 def ends(costs: Array) -> list[float]:
@@ -185,7 +206,7 @@ def edge(axis: dict[str, Any]) -> float:
     return float(10**level)
 
 
-def best_corner(shapes: Sequence[Any]) -> dict[str, Any]:
+def best_corner(shapes: Sequence[Any], says: str) -> dict[str, Any]:
     """The layout that marks where an engine should be: lower left."""
     paper = {"xref": "paper", "yref": "paper"}
     corner = {
@@ -197,7 +218,7 @@ def best_corner(shapes: Sequence[Any]) -> dict[str, Any]:
         "line": {"width": 0},
     }
     text = {
-        "text": "<b>best</b><br>near and cheap",
+        "text": f"<b>best</b><br>{says}",
         "x": 0.012,
         "y": 0.02,
         "xanchor": "left",
@@ -218,25 +239,9 @@ def traces_of(
     fine = group[group.cost.notna() & np.isfinite(group.error)].sort_values("step_size")
     common = {"type": "scatter", "name": name, "cliponaxis": False}
     cost, height = fine.cost.to_numpy(float), np.maximum(fine.error.to_numpy(float), floor)
-    if len(fine) and fine.idle.gt(0).any():
-        left = bare(fine)
-        yield common | {
-            "mode": "markers",
-            "x": shortened(left),
-            "y": shortened(height),
-            "opacity": 0.35,
-            "hoverinfo": "skip",
-            "marker": {"symbol": look.symbol, "size": 7, "color": look.light},
-            "error_x": {
-                "type": "data",
-                "symmetric": False,
-                "array": shortened(cost - left),
-                "arrayminus": [0.0] * len(left),
-                "thickness": 1,
-                "width": 0,
-                "color": look.light,
-            },
-        }
+    left = bare(fine)
+    if (left < cost).any():
+        yield light_marks(engine, profile, cost, left, height)
     yield common | {
         "mode": "lines+markers",
         "x": shortened(cost),
@@ -277,12 +282,38 @@ def traces_of(
         }
 
 
+def light_marks(
+    engine: str, profile: str, cost: Array, left: Array, height: Array
+) -> dict[str, Any]:
+    """A trace: where points would be if the way from Python to the engine cost nothing, each with
+    a thin line to the point."""
+    look = style.look(engine, profile)
+    return {
+        "type": "scatter",
+        "name": f"{engine}:{profile}",
+        "mode": "markers",
+        "x": shortened(left),
+        "y": shortened(height),
+        "opacity": 0.35,
+        "hoverinfo": "skip",
+        "marker": {"symbol": look.symbol, "size": 7, "color": look.light},
+        "error_x": {
+            "type": "data",
+            "symmetric": False,
+            "array": shortened(cost - left),
+            "arrayminus": [0.0] * len(left),
+            "thickness": 1,
+            "width": 0,
+            "color": look.light,
+        },
+    }
+
+
 def bare(found: pd.DataFrame) -> Array:
-    """µs per simulated second without the binding's part, of a scene or pooled; `LEAST` where
-    nothing is left."""
-    left = found.bare if "bare" in found else found.cost - found.idle
-    values: Array = left.fillna(found.cost).to_numpy(float)
-    return np.maximum(values, LEAST)
+    """µs per simulated second without the binding's part, of a scene or pooled."""
+    cost = found.cost.to_numpy(float)
+    left = found.bare.to_numpy(float) if "bare" in found else without(cost, found.idle.to_numpy())
+    return np.where(np.isfinite(left), left, cost)
 
 
 def by_engine(table: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
@@ -327,33 +358,38 @@ def sentences(found: pd.DataFrame, table: pd.DataFrame, fault: str) -> list[str]
 
 
 def unbeaten(table: pd.DataFrame) -> str:
-    """The engines of which no other is both nearer and cheaper, with the binding's part and
-    without."""
+    """The engines of which no other is both nearer and cheaper; and who would be one of them
+    without the binding's part."""
     rows = table[table.cost.notna() & np.isfinite(table.error)]
-    error = np.maximum(rows.error.to_numpy(float), FINEST)
-    cost, left = rows.cost.to_numpy(float), bare(rows)
-    best = [
-        k
-        for k in range(len(rows))
-        if not (
-            (error <= error[k]) & (MARGIN * cost < cost[k]) & (MARGIN * left < left[k])
-            | (error < error[k]) & (MARGIN * cost <= cost[k]) & (MARGIN * left <= left[k])
-        ).any()
-    ]
-    if not best:
+    rows = rows.assign(name=rows.engine + ":" + rows.profile, bare=bare(rows))
+    if rows.empty:
         return "No engine has both a time and an error."
-    said: dict[str, str] = {}
-    for k in sorted(best, key=lambda k: cost[k]):
-        row = rows.iloc[k]
-        said.setdefault(
-            f"{row.engine}:{row.profile}",
-            f"{style.number(row.error, 2)} radii for {style.number(row.cost, 2)} µs",
-        )
-    listed = ", ".join(f"{name} ({numbers})" for name, numbers in said.items())
-    return (
-        f"No other engine is both nearer to the exact answer and cheaper than {listed}; the times"
-        " are per simulated second, at the cheapest such step size."
+    best, joining = front_of(rows)
+    rest = rows[~rows.name.isin(rows.name[rows.error <= FINEST])]
+    others, joining_others = front_of(rest)
+    said = (
+        f"No engine is both nearer to the exact answer and cheaper, per simulated second, than"
+        f" {', '.join(best)}."
     )
+    if len(rest) < len(rows) and others:
+        said += f" Of those that are not right to a millionth of a radius: {', '.join(others)}."
+    if names := list(dict.fromkeys([*joining, *joining_others])):
+        said += f" If calls from Python cost nothing, {', '.join(names)} would be unbeaten as well."
+    return said
+
+
+def front_of(rows: pd.DataFrame) -> tuple[list[str], list[str]]:
+    """The engines that no other of them beats, each with error and cost of its cheapest such step;
+    and the names of those that only the binding's part keeps from it."""
+    error = np.maximum(rows.error.to_numpy(float), FINEST)
+    cost, names = rows.cost.to_numpy(float), rows.name.tolist()
+    best: dict[str, str] = {}
+    for k in front(cost, error):
+        numbers = style.number(rows.error.iloc[k], 2), style.number(cost[k], 2)
+        best.setdefault(names[k], f"{numbers[0]} radii for {numbers[1]} µs")
+    bare_best = dict.fromkeys(names[k] for k in front(rows.bare.to_numpy(float), error))
+    joining = [name for name in bare_best if name not in best]
+    return [f"{name} ({numbers})" for name, numbers in best.items()], joining
 
 
 def cheapest(found: pd.DataFrame) -> str:
@@ -372,7 +408,7 @@ def cheapest(found: pd.DataFrame) -> str:
             continue
         name, cost, left = min(ways, key=lambda way: way[1])
         rivals = [other for other in ways if other[0] != name]
-        if all(MARGIN * cost < c and MARGIN * left < b for _, c, b in rivals):
+        if all(surely_less((cost, left), (c, b)) for _, c, b in rivals):
             wins.setdefault(name, []).append(cost)
         else:
             even += 1
@@ -391,6 +427,13 @@ def cheapest(found: pd.DataFrame) -> str:
         f" {counted(len(scenes), 'scene')}; the cost of the way from Python to the engine decides"
         " none of these."
     )
+
+
+def surely_less(mine: tuple[float, float], theirs: tuple[float, float]) -> bool:
+    """Whether a cost is less than another with the binding's part and, (cost, cost without it),
+    without: by more than the noise of both."""
+    (cost, left), (other, other_left) = mine, theirs
+    return MARGIN * cost < other and left + UNSURE * cost < other_left - UNSURE * other
 
 
 def way_of(group: pd.DataFrame) -> Iterator[tuple[str, float, float]]:

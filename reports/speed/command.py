@@ -143,7 +143,7 @@ def print_summary(results: Results, page: str) -> None:
         )
     ]
     title = "What an error, in radii, costs: µs per simulated second"
-    title += f", median of {scenes} scenes" if scenes > 1 else ""
+    title += " (in how many of the scenes)" if scenes > 1 else ""
     print_table(console, ["engine", *ACCURACIES], rows, title)
     console.print()
     print_texts(console, marks_in(rows, scenes))
@@ -159,7 +159,8 @@ def print_summary(results: Results, page: str) -> None:
 def cost_of(row: Mapping[Hashable, Any]) -> str:
     """What an accuracy costs an engine, or in how many scenes it is reached."""
     if isfinite(row["cost"]):
-        return style.number(row["cost"])
+        got = f" ({row['got']})" if row["of"] > 1 else ""
+        return style.number(row["cost"]) + got
     if row["lost"]:
         return NEVER
     return f"{row['got']} of {row['of']}" if row["of"] > 1 else NOT_REACHED
@@ -175,7 +176,7 @@ def marks_in(rows: Sequence[Sequence[str]], scenes: int) -> dict[str, str]:
     cells = {cell for row in rows for cell in row[1:]}
     found = {mark: meaning for mark, meaning in meanings.items() if mark in cells}
     if any(" of " in cell for cell in cells):
-        found[f"k of {scenes}"] = f"in k of the {scenes} scenes, too few for a median"
+        found[f"k of {scenes}"] = f"in k of the {scenes} scenes, too few to compare"
     return found
 
 
