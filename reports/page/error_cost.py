@@ -478,17 +478,17 @@ def halving(table: pd.DataFrame, timed: bool) -> str:
         else:
             dearer.append((cost[-1] / cost[0]) ** (1 / halvings))
             nearer.append((error[0] / max(error[-1], FINEST)) ** (1 / halvings))
-    costs = f"multiplies the time by {span(dearer)} and " if timed else ""
-    said = f"Half the step {costs}divides the error by {span(nearer)}" if nearer else ""
-    if not stuck:
-        return f"{said}, for every engine that takes steps." if said else "No engine takes steps."
-    lost = (
-        f"it brings {', '.join(stuck)} no nearer to the exact answer"
-        if said
-        else (f"Smaller steps bring {', '.join(stuck)} no nearer to the exact answer")
-    )
+    if not nearer and not stuck:
+        return "At every step size all engines are right to a millionth of a radius."
     spent = ", at more cost" if timed else ""
-    return f"{said}; {lost}{spent}." if said else f"{lost}{spent}."
+    lost = f"bring{{}} {', '.join(stuck)} no nearer to the exact answer{spent}."
+    if not nearer:
+        return f"Smaller steps {lost.format('')}"
+    costs = f"multiplies the time by {span(dearer)} and " if timed else ""
+    said = f"Half the step {costs}divides the error by {span(nearer)}"
+    return (
+        f"{said}; it {lost.format('s')}" if stuck else f"{said}, for every engine that takes steps."
+    )
 
 
 def span(ratios: Sequence[float]) -> str:

@@ -130,8 +130,8 @@ def pooled_section(results: Results) -> SpeedSection:
             f" {said_of_pool(results.pooled)} A scene that an engine failed counts as infinitely"
             " wrong and infinitely dear. The light mark left of a point is the cost without what as"
             " many steps and calls take where there is nothing to do. Down and left is better; no"
-            " engine is both faster and better than the broad grey line, and of those who take steps"
-            " none than the narrow one.",
+            " engine is both faster and better than the broad grey line, and of those who take"
+            " steps none than the narrow one.",
             charts.speed(results.pooled, tall=True),
         ),
         "matched": Drawing(
@@ -139,8 +139,8 @@ def pooled_section(results: Results) -> SpeedSection:
             "What the cheapest measured dt costs whose error, and that of every finer one, is no"
             " larger. Engines are compared in the scenes in which both get there: the cost of"
             f" {YARDSTICK}, geometric mean over its scenes, times that of the ratios to it. never:"
-            " half of the scenes or more are unreachable at any dt, or failed. not yet: half or more are not reached down to the finest dt measured. Hover"
-            " for how many of each.",
+            " half of the scenes or more are unreachable at any dt, or failed. not yet: half or"
+            " more are not reached down to the finest dt measured. Hover for how many of each.",
             charts.matched(results.pooled_reached, tall=True),
         ),
     }

@@ -92,10 +92,10 @@ class Results:
         """As `reached`, one cost for all scenarios where an engine gets there in more than half of
         them: `paired_cost`, and how many do and do not.
 
-        A median over all of them would be that of other scenarios for each engine, and with many
-        out of reach of the dearest. Columns besides: of, how many scenarios; got,
-        in how many it gets there; never, at no dt; failed; untimed; in the
-        others it does not down to the finest dt. lost: half or more are never or failed.
+        A median over all of them would be that of other scenarios for each engine; with many out
+        of reach, of the dearest. Columns besides: of, how many scenarios; got, in how many it gets
+        there; never, at no dt; failed; untimed; in the others it does not down to the finest dt.
+        lost: half or more are never or failed.
         """
         rows = []
         own = yardstick_of(self.reached)
