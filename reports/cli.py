@@ -24,6 +24,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 DEFAULT_OUT = Path("reports/out/latest")
+DEFAULT_TIMINGS = 12.0
 VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
 
 Scenes = Annotated[
@@ -86,12 +87,12 @@ Scheduler = Annotated[
     str, typer.Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")
 ]
 Timings = Annotated[
-    int,
+    float,
     typer.Option(
         min=0,
-        max=10_000,
-        metavar="N",
-        help="Time every engine N times after the run, one process at a time.",
+        max=3600,
+        metavar="SECONDS",
+        help="How long the timing of the engines after the run may take; 0: none.",
     ),
 ]
 Resume = Annotated[
@@ -137,7 +138,7 @@ def run(
     full: Full = False,
     seed: Seed = 0,
     out: Out = DEFAULT_OUT,
-    timings: Timings = 0,
+    timings: Timings = DEFAULT_TIMINGS,
     workers: Workers = 0,
     timeout: Timeout = 60.0,
     memory: Memory = 0,
@@ -148,11 +149,13 @@ def run(
     from reports.commands import run as run_command
 
     means = run_command.means_of(workers, timeout, memory, scheduler)
-    what = scenes or [], engine or [], dt or [], full, seed, timings
+    what = scenes or [], engine or [], dt or [], full, seed
     if resume is not None:
-        run_command.resume(resume, means, alone=not any(what) and out == DEFAULT_OUT)
+        run_command.resume(
+            resume, means, alone=not any(what) and (timings, out) == (DEFAULT_TIMINGS, DEFAULT_OUT)
+        )
     command = as_typed()
-    run_command.run_plan(run_command.RunRequest(*what, out), means, command)
+    run_command.run_plan(run_command.RunRequest(*what, timings, out), means, command)
 
 
 @app.command()

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 from playwright.sync_api import Browser
 
-from reports.run import worker
+from reports.run import timing_pass, worker
 from tests.forks import FRESH, Forked
 from tests.reports.page.browsing import chromium
 
@@ -55,6 +55,7 @@ def forked_workers() -> Iterator[None]:
     take seconds."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(worker, "start", Forked)
+        patch.setattr(timing_pass, "ROUNDS", 1)  # of many runs no test looks at the times
         yield
 
 

@@ -109,7 +109,7 @@ def sentence(changed: Difference) -> str:
     """What it comes to."""
     said = f"{counted(changed.worse, 'result') if changed.worse else 'Nothing'} got worse."
     if not changed.timings:
-        return f"{said} No times were compared: run both on one machine with --timings 5."
+        return f"{said} No times were compared: run both on one machine that is idle."
     return (
         f"{said} A time counts as worse if its factor is above {FACTOR:g} and its whole 99 %"
         " interval above 1."

@@ -51,7 +51,7 @@ class RunRequest:
     dts: Sequence[float]
     full: bool
     seed: int
-    timings: int
+    timings: float
     out: Path
 
 

@@ -71,6 +71,17 @@ async function openCharts(scenario) {
     }
   }, { rootMargin: "300px" });
   scenario.querySelectorAll(".plot").forEach((plot) => watch.observe(plot));
+  const pick = scenario.querySelector(".pick select");
+  if (pick) pick.onchange = () => showPicked(pick, charts);
+}
+
+// Draws another figure in the place of the one above or below the picker, on paper as well.
+function showPicked(pick, charts) {
+  const plot = pick.closest("figure").querySelector(".plot");
+  plot.dataset.chart = pick.value;
+  const text = JSON.stringify(charts[pick.value]);
+  if (plot.dataset.paper) printed.set(plot, text);
+  drawChart(plot, text);
 }
 
 async function openPlayer(scenario) {

@@ -16,7 +16,7 @@ from adapters.run import Run
 from adapters.thrust_grid import off_grid_note
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
-from reports.page import overview, pooled, situations, style
+from reports.page import error_cost, overview, pooled, situations, style
 from reports.page.charts import CHARTS, NOISE, POINTS, Drawing, packed_charts
 from reports.page.documents import CHARTED, render
 from reports.page.links import neighbours
@@ -61,6 +61,7 @@ def write_page(
     known_answers: pd.DataFrame,
     about: Mapping[str, Any],
     lessons: Mapping[str, Any],
+    clock: error_cost.Clock = error_cost.NO_CLOCK,
     said: Mapping[str, Sequence[str]] = MappingProxyType({}),
     on_paper: Sequence[str] = (),
 ) -> None:
@@ -68,7 +69,8 @@ def write_page(
 
     `findings` are the sentences on top; who is in `untrusted` is not scored; `conformance` and
     `known_answers` are the tables below them; `about` holds command, seed, machine, versions,
-    started and seconds; `lessons` name -> what has its number, title and question; `said` a
+    started and seconds; `clock` what its steps cost;
+    `lessons` name -> what has its number, title and question; `said` a
     solver's file -> what `crosscheck check` says of it. Scenarios `on_paper` have half a page each
     where the page is printed, others none.
     """
@@ -79,6 +81,7 @@ def write_page(
     scores = pooled.scores(comparisons)
     answers = situations.answers(scores[scores.middle], situated(comparisons), untrusted)
     drawings = pooled.drawings(scores, answers, untrusted)
+    first = error_cost.error_cost(scores, clock, untrusted)
     html = render(
         "page/page.html.j2",
         generator=GENERATOR,
@@ -97,6 +100,9 @@ def write_page(
         columns=overview.SUMMARY,
         summary=overview.summary(comparisons, names, untrusted),
         groups=situations.grouped(names, scores),
+        error_cost=first,
+        error_cost_key=error_cost.KEY,
+        error_cost_charts=packed_charts(first.drawings) if first else "",
         answers=answers,
         far_off=situations.FAR_OFF,
         pooled=drawings,

@@ -16,7 +16,7 @@ from scenarios.model import Array
 
 KEY = "pooled"  # of their figures in the page
 ERROR, ANGLE = "position_max_radii", "angle_max"
-SCORES = [*situations.COLUMNS, "step_size", "middle"]
+SCORES = [*situations.COLUMNS, "step_size", "dt_s", "middle"]
 
 
 def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
@@ -24,7 +24,7 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
 
     error (radii) and angle (rad) are the largest of any disk in any sample, inf without a result;
     cost is µs of engine time per simulated second, nan without one; step_size counts from the
-    coarsest, middle says whether it is the one in the middle of the ladder.
+    coarsest, dt_s is its length, middle says whether it is the one in the middle of the ladder.
     """
     rows = []
     for comparison in comparisons:
@@ -43,7 +43,8 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
             )
             cost = run.seconds / scenario.duration * 1e6 if np.isfinite(error) else np.nan
             middle = run.dt == comparison.middle_dt
-            rows.append((scenario.name, run.name, error, angle, cost, steps.index(run.dt), middle))
+            step_size = steps.index(run.dt)
+            rows.append((scenario.name, run.name, error, angle, cost, step_size, run.dt, middle))
     return pd.DataFrame(rows, columns=SCORES).astype({"middle": bool})
 
 

@@ -10,11 +10,13 @@ from typing import Any
 import pandas as pd
 
 from reports.compare.comparison import Comparison
+from reports.page.error_cost import Clock
 from reports.page.findings import findings, not_counted
 from reports.page.page import write_page
 from reports.run.archive import Archive
 from reports.run.made import writing
 from reports.run.tables import TABLES, comparisons_of, make_tables
+from reports.run.timing_pass import noise_floor
 
 PAGE = "report.html"
 
@@ -50,14 +52,14 @@ def make_report(
     lessons: Mapping[str, Any],
     on_paper: Sequence[str] = (),
 ) -> Report:
-    """From the journal of `folder` write deviations.csv, runs.csv and report.html; `say` hears what
-    is being done.
+    """From the journal of `folder` write deviations.csv, runs.csv, timings.csv and report.html;
+    `say` hears what is being done.
 
     `lessons`: name -> a lesson, for the page's list of them; `on_paper`: scenarios that are printed
     with the page.
 
     Raises:
-        FolderTaken: one of the three is there and is not this program's.
+        FolderTaken: one of these is there and is not this program's.
         ValueError: the journal cannot be used, or a scene is not the one that was played.
     """
     with writing(folder, (*TABLES, PAGE)):
@@ -106,6 +108,7 @@ def made_report(
         conformance=pd.DataFrame([row for rows in asked for row in rows]),
         known_answers=pd.DataFrame(known),
         about=header | {"seconds": archive.seconds},
+        clock=Clock(tables.timed, noise_floor(archive), header["timings"]),
         lessons=lessons,
         said=said,
         on_paper=on_paper,

@@ -54,7 +54,9 @@ class Archive:
         conformance: `engine:profile` -> its line.
         known_answers: the lines of the known answers that were made again.
         checked: solver's file, `PATH:own` -> its line, what `crosscheck check` says of it.
-        timings: key of a cell -> s, its timings, each taken alone.
+        timings: key of a cell -> 0, and 1 if it was timed twice -> the line of that timing.
+        beside: (what, `engine:profile`, scenario or "") -> s that it took, round by round, see
+            stepping.py.
         seconds: that the run took, up to now; NaN if it is not complete.
         complete: whether everything that was asked for has ended.
     """
@@ -65,7 +67,8 @@ class Archive:
     conformance: dict[str, dict[str, Any]]
     known_answers: list[dict[str, Any]]
     checked: dict[str, dict[str, Any]]
-    timings: dict[str, list[float]]
+    timings: dict[str, dict[int, dict[str, Any]]]
+    beside: dict[tuple[str, str, str], list[float]]
     seconds: float
     complete: bool
 
@@ -77,7 +80,8 @@ class Archive:
         last: dict[str, Numbered] = {
             kind: {} for kind in ("cell", "conformance", "known_answer", "checked")
         }
-        timings: dict[str, list[float]] = {}
+        timings: dict[str, dict[int, dict[str, Any]]] = {}
+        beside: dict[tuple[str, str, str], list[float]] = {}
         seconds, complete = 0.0, False
         for number, kind, line in checked_lines(folder, KINDS):
             complete = kind == "footer"
@@ -86,7 +90,9 @@ class Archive:
             elif kind == "header":
                 header = line["header"]
             elif kind == "timing":
-                timings.setdefault(line["timing"], []).append(line["seconds"])
+                timings.setdefault(line["timing"], {})[line["copy"]] = line
+            elif kind == "beside":
+                beside[line["beside"], line["of"], line["scenario"]] = line["cost"]
             else:
                 last[kind][what_of(line) if kind == "cell" else line["of"]] = number, line
         if not header:
@@ -107,6 +113,7 @@ class Archive:
             known,
             {line["of"]: line for line in checked},
             timings,
+            beside,
             seconds if complete else float("nan"),
             complete,
         )

@@ -17,14 +17,15 @@ from reports.compare.table import COLUMNS
 from reports.compare.view import NOT_JUDGED
 from reports.run.archive import Archive
 from reports.run.tables import is_sealed
+from reports.run.timing_pass import is_busy, noise_floor
 from reports.terminal.foreign_text import encoded
 
 # Measured on two cores under a load of 15 to 20 (no idler machine could be had), 3 scenes and
-# --timings 5. 8 runs of one build set against each other, 280 verdicts from 4200 ratios of rounds:
-# "worse" 4 times, as often with a factor of 1.1 as with 1.35; 8 times when the factor was the
-# median of the ratios, for other work lengthens a round, but seldom all of them. Every engine made
-# half as slow again, 240 verdicts: the factor is above 1.25 in 227, but found are 118: what fails
-# under such a load is to be sure, which more rounds and more scenes mend.
+# five rounds of timings. 8 runs of one build set against each other, 280 verdicts from 4200 ratios
+# of rounds: "worse" 4 times, as often with a factor of 1.1 as with 1.35; 8 times when the factor
+# was the median of the ratios, for other work lengthens a round, but seldom all of them. Every
+# engine made half as slow again, 240 verdicts: the factor is above 1.25 in 227, but found are 118:
+# what fails under such a load is to be sure, which more rounds and more scenes mend.
 FACTOR = 1.25
 CONFIDENCE = 0.99
 WHOSE = ["scenario", "engine", "profile", "dt_s", "metric", "versus"]
@@ -111,9 +112,14 @@ def difference(before: Path, after: Path) -> Difference:
     statuses = changed_statuses(*cells) + changed_judgement(
         *tables, cells[0].keys() & cells[1].keys()
     )
-    return Difference(
-        warnings, statuses, numbers, same, timings_of(one, other, *cells) if like else []
-    )
+    busy = [archive for archive in (one, other) if archive.timings and is_busy(archive)]
+    warnings += [
+        f"{archive.folder}: its times are not compared: an engine against itself read"
+        f" {1 + noise_floor(archive).floor:.2f}"
+        for archive in busy
+    ]
+    timed = timings_of(one, other, *cells) if like and not busy else []
+    return Difference(warnings, statuses, numbers, same, timed)
 
 
 def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
@@ -297,15 +303,14 @@ def timings_of(
     ratios: dict[str, list[float]] = {}
     least: dict[str, list[float]] = {}
     for name in before.keys() & after.keys():
-        rounds = [
-            *zip(
-                one.timings.get(before[name]["cell"], []),
-                other.timings.get(after[name]["cell"], []),
-            )
-        ]
+        was = one.timings.get(before[name]["cell"], {}).get(0)
+        now = other.timings.get(after[name]["cell"], {}).get(0)
+        if was is None or now is None or was["timed_s"] != now["timed_s"]:
+            continue
+        rounds = [*zip(was["cost"], now["cost"])]
         if rounds and min(min(rounds)) > 0:
-            was, now = (min(times) for times in zip(*rounds))
-            least.setdefault(name[1], []).append(now / was)
+            fastest, then = (min(times) for times in zip(*rounds))
+            least.setdefault(name[1], []).append(then / fastest)
             ratios.setdefault(name[1], []).extend(now / was for was, now in rounds)
     return [
         timing(engine, sorted(ratios[engine]), float(np.median(least[engine])))

@@ -68,12 +68,6 @@ def play_here(cell: Cell, row: EngineRow, scenario: Scenario) -> CellResult:
     return CellResult(replace(run, trajectory=None), samples, file, engine())
 
 
-def time_here(cell: Cell, row: EngineRow, scenario: Scenario) -> float:
-    """In the worker: s inside the engine's `step`."""
-    allow(LOADING)
-    return play_cell(cell, row, scenario, Begun()).seconds
-
-
 def conform_here(name: str, row: EngineRow) -> list[Finding]:
     """In the worker: what the probes find; before their clock starts the engine is loaded once, and
     so compiled."""

@@ -26,8 +26,9 @@ from reports.run.journal_lines import (
     Step,
     Words,
 )
+from reports.run.stepping import CALL, EMPTY, READ
 
-MOST_ROUNDS = 10_000  # of timings: each takes as long as all middle steps of a run
+LONGEST_PASS = 3600.0  # s, of timings
 
 
 class Header(Line):
@@ -42,7 +43,7 @@ class Header(Line):
     engines: list[EngineProfile]
     dts: list[Step]
     full: bool
-    timings: Annotated[int, Field(ge=0, le=MOST_ROUNDS)]
+    timings: Annotated[float, Field(ge=0, le=LONGEST_PASS)]
     folder: File
     names: dict[File, Name]
     tasks: Count
@@ -136,12 +137,27 @@ class CheckedLine(Line):
     key: Literal[""] | Digest
 
 
+Costs = Annotated[list[Seconds], Field(min_length=1, max_length=1000)]
+
+
 class TimingLine(Line):
-    """A timing of a cell."""
+    """What a cell cost in the first `timed_s` of its scenario: s per simulated second, a number a
+    round; and as much again that setting disks onto the opposite edge took in Python."""
 
     timing: Digest
-    round: Count
-    seconds: Seconds
+    copy_: Annotated[Literal[0, 1], Field(alias="copy")]
+    timed_s: Step
+    cost: Costs
+    wrapping: Costs
+
+
+class BesideLine(Line):
+    """What was measured beside the steps of an engine, s, a number a round."""
+
+    beside: Literal[EMPTY, CALL, READ]  # type: ignore[valid-type]
+    of: EngineProfile
+    scenario: Literal[""] | Name
+    cost: Costs
 
 
 class Footer(Line):
@@ -172,6 +188,7 @@ KINDS = Kinds(
         "known_answer": KnownAnswerLine,
         "checked": CheckedLine,
         "timing": TimingLine,
+        "beside": BesideLine,
         "footer": FooterLine,
     },
     "delete that line, and run --resume plays what it was of",

@@ -23,10 +23,11 @@ from reports.run.journal import Journal, plain
 from reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.run.machine import about
 from reports.run.made import writing
-from reports.run.playing import CellResult, conform_here, engine, play_here, time_here
+from reports.run.playing import CellResult, conform_here, engine, play_here
 from reports.run.runner import TIMEOUT, run_all
 from reports.run.scenes import open_scene, with_steps
 from reports.run.shares import Gathering
+from reports.run.timing_pass import Pass, is_timed, laps_of
 from reports.run.worker_process import Failure
 from reports.terminal.foreign_text import put_bytes, put_text
 from reports.terminal.progress import Progress
@@ -64,7 +65,7 @@ class RunPlan:
         seed: seed of random scenes.
         dts: step sizes in s instead of each scenario's own; empty: its own.
         full: two finer steps for every scenario.
-        timings: rounds of timings after all is played.
+        timings: s that the timing pass after all is played may take; 0: there is none.
         command: how to ask for the same again.
         folder: where it was asked for, from where paths that are not absolute are meant.
         files: what is read instead of a scene's path, such as the copy of a file that is gone.
@@ -76,7 +77,7 @@ class RunPlan:
     seed: int
     dts: Sequence[float]
     full: bool
-    timings: int
+    timings: float
     command: str
     folder: str = field(default_factory=os.getcwd)
     files: Mapping[str, Path] = field(default_factory=dict)
@@ -369,26 +370,20 @@ def take_timings(
     scenarios: Mapping[str, Scenario],
     progress: Progress,
 ) -> None:
-    """Time the middle step of every scenario on every engine that played it, round by round,
-    nothing beside it."""
-    tasks: dict[Any, Callable[[], Any]] = {}
-    for turn in range(plan.timings):
-        for record in archive.records:
-            scenario = scenarios[record["scene"]]
-            middle = scenario.substeps[len(scenario.substeps) // 2]
-            name = f"{record['engine']}:{record['profile']}"
-            timed = len(archive.timings.get(record["cell"], []))
-            if record["status"] == "ok" and record["substeps"] == middle and turn >= timed:
-                cell = Cell(record["scene"], record["seed"], name, middle)
-                tasks[turn, record["cell"]] = partial(
-                    time_here, cell, plan.engines[name], replace(scenario, truth=None)
-                )
-    progress.start(len(tasks), len(tasks), "taking timings, one after the other")
-    with closing(run_all(tasks, 1, means.timeout, means.memory)) as results:
-        for (turn, key), seconds in results:
-            if not isinstance(seconds, Failure):
-                journal.append({"timing": key, "round": turn, "seconds": seconds})
-            progress.done(f"timings, round {turn + 1} of {plan.timings}")
+    """Have the timing pass done, unless the journal has it; nothing of this run is beside it."""
+    laps = laps_of(archive, plan.engines, scenarios) if plan.timings else []
+    if not laps or is_timed(archive, laps):
+        return
+    progress.start(1, 1, f"timing, at most {plan.timings:g} s")
+    task: dict[Any, Callable[[], Any]] = {"timing": Pass(laps, plan.timings, plan.seed)}
+    with closing(run_all(task, 1, plan.timings + means.timeout, means.memory)) as results:
+        for _, result in results:
+            if isinstance(result, Failure):
+                progress.done("timing", result.status, result.reason)
+            else:
+                for line in result:
+                    journal.append(line)
+                progress.done("timing")
 
 
 def sweep(archive: Archive) -> None:

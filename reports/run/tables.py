@@ -35,13 +35,15 @@ from reports.run.shares import (
     scenario_of,
     share_file,
 )
+from reports.run.timing_pass import TABLE, timings
 from reports.run.worker_process import Failure
 from reports.terminal.exits import say as warn
 from reports.terminal.foreign_text import encoded, is_part, put_text, whole
+from scenarios.model import Scenario
 from scenarios.no_truth import answered
 from scenarios.regular import all_of
 
-TABLES = ("deviations.csv", "runs.csv")
+TABLES = ("deviations.csv", "runs.csv", TABLE)
 
 
 class Tables(NamedTuple):
@@ -49,6 +51,7 @@ class Tables(NamedTuple):
 
     Attributes:
         runs: runs.csv.
+        timed: timings.csv.
         answers: scene -> its exact answer, as it was had or not.
         shares: scene -> where its share of deviations.csv is.
         unkept: scene -> its comparison, of which no share is kept: it could not be made, or a file
@@ -58,6 +61,7 @@ class Tables(NamedTuple):
     """
 
     runs: pd.DataFrame
+    timed: pd.DataFrame
     answers: dict[str, Answer]
     shares: dict[str, Path]
     unkept: dict[str, Comparison]
@@ -65,8 +69,8 @@ class Tables(NamedTuple):
 
 
 def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
-    """Write deviations.csv and runs.csv; what was compared before and has not changed is not
-    compared again.
+    """Write deviations.csv, runs.csv and timings.csv; what was compared before and has not changed
+    is not compared again.
 
     Raises:
         ValueError: no cell has ended, or a scene is not the one that was played.
@@ -98,11 +102,17 @@ def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
     write_deviations(folder, shares, unkept)
     had_from = {answer_file(folder, records) for records in by_scene.values()}
     sweep(folder / "compared", {*shares.values(), *had_from, seal_of(folder)})
-    runs = table_of_runs(
-        [record for records in by_scene.values() for record in records], archive, unkept
-    )
+    runs = table_of_runs([record for records in by_scene.values() for record in records], unkept)
     put_text(folder / "runs.csv", runs.to_csv(index=False))
-    return Tables(runs, had, shares, unkept, unjudged)
+    timed = timings(archive, scenarios_by_name(folder, by_scene))
+    put_text(folder / TABLE, timed.to_csv(index=False, float_format="%.6g"))
+    return Tables(runs, timed, had, shares, unkept, unjudged)
+
+
+def scenarios_by_name(folder: Path, by_scene: Mapping[str, Records]) -> dict[str, Scenario]:
+    """Of all that was played."""
+    scenarios = [scenario_of(folder, records) for records in by_scene.values()]
+    return {scenario.name: scenario for scenario in scenarios}
 
 
 def compare_missing(
@@ -220,7 +230,7 @@ def settled(name: str, pair: Sequence[Any]) -> str:
 
 
 def table_of_runs(
-    records: Sequence[dict[str, Any]], archive: Archive, unkept: Mapping[str, Comparison]
+    records: Sequence[dict[str, Any]], unkept: Mapping[str, Comparison]
 ) -> pd.DataFrame:
     """A row a cell: what was played, how it ended, how long the engine took, with which settings
     and versions."""
@@ -247,7 +257,6 @@ def table_of_runs(
         | found.get((record["scenario"], name_of(record), record["dt_s"]), {})
         | {
             "until_s": float(record["until_s"]),
-            "seconds_alone": min(archive.timings.get(record["cell"], [float("nan")])),
             "settings": "; ".join(map(settled, record["settings"], record["settings"].values())),
             "versions": "; ".join(
                 f"{name} {version}" for name, version in record["versions"].items()
@@ -255,4 +264,4 @@ def table_of_runs(
         }
         for record in records
     ]
-    return pd.DataFrame(rows, columns=[*columns, "seconds_alone", "settings", "versions"])
+    return pd.DataFrame(rows, columns=[*columns, "settings", "versions"])

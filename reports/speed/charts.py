@@ -10,10 +10,12 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
+from reports.compare.pareto import ACCURACIES, FAILED, front
+from reports.compare.pooling import without
 from reports.page import style
 from reports.page.charts import ZERO, broken_axis, decades, marked_break, shortened, sized
+from reports.page.error_cost import light_marks
 from reports.speed.models import KINDS
-from reports.speed.pareto import ACCURACIES, FAILED, front
 from scenarios.model import Array
 
 FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"
@@ -47,6 +49,10 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
         text = [hover_text(row) for row in records(fine)]
         values = {"customdata": shortened(fine.error, 3)}  # what is saved as CSV
         height = lifted(fine.error, floor)
+        cost = fine.cost.to_numpy(float)
+        left = fine.bare.to_numpy(float) if tall else without(cost, fine.idle.to_numpy(float))
+        if np.isfinite(left).all():
+            traces.append(light_marks(engine, profile, cost, left, height.to_numpy(float)))
         traces.append(line(engine, profile, fine.cost, height, text, spreads | values))
     lost = points[~(points.cost.notna() & np.isfinite(points.error))]
     traces += at_the_edge(lost, drawn, x_axis, y_axis, floor)

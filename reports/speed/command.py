@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from adapters.engines import ENGINES, OWN, row_of
+from reports.compare.pareto import ACCURACIES
+from reports.compare.pooling import said_of_pool
 from reports.page import style
 from reports.run.arguments import checked_engines, checked_scenes, opening
 from reports.run.folders import discard, given_back, open_part, place_of, replace_folder
@@ -25,9 +27,7 @@ from reports.speed.explained import sentence
 from reports.speed.kept import Kept
 from reports.speed.measure import measure
 from reports.speed.page import write_page
-from reports.speed.pareto import ACCURACIES
 from reports.speed.plan import SpeedPlan
-from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
@@ -148,7 +148,7 @@ def print_summary(results: Results, page: str) -> None:
         )
     ]
     title = "What an error, in radii, costs: µs per simulated second"
-    title += f", median of {scenes} scenes" if scenes > 1 else ""
+    title += " (in how many of the scenes)" if scenes > 1 else ""
     print_table(console, ["engine", *ACCURACIES], rows, title)
     console.print()
     print_texts(console, marks_in(rows, scenes))
@@ -164,7 +164,8 @@ def print_summary(results: Results, page: str) -> None:
 def cost_of(row: Mapping[Hashable, Any]) -> str:
     """What an accuracy costs an engine, or in how many scenes it is reached."""
     if isfinite(row["cost"]):
-        return style.number(row["cost"])
+        got = f" ({row['got']})" if row["of"] > 1 else ""
+        return style.number(row["cost"]) + got
     if row["lost"]:
         return NEVER
     return f"{row['got']} of {row['of']}" if row["of"] > 1 else NOT_REACHED
@@ -180,7 +181,7 @@ def marks_in(rows: Sequence[Sequence[str]], scenes: int) -> dict[str, str]:
     cells = {cell for row in rows for cell in row[1:]}
     found = {mark: meaning for mark, meaning in meanings.items() if mark in cells}
     if any(" of " in cell for cell in cells):
-        found[f"k of {scenes}"] = f"in k of the {scenes} scenes, too few for a median"
+        found[f"k of {scenes}"] = f"in k of the {scenes} scenes, too few to compare"
     return found
 
 

@@ -9,9 +9,9 @@ from math import ceil
 from adapters.engines import ENGINES
 from adapters.mechanisms.table import MECHANISMS
 from reports.run.scenes import open_scene
+from reports.run.timing import FEWEST_ROUNDS, LEAST, WARM_UP
 from reports.speed.effort import Effort
 from reports.speed.plan import SCENE, Measurement, Reach, SpeedPlan
-from reports.speed.timing import FEWEST_ROUNDS, LEAST, WARM_UP
 from reports.terminal.counts import counted
 from scenarios.model import Scenario
 

@@ -73,6 +73,7 @@ def figures(results: Results) -> pd.DataFrame:
             unit="1",
         ),
         results.driving.assign(figure="idle step", value=results.driving.step_us, unit="us"),
+        results.driving.assign(figure="read-out", value=results.driving.read_us, unit="us"),
         results.driving.assign(figure="idle call", value=results.driving.call_us, unit="us"),
         cheaper(results.versus, AGAINST, "cheaper", "ratio"),
         cheaper(results.versus, AGAINST_BARE, "bare_cheaper", ""),

@@ -3,24 +3,21 @@ separate passes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.advance import advance
-from adapters.engine import Engine
 from adapters.play import play_once
 from reports.compare import laws
 from reports.run.scenes import open_scene
-from reports.speed.timing import Sample, Spent, Timed, interleaved
+from reports.run.stepping import Make, Stepping, beside
+from reports.run.timing import Sample, Timed, interleaved
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import NoTruth
-
-Make = Callable[[], Engine]
 
 
 class Held(NamedTuple):
@@ -100,32 +97,21 @@ def errors_of(
 
 
 def times_of(
-    scene: str, seed: int, engines: Mapping[tuple[Any, int, int], Make], rounds: int, budget: float
+    scene: str,
+    seed: int,
+    engines: Mapping[tuple[Any, int, int], Make],
+    rounds: int,
+    budget: float,
+    also: Mapping[str, Make] = MappingProxyType({}),
 ) -> list[Sample]:
     """Samples, s per simulated second, of engines by (who, substeps, copy) over the whole length of
-    the scene."""
+    the scene; of those in `also` by (name, what) what is measured beside it, s each, see
+    `stepping.beside`."""
     scenario = held(scene, seed).scenario
     what = [
         Timed(key, Stepping(make, scenario, key[1]), scenario.duration)
         for key, make in engines.items()
     ]
+    for name, make in also.items():
+        what += [Timed((name, each), run, amount) for each, run, amount in beside(make, scenario)]
     return interleaved(what, rounds, budget, seed)
-
-
-@dataclass(frozen=True)
-class Stepping:
-    """A run of an engine through a scenario: building it is not timed, and nothing is read or heard
-    of."""
-
-    make: Make
-    scenario: Scenario
-    substeps: int
-
-    def __call__(self) -> Spent:
-        """One run."""
-        scenario, dt = self.scenario, self.scenario.dt(self.substeps)
-        with closing(self.make()) as engine:
-            engine.listening, engine.wrapping = False, 0.0
-            engine.load(scenario.scene, dt)
-            seconds = advance(engine, scenario, 0, scenario.samples * self.substeps, dt)
-            return Spent(seconds, engine.wrapping)

@@ -25,7 +25,8 @@ from reports.run.journal_lines import (
     number,
     sentence,
 )
-from reports.speed.timing import WARM_UP
+from reports.run.stepping import CALL, EMPTY, READ
+from reports.run.timing import WARM_UP
 from scenarios.model import Scenario
 
 
@@ -118,7 +119,6 @@ class SampleRow(Row):
     dt_s: Length
     n: Count
     copy_of: Literal[0, 1]
-    singly: bool
     round: Annotated[int, Field(ge=WARM_UP, le=10**6)]
     place: Count
     cost: Cost
@@ -156,7 +156,6 @@ class Samples(Line):
                 str(row.dt_s),
                 row.n,
                 row.copy_of,
-                row.singly,
             )
             rounds[what].append(row.round)
         for what, those in rounds.items():
@@ -164,9 +163,7 @@ class Samples(Line):
                 raise ValueError(
                     f"result: must have each round of {what[2]} once, from {WARM_UP} on"
                 )
-        if any((*what[:-1], not what[-1]) not in rounds for what in rounds if what[0] == "idle"):
-            raise ValueError("result: must have each engine singly and not")
-        if any((*what[:-2], 0, what[-1]) not in rounds for what in rounds):
+        if any((*what[:-1], 0) not in rounds for what in rounds):
             raise ValueError("result: must have a copy_of 0 of each engine")
         return self
 
@@ -222,13 +219,12 @@ RESULTS: dict[tuple[str, ...], type[Line]] = {
     ("time", "scene"): Samples,
     ("time", "option"): Samples,
     ("time", "sweep"): Samples,
-    ("time", "idle"): Samples,
     ("time", "size"): Sizes,
     ("time", "truth"): Truth,
 }
 """How a task begins -> what it gives."""
 # of its task, from and to
-PARTS = {Errors: (7, 64), Budget: (3, 3), Samples: (2, 3), Sizes: (2, 2), Truth: (3, 3)}
+PARTS = {Errors: (7, 64), Budget: (3, 3), Samples: (3, 3), Sizes: (2, 2), Truth: (3, 3)}
 
 
 class TaskLine(Line):
@@ -248,9 +244,7 @@ class TaskLine(Line):
                 f"task = {str(task)[:60]}: must begin as one of {', '.join(map(' '.join, RESULTS))}"
             )
         low, high = PARTS[model]
-        if not low <= len(task) <= high or (
-            model is Samples and (len(task) == 2) != (begins[1] == "idle")
-        ):
+        if not low <= len(task) <= high:
             raise ValueError(
                 f"task = {str(task)[:60]}: must have as many contributions as one of its kind"
             )
@@ -267,7 +261,8 @@ class TaskLine(Line):
                 )
         if begins[0] == "budget" and any(row.name != task[2] for row in found.result):
             raise ValueError("result: must be of the engine that the task names")
-        if model is Samples and any(row.kind != begins[1] for row in found.result):
+        kinds = {begins[1]} | ({EMPTY, CALL, READ} if begins[1] == "scene" else set())
+        if model is Samples and any(row.kind not in kinds for row in found.result):
             raise ValueError("result: must be of the kind that the task names")
         return self
 

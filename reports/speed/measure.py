@@ -16,17 +16,17 @@ from adapters.mechanisms.table import MECHANISMS
 from reports.run.machine import busy_cores
 from reports.run.runner import run_all
 from reports.run.scenes import open_scene
+from reports.run.timing import Sample
 from reports.run.worker_process import Failure
 from reports.speed import budget, ladder, models, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept
 from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
-from reports.speed.timing import Sample
 from reports.terminal.progress import Progress
 
 # s a ladder and a timing may take: against what hangs, no limit of what is measured
 HANGS, ALL_ROUNDS = 600.0, 3600.0
-SIZE, IDLE, TRUTH = "size", "idle", "truth"
+SIZE, TRUTH = "size", "truth"
 
 
 @dataclass
@@ -36,9 +36,9 @@ class Measured:
     Attributes:
         errors: kind, change, and the columns of `ladder.errors_of`.
         budget: the columns of `budget.budget_of`.
-        samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, singly, round, place,
-            cost, wrapping, runs; cost in s per simulated second in a scene, in s a step for sizes
-            and idle worlds.
+        samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, round, place,
+            cost, wrapping, runs; cost in s per simulated second in a scene, in s a step for sizes;
+            of the kinds of `stepping.beside` in s each.
         truths: as `models.closed_form` gives them.
         left_out: (what, reason) of what could not be measured.
         busy: cores that others kept busy when the timing began.
@@ -207,7 +207,6 @@ def timings(
             tasks["time", TRUTH, scene] = partial(models.closed_form, scene, plan.seed)
     if plan.whole:
         tasks["time", SIZE] = partial(size_rows, makes, plan, often)
-    tasks["time", IDLE] = partial(idle_rows, makes, plan.seed, often)
     return tasks
 
 
@@ -233,9 +232,15 @@ def in_turns(
 def scene_rows(
     kind: str, scene: str, seed: int, measurements: Mapping[Any, Any], often: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
-    """Rows of `Measured.samples` of measurements as `in_turns` gives them."""
+    """Rows of `Measured.samples` of measurements as `in_turns` gives them; where these are of a
+    scene's ladders, of what is measured beside their steps, too."""
     scenario, rows = open_scene(scene, seed), []
-    for sample in ladder.times_of(scene, seed, measurements, **often):
+    also = {who[0]: make for (who, _, _), make in measurements.items()} if kind == SCENE else {}
+    for sample in ladder.times_of(scene, seed, measurements, **often, also=also):
+        if len(sample.key) == 2:
+            name, what = sample.key
+            rows.append(sample_row(what, name, sample, scenario=scenario.name))
+            continue
         (name, change), k, copy = sample.key
         identity = {
             "scenario": scenario.name,
@@ -259,14 +264,6 @@ def size_rows(
     return {"samples": rows, "stopped": [(name, n, why) for (name, n), why in stopped.items()]}
 
 
-def idle_rows(
-    makes: Mapping[str, Callable[..., Any]], seed: int, often: Mapping[str, Any]
-) -> list[dict[str, Any]]:
-    """Rows of `Measured.samples` of worlds without anything to do."""
-    found = sizes.driving(makes, seed=seed, **often)
-    return [sample_row(IDLE, sample.key[0], sample, singly=sample.key[1]) for sample in found]
-
-
 def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[str, Any]:
     """A sample as a row of `Measured.samples`."""
     engine, profile = name.split(":")
@@ -276,7 +273,6 @@ def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[st
         "dt_s": float("nan"),
         "n": 0,
         "copy_of": 0,
-        "singly": False,
     }
     return (
         {"kind": kind, "engine": engine, "profile": profile}

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from reports.compare.order import FINEST
 from reports.speed.ladder import held
-from reports.speed.order import FINEST
 from scenarios.truth.exact import CLOSED_FORM, answered_by
 
 KINDS = {"event_driven": "collision to collision, float64"}

@@ -9,6 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from reports.compare.order import ELSEWHERE, UNSTEADY
+from reports.compare.pareto import ACCURACIES, YARDSTICK
+from reports.compare.pooling import said_of_pool
 from reports.page import situations, style
 from reports.page.charts import Drawing, packed_charts
 from reports.page.documents import CHARTED, render
@@ -17,9 +20,6 @@ from reports.run.scenes import open_scene
 from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import RESIDUAL, TOTALS
 from reports.speed.ladder import held
-from reports.speed.order import ELSEWHERE, UNSTEADY
-from reports.speed.pareto import ACCURACIES
-from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.speed.versus import OWN
 from reports.terminal.foreign_text import put_text
@@ -128,18 +128,19 @@ def pooled_section(results: Results) -> SpeedSection:
             f"A point is one step size, {steps} that all scenes have, each of its coordinates the"
             f" geometric mean of the middle half of {count} scenes: {', '.join(results.scenes)}."
             f" {said_of_pool(results.pooled)} A scene that an engine failed counts as infinitely"
-            " wrong and infinitely dear. Down and left is better; no engine is both faster and"
-            " better than the broad grey line, and of those who take steps none than the narrow"
-            " one.",
+            " wrong and infinitely dear. The light mark left of a point is the cost without what as"
+            " many steps and calls take where there is nothing to do. Down and left is better; no"
+            " engine is both faster and better than the broad grey line, and of those who take"
+            " steps none than the narrow one.",
             charts.speed(results.pooled, tall=True),
         ),
         "matched": Drawing(
             "Cost at matched accuracy",
-            "The median over the scenes of what the cheapest measured dt costs whose error, and"
-            " that of every finer one, is no larger; a scene in which it is not reached counts as"
-            " infinitely dear. never: half of the scenes or more are unreachable at any dt, or"
-            " failed. not yet: half or more are not reached down to the finest dt measured. Hover"
-            " for how many of each.",
+            "What the cheapest measured dt costs whose error, and that of every finer one, is no"
+            " larger. Engines are compared in the scenes in which both get there: the cost of"
+            f" {YARDSTICK}, geometric mean over its scenes, times that of the ratios to it. never:"
+            " half of the scenes or more are unreachable at any dt, or failed. not yet: half or"
+            " more are not reached down to the finest dt measured. Hover for how many of each.",
             charts.matched(results.pooled_reached, tall=True),
         ),
     }
@@ -180,7 +181,8 @@ def section_of(results: Results, scene: str) -> SpeedSection:
         "speed": Drawing(
             "Error against cost",
             f"A point is one dt; halving it goes right.{scored}{spread} Time: median of the rounds,"
-            f" bars the quartiles.{floor}{budgets}",
+            f" bars the quartiles; the light mark: without what as many steps and calls take where"
+            f" there is nothing to do.{floor}{budgets}",
             charts.speed(points),
         ),
         "matched": Drawing(

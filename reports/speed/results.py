@@ -9,11 +9,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from reports.compare.pareto import (
+    ACCURACIES,
+    FAILED,
+    NOT_TIMED,
+    UNREACHABLE,
+    paired_cost,
+    yardstick_of,
+)
+from reports.compare.pooling import POOLED, pooled
 from reports.speed import explained, models, tables, versus
 from reports.speed.measure import Measured
-from reports.speed.pareto import ACCURACIES, FAILED, NOT_TIMED, UNREACHABLE
 from reports.speed.plan import SpeedPlan
-from reports.speed.pooling import POOLED, pooled
 from reports.terminal.foreign_text import put_text
 
 QUIET = 0.05  # how far from 1 an engine against itself may read
@@ -52,9 +59,8 @@ class Results:
         """See `tables.points`; and idle, what as many steps cost where there is nothing to do, µs
         per simulated s."""
         points = tables.points(self.measured, self.plan.seed)
-        each = {(row.engine, row.profile): row.step_us for row in self.driving.itertuples()}
-        steps = [each.get(who, np.nan) for who in zip(points.engine, points.profile)]
-        return points.assign(idle=np.array(steps, float) / points.dt_s)
+        scenarios = {tables.asks_of(scene)[0]: scene for scene in self.plan.scenes}
+        return points.assign(idle=tables.idle(self.bindings, points, scenarios))
 
     @cached_property
     def orders(self) -> pd.DataFrame:
@@ -83,14 +89,16 @@ class Results:
 
     @cached_property
     def pooled_reached(self) -> pd.DataFrame:
-        """As `reached`: the median over the scenarios where more than half get there, and how many
-        do and do not.
+        """As `reached`, one cost for all scenarios where an engine gets there in more than half of
+        them: `paired_cost`, and how many do and do not.
 
-        A scenario in which an engine does not get there is infinitely dear. Columns besides: of,
-        how many scenarios; got, in how many it gets there; never, at no dt; failed; untimed; in the
-        others it does not down to the finest dt. lost: half or more are never or failed.
+        A median over all of them would be that of other scenarios for each engine; with many out
+        of reach, of the dearest. Columns besides: of, how many scenarios; got, in how many it gets
+        there; never, at no dt; failed; untimed; in the others it does not down to the finest dt.
+        lost: half or more are never or failed.
         """
         rows = []
+        own = yardstick_of(self.reached)
         for (engine, profile, accuracy), group in self.reached.groupby(
             ["engine", "profile", "accuracy"], sort=False
         ):
@@ -101,7 +109,7 @@ class Results:
                 "failed": int((group.why == FAILED).sum()),
                 "untimed": int((group.why == NOT_TIMED).sum()),
             }
-            median = float(np.median(group.cost.fillna(np.inf)))
+            most = 2 * counts["got"] > len(group)
             others = [
                 f"{what} in {counts[what]}"
                 for what in ("never", "failed", "untimed")
@@ -113,7 +121,7 @@ class Results:
                     "engine": engine,
                     "profile": profile,
                     "accuracy": accuracy,
-                    "cost": median if np.isfinite(median) else np.nan,
+                    "cost": paired_cost(group, own[own.accuracy == accuracy]) if most else np.nan,
                     "dt_s": np.nan,
                     "why": ", ".join([f"{counts['got']} of {len(group)}", *others]),
                     "lost": 2 * int(group.lost.sum()) >= len(group),
@@ -148,7 +156,12 @@ class Results:
     @cached_property
     def driving(self) -> pd.DataFrame:
         """See `tables.driving`."""
-        return tables.driving(self.measured)
+        return tables.driving(self.bindings)
+
+    @cached_property
+    def bindings(self) -> pd.DataFrame:
+        """See `tables.bindings`."""
+        return tables.bindings(self.measured)
 
     @property
     def sizes(self) -> pd.DataFrame:
@@ -207,6 +220,8 @@ class Results:
                 for accuracy in ACCURACIES
             }
         )
+        beside = self.bindings[self.bindings.scenario == scene].drop(columns="scenario")
+        wide = wide.merge(beside, on=["engine", "profile"], how="left")
         return wide.assign(name=wide.engine + ":" + wide.profile)
 
     @cached_property
@@ -222,6 +237,7 @@ class Results:
             "speed_sizes": self.sizes,
             "speed_options": self.options,
             "speed_driving": self.driving,
+            "speed_bindings": self.bindings,
             "speed_noise": self.noise,
             "speed_models": self.models,
             "speed_sweeps": self.sweeps,

@@ -1,17 +1,15 @@
-"""What a step costs against the number of disks, in a gas; and what it costs where there is nothing
-to do."""
+"""What a step costs against the number of disks, in a gas."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 from time import perf_counter
 
 import numpy as np
 
 from adapters.engine import Engine, Unsupported
-from reports.speed.order import line_interval
-from reports.speed.timing import Sample, Spent, Timed, interleaved
+from reports.compare.order import line_interval
+from reports.run.timing import Sample, Spent, Timed, interleaved
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scene
 
@@ -23,7 +21,6 @@ WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3
 # nothing
 FRESH = 400
 FIT_FROM = 100  # disks: below it the fixed cost of a step hides how it grows
-IDLE_STEPS = 1000
 STOPPED = "stopped: a step would take longer than {:g} s"
 
 
@@ -125,36 +122,3 @@ def exponent(n: Array, cost: Array) -> tuple[float, float, float]:
     if many.sum() < 3:
         return np.nan, np.nan, np.nan
     return line_interval(np.log(n[many]), np.log(cost[many]))
-
-
-def driving(engines: Mapping[str, Make], rounds: int, budget: float, seed: int) -> list[Sample]:
-    """Samples, s a step, of a world with one static disk: by (name, True) step by step, by (name,
-    False) in one call.
-
-    What the second costs is the loop and the engine's own fixed cost of a step; what the first
-    costs more is the call.
-    """
-    idle = lay_out(
-        position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[np.inf], restitution=1.0
-    )
-    what: list[Timed] = []
-    for name, make in engines.items():
-        what += [
-            Timed((name, singly), _Idle(make, idle, singly), IDLE_STEPS) for singly in (True, False)
-        ]
-    return interleaved(what, rounds, budget, seed)
-
-
-class _Idle:
-    def __init__(self, make: Make, scene: Scene, singly: bool) -> None:
-        self.make, self.scene, self.singly = make, scene, singly
-
-    def __call__(self) -> Spent:
-        with closing(self.make()) as engine:
-            engine.listening = False
-            engine.load(self.scene, DT)
-            calls, count = (IDLE_STEPS, 1) if self.singly else (1, IDLE_STEPS)
-            started = perf_counter()
-            for _ in range(calls):
-                engine.step(count)
-            return Spent(perf_counter() - started)

@@ -3,7 +3,7 @@ noise floor."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,14 +11,15 @@ import pandas as pd
 
 from adapters.engines import ENGINES
 from adapters.mechanisms.options import SWEEPS
+from reports.compare.order import FINEST, NEARER, Order, median_interval, order_of
+from reports.compare.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
+from reports.compare.pooling import WHO, pooled
 from reports.run.scenes import open_scene
-from reports.speed.measure import IDLE, SIZE, Measured
-from reports.speed.order import FINEST, NEARER, Order, median_interval, order_of
-from reports.speed.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
+from reports.run.stepping import CALL, EMPTY, READ, binding_of
+from reports.run.timing import summed_up
+from reports.speed.measure import SIZE, Measured
 from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
-from reports.speed.pooling import WHO, pooled
 from reports.speed.sizes import exponent
-from reports.speed.timing import summed_up
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
@@ -237,19 +238,46 @@ def noise(measured: Measured) -> pd.DataFrame:
     return (both[1] / both[0]).dropna().rename("ratio").reset_index()
 
 
-def driving(measured: Measured) -> pd.DataFrame:
-    """engine, profile, step_us and call_us: what a step and a call cost where there is nothing to
-    do."""
-    idle = measured.samples[measured.samples.kind == IDLE]
-    if idle.empty:
-        return pd.DataFrame(columns=[*WHO, "step_us", "call_us"])
+def bindings(measured: Measured) -> pd.DataFrame:
+    """scenario, engine, profile, step_us, call_us and read_us: what a step and a call cost where
+    there is nothing to do, measured in the rounds of that scenario, and a read-out of it."""
+    samples = measured.samples[measured.samples.kind.isin([EMPTY, CALL, READ])]
+    if samples.empty:
+        return pd.DataFrame(columns=["scenario", *WHO, "step_us", "call_us", "read_us"])
     # The fastest: a difference of medians of a busy machine may be of either sign.
-    wide = in_us(summed_up(idle, [*WHO, "singly"])).pivot(
-        index=WHO, columns="singly", values="best"
+    wide = in_us(summed_up(samples, ["scenario", *WHO, "kind"])).pivot(
+        index=["scenario", *WHO], columns="kind", values="best"
     )
-    return in_order(
-        pd.DataFrame({"step_us": wide[False], "call_us": wide[True] - wide[False]}).reset_index()
-    )
+    call = (wide[CALL] - wide[EMPTY]).clip(lower=0.0)
+    return pd.DataFrame(
+        {"step_us": wide[EMPTY], "call_us": call, "read_us": wide[READ]}
+    ).reset_index()
+
+
+def driving(found: pd.DataFrame) -> pd.DataFrame:
+    """engine, profile, and of `bindings` the median over the scenes, besides read_most_us, the
+    largest."""
+    each = found.groupby(WHO)
+    medians = each[["step_us", "call_us", "read_us"]].median()
+    return in_order(medians.assign(read_most_us=each.read_us.max()).reset_index())
+
+
+def idle(found: pd.DataFrame, points: pd.DataFrame, scenes: Mapping[str, str]) -> pd.Series:
+    """Of each row of `points` what its steps and calls cost where there is nothing to do, µs per
+    simulated second; nan where `found`, of `bindings`, does not say. scenes: by the name of the
+    scenario."""
+    both = points[["scenario", *WHO, "substeps"]].merge(found, on=["scenario", *WHO], how="left")
+    scenarios = {name: open_scene(scene, 0) for name, scene in scenes.items()}
+    values = [
+        binding_of(
+            row["step_us"],
+            row["step_us"] + row["call_us"],
+            scenarios[row["scenario"]],
+            row["substeps"],
+        )
+        for row in both.to_dict("records")
+    ]
+    return pd.Series(values, points.index, dtype=float)
 
 
 def in_order(table: pd.DataFrame) -> pd.DataFrame:

@@ -27,7 +27,7 @@ UNPRINTED = "removeEventListener('beforeprint', drawPaper)"
 def sheet(browser: Browser, path: Path) -> Iterator[Page]:
     """The page as wide as paper, nothing of it scrolled to."""
     page, heard = opened(browser, path.as_uri(), viewport=A4)
-    page.wait_for_function("() => window.Plotly && printed.size === 3")
+    page.wait_for_function("() => window.Plotly && printed.size === 4")
     yield page
 
     assert heard == []
@@ -56,7 +56,7 @@ def test_charts_that_were_never_in_view_are_printed(browser: Browser, path: Path
     made = []
     for before in ("1", UNPRINTED):
         page, heard = opened(browser, path.as_uri())
-        page.wait_for_function("() => window.Plotly && printed.size === 3")
+        page.wait_for_function("() => window.Plotly && printed.size === 4")
         page.evaluate(before)
         made.append(page.pdf(format="A4", print_background=True))
         page.context.close()
@@ -70,7 +70,7 @@ def test_charts_that_were_never_in_view_are_printed(browser: Browser, path: Path
 
 @pytest.mark.slow
 def test_every_chart_on_paper_is_drawn_and_is_gone_from_the_screen_after(sheet: Page):
-    """One of all scenes, two of the scene that was asked for; none is left behind."""
+    """Two of all scenes, two of the scene that was asked for; none is left behind."""
     sheet.evaluate("dispatchEvent(new Event('beforeprint'))")
     drawn = sheet.evaluate(
         "[...document.querySelectorAll('.sheet')].map(s => s.querySelectorAll('.trace').length)"
@@ -78,7 +78,7 @@ def test_every_chart_on_paper_is_drawn_and_is_gone_from_the_screen_after(sheet: 
     inks = sheet.evaluate("document.querySelector('.sheet .xtick text').style.fill")
     sheet.evaluate("dispatchEvent(new Event('afterprint'))")
 
-    assert len(drawn) == 3
+    assert len(drawn) == 4
     assert min(drawn) >= len(PLAYED)
     assert inks == "rgb(28, 34, 41)"  # of paper, whatever the page is in
     assert sheet.locator(".sheet").count() == 0

@@ -45,7 +45,10 @@ def make(folder: Path, scene_file: Path) -> Path:
             scenario, row = scenarios[cell.scene], ENGINES[cell.engine]
             key = cell.key(scene_hash(scenario), row.source)
             line = keep_cell(journal, scenario, Means(1), cell, key, play_here(cell, row, scenario))
-        journal.append({"timing": line["cell"], "round": 0, "seconds": 0.5})
+        journal.append(
+            {"timing": line["cell"], "copy": 0, "timed_s": 1.0, "cost": [0.5], "wrapping": [0.0]}
+        )
+        journal.append({"beside": "read", "of": PLAYED[0], "scenario": "", "cost": [1e-6]})
         journal.append({"footer": {"tasks": len(cells), "played": len(cells), "seconds": 1.0}})
     replace_folder(part_of(folder), folder, RUN)
     return folder

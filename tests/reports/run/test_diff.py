@@ -166,18 +166,39 @@ def test_a_cell_that_fails_now_or_is_gone_is_worse(before: Path, after: Path):
     assert [one.verdict for one in difference(after, before).statuses] == ["better"]
 
 
+def rounds_of(costs: list[float], again: float = 1.0) -> Callable[[dict], None]:
+    """Gives every timing these costs, and what was timed twice `again` times as much the second
+    time."""
+
+    def change(line: dict) -> None:
+        if "timing" in line:
+            line["cost"] = [cost * (again if line["copy"] else 1.0) for cost in costs]
+
+    return change
+
+
+def test_times_of_a_busy_machine_are_not_compared(before: Path, after: Path):
+    """An engine that reads 1.5 against itself: a warning, and no verdict; one that reads 1.05 is
+    compared."""
+    edit(after, rounds_of([2.0] * 9, again=1.5))
+    busy = difference(before, after)
+    edit(after, rounds_of([2.0] * 9, again=1.05))
+    edit(quiet := Path(shutil.copytree(before, after.parent / "quiet")), rounds_of([1.0] * 9))
+    calm = difference(quiet, after)
+
+    assert busy.timings == []
+    assert any("read 1.50" in warning for warning in busy.warnings)
+    assert {one.verdict for one in calm.timings} == {"worse"}
+
+
 @pytest.mark.parametrize(("machine", "verdicts"), [("same", {"worse"}), ("other", set())])
 def test_timings_are_judged_on_one_machine_only(
     before: Path, after: Path, machine: str, verdicts: set[str]
 ):
     """All twice as slow: worse; on another machine there is a warning instead."""
-    edit(after, lambda line: line.update(seconds=2 * line["seconds"]) if "timing" in line else None)
-    for folder in (before, after):  # nine rounds of the same
-        timings = [line for line in lines_of(folder) if "timing" in line]
-        if len(timings) == 4:
-            with Journal(folder) as journal:
-                for line in timings * 8:
-                    journal.append(line)
+    before = Path(shutil.copytree(before, after.parent / "before"))
+    edit(before, rounds_of([1.0] * 9))
+    edit(after, rounds_of([2.0] * 9))
     if machine == "other":
         edit(
             after,

@@ -194,7 +194,7 @@ def test_what_is_refused_names_its_line(made: Path, tmp_path: Path):
         ),
         ("header", ("header", "seed"), GONE, "header.seed: missing"),
         ("conformance", ("of",), "pymunk:other", "must be of one engine"),
-        ("timing", ("seconds",), float("nan"), "seconds = nan: must be a finite number"),
+        ("timing", ("cost", 0), float("nan"), "cost[0] = nan: must be a finite number"),
     ],
 )
 def test_what_does_not_fit_is_named(

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from reports.cli import app
-from reports.speed.pooling import POOLED
+from reports.compare.pooling import POOLED
 
 pytestmark = pytest.mark.slow  # starts worker processes six times
 

@@ -15,6 +15,8 @@ from playwright.sync_api import Browser
 from adapters.mechanisms.options import OPTIONS
 from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play
+from reports.compare.pareto import FAILED, UNREACHABLE
+from reports.compare.pooling import said_of_pool
 from reports.run.machine import about
 from reports.speed import charts, figures
 from reports.speed.budget import budget_of
@@ -22,9 +24,7 @@ from reports.speed.effort import QUICK
 from reports.speed.explained import extent
 from reports.speed.measure import Measured, measure
 from reports.speed.page import write_page
-from reports.speed.pareto import FAILED, UNREACHABLE
 from reports.speed.plan import SpeedPlan
-from reports.speed.pooling import said_of_pool
 from reports.speed.results import Results
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario

@@ -9,10 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reports.speed import ladder, sizes
-from reports.speed.effort import QUICK
-from reports.speed.estimate import READY, all_rounds
-from reports.speed.timing import (
+from reports.run.timing import (
     FEWEST_ROUNDS,
     WARM_UP,
     Sample,
@@ -21,6 +18,9 @@ from reports.speed.timing import (
     interleaved,
     summed_up,
 )
+from reports.speed import ladder, sizes
+from reports.speed.effort import QUICK
+from reports.speed.estimate import READY, all_rounds
 from scenarios.catalogue import scenario
 from scenarios.model import Scene
 from tests.reports.speed.clockwork import Sleeper

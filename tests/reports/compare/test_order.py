@@ -7,8 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from reports.speed import ladder
-from reports.speed.order import (
+from reports.compare.order import (
     ELSEWHERE,
     EXACT,
     ORDER,
@@ -20,7 +19,8 @@ from reports.speed.order import (
     order_of,
     verdict_of,
 )
-from reports.speed.pareto import FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach, front
+from reports.compare.pareto import FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach, front
+from reports.speed import ladder
 from tests.reports.speed.clockwork import Late
 
 STEP_SIZES = [1, 2, 4, 8, 16]

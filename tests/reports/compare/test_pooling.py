@@ -8,11 +8,11 @@ import pandas as pd
 import pytest
 
 from adapters.engines import ENGINES
+from reports.compare.order import FINEST
+from reports.compare.pooling import middle_half, moved, pooled, said_of_pool
 from reports.run.scenes import open_scene
 from reports.speed import ladder
 from reports.speed.effort import QUICK
-from reports.speed.order import FINEST
-from reports.speed.pooling import middle_half, moved, pooled, said_of_pool
 from scenarios.model import Array
 
 MOST = 2.0  # the factor by which leaving out one scene of the quick form may move a pooled error

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from reports.speed.order import ELSEWHERE
+from reports.compare.order import ELSEWHERE
+from reports.compare.pooling import middle_half
 from scenarios.model import Array
 
+NEAR = 0.1  # radii: the accuracy that sentences speak of
 ACCURACIES = {"10 %": 0.1, "1 %": 0.01, "0.1 %": 0.001, "1e-6": 1e-6}  # of a radius
 UNREACHABLE = "unreachable at any dt"
 NOT_REACHED = "not reached"
@@ -62,3 +65,25 @@ def cost_to_reach(accuracy: float, dt: Array, cost: Array, error: Array, verdict
     if held.any():
         return Reached(np.nan, np.nan, NOT_TIMED)
     return Reached(np.nan, np.nan, UNREACHABLE if verdict == ELSEWHERE else NOT_REACHED)
+
+
+YARDSTICK = "reference:exercise"
+
+
+def yardstick_of(reached: pd.DataFrame) -> pd.DataFrame:
+    """The rows of `YARDSTICK` in a table of scenario, engine, profile, accuracy and cost; of the
+    first engine, where that is not in it."""
+    names = reached.engine + ":" + reached.profile
+    return reached[names == (YARDSTICK if (names == YARDSTICK).any() else names.iloc[0])]
+
+
+def paired_cost(mine: pd.DataFrame, own: pd.DataFrame) -> float:
+    """What an accuracy costs an engine: that of the yardstick, `middle_half` over its scenarios,
+    times that of the ratios to it in the scenarios where both get there.
+
+    Two engines of which one costs less in every scenario that both reach are thus in that order,
+    whichever scenarios either reaches besides. nan where they have none in common.
+    """
+    both = mine.merge(own, on="scenario", suffixes=("", "_own")).dropna(subset=["cost", "cost_own"])
+    ratios = (both.cost / both.cost_own).to_numpy(float)
+    return middle_half(own.cost.dropna().to_numpy(float)) * middle_half(ratios)

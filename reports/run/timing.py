@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Sequence
+from math import inf
+from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,24 +49,56 @@ class Sample(NamedTuple):
     runs: int
 
 
-def interleaved(what: Sequence[Timed], rounds: int, budget: float, seed: int) -> list[Sample]:
+class Noise(NamedTuple):
+    """An engine's time over its own time again, over `pairs` of such ratios: the median, the
+    quartiles, the least and the largest."""
+
+    pairs: int
+    low: float
+    median: float
+    high: float
+    least: float
+    most: float
+
+    @property
+    def floor(self) -> float:
+        """How far from 1 half of the ratios read at most; inf where nothing was timed twice."""
+        return max(abs(self.low - 1), abs(self.high - 1)) if self.pairs else inf
+
+
+def noise_of(ratios: Sequence[float] | pd.Series) -> Noise:
+    """The noise of a measurement from the ratios of an engine's cost to that of its copy."""
+    if not len(ratios):
+        return Noise(0, *[np.nan] * 5)
+    low, median, high, least, most = np.percentile(ratios, [25, 50, 75, 0, 100]).tolist()
+    return Noise(len(ratios), low, median, high, least, most)
+
+
+def interleaved(
+    what: Sequence[Timed], rounds: int, budget: float, seed: int, limit: float = inf
+) -> list[Sample]:
     """Samples of all of `what`, warm-up round first; each round visits all of it, in a new
     random order.
 
     What has spent `budget` s of its own sits out the rounds left, but never the first
     `FEWEST_ROUNDS`. Slow change of the machine (heat, clock, neighbours) thus meets all alike. The
-    garbage collector is off meanwhile, as in `timeit`.
+    garbage collector is off meanwhile, as in `timeit`. After `limit` s it ends, and a round that is
+    not whole by then is left out: of the rounds kept nothing is missing.
     """
     rng = np.random.default_rng(seed)
     spent = {one.key: 0.0 for one in what}
     samples: list[Sample] = []
+    end = perf_counter() + limit
     collecting = gc.isenabled()
     gc.collect()
     gc.disable()
     try:
         for k in range(WARM_UP, rounds):
+            whole = len(samples)
             for place, index in enumerate(rng.permutation(len(what))):
                 one = what[index]
+                if perf_counter() > end:
+                    return samples[:whole]
                 if k < FEWEST_ROUNDS or spent[one.key] < budget:
                     sample = sampled(one, k, place)
                     spent[one.key] += sample.cost * one.amount * sample.runs

@@ -6,13 +6,16 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from reports.speed.order import FINEST
+from reports.compare.order import FINEST
 from scenarios.model import Array
 
 WHO = ["engine", "profile"]
 POOLED = "pooled"
 QUARTERS = (0.25, 0.75)
 LEAST = 2.0**-53  # an error of 0 counts as one of rounding: it has no logarithm
+# of a cost: what is left of it without idle steps is not known better than the noise that times may
+# have, and a mean of logarithms must not be carried by what is nearly nothing
+UNSURE = 0.1
 
 
 def middle_half(values: Array) -> float:
@@ -64,7 +67,7 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
         scenes, error = group.scenario.to_numpy(str), group.error.to_numpy(float)
         priced = group[group.cost.notna() | (group.failed > 0)]
         cost = priced.cost.fillna(np.inf).to_numpy(float)
-        bare = cost - priced.idle.to_numpy(float)
+        bare = without(cost, priced.idle.to_numpy(float))
         quartiles = np.percentile(error, [25, 75], method="nearest")
         prices = np.percentile(cost, [25, 75], method="nearest") if len(cost) else [np.nan] * 2
         rows.append(
@@ -95,6 +98,12 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def without(cost: Array, idle: Array) -> Array:
+    """Costs less those of as many idle steps, at least `UNSURE` of them; nan where the latter are
+    not known."""
+    return np.maximum(cost - idle, UNSURE * cost)
 
 
 def finite(value: float) -> float:

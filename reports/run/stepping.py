@@ -1,0 +1,114 @@
+"""What is timed of an engine: a run through a scenario; and beside it what the way from Python to
+the engine takes, a step of a world with nothing to do, a call, a read-out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from time import perf_counter
+
+from adapters.advance import advance, thrust_steps
+from adapters.engine import Engine
+from reports.run.timing import Spent
+from scenarios.families.placing import lay_out
+from scenarios.model import Scenario, Scene
+
+Make = Callable[[], Engine]
+EMPTY_STEPS, READS = 1000, 20  # of one run
+EMPTY, CALL, READ = "empty step", "call", "read"
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """A run of an engine through a scenario: building it is not timed, and nothing is read or heard
+    of."""
+
+    make: Make
+    scenario: Scenario
+    substeps: int
+
+    def __call__(self) -> Spent:
+        """One run."""
+        scenario, dt = self.scenario, self.scenario.dt(self.substeps)
+        with closing(self.make()) as engine:
+            engine.listening, engine.wrapping = False, 0.0
+            engine.load(scenario.scene, dt)
+            seconds = advance(engine, scenario, 0, scenario.samples * self.substeps, dt)
+            return Spent(seconds, engine.wrapping)
+
+
+@dataclass(frozen=True)
+class EmptySteps:
+    """`EMPTY_STEPS` steps of a world with one static disk, as no engine here can have less: in one
+    call of `step`, or `singly`."""
+
+    make: Make
+    dt: float
+    singly: bool
+
+    def __call__(self) -> Spent:
+        """One run."""
+        with closing(self.make()) as engine:
+            engine.listening = False
+            engine.load(empty(), self.dt)
+            calls, count = (EMPTY_STEPS, 1) if self.singly else (1, EMPTY_STEPS)
+            started = perf_counter()
+            for _ in range(calls):
+                engine.step(count)
+            return Spent(perf_counter() - started)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """`READS` read-outs of a scene after its first step, each after another step: some engines keep
+    what they have read."""
+
+    make: Make
+    scenario: Scenario
+
+    def __call__(self) -> Spent:
+        """One run."""
+        seconds = 0.0
+        with closing(self.make()) as engine:
+            engine.listening = False
+            engine.load(self.scenario.scene, self.scenario.dt(self.scenario.substeps[-1]))
+            for _ in range(READS):
+                engine.step(1)
+                started = perf_counter()
+                engine.read()
+                seconds += perf_counter() - started
+        return Spent(seconds)
+
+
+def beside(make: Make, scenario: Scenario) -> list[tuple[str, EmptySteps | Reading, int]]:
+    """(what, how to run it, how many there are in a run) of all that is measured beside the steps
+    of an engine in a scenario."""
+    dt = scenario.dt(scenario.substeps[-1])
+    return [
+        (EMPTY, EmptySteps(make, dt, singly=False), EMPTY_STEPS),
+        (CALL, EmptySteps(make, dt, singly=True), EMPTY_STEPS),
+        (READ, Reading(make, scenario), READS),
+    ]
+
+
+def empty() -> Scene:
+    """One static disk, and nothing that moves."""
+    return lay_out(
+        position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[float("inf")], restitution=1.0
+    )
+
+
+def binding_of(step: float, singly: float, scenario: Scenario, substeps: int) -> float:
+    """What the steps and calls of a simulated second take where there is nothing to do, if an empty
+    step takes `step` in a call of many, and `singly` in one of its own."""
+    steps, calls = rates(scenario, substeps)
+    return step * steps + max(singly - step, 0.0) * calls
+
+
+def rates(scenario: Scenario, substeps: int) -> tuple[float, float]:
+    """How many steps, and how many calls of `step`, a simulated second of the scenario takes: in
+    its one call there are many steps, but for those in which a thrust acts."""
+    steps = scenario.samples * substeps
+    calls = sum(1 for _ in thrust_steps(scenario.thrusts, 0, steps, scenario.dt(substeps)))
+    return steps / scenario.duration, calls / scenario.duration

@@ -1,0 +1,246 @@
+"""The timing pass of a run: after all is played, what its steps cost is measured in one process,
+in interleaved rounds, with nothing of the run beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from math import ceil, log2
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from adapters.engine_row import EngineRow
+from reports.run.archive import Archive
+from reports.run.stepping import (
+    CALL,
+    EMPTY,
+    READ,
+    Stepping,
+    beside,
+    binding_of,
+)
+from reports.run.timing import WARM_UP, Noise, Timed, interleaved, noise_of
+from reports.run.worker_process import allow
+from scenarios.model import Scenario
+
+ROUNDS = 9  # at most, the warm-up not counted
+SCENES = (
+    "free_fall",  # flight
+    "oblique_e09",  # one collision
+    "cradle_with_gaps",  # a row
+    "column_of_ten",  # a stack
+    "asteroids",  # the exercise's own scene
+    "gas_of_100",  # a crowd
+)
+"""Scenes that need different things of an engine."""
+# s a run may take: of a longer one only the first part is timed, so that every round visits all.
+# About a hundred of them take a quarter of the pass.
+LONGEST = 0.03
+BUSY = 0.10  # a noise floor beyond it: no time is shown
+STARTING = 120.0  # s to import and compile the engines, before the first round
+
+TABLE = "timings.csv"
+COLUMNS = [
+    "scenario",
+    "engine",
+    "profile",
+    "dt_s",
+    "timed_s",
+    "rounds",
+    "cost_us_per_s",
+    "low_us_per_s",
+    "high_us_per_s",
+    "binding_us_per_s",
+    "read_us",
+    "wrapping_us_per_s",
+    "again_us_per_s",
+]
+"""Of timings.csv: µs of engine time per simulated second (median and quartiles of the rounds), of
+which `binding` is what as many steps and calls take in a world with nothing to do; µs of one
+read-out; `again` is the same cell timed a second time in the same rounds, where it was."""
+
+
+class Lap(NamedTuple):
+    """A cell to be timed: its key, its engine, and the scenario without its answer."""
+
+    key: str
+    name: str
+    row: EngineRow
+    scenario: Scenario
+    substeps: int
+    seconds: float  # that it took when it was played
+
+    @property
+    def part(self) -> Scenario:
+        """The scenario, or as much of its beginning as takes `LONGEST`."""
+        scenario = self.scenario
+        # Halved, so that another run of the same times the same part.
+        halvings = max(0, ceil(log2(max(self.seconds, 1e-9) / LONGEST)))
+        samples = max(1, scenario.samples // 2**halvings)
+        return replace(scenario, duration=samples * scenario.sample_interval)
+
+
+def laps_of(
+    archive: Archive, engines: Mapping[str, EngineRow], scenarios: Mapping[str, Scenario]
+) -> list[Lap]:
+    """The cells that are timed: of `timed_scenes`, those that were played to their end."""
+    played = {record["scene"] for record in archive.records if record["status"] == "ok"}
+    chosen = set(timed_scenes([scene for scene in scenarios if scene in played]))
+    return [
+        Lap(
+            record["cell"],
+            name,
+            engines[name],
+            replace(scenarios[record["scene"]], truth=None),
+            record["substeps"],
+            record["seconds"],
+        )
+        for record in archive.records
+        if (name := f"{record['engine']}:{record['profile']}") in engines
+        and record["status"] == "ok"
+        and record["scene"] in chosen
+    ]
+
+
+def timed_scenes(played: Sequence[str]) -> list[str]:
+    """Those of `SCENES` that were played, then others in their order, to as many as `SCENES`."""
+    known = [scene for scene in SCENES if scene in played]
+    return [*known, *(scene for scene in played if scene not in SCENES)][: len(SCENES)]
+
+
+@dataclass(frozen=True)
+class Pass:
+    """The task of the worker: times the laps and what is measured beside them, in so many s."""
+
+    laps: Sequence[Lap]
+    seconds: float
+    seed: int
+
+    def __call__(self) -> list[dict[str, Any]]:
+        """A line of the journal for each thing that was timed; none if not even one round after
+        the warm-up fits."""
+        allow(self.seconds + STARTING)
+        what = [
+            timed
+            for lap, copies in in_turns(self.laps)
+            for timed in (lap_of(lap, copy) for copy in range(copies))
+        ]
+        what += besides(self.laps)
+        samples = interleaved(what, ROUNDS, self.seconds, self.seed, self.seconds)
+        rounds: dict[Any, list[Any]] = {}
+        for sample in samples:
+            if sample.round != WARM_UP:
+                rounds.setdefault(sample.key, []).append(sample)
+        return [line_of(key, found) for key, found in rounds.items()]
+
+
+def in_turns(laps: Sequence[Lap]) -> list[tuple[Lap, int]]:
+    """The laps, and how often each takes part: twice at the middle step size of its scene, which
+    gives the noise floor."""
+    return [(lap, 2 if lap.substeps == middle(lap.scenario) else 1) for lap in laps]
+
+
+def middle(scenario: Scenario) -> int:
+    """Steps in a sample interval at the middle step size."""
+    return scenario.substeps[len(scenario.substeps) // 2]
+
+
+def lap_of(lap: Lap, copy: int) -> Timed:
+    """A lap as it is timed, its cost in s per simulated second."""
+    part = lap.part
+    key = ("timing", lap.key, copy, part.duration)
+    return Timed(key, Stepping(lap.row.make, part, lap.substeps), part.duration)
+
+
+def besides(laps: Sequence[Lap]) -> list[Timed]:
+    """The empty steps, calls and read-outs of all engines that have an answer to a world with
+    nothing to do."""
+    found: dict[Any, Timed] = {}
+    for lap in laps:
+        for what, run, amount in beside(lap.row.make, lap.scenario):
+            # Nothing but a read-out depends on the scene.
+            key = ("beside", what, lap.name, lap.scenario.name if what == READ else "")
+            found.setdefault(key, Timed(key, run, amount))
+    return [timed for timed in found.values() if can(timed)]
+
+
+def can(timed: Timed) -> bool:
+    """Whether it runs at all: an engine may refuse a world in which nothing moves."""
+    with suppress(Exception):
+        timed.run()
+        return True
+    return False
+
+
+def line_of(key: tuple[Any, ...], samples: Sequence[Any]) -> dict[str, Any]:
+    """The line of the journal for one thing."""
+    costs = [sample.cost for sample in samples]
+    if key[0] == "timing":
+        _, cell, copy, until = key
+        wrapping = [sample.wrapping for sample in samples]
+        return {"timing": cell, "copy": copy, "timed_s": until, "cost": costs, "wrapping": wrapping}
+    _, what, name, scene = key
+    return {"beside": what, "of": name, "scenario": scene, "cost": costs}
+
+
+def is_busy(archive: Archive) -> bool:
+    """Whether something else kept the machine so busy that no time is worth showing."""
+    return noise_floor(archive).floor > BUSY
+
+
+def is_timed(archive: Archive, laps: Sequence[Lap]) -> bool:
+    """Whether the journal has a timing of each of the laps."""
+    return all(lap.key in archive.timings for lap in laps)
+
+
+def timings(archive: Archive, scenarios: Mapping[str, Scenario]) -> pd.DataFrame:
+    """timings.csv, `COLUMNS`: a row a cell that was timed.
+
+    scenarios: by name, with their steps.
+    """
+    rows = []
+    for record in archive.records:
+        lines = archive.timings.get(record["cell"], {})
+        if 0 not in lines:
+            continue
+        line, name = lines[0], f"{record['engine']}:{record['profile']}"
+        low, cost, high = np.percentile(line["cost"], [25, 50, 75])
+        again = lines.get(1, {}).get("cost", [np.nan])
+        scenario = scenarios[record["scenario"]]
+        rows.append(
+            (
+                record["scenario"],
+                record["engine"],
+                record["profile"],
+                record["dt_s"],
+                line["timed_s"],
+                len(line["cost"]),
+                *(1e6 * value for value in (cost, low, high)),
+                1e6 * binding(archive, name, scenario, record["substeps"]),
+                1e6 * median_of(archive.beside.get((READ, name, scenario.name))),
+                1e6 * float(np.median(line["wrapping"])),
+                1e6 * float(np.median(again)),
+            )
+        )
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def binding(archive: Archive, name: str, scenario: Scenario, substeps: int) -> float:
+    """s per simulated second that the steps and calls of an engine take where there is nothing to
+    do; nan where that is not known."""
+    step, singly = (median_of(archive.beside.get((what, name, ""))) for what in (EMPTY, CALL))
+    return binding_of(step, singly, scenario, substeps)
+
+
+def median_of(costs: Sequence[float] | None) -> float:
+    """nan of none."""
+    return float(np.median(costs)) if costs else np.nan
+
+
+def noise_floor(archive: Archive) -> Noise:
+    """How far the time of an engine is from its own time again, over all cells timed twice."""
+    pairs = [lines for lines in archive.timings.values() if {0, 1} <= lines.keys()]
+    return noise_of([median_of(pair[1]["cost"]) / median_of(pair[0]["cost"]) for pair in pairs])

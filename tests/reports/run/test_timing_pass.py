@@ -1,0 +1,162 @@
+"""The timing pass: within its time, in whole rounds, of what was played; kept, not done twice."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from adapters.engines import ENGINES
+from reports.run import timing_pass
+from reports.run.archive import Archive
+from reports.run.journal import lines_of
+from reports.run.stepping import binding_of
+from reports.run.timing import WARM_UP, Spent, Timed, interleaved, noise_of
+from reports.run.timing_pass import (
+    BUSY,
+    LONGEST,
+    SCENES,
+    TABLE,
+    Lap,
+    is_busy,
+    noise_floor,
+    timed_scenes,
+)
+from scenarios.catalogue import SCENARIOS, scenario
+from tests.reports.terminal.command_line import crosscheck
+
+RUN = ("near_miss", "--engine", "pymunk", "--out", "out", "--workers", "1")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where a run into `out` was made, by one that is asked for no more than ever."""
+    folder = tmp_path_factory.mktemp("timed")
+    assert crosscheck("run", *RUN, cwd=folder).returncode == 0
+    return folder
+
+
+def timing_lines(folder: Path) -> list[dict]:
+    """Those of the journal."""
+    return [line for line in lines_of(folder / "out") if "timing" in line or "beside" in line]
+
+
+def test_every_cell_that_was_played_is_timed_and_its_binding_beside_it(folder: Path):
+    """A row a cell, none cheaper than nothing; the middle step size twice."""
+    table = pd.read_csv(folder / "out" / TABLE)
+    steps = len(scenario("near_miss").substeps)
+
+    assert list(table.columns) == timing_pass.COLUMNS
+    assert len(table) == 2 * steps
+    assert (table[["cost_us_per_s", "binding_us_per_s", "read_us"]] > 0).all(axis=None)
+    assert table.again_us_per_s.notna().sum() == 2
+    assert noise_floor(Archive.read(folder / "out")).pairs == 2
+
+
+def test_a_report_has_the_times_again_and_a_resumed_run_takes_none(folder: Path):
+    """The same bytes; the journal has no more timings than before."""
+    path, before = folder / "out" / TABLE, timing_lines(folder)
+    written = path.read_bytes()
+    path.unlink()
+    crosscheck("report", "out", cwd=folder)
+    again = path.read_bytes()
+    crosscheck("run", "--resume", "out", cwd=folder)
+
+    assert again == path.read_bytes() == written
+    assert timing_lines(folder) == before
+
+
+def test_without_a_second_nothing_is_timed(tmp_path: Path):
+    """The table has its columns and no row, and the page says why."""
+    crosscheck("run", *RUN, "--timings", "0", cwd=tmp_path)
+
+    assert pd.read_csv(tmp_path / "out" / TABLE).empty
+    assert timing_lines(tmp_path) == []
+    assert "took no times (--timings 0)" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_six_scenes_that_need_different_things_are_timed_else_the_first_played():
+    """Each is in the catalogue; of others as many."""
+    others = [name for name in SCENARIOS if name not in SCENES]
+
+    assert set(SCENES) <= set(SCENARIOS)
+    assert timed_scenes([*others, *SCENES]) == list(SCENES)
+    assert timed_scenes(["mine.toml", "asteroids"]) == ["asteroids", "mine.toml"]
+    assert timed_scenes(others) == others[: len(SCENES)]
+
+
+def test_the_pass_ends_in_time_and_leaves_out_a_round_that_is_not_whole(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Four things of 1 s in 10.5 s: a warm-up and one round; the second round is not half there.
+    Without a limit all rounds are."""
+    clock = 0.0
+
+    def run() -> Spent:
+        nonlocal clock
+        clock += 1.0
+        return Spent(1.0)
+
+    monkeypatch.setattr("reports.run.timing.perf_counter", lambda: clock)
+    what = [Timed(key, run, 1.0) for key in "abcd"]
+    samples = interleaved(what, 9, 99.0, 0, limit=10.5)
+    took = clock
+
+    assert took == 11.0  # what has begun ends
+    assert [sample.round for sample in samples] == [WARM_UP] * 4 + [0] * 4
+    assert interleaved(what, 9, 99.0, 0, limit=2.5) == []
+    assert len(interleaved(what, 9, 99.0, 0)) == 40
+
+
+def test_of_a_long_run_only_the_first_part_is_timed():
+    """Halved until it takes `LONGEST`; a short one is whole."""
+    scene = scenario("near_miss")
+    whole, part = (
+        Lap("key", "a:b", ENGINES["pymunk:matched"], scene, 1, seconds).part
+        for seconds in (LONGEST, 3 * LONGEST)
+    )
+
+    assert whole.duration == scene.duration
+    assert part.duration == pytest.approx(scene.duration / 4, abs=scene.sample_interval)
+
+
+def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
+    """An empty step of 1, of 5 by itself: in free flight one call has 4 more, with a force every
+    step has."""
+    free, pushed = scenario("near_miss"), scenario("body_frame_thrust")
+    steps = free.samples * 2
+    on = sum(thrust.stop - thrust.start for thrust in pushed.thrusts) / pushed.dt(1)
+
+    assert binding_of(1.0, 5.0, free, 2) * free.duration == pytest.approx(steps + 4)
+    found = binding_of(1.0, 5.0, pushed, 1) * pushed.duration
+    # besides, a call for each stretch without a force: two at most
+    assert pushed.samples + 4 * on <= found + 1e-9 <= pushed.samples + 4 * (on + 2) + 1e-6
+
+
+def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
+    """Half of the pairs are off by 12 %: busy; by 8 %: not; no pair: not known, so busy."""
+
+    def with_pairs(*ratios: float) -> Archive:
+        timings = {
+            str(k): {0: {"cost": [1.0]}, 1: {"cost": [ratio]}} for k, ratio in enumerate(ratios)
+        }
+        return Archive(Path(), {}, [], {}, [], {}, timings, {}, 0.0, True)
+
+    assert is_busy(with_pairs(0.88, 1.0, 1.12, 1.12))
+    assert not is_busy(with_pairs(0.92, 1.0, 1.08, 1.08))
+    assert is_busy(with_pairs())
+    assert noise_of([1.0, 1.0, 3.0, 1.0, 1.0]).floor < BUSY  # one outlier is none
+
+
+def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest.MonkeyPatch):
+    """An engine that takes no world in which nothing moves is timed all the same."""
+    refusing = timing_pass.Lap(
+        "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
+    )
+    monkeypatch.setattr("reports.run.stepping.empty", partial(int, "no world"))
+    lines = timing_pass.Pass([refusing], 5.0, 0)()
+
+    assert [line.get("timing") or line["beside"] for line in lines].count("key") == 1
+    assert {line["beside"] for line in lines if "beside" in line} == {"read"}
