@@ -64,6 +64,7 @@ COMMANDS = [
 WRITTEN = {
     "deviations.csv",
     "runs.csv",
+    "timings.csv",
     "machine.json",
     "limits.csv",
     "speed_budget.csv",

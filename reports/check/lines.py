@@ -262,7 +262,7 @@ class Source:
             return made or displacing(seen, row.cause)
         if row.task == "2c":
             return made or impelling(seen, row.cause)
-        return [a.line for a in seen if is_write(a, "velocity")]
+        return [a.line for a in seen if is_write(a, "velocity")] if row.task == "2d" else []
 
     def making(self, seen: Sequence[Access], cause: str) -> list[int]:
         """The lines that make the normal, or the distance from it, if the cause is about that.

@@ -141,7 +141,7 @@ def integrated(question: Question, came: dict[str, Answer]) -> CheckRow:
         return judged("all spheres", "loop", asked, "yes", "yes", True)
     first = wrong[0]
     got = f"{name_of(first)} moves at {shown(after[first].v)} m/s"
-    got += f" ({len(wrong)} of {len(after)} spheres are wrong)"
+    got += f" (wrong: {len(wrong)} of {len(after)} spheres)"
     cause = integration_cause(first, question.balls[first], after[first], came["watched"])
     return judged("all spheres", "loop", asked, got, f"{shown(end.v)} m/s", False, cause)
 

@@ -80,7 +80,8 @@ class ErrorCost(NamedTuple):
 def error_cost(scores: pd.DataFrame, clock: Clock, untrusted: Set[str]) -> ErrorCost | None:
     """Of the scores of a run (columns `pooled.SCORES`) and its times, without who is `untrusted`;
     None where no scene has an exact answer."""
-    found = points(scores[~scores.name.isin(untrusted)], clock)
+    trusted = scores[~scores.name.isin(untrusted)]
+    found = points(trusted, clock) if len(trusted) else trusted
     if found.empty:
         return None
     scenes = list(dict.fromkeys(found.scenario))

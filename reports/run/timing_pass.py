@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import ceil, log2
+from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -123,13 +124,15 @@ class Pass:
         """A line of the journal for each thing that was timed; none if not even one round after
         the warm-up fits."""
         allow(self.seconds + STARTING)
+        started = perf_counter()
         what = [
             timed
             for lap, copies in in_turns(self.laps)
             for timed in (lap_of(lap, copy) for copy in range(copies))
         ]
         what += besides(self.laps)
-        samples = interleaved(what, ROUNDS, self.seconds, self.seed, self.seconds)
+        left = self.seconds - (perf_counter() - started)  # the engines have been imported, too
+        samples = interleaved(what, ROUNDS, self.seconds, self.seed, left)
         rounds: dict[Any, list[Any]] = {}
         for sample in samples:
             if sample.round != WARM_UP:

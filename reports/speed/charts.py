@@ -31,7 +31,8 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
     """Error against cost, a line an engine over its ladder; `points` of one scene, or pooled and
     then `tall`."""
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
-    x_axis = log_axis(COST, drawn.cost.to_numpy(float))
+    bare = drawn.bare if tall else pd.Series(without(drawn.cost.to_numpy(), drawn.idle.to_numpy()))
+    x_axis = log_axis(COST, np.append(drawn.cost.to_numpy(float), bare.dropna().to_numpy(float)))
     y_axis, floor = error_axis(drawn.error.to_numpy(float))
     traces = fronts(drawn, x_axis, y_axis, floor)
     for engine, profile, group in by_engine(points):

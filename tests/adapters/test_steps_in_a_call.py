@@ -8,6 +8,7 @@ import inspect
 import Box2D
 import pyb2d3
 import pymunk
+from pymunk import batch
 
 
 def stepping(owner: object) -> set[str]:
@@ -24,7 +25,7 @@ def test_pymunk_steps_once_a_call():
     """`Space.step(dt)` has no count; the other names are a callback and what dt was last."""
     assert list(inspect.signature(pymunk.Space.step).parameters) == ["self", "dt"]
     assert stepping(pymunk.Space) == {"step", "add_post_step_callback", "current_time_step"}
-    assert stepping(pymunk.batch) == set()
+    assert stepping(batch) == set()
 
 
 def test_box2d_steps_once_a_call():

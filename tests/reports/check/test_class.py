@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from reports.check import command
-from reports.check.verdict import check_file
+from reports.check.verdict import check_file, named
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS
 
@@ -80,3 +80,18 @@ def test_a_folder_beside_the_files_of_a_class_is_nobody(tmp_path: Path):
     (tmp_path / "pictures").mkdir()
 
     assert command.files_of(tmp_path) == [tmp_path / "anna.js"]
+
+
+def test_what_is_no_solver_is_named(tmp_path: Path):
+    """An archive beside the files, and what a student's folder holds instead; at most three."""
+    shutil.copy(RIGHT, tmp_path / "anna.js")
+    for name in ("a.zip", "b.zip", "c.zip", "d.zip", ".hidden"):
+        (tmp_path / name).write_text("")
+
+    assert command.others_in(tmp_path) == ["a.zip", "b.zip", "c.zip", "d.zip"]
+    assert named(command.others_in(tmp_path)) == "a.zip, b.zip, c.zip and 1 more"
+    (tmp_path / "eva").mkdir()
+    (tmp_path / "eva" / "report.pdf").write_text("")
+    assert check_file(tmp_path / "eva").refused.endswith(
+        "holds no .js and no .py file, only report.pdf"
+    )

@@ -170,6 +170,7 @@ def test_a_fault_shows_the_lines_of_the_file_and_the_formula(checks: dict[str, F
         ("brackets are missing: sizes / 2 - distance", "2b", [55, 56, 57, 58, 59]),
         ("the velocity of B is left out", "2c", [61]),
         ("the mass of A is used for both", "2c", [63]),
+        ("it follows from the faults above", "scenes", []),
     ],
 )
 def test_the_lines_are_those_in_which_the_cause_is(cause: str, task: str, lines: list[int]):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from reports.compare.order import (
@@ -19,7 +20,17 @@ from reports.compare.order import (
     order_of,
     verdict_of,
 )
-from reports.compare.pareto import FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach, front
+from reports.compare.pareto import (
+    FAILED,
+    NOT_REACHED,
+    UNREACHABLE,
+    YARDSTICK,
+    cost_to_reach,
+    front,
+    paired_cost,
+    yardstick_of,
+)
+from reports.compare.pooling import middle_half
 from reports.speed import ladder
 from tests.reports.speed.clockwork import Late
 
@@ -161,3 +172,32 @@ def test_a_failed_finest_step_does_not_pass_for_an_accuracy():
     error = np.array([0.5, 0.05, 0.05, 0.05, np.inf])
 
     assert cost_to_reach(0.1, DT, 1.0 / DT, error, ORDER).why == NOT_REACHED
+
+
+def costs_of(name: str, costs: list[float]) -> pd.DataFrame:
+    """What an accuracy costs an engine, scene by scene; nan where it does not get there."""
+    engine, profile = name.split(":")
+    return pd.DataFrame(
+        {
+            "scenario": [f"scene_{k}" for k in range(len(costs))],
+            "engine": engine,
+            "profile": profile,
+            "accuracy": "10 %",
+            "cost": costs,
+        }
+    )
+
+
+def test_engines_are_compared_in_the_scenes_that_both_reach():
+    """The yardstick is cheaper wherever both get there, and also gets to two dear scenes: it costs
+    less; its median over all scenes is the larger, as once in the table of the quick form."""
+    own = costs_of(YARDSTICK, [10.0, 10.0, 10.0, 900.0, 900.0, np.nan, np.nan])
+    other = costs_of("pymunk:matched", [30.0, 30.0, 30.0, np.nan, np.nan, 30.0, 30.0])
+    medians = [float(np.median(each.cost.fillna(np.inf))) for each in (own, other)]
+
+    assert medians[0] > medians[1]
+    assert paired_cost(other, own) == pytest.approx(3 * paired_cost(own, own))
+    assert paired_cost(own, own) == pytest.approx(middle_half(own.cost.dropna().to_numpy()))
+    assert np.isnan(paired_cost(other[5:], own))
+    assert yardstick_of(pd.concat([other, own])).engine.unique().tolist() == ["reference"]
+    assert yardstick_of(other).engine.unique().tolist() == ["pymunk"]

@@ -137,7 +137,7 @@ def test_what_no_step_reaches_and_what_failed_are_drawn_as_such():
 
     assert dotted == [STUCK]
     assert lost == [NEAR]
-    assert top and figure.layout.yaxis.ticktext[-1] == "failed"
+    assert figure.layout.yaxis.ticktext[-1] == "failed"
 
 
 def test_the_light_mark_is_the_cost_without_the_binding():

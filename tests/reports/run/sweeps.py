@@ -56,18 +56,19 @@ def broken_off(whole: Path, out: Path, after: int) -> Path:
     """A copy of a run as a power cut leaves it in the middle of a line of its journal: OUT.part.
 
     Which of two workers is done first is chance, so the lines are put in order: header, probes,
-    cells.
+    cells, timings.
     """
     part = out.with_name(f"{out.name}.part")
     shutil.copytree(whole, part)
     journal = (part / "journal.jsonl").read_text().splitlines(keepends=True)
     journal.sort(
         key=lambda line: [
-            f'{{"{kind}"' in line for kind in ("footer", "cell", "conformance", "header")
+            f'{{"{kind}"' in line
+            for kind in ("footer", "beside", "timing", "cell", "conformance", "header")
         ]
     )
     (part / "journal.jsonl").write_text("".join(journal[:after]) + journal[after][:50])
-    for name in ("deviations.csv", "runs.csv", "report.html"):
+    for name in ("deviations.csv", "runs.csv", "timings.csv", "report.html"):
         (part / name).unlink()
     folders.begun(part, folders.RUN, out)
     return part

@@ -16,7 +16,7 @@ from adapters.own_solver.engine import engine_file
 from adapters.own_solver.file import LARGEST, NotASolver, read_solver
 from adapters.play import play
 from adapters.run import Run
-from reports.check.command import make_page
+from reports.check.command import make_page, scenes_of
 from reports.check.verdict import check_file
 from reports.run import suite
 from reports.run.archive import Archive, load_trajectory, trajectory_file
@@ -184,7 +184,7 @@ def test_the_page_of_a_check_shows_the_text_that_was_checked(tmp_path: Path):
     digest = read_solver(path).digest
     check = check_file(path)
     path.unlink()
-    make_page(tmp_path / "check.html", check)
+    make_page(tmp_path / "check.html", check, scenes_of(check))
     page = (tmp_path / "check.html").read_text()
 
     assert check.faults
