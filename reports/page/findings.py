@@ -1,5 +1,4 @@
-"""The finding in three sentences, computed from the table: nothing here is written by hand but the
-grammar."""
+"""The findings, computed from the scores: nothing here is written by hand but the grammar."""
 
 from __future__ import annotations
 
@@ -9,18 +8,27 @@ import numpy as np
 import pandas as pd
 
 from reports.compare.comparison import Comparison
-from reports.page.overview import MAPPED, values
+from reports.page import pooled
+from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, grouped
+from reports.page.style import number
 from reports.terminal.counts import counted
-
-FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
-    """Three sentences: who is closest, what settings are worth, where each fails; a fourth on who
-    is not counted."""
-    off = position_errors(comparisons).drop(columns=list(untrusted), errors="ignore")
+    """Who is closest, what settings are worth, where each fails; before them the reader's own
+    solver, after them what orders collisions by time, and who is not counted."""
+    scores = pooled.scores(comparisons)
+    scores = scores[scores.middle & ~scores.name.isin(untrusted)]
+    groups = grouped(dict.fromkeys(scores.name), scores)
+    off = position_errors(scores, comparisons)
+    apart = [name for group in (YOURS, EXACT) for name in groups.get(group, [])]
+    # where nothing else was played, these are all there is to speak of
+    engines = off if len(apart) == off.shape[1] else off.drop(columns=apart)
     statuses = [run.status for comparison in comparisons for run in comparison.runs]
-    sentences = [closest(off), worth_of_settings(off), where_it_fails(off, statuses)]
+    sentences = [closest(engines), worth_of_settings(engines), where_it_fails(engines, statuses)]
+    if engines is not off:
+        sentences = [how_right(name, off) for name in groups.get(YOURS, [])] + sentences
+        sentences += [how_right(name, off) for name in groups.get(EXACT, [])]
     if untrusted:
         sentences.append(
             f"Not counted, as it broke the protocol of the harness: {', '.join(sorted(untrusted))}."
@@ -28,27 +36,38 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
     return sentences
 
 
-def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """Largest deviation from the truth in radii at the middle dt: a row a scenario, a column an
-    `engine:profile`.
+def position_errors(scores: pd.DataFrame, comparisons: Sequence[Comparison]) -> pd.DataFrame:
+    """Largest deviation from the truth in radii at the middle dt: a row a scenario with an exact
+    answer, a column an `engine:profile`.
 
     `inf` for who was asked and has no result, so that to refuse a hard scene does not help.
     """
     # A truth that is lost before its second sample has only the start, which is given to all.
     scored = [
-        comparison
+        comparison.scenario.name
         for comparison in comparisons
         if comparison.truth is not None and len(comparison.truth) > 1
     ]
-    rows = []
-    for comparison in scored:
-        found = {
-            name: one.value
-            for (name, metric), one in values(comparison).items()
-            if metric == MAPPED
-        }
-        rows.append({run.name: found.get(run.name, np.inf) for run in comparison.middle_runs})
-    return pd.DataFrame(rows, index=[comparison.scenario.name for comparison in scored])
+    names = list(dict.fromkeys(scores.name))
+    table = scores.pivot(index="scenario", columns="name", values="error")
+    return table.reindex(index=scored, columns=names)
+
+
+def how_right(name: str, off: pd.DataFrame) -> str:
+    """Of an engine that is not ranked: in how many scenes it is right, and in which it fails."""
+    errors = off[name].dropna()
+    far = errors[errors > FAR_OFF].sort_values(ascending=False, kind="stable")
+    right = f"{name} is within {number(RIGHT)} radii in {int((errors < RIGHT).sum())}"
+    listed = [
+        f"{scene} ({f'{number(error, 2)} radii' if np.isfinite(error) else 'no result'})"
+        for scene, error in far.items()
+    ]
+    more = f" and {len(listed) - 3} more" if len(listed) > 3 else ""
+    return (
+        f"{right} of {counted(len(errors), 'scene')}"
+        + (f", and fails in {', '.join(listed[:3])}{more}" if listed else ", and fails in none")
+        + ". It is not ranked among the engines."
+    )
 
 
 def closest(off: pd.DataFrame) -> str:
@@ -69,7 +88,7 @@ def closest(off: pd.DataFrame) -> str:
             "No engine was played to its end in half of the scenes with an exact answer, so engines"
             " are not ranked."
         )
-    best, *others = (f"{name} ({value:.2g})" for name, value in medians.items())
+    best, *others = (f"{name} ({number(value, 2)})" for name, value in medians.items())
     # within 1 % counts as equal
     wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())
     ranking = (
@@ -111,10 +130,10 @@ def worth_of_settings(off: pd.DataFrame) -> str:
 def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     """Scenes in which an engine ends up more than a radius away, and cells without a result."""
     cells = played_to_the_end(statuses)
-    lost = off > FAR_OFF
+    lost = off > FAR_OFF  # what was not asked for is nan
     if off.empty or not lost.any(axis=None):
         return (
-            f"No engine that is scored is off by more than a radius; {cells}"
+            f"No engine that is ranked is off by more than a radius; {cells}"
             if not off.empty
             else cells[0].upper() + cells[1:]
         )
