@@ -15,8 +15,10 @@ TRUTH = "truth"
 
 
 class Look(NamedTuple):
-    """How an engine and profile are drawn; without colour the mark (shape, filled or not) tells all of
-    `ENGINES` apart, and the dash the profiles of an engine.
+    """How an engine and profile are drawn.
+
+    Without colour the mark (shape, filled or not) tells all of `ENGINES` apart, and the dash tells
+    the profiles of an engine apart.
 
     Attributes:
         light, dark: hex colour on a light and on a dark page.
@@ -60,7 +62,8 @@ PATHS = {
     "pentagon": "M0,-4.6L4.4,-1.4L2.7,3.7H-2.7L-4.4,-1.4Z",
     "bowtie": "M-4.2,-3.2V3.2L0,0L4.2,3.2V-3.2L0,0Z",
     "hourglass": "M-3.4,-4.2H3.4L-3.4,4.2H3.4Z",
-    "x": "M-4.2,-2.1L-2.1,-4.2L0,-2.1L2.1,-4.2L4.2,-2.1L2.1,0L4.2,2.1L2.1,4.2L0,2.1L-2.1,4.2L-4.2,2.1L-2.1,0Z",
+    "x": "M-4.2,-2.1L-2.1,-4.2L0,-2.1L2.1,-4.2L4.2,-2.1L2.1,0L4.2,2.1L2.1,4.2L0,2.1L-2.1,4.2"
+    "L-4.2,2.1L-2.1,0Z",
     "star": "M0,-5L1.3,-1.7L4.8,-1.5L2.1,0.7L2.9,4L0,2.2L-2.9,4L-2.1,0.7L-4.8,-1.5L-1.3,-1.7Z",
 }
 PALETTE = (
